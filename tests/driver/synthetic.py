@@ -161,7 +161,7 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
         noise=Noise(deviation, "before and after", float(draws[0, 0])),
         bounces=(),
         steps=(),
-        remarks=(),
+        warnings=(),
         contact=Contact(
             touch, release, touch, release, 1500.0, (0, len(time)), force, np.zeros(len(time)),
             gate, offset, (before, after),

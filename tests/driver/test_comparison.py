@@ -137,12 +137,12 @@ def test_limits_are_those_of_the_recordings_where_no_case_has_others() -> None:
 
 def test_recordings_say_what_is_doubtful_and_have_their_names() -> None:
     ball = replace(recorded(thud.solve()), name="plate 7")
-    assert ball.remarks
+    assert ball.warnings
     with pytest.warns(PlausibilityWarning, match="plate 7: "):
         comparison = thud.compare([ball, ball])
     assert list(comparison.impacts) == ["plate 7", "plate 7 (2)"]
     for name in comparison.impacts:
-        assert {f"{name}: {remark}" for remark in ball.remarks} <= set(comparison.remarks)
+        assert {f"{name}: {warning}" for warning in ball.warnings} <= set(comparison.warnings)
 
 
 def test_heights_of_recordings_are_those_of_the_drop_within_their_limits() -> None:

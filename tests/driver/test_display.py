@@ -87,11 +87,11 @@ def test_unknown_criteria_are_not_met() -> None:
     assert verdicts["all criteria"] == "inconclusive"
 
 
-def test_remarks_are_shown() -> None:
+def test_warnings_are_shown() -> None:
     with pytest.warns(thud.PlausibilityWarning):
         odd = thud.solve(thud.Ball(mass=0.5, youngs_modulus=1e5))
-    assert [row[1] for row in odd.rows() if row[0] == "remark"] == list(odd.remarks)
-    assert odd.remarks
+    assert [row[1] for row in odd.rows() if row[0] == "warning"] == list(odd.warnings)
+    assert odd.warnings
 
 
 def test_html_is_escaped() -> None:

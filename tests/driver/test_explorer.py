@@ -196,9 +196,9 @@ def test_recording_of_a_ball_that_is_not_known_is_shown(client: TestClient) -> N
     content = (REPOSITORY / "inputs/recordings/drop_1.csv").read_bytes()
     report = last_report(client, "/measure", params={"name": "drop_1.csv"}, content=content)
     assert ["restitution", None, ""] in report["answer"]["numbers"]
-    remarks = report["answer"]["remarks"]
+    warnings = report["answer"]["warnings"]
     # The page puts the name before them.
-    assert any("ring" in remark for remark in remarks)
+    assert any("ring" in warning for warning in warnings)
 
 
 @pytest.mark.parametrize("name", ["../../etc/passwd.wav", "x.exe", "a\0b.wav", "", "x" * 5000])

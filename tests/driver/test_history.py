@@ -117,9 +117,9 @@ def test_trend_without_noise_reaches_the_limit_on_its_day() -> None:
     # From 31 to 32.5 dB by 0.1 dB a year; the line is sure to 0.1 dB.
     assert trend.reached == pytest.approx(15, abs=1e-9)
     assert trend.earliest < 15 < trend.latest
-    (remark,) = found.remarks()
+    (warning,) = found.warnings()
     due = (date(2015, 1, 1) + 15 * YEAR).isoformat()
-    assert re.search(naming("63 Hz, dB", "+0.100", due, "95 %"), remark)
+    assert re.search(naming("63 Hz, dB", "+0.100", due, "95 %"), warning)
     assert [row[-1] for row in found.table()][1:4] == ["–", due, "–"]
 
 
@@ -304,7 +304,7 @@ def test_far_days_are_not_told() -> None:
     for one in far:
         one["criteria"][1]["upper"] = 300.0
     distant = History("ball", found.dates, tuple(far))
-    (remark,) = distant.remarks()
-    assert re.search(naming("63 Hz, dB", "+0.100 ± 0.019", "year"), remark)
-    assert "95 %" not in remark
+    (warning,) = distant.warnings()
+    assert re.search(naming("63 Hz, dB", "+0.100 ± 0.019", "year"), warning)
+    assert "95 %" not in warning
     assert distant.table()[2][-1] == "–"

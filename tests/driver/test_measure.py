@@ -208,8 +208,8 @@ def test_dropout_that_rang_in_the_correction_of_a_plate(tmp_path: Path) -> None:
     whole, filled = example("drop_1.wav", tmp_path), example(tmp_path / "lost.wav", tmp_path)
     np.testing.assert_allclose(filled.levels(), whole.levels(), atol=0.05)
     assert any(re.search(naming("dropout", "0.125 ms"), step) for step in filled.steps)
-    assert any("dropout" in remark for remark in filled.remarks)
-    assert not any("dropout" in remark for remark in whole.remarks)
+    assert any("dropout" in warning for warning in filled.warnings)
+    assert not any("dropout" in warning for warning in whole.warnings)
 
 
 @pytest.mark.parametrize("ending", ["wav", "csv", "flac"])
@@ -262,7 +262,7 @@ def test_uncertainty_of_the_calibration_that_counted_as_zero_or_was_dropped() ->
     file, table = FOLDER / "drop_1.wav", FOLDER / "drop_1.csv"
     unknown = thud.read_recording(file, calibration="5000 N/FS")
     assert unknown.calibration_uncertainty is None
-    assert f"{NOT_COUNTED}calibration" in unknown.remarks
+    assert f"{NOT_COUNTED}calibration" in unknown.warnings
     assert "calibration" not in parts(unknown, 0)
     config = replace(read_config(FOLDER / "lab.toml"), polarity=None)
     number = Config(calibration=1.0, calibration_uncertainty=0.005)
@@ -273,7 +273,7 @@ def test_uncertainty_of_the_calibration_that_counted_as_zero_or_was_dropped() ->
         thud.read_recording(table, unit="V", config=number),
     ):
         assert known.calibration_uncertainty == 0.005
-        assert not any("calibration" in remark for remark in known.remarks)
+        assert not any("calibration" in warning for warning in known.warnings)
         assert parts(known, 0)["calibration"] == pytest.approx(0.0434, rel=1e-3)
     with pytest.raises(thud.InputError, match=naming("calibration_uncertainty", -1)):
         thud.read_recording(table, calibration_uncertainty=-1)
@@ -283,8 +283,8 @@ def test_uncertainty_of_the_resonance_is_part_of_the_levels(tmp_path: Path) -> N
     known = example("drop_1.wav", tmp_path)
     unknown = example("drop_1.wav", tmp_path, ("f0_uncertainty = 0.005", "# "))
     told = f"{NOT_COUNTED}resonance of the plate"
-    assert not any(told in remark for remark in known.remarks)
-    assert any(told in remark for remark in unknown.remarks)
+    assert not any(told in warning for warning in known.warnings)
+    assert any(told in warning for warning in unknown.warnings)
     assert parts(known, 4)["plate"] == pytest.approx(0.061, abs=2e-3)
 
 
@@ -300,7 +300,7 @@ def test_peaks_of_noise_that_were_counted_as_exact() -> None:
         peaks = next(d for d in found.assess().criteria if d.name == "peak_count")
         known = "conforms" if expected == 1 else "does not conform"
         assert peaks.result == (known if np.isfinite(expected) else "inconclusive")
-        assert any("noise" in remark for remark in found.remarks) == np.isnan(expected)
+        assert any("noise" in warning for warning in found.warnings) == np.isnan(expected)
 
 
 def test_weights_of_the_restitution_hold_the_calibration() -> None:
@@ -329,14 +329,14 @@ def test_restitution_of_a_slower_bounce_that_was_judged() -> None:
     assert np.isnan(recording.restitution)
     (decision,) = [d for d in recording.assess().criteria if d.name == "restitution"]
     assert decision.result == "inconclusive"
-    assert sum(bool(re.search(r"bounce.* 0\.8", remark)) for remark in recording.remarks) == 3
+    assert sum(bool(re.search(r"bounce.* 0\.8", warning)) for warning in recording.warnings) == 3
 
 
 def test_drops_without_a_restitution_are_told() -> None:
     config = replace(read_config(FOLDER / "lab.toml"), mass=None)
     files = [FOLDER / "drop_1.wav", FOLDER / "three_drops.flac"]
     recording = thud.read_recording(files, config=config)
-    assert any(re.search(naming("restitution", 3, 4), one) for one in recording.remarks)
+    assert any(re.search(naming("restitution", 3, 4), one) for one in recording.warnings)
 
 
 @pytest.mark.slow
@@ -519,7 +519,7 @@ def test_outliers_of_all_quantities_are_marked() -> None:
     assert {"contact time", "restitution"} <= marked
     assert {outlier.name for outlier in found.outliers} == {"recording, drop 4"}
     assert len(found.drops) == 7
-    assert any("contact time, ms, 2" in remark for remark in found.remarks)
+    assert any("contact time, ms, 2" in warning for warning in found.warnings)
 
 
 def test_low_pass_and_plate_are_those_of_the_configuration(tmp_path: Path) -> None:
@@ -534,7 +534,7 @@ def test_low_pass_and_plate_are_those_of_the_configuration(tmp_path: Path) -> No
     assert not np.array_equal(found.levels(), usual.levels())
     assert any(re.search(naming("low-pass", "1.25 kHz"), step) for step in found.steps)
     assert [one.met for one in found.config.plate_checks] == [False, True, False, True]
-    told = [remark for remark in found.remarks if "force plate" in remark]
+    told = [warning for warning in found.warnings if "force plate" in warning]
     assert len(told) == 2
     assert "0.2 Hz" in told[0]
     assert "4000 N" in told[1]

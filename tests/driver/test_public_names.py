@@ -237,7 +237,7 @@ def test_standard_ball_conforms() -> None:
         loss_frequency=74.0,
     )
     assert impact.assess()
-    assert impact.remarks == ()
+    assert impact.warnings == ()
 
 
 @pytest.mark.parametrize(

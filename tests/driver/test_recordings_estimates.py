@@ -119,11 +119,11 @@ def test_kilonewtons_for_newtons_are_told() -> None:
         thud.Recording.from_array(force * 1e3, 48e3)
 
 
-def test_small_peaks_that_one_check_remarked_and_another_refused() -> None:
+def test_small_peaks_that_one_check_warninged_and_another_refused() -> None:
     force, _ = make_recording(HALF_SINE, FINE, rate=48e3, noise_db=60)
     found = thud.Recording.from_array(force / 10, 48e3)
     assert found.peak_force == pytest.approx(150, rel=0.01)
-    assert any(re.search(r"peak\b.* 150", remark) for remark in found.remarks)
+    assert any(re.search(r"peak\b.* 150", warning) for warning in found.warnings)
     with pytest.raises(thud.InputError, match=naming("peak", "unit", "calibration", 300, 15000)):
         thud.Recording.from_array(force / 1e4, 48e3)
 
@@ -157,7 +157,7 @@ def test_sampled_half_sine_has_its_levels_at_every_rate(rate: float, shift: floa
     (drop,) = drops(half_sine(rate, start, int(0.25 * rate)) + 20.0, rate)
     sampling = aliased_levels(rate, start) - ORACLE
     np.testing.assert_allclose(levels(drop) - sampling, ORACLE, rtol=0, atol=1e-3)
-    told = any(f"{rate / 2:g} Hz" in remark for remark in drop.remarks)
+    told = any(f"{rate / 2:g} Hz" in warning for warning in drop.warnings)
     assert told or np.abs(sampling).max() < 0.2
     assert not told or rate < 10e3
 
@@ -196,7 +196,7 @@ def test_bounces_are_told_from_drops() -> None:
         assert abs(by.value - 0.8 * part - below) < 4 * by.uncertainty
     (without,) = drops(force[: int(5 * 24e3)], 24e3, height=None)  # type: ignore[arg-type]
     assert np.isnan(without.restitution.value)
-    assert any("0.800" in remark for remark in without.remarks)
+    assert any("0.800" in warning for warning in without.warnings)
 
 
 def test_disagreement_of_impulse_and_bounces_was_averaged_away() -> None:
@@ -211,12 +211,12 @@ def test_disagreement_of_impulse_and_bounces_was_averaged_away() -> None:
         named = {part.name: part.uncertainty for part in one.contributions}
         ways = [way.value for way in found.drops[0].restitutions.values()]
         assert ("impulse against bounces" in named) == differs
-        assert any(re.search(naming("impulse", "bounce"), one) for one in found.remarks) == differs
+        assert any(re.search(naming("impulse", "bounce"), one) for one in found.warnings) == differs
         if differs:
             width = abs(np.subtract(*ways))
             assert named["impulse against bounces"] == pytest.approx(width / np.sqrt(3))
             assert one.value - one.expanded <= min(ways) < max(ways) <= one.value + one.expanded
-            assert any(f"{fits:.3f} kg" in remark for remark in found.remarks)
+            assert any(f"{fits:.3f} kg" in warning for warning in found.warnings)
 
 
 def test_uncertainties_of_mass_and_height_follow_the_formulas() -> None:
@@ -441,7 +441,7 @@ def test_noise_behind_a_drop_was_taken_for_its_bounce() -> None:
     )
     (drop,) = drops(force, 24e3)
     assert drop.restitution_method == "impulse"
-    assert any(re.search(naming("bounce", "1 m"), remark) for remark in drop.remarks)
+    assert any(re.search(naming("bounce", "1 m"), warning) for warning in drop.warnings)
 
 
 def test_noise_that_ran_into_a_pulse_was_the_pulse() -> None:
@@ -463,7 +463,7 @@ def test_mass_that_is_not_stated_is_measured() -> None:
     expected = 1500 * 0.02 * 2 / np.pi / (SPEED * 1.75 + 9.81 * 0.02)
     assert mass.value == pytest.approx(expected, rel=1e-3)
     assert mass.uncertainty == pytest.approx(0.01 * mass.value, rel=1e-3)
-    assert any("effective mass" in remark for remark in found.remarks)
+    assert any("effective mass" in warning for warning in found.warnings)
 
 
 def test_restitution_and_mass_follow_from_the_impulse() -> None:
@@ -548,7 +548,7 @@ def test_short_dropouts_are_filled_and_long_ones_refused() -> None:
     lost = force.copy()
     lost[5200:5215] = 0
     (drop,) = drops(lost, 48e3)
-    assert any(re.search(naming("dropout", "0.312 ms"), remark) for remark in drop.remarks)
+    assert any(re.search(naming("dropout", "0.312 ms"), warning) for warning in drop.warnings)
     np.testing.assert_allclose(levels(drop)[:3], ORACLE[:3], rtol=0, atol=0.1)
     lost[5200:5300] = 0
     with pytest.raises(thud.InputError, match=naming("dropout", "ms")):
@@ -573,14 +573,14 @@ def test_held_samples_jump_by_a_part_of_the_peak_above_the_quiet(offset: float) 
         held = force.copy()
         held[first : first + count] = force[first]
         (window,) = find_windows(Signal.from_array(held, 48e3, "file.wav"))
-        filled, steps, remarks = repair(window)
-        assert bool(remarks) == bool(steps) == expected
+        filled, steps, warnings = repair(window)
+        assert bool(warnings) == bool(steps) == expected
         found = filled[first - window.start :][:count]
         truth = force[first : first + count] if expected else np.full(count, force[first])
         # A line between the ends of the flank, and the noise.
         np.testing.assert_allclose(found, truth, atol=1.5)
         if expected:
-            assert f"dropouts of {1e3 * count / 48e3:.3g} ms" in remarks[0]
+            assert f"dropouts of {1e3 * count / 48e3:.3g} ms" in warnings[0]
 
 
 @pytest.mark.parametrize("part", [slice(4900, None), slice(None, 5600)])

@@ -101,7 +101,7 @@ def crowded(one: Recording) -> Recording:
             drop,
             name=f"a_long_name_of_a_file_{i}" + "z" * 200,
             steps=tuple(f"step {chr(97 + k)}: {i} N were " + "moved " * 30 for k in range(9)),
-            remarks=tuple(
+            warnings=tuple(
                 f"doubt {chr(97 + k)} of {i} N, " + "a long one " * 20 for k in range(20)
             ),
         )
@@ -340,7 +340,7 @@ def test_names_are_no_code(one: Recording, tmp_path: Path) -> None:
     )
     texts = dict.fromkeys(("laboratory", "ball", "serial"), HOSTILE)
     recording = many(one, 2, **texts, instruments=(HOSTILE, HOSTILE))
-    drops = tuple(replace(d, name=HOSTILE + d.name, remarks=(HOSTILE,)) for d in recording.drops)
+    drops = tuple(replace(d, name=HOSTILE + d.name, warnings=(HOSTILE,)) for d in recording.drops)
     origins = tuple(replace(o, name=HOSTILE, calibration=HOSTILE) for o in recording.origins)
     write_report(replace(recording, drops=drops, origins=origins), tmp_path)
     page = (tmp_path / "report.html").read_text()

@@ -65,8 +65,8 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
     found = call(
         api.run, os.fsencode(path), os.fsencode(output), options.replace, not options.quiet
     )
-    for remark in found.get("run_remarks", {}).values():
-        tqdm.write(f"thud-driver: {text(remark)}", file=sys.stderr)
+    for warning in found.get("run_remarks", {}).values():
+        tqdm.write(f"thud-driver: {text(warning)}", file=sys.stderr)
     folder = Path(output or os.fsdecode(found["directory"]))
     pictures = _pictures(found, figures=not options.no_figures, animation=options.animation)
     if pictures:

@@ -75,9 +75,9 @@ class Comparison(Displayed):
     source: LimitsSource = "rubber_ball"
 
     @property
-    def remarks(self) -> list[str]:
+    def warnings(self) -> list[str]:
         """What is possible but not plausible, or doubtful, with the names of the impacts."""
-        return [f"{name}: {remark}" for name, i in self.impacts.items() for remark in i.remarks]
+        return [f"{name}: {warning}" for name, i in self.impacts.items() for warning in i.warnings]
 
     def __repr__(self) -> str:
         """Return the names of what is compared."""
@@ -214,7 +214,7 @@ def compare(
     Warns
     -----
     PlausibilityWarning
-        As `Comparison.remarks`.
+        As `Comparison.warnings`.
     """
     if force is not None:
         require_choice("force", force, FORCES)
@@ -236,8 +236,8 @@ def compare(
             solved[name] = given
     _require_same_drop(solved)
     found = Comparison(solved, run_times, force, common_source(solved, source))
-    for remark in found.remarks:
-        warnings.warn(remark, PlausibilityWarning, stacklevel=2)
+    for warning in found.warnings:
+        warnings.warn(warning, PlausibilityWarning, stacklevel=2)
     return found
 
 

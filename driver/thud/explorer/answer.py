@@ -67,20 +67,20 @@ def answer_quickly(case: Case) -> Answer | None:
 
 
 def answer_case(case: Case) -> Answer:
-    """Return force, levels, verdict, remarks and, where there are, motion, floor and room."""
+    """Return force, levels, verdict, warnings and, where there are, motion, floor and room."""
     start = time.perf_counter()
     impact = compute(case)
     force = case.levels.force
     found = _answer(impact, *contact_force(impact, force), impact.peak())
     found["force"]["words"] = FORCE_WORDS[force]
-    found["remarks"] += impact.remarks
+    found["warnings"] += impact.warnings
     moving = impact.on_floor
     found["motion"] = _motion(moving or impact)
     found["floor"] = None if moving is None else _floor(impact, moving)
     if case.room is not None and case.floor is not None:
         found["room"] = _room(impact)
-        further = found["room"].pop("remarks")
-        found["remarks"] += [remark for remark in further if remark not in found["remarks"]]
+        further = found["room"].pop("warnings")
+        found["warnings"] += [warning for warning in further if warning not in found["warnings"]]
     found["seconds"] = time.perf_counter() - start
     return found
 
@@ -110,9 +110,9 @@ def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answe
     found["seconds"] = time.perf_counter() - start
     found["drops"] = len(recording.drops)
     copy = Path(path).name
-    # The page says whose the remarks are.
-    found["remarks"] += [
-        remark.removeprefix(f"{copy}: ").replace(copy, name) for remark in recording.remarks
+    # The page says whose the warnings are.
+    found["warnings"] += [
+        warning.removeprefix(f"{copy}: ").replace(copy, name) for warning in recording.warnings
     ]
     return found
 
@@ -136,7 +136,7 @@ def _answer(
             ["contact", 1e3 * source.contact_time, "ms"],
             ["restitution", *_plain([source.restitution]), ""],
         ],
-        "remarks": [],
+        "warnings": [],
     }
 
 
@@ -220,7 +220,7 @@ def _room(impact: Impact) -> Answer:
         "level": _plain(found.level),
         "rating": found.rating.rounded,
         "standardised": found.standardised_rating.rounded,
-        "remarks": list(found.remarks),
+        "warnings": list(found.warnings),
     }
 
 

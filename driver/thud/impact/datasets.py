@@ -59,8 +59,8 @@ def impact_dataset(impact: Impact, histories: Mapping[str, NDArray[np.float64]])
     conforms = impact.assess().conforms
     variables["conforms"] = ((), conforms, attributes(*SET_QUANTITIES["conforms"]))
     coordinates = {"time": _time(impact.time), **band_coordinates(BANDWIDTHS)}
-    remarks = {"remarks": "\n".join(impact.remarks)}
-    found = xr.Dataset(variables, coordinates, origin(impact.case) | impact.facts | remarks)
+    warnings = {"warnings": "\n".join(impact.warnings)}
+    found = xr.Dataset(variables, coordinates, origin(impact.case) | impact.facts | warnings)
     # The arrays of the impact are read-only.
     return found.copy(deep=True)
 

@@ -56,7 +56,7 @@ class Impact(Displayed):
         Other histories of the model, such as the contact radius; the names end with units.
     facts : dict of str to float
         Other numbers of the model, such as the bulk modulus; SI units.
-    remarks : tuple of str
+    warnings : tuple of str
         What is possible but not plausible, such as a wall with the density of no rubber.
     motion : Motion or None
         Snapshots of the deformed ball; None where the model has none.
@@ -97,7 +97,7 @@ class Impact(Displayed):
     parts: dict[str, NDArray[np.float64]]
     channels: dict[str, NDArray[np.float64]]
     facts: dict[str, float]
-    remarks: tuple[str, ...]
+    warnings: tuple[str, ...]
     motion: Motion | None
     sample_rate: float
     impact_velocity: float
@@ -131,8 +131,8 @@ class Impact(Displayed):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
-        remarks = [("remark", remark, "", "") for remark in self.remarks]
-        return [*self.assess().rows(), *remarks]
+        warnings = [("warning", warning, "", "", "") for warning in self.warnings]
+        return [*self.assess().rows(), *warnings]
 
     @property
     def shell_force(self) -> NDArray[np.float64]:
@@ -268,7 +268,7 @@ class Impact(Displayed):
         return {}
 
 
-def history(case: Case, found: Bundle, remarks: tuple[str, ...]) -> dict[str, Any]:
+def history(case: Case, found: Bundle, warnings: tuple[str, ...]) -> dict[str, Any]:
     """Return what every history in a bundle has."""
     samples, scalars = found["samples"], found["scalars"]
     return {
@@ -278,7 +278,7 @@ def history(case: Case, found: Bundle, remarks: tuple[str, ...]) -> dict[str, An
         "parts": found["parts"],
         "channels": found.get("channels", {}),
         "facts": found.get("facts", {}),
-        "remarks": remarks,
+        "warnings": warnings,
         "motion": new_motion(**found["motion"]) if "motion" in found else None,
         **scalars,
     }

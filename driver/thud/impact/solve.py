@@ -67,7 +67,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     Warns
     -----
     PlausibilityWarning
-        As `Impact.remarks`.
+        As `Impact.warnings`.
     """
     sampling = {"sample_rate": sample_rate, "duration": duration, "substeps": substeps}
     given = {name: value for name, value in sampling.items() if value is not None}
@@ -84,6 +84,6 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
             floor=floor,
         )
     impact = compute(case)
-    for remark in impact.remarks:
-        warnings.warn(remark, PlausibilityWarning, stacklevel=2)
+    for warning in impact.warnings:
+        warnings.warn(warning, PlausibilityWarning, stacklevel=2)
     return impact

@@ -111,8 +111,8 @@ def _difference(drops: Sequence[Drop], fall: DropConditions) -> Estimate:
     parts: dict[str, list[float]] = {}
     for drop in drops:
         by, other = (drop.restitutions[way] for way in (IMPULSE, BOUNCES))
-        doubt = math.hypot(by.uncertainty, other.uncertainty)
-        differences.append(Estimate(by.value - other.value, doubt))
+        combined = math.hypot(by.uncertainty, other.uncertainty)
+        differences.append(Estimate(by.value - other.value, combined))
         one, two = (fall.shared(drop.restitutions, drop.impulse)[w] for w in (IMPULSE, BOUNCES))
         for name in one:
             parts.setdefault(name, []).append(one[name] - two.get(name, 0.0))

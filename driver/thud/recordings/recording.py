@@ -16,7 +16,7 @@ from thud.level.assessment import assess
 from thud.recordings.averages import level_estimates
 from thud.recordings.budgets import drop_estimates, find_deviant, told_restitution
 from thud.recordings.config import Config, checked_config
-from thud.recordings.excursion import doubt, scan
+from thud.recordings.excursion import check_peak, scan
 from thud.recordings.low_pass import describe_low_pass
 from thud.recordings.measure_drops import measure_signals
 from thud.recordings.recorded_levels import average_levels, compare_methods, measure_levels
@@ -115,8 +115,8 @@ class Recording(Displayed):
             calibration_uncertainty=calibration_uncertainty,
         )
         signal = Signal.from_array(force, sample_rate, name)
-        doubts = doubt(scan(signal.read, signal.n_sample, name), 1.0, name, assumed=False)
-        return cls.from_signals([replace(signal, remarks=doubts)], config)
+        warnings = check_peak(scan(signal.read, signal.n_sample, name), 1.0, name, assumed=False)
+        return cls.from_signals([replace(signal, warnings=warnings)], config)
 
     @classmethod
     def from_signals(
@@ -191,15 +191,15 @@ class Recording(Displayed):
         return float(np.mean([drop.peak_force.value for drop in self.drops]))
 
     @property
-    def remarks(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:
         """What is doubtful: of the whole, of files and of drops; a sentence each."""
-        found = [*self.doubts, *map(str, self.outliers)]
-        found += [remark for one in self.origins for remark in one.remarks]
-        found += [f"{drop.name}: {remark}" for drop in self.drops for remark in drop.remarks]
+        found = [*self.own_warnings, *map(str, self.outliers)]
+        found += [warning for one in self.origins for warning in one.warnings]
+        found += [f"{drop.name}: {warning}" for drop in self.drops for warning in drop.warnings]
         return tuple(dict.fromkeys(found))
 
     @cached_property
-    def doubts(self) -> tuple[str, ...]:
+    def own_warnings(self) -> tuple[str, ...]:
         """What is doubtful of the recording as a whole; a sentence each."""
         config, found = self.config, list[str]()
         if math.isnan(self.estimates["peaks"].value):

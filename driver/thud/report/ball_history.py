@@ -141,7 +141,7 @@ class History:
         columns.append(("limit on", *(self._limit(trend) for _, trend in together), ""))
         return list(zip(*columns, strict=True))
 
-    def remarks(self) -> list[str]:
+    def warnings(self) -> list[str]:
         """Return a sentence for each criterion with a trend that is more than chance."""
         found = []
         for one, trend in zip(self.criteria(), self.trends(), strict=True):

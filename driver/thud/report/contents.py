@@ -59,7 +59,7 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
         "drops": [_drop(drop) for drop in recording.drops],
         "plate": [vars(one) for one in config.plate_checks],
         "steps": list(recording.level_steps),
-        "remarks": list(recording.doubts),
+        "warnings": list(recording.own_warnings),
         "outliers": [vars(one) for one in recording.outliers],
         "files": [
             {
@@ -70,7 +70,7 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
                 "sample_rate": one.sample_rate,
                 "drops": one.drops,
                 "steps": list(one.steps),
-                "remarks": list(one.remarks),
+                "warnings": list(one.warnings),
             }
             for one in recording.origins
         ],
@@ -184,7 +184,7 @@ def _drop(drop: Drop) -> dict[str, Any]:
         "bounces": list(drop.bounces),
         "noise": drop.noise.deviation,
         "steps": list(drop.steps),
-        "remarks": list(drop.remarks),
+        "warnings": list(drop.warnings),
     }
 
 

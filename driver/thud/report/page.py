@@ -28,7 +28,7 @@ SIZE = 7.3
 WIDTH, COLUMN, LABEL, REASON = 186.0, 91.0, 23.0, 112.0
 # Lines of a value, of the instruments, of files, of the blocks of notes and of a note.
 VALUE_LINES, INSTRUMENT_LINES, FILES = 2, 6, 5
-RESULT_LINES, STEP_LINES, REMARK_LINES = 13, 8, 7
+RESULT_LINES, STEP_LINES, WARNING_LINES = 13, 8, 7
 SENTENCE_LINES = 3
 # Of two drops, none is an outlier.
 MIN_DROPS = 2
@@ -65,7 +65,7 @@ def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) 
         figures="\n".join(_cells(figures)),
         results=_notes("Drops and methods", _results(data), RESULT_LINES),
         done=_notes("Signal processing", _told(data, "steps") or ["nothing"], STEP_LINES),
-        remarks=_notes("Remarks", _told(data, "remarks") or ["none"], REMARK_LINES),
+        warnings=_notes("Warnings", _told(data, "warnings") or ["none"], WARNING_LINES),
         files=_files(data["files"]),
         footer=_text(f"thud {data['thud']} · report.json: SHA-256 {checksum}"),
     )
@@ -256,7 +256,7 @@ def _outliers(outliers: Iterable[dict[str, Any]]) -> str:
 
 
 def _told(data: dict[str, Any], kind: str) -> list[str]:
-    """Return the steps or remarks of all, of files and of drops; those of several as one."""
+    """Return the steps or warnings of all, of files and of drops; those of several as one."""
     places = {key: [(one["name"], one[kind]) for one in data[key]] for key in ("files", "drops")}
     return [*data[kind], *group_places(places)]
 

@@ -62,7 +62,7 @@ def drop_table(recording: Recording) -> list[tuple[str, ...]]:
 
 
 def sentences(recording: Recording, kind: str) -> list[str]:
-    """Return the ``"steps"`` or ``"remarks"`` of files and drops, those that are alike as one."""
+    """Return the ``"steps"`` or ``"warnings"`` of files and drops, those that are alike as one."""
     return group_places(
         {
             "files": [(one.name, getattr(one, kind)) for one in recording.origins],

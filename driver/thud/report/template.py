@@ -26,7 +26,7 @@ $figures
 </tr></table>
 <table class="columns"><tr>
 <td>$results</td>
-<td>$done$remarks</td>
+<td>$done$warnings</td>
 </tr></table>
 <h2>Files and their SHA-256</h2>
 <table class="files">$files</table>
