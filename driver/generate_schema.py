@@ -244,6 +244,10 @@ def python_module(schema: Entry) -> str:
               "RATED_BANDS: dict[BandSet, tuple[float, ...]]",
               [f"{quoted(name)}: {tuple(bands)!r}"
                for name, bands in schema["rated_bands"].items()]),
+        table("Name, unit, lower and upper limit of the criteria of each source.",
+              "LIMITS: dict[LimitsSource, tuple[tuple[str, str, float, float], ...]]",
+              [f"{quoted(source)}: ({', '.join(map(limits_entry, limits))})"
+               for source, limits in schema["limits"].items()]),
         "\n# Maximum A-weighted levels of the classes 1, 2, ... of KS F 2863-2, dB.\n",
         f"CLASS_LIMITS = {tuple(schema['class_limits'])!r}\n",
         "\n# Every key, in the order of an input file.\nKEYS = (\n",
@@ -301,6 +305,11 @@ def table(comment: str, name: str, entries: list[str]) -> str:
 def bands_entry(bands: dict[str, list[float]]) -> str:
     """Return the frequencies of bands as Python writes them."""
     return repr({name: tuple(values) for name, values in bands.items()}).replace("'", '"')
+
+
+def limits_entry(entry: Entry) -> str:
+    """Return a criterion as Python writes it."""
+    return repr(tuple(entry.values())).replace("'", '"')
 
 
 def python_quantity(entry: Entry) -> str:

@@ -8,8 +8,8 @@ module thud_answer
    use thud_error, only: error_type, input_error
    use thud_floor_answers, only: answer_floor_energy, answer_floor_impact, answer_mobility, answer_mobility_fit, &
       answer_point_velocity, answer_radiator, answer_room_level
-   use thud_level_answers, only: answer_background, answer_criteria, answer_levels, answer_peak_count, answer_rating, &
-      answer_recorded_force, answer_standardization
+   use thud_level_answers, only: answer_background, answer_levels, answer_peak_count, answer_rating, answer_recorded_force, &
+      answer_standardization
    use thud_request, only: request_type
    use thud_text, only: quoted
    implicit none (type, external)
@@ -74,8 +74,6 @@ contains
          call answer_peak_count(request, bundle)
       case ('recorded_force')
          call answer_recorded_force(request, bundle)
-      case ('criteria')
-         call answer_criteria(request, bundle, error)
       case ('rating')
          call answer_rating(request, bundle)
       case ('standardization')

@@ -1,4 +1,4 @@
-!> Answers on levels, criteria and ratings of any record; see `thud_answer`.
+!> Answers on levels and ratings of any record; see `thud_answer`.
 module thud_level_answers
    use thud_band, only: band_type, find_bands, octave_set
    use thud_bundle, only: bundle_type
@@ -9,13 +9,12 @@ module thud_level_answers
    use thud_rating, only: correct_for_background, get_a_weighted_level, get_grade, get_legacy_rating, get_rounded, &
       get_standardisation
    use thud_request, only: request_type
-   use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
-      get_source_limits, source_limits_type
+   use thud_source_limits, only: get_peak_count
    use thud_transform, only: get_low_pass
    implicit none (type, external)
    private
 
-   public :: answer_background, answer_criteria, answer_levels, answer_peak_count, answer_rating, answer_recorded_force
+   public :: answer_background, answer_levels, answer_peak_count, answer_rating, answer_recorded_force
    public :: answer_standardization
 
 contains
@@ -60,33 +59,6 @@ contains
       call get_low_pass(force, request%get_number('sample_rate'), recorded_band, recorded)
       call bundle%add_array('force', shape(recorded), recorded)
    end subroutine answer_recorded_force
-
-   !> The criteria of `source` by name, each with value, limits and 1 where it is met, for octave `levels`, dB,
-   !> `contact_time`, s, `restitution`, `peak_count`, `mass`, kg, and `drop_height`, m.
-   subroutine answer_criteria(request, bundle, error)
-      type(request_type), intent(in) :: request
-      type(bundle_type), intent(inout) :: bundle
-      !> The source is unknown.
-      type(error_type), allocatable, intent(out) :: error
-      type(criterion_type) :: criteria(criterion_count)
-      type(source_limits_type) :: limits
-      character(len=:), allocatable :: source
-      integer :: i
-
-      call request%get_text('source', source)
-      call get_source_limits(source, limits, error)
-      if (allocated(error)) return
-      criteria = get_criteria(limits, request%get_array('levels'), request%get_number('contact_time'), &
-         request%get_number('restitution'), nint(request%get_number('peak_count')), request%get_number('mass'), &
-         request%get_number('drop_height'))
-      do i = 1, criterion_count
-         associate (criterion => criteria(i))
-            call bundle%add_text('unit.'//criterion%name, trim(criterion%unit))
-            call bundle%add_array('criterion.'//criterion%name, [4], [criterion%value, criterion%lower, criterion%upper, &
-               merge(1.0_wp, 0.0_wp, conforms(criterion))])
-         end associate
-      end do
-   end subroutine answer_criteria
 
    !> Single numbers of `levels` in a room, dB, in the rated bands of the set `bands`: A-weighted, as stated, class (0 for
    !> none), and, of octaves, by the inverse A-weighted curve.

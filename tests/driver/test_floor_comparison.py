@@ -54,8 +54,8 @@ def test_tapping_levels_are_those_of_the_published_example() -> None:
 
 def test_page_tells_where_a_floor_is_not_what_it_claims_to_be() -> None:
     found = thud.predict_level(thud.solve(), thud.JoistFloor(), thud.Room())
-    remarks = thud.compare_floors({"joists": found}).remarks
-    assert any("joists" in one and "Hz" in one for one in remarks)
+    warnings = thud.compare_floors({"joists": found}).warnings
+    assert any("joists" in one and "Hz" in one for one in warnings)
 
 
 def test_rating_of_the_tapping_machine_is_the_shifted_curve() -> None:
@@ -147,7 +147,7 @@ def test_comparison_has_the_numbers_of_its_predictions(found: thud.FloorComparis
         f"{thin.octave_level[0]:.1f}",
         f"{thick.octave_level[0]:.1f}",
     )
-    assert re.search(naming("thin", "modes", "Hz"), found.remarks[0])
+    assert re.search(naming("thin", "modes", "Hz"), found.warnings[0])
 
 
 def test_floors_without_a_tapping_level_leave_its_cell_empty(found: thud.FloorComparison) -> None:

@@ -173,14 +173,6 @@ def test_circles_of_fortran_are_found(tmp_path: Path) -> None:
         require_no_circle(fortran_uses(tmp_path))
 
 
-def test_procedures_are_counted_with_those_inside() -> None:
-    inner = "pure function f(x) result(y)\nend function f\n"
-    text = (
-        f"subroutine s(a)\ncontains\n{inner}end subroutine s\nreal(wp) function g()\nend function"
-    )
-    assert procedures(text) == [("f", 2), ("s", 5), ("g", 2)]
-
-
 def test_caches_of_functions_with_arguments_are_bounded() -> None:
     found = 0
     for module in walk_packages(thud.__path__, "thud."):

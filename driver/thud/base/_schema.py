@@ -928,6 +928,12 @@ RATED_BANDS: dict[BandSet, tuple[float, ...]] = {
     "third": (50.0, 63.0, 80.0, 100.0, 125.0, 160.0, 200.0, 250.0, 315.0, 400.0, 500.0, 630.0),
 }
 
+# Name, unit, lower and upper limit of the criteria of each source.
+LIMITS: dict[LimitsSource, tuple[tuple[str, str, float, float], ...]] = {
+    "rubber_ball": (("octave_31_5", "dB", 38.0, 40.0), ("octave_63", "dB", 29.5, 32.5), ("octave_125", "dB", 21.5, 24.5), ("octave_250", "dB", 15.0, 19.0), ("octave_500", "dB", 10.5, 14.5), ("contact_time", "s", 0.018, 0.022), ("restitution", "", 0.7, 0.9), ("peak_count", "", 1.0, 1.0), ("mass", "kg", 2.4, 2.6), ("drop_height", "m", 0.99, 1.01)),
+    "tyre": (("octave_31_5", "dB", 46.0, 48.0), ("octave_63", "dB", 38.5, 41.5), ("octave_125", "dB", 20.5, 23.5), ("octave_250", "dB", 9.5, 13.5), ("octave_500", "dB", 3.5, 7.5), ("contact_time", "s", 0.018, 0.022), ("restitution", "", 0.7, 0.9), ("peak_count", "", 1.0, 1.0), ("mass", "kg", 7.1, 7.5), ("drop_height", "m", 0.84, 0.86)),
+}
+
 # Maximum A-weighted levels of the classes 1, 2, ... of KS F 2863-2, dB.
 CLASS_LIMITS = (37.0, 41.0, 45.0, 49.0)
 

@@ -34,7 +34,7 @@ def run_export(options: argparse.Namespace) -> int:
     if not chosen:
         refuse("export: no format is given", ", ".join(f"--{kind}" for kind in KINDS))
     source = _read(options.source, options.config)
-    print_notes(source.remarks)
+    print_notes(source.warnings)
     force = force_files.blocked_force(source, drop=options.drop, rate=options.rate)
     contents: dict[str, bytes] = {}
     for kind in chosen:

@@ -66,8 +66,8 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
         "run", path=os.fsencode(path), output=os.fsencode(output), replace=options.replace,
         progress=not options.quiet,
     )  # fmt: skip
-    for remark in found.get("run_remarks", {}).values():
-        tqdm.write(f"thud-driver: {text(remark)}", file=sys.stderr)
+    for warning in found.get("run_remarks", {}).values():
+        tqdm.write(f"thud-driver: {text(warning)}", file=sys.stderr)
     folder = Path(output or os.fsdecode(found["directory"]))
     pictures = _pictures(found, figures=not options.no_figures, animation=options.animation)
     if pictures:

@@ -79,7 +79,7 @@ def run_study(options: argparse.Namespace) -> int:
             raise type(error)(message) from error
         if not options.quiet:
             tqdm.write(kind.table(result, study))
-        print_notes(f"{options.study}: {remark}" for remark in kind.remarks(result))
+        print_notes(f"{options.study}: {warning}" for warning in kind.warnings(result))
         contents = kind.files(result, study)
         if drawn:
             with left_out("the figure of the study"):

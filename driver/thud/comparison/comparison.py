@@ -34,8 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from thud.base._schema import LevelsForce, LimitsSource
-    from thud.level.criteria import Criterion
-    from thud.recordings.verdict import CriterionResult
+    from thud.level.assessment import Criterion
 
 # Endings of namelist files; all others are recordings.
 NAMELISTS = (".nml", ".namelist", "")
@@ -76,9 +75,9 @@ class Comparison(Displayed):
     source: LimitsSource = "rubber_ball"
 
     @property
-    def remarks(self) -> list[str]:
+    def warnings(self) -> list[str]:
         """What is possible but not plausible, or doubtful, with the names of the impacts."""
-        return [f"{name}: {remark}" for name, i in self.impacts.items() for remark in i.remarks]
+        return [f"{name}: {warning}" for name, i in self.impacts.items() for warning in i.warnings]
 
     def __repr__(self) -> str:
         """Return the names of what is compared."""
@@ -94,11 +93,11 @@ class Comparison(Displayed):
         Columns are the impacts and, in the last, the limits.
         """
         impacts = self.impacts.values()
-        verdicts = [impact.conformity(self.source, self.force) for impact in impacts]
+        verdicts = [impact.assess(self.source, self.force) for impact in impacts]
         octaves = [(f"{nominal:g} Hz, dB", 1.0, 2) for nominal in get_bands().nominal]
         rows = [
             ("", *self.impacts, f"limits, {self.source.replace('_', ' ')}"),
-            ("force", *(impact.judged(self.force) for impact in impacts), ""),
+            ("force", *(impact.assessed_force(self.force) for impact in impacts), ""),
             ("levels", *(impact.level_method for impact in impacts), ""),
         ]
         together = zip(*(verdict.criteria for verdict in verdicts), strict=True)
@@ -115,7 +114,7 @@ class Comparison(Displayed):
         if self.run_times:
             times = (self.run_times.get(name) for name in self.impacts)
             rows.append(("computed in, ms", *(f"{1e3 * t:.1f}" if t else "" for t in times), ""))
-        return [*rows, ("verdict", *(verdict.verdict for verdict in verdicts), "")]
+        return [*rows, ("verdict", *(verdict.result for verdict in verdicts), "")]
 
     def figure(self) -> Figure:
         """Return the page as a matplotlib figure."""
@@ -149,13 +148,16 @@ def _digits(force: float) -> str:
     return f"{force:.1f}" if force >= 1 else f"{force:.3g}"
 
 
-def _cell(criterion: Criterion | CriterionResult, unit: float, decimals: int) -> str:
+def _cell(criterion: Criterion, unit: float, decimals: int) -> str:
     """Return the value of a criterion, and how it misses its limits."""
     if np.isnan(criterion.value):
         return "not known"
-    word = "" if criterion.conforms else "low" if criterion.value < criterion.lower else "high"
-    if not criterion.conforms and criterion.lower <= criterion.value <= criterion.upper:
-        word = "open"
+    if criterion.conforms:
+        word = ""
+    elif criterion.value < criterion.lower:
+        word = "low"
+    else:
+        word = "high" if criterion.value > criterion.upper else "open"
     return f"{criterion.value / unit:z.{decimals}f} {word}".rstrip()
 
 
@@ -212,7 +214,7 @@ def compare(
     Warns
     -----
     PlausibilityWarning
-        As `Comparison.remarks`.
+        As `Comparison.warnings`.
     """
     if force is not None:
         require_choice("force", force, FORCES)
@@ -234,8 +236,8 @@ def compare(
             solved[name] = given
     _require_same_drop(solved)
     found = Comparison(solved, run_times, force, common_source(solved, source))
-    for remark in found.remarks:
-        warnings.warn(remark, PlausibilityWarning, stacklevel=2)
+    for warning in found.warnings:
+        warnings.warn(warning, PlausibilityWarning, stacklevel=2)
     return found
 
 

@@ -69,7 +69,7 @@ class BlockedForce(Immutable):
         SHA-256 of the case as `thud.write_case` writes it, or of the recording's file.
     date : str
         Date of the measurement where it is known, or empty.
-    remarks : tuple of str
+    notes : tuple of str
         What was done to the force, a sentence each.
     """
 
@@ -81,7 +81,7 @@ class BlockedForce(Immutable):
     origin: str
     checksum: str
     date: str = ""
-    remarks: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def time(self) -> NDArray[np.float64]:
@@ -109,7 +109,7 @@ class BlockedForce(Immutable):
             f"Sample rate: {self.sample_rate:.10g} Hz",
             f"Origin: {self.origin}",
             f"SHA-256: {self.checksum}",
-            *self.remarks,
+            *self.notes,
             f"{NOTE_END}{version()}",
         )
         # Names of files may not be UTF-8, and words of a laboratory have several lines.
@@ -120,7 +120,7 @@ class BlockedForce(Immutable):
 def blocked_force(
     source: Impact | Recording, *, drop: int = 1, rate: float | None = None
 ) -> BlockedForce:
-    """Return the force of an impact that its case judges, or that of a drop of a recording.
+    """Return the force of an impact that its case assesses, or that of a drop of a recording.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def _of_impact(impact: Impact) -> BlockedForce:
         force=impact.force(),
         sample_rate=impact.sample_rate,
         start=float(impact.time[0] - impact.touch_time),
-        kind=impact.judged(),
+        kind=impact.assessed_force(),
         origin=f"case {case.name}, model {model}, drop height {case.drop.height:g} m",
         checksum=hashlib.sha256(case_text(case)).hexdigest(),
     )
@@ -172,11 +172,11 @@ def _of_recording(recording: Recording, drop: int) -> BlockedForce:
         force=force,
         sample_rate=one.sample_rate,
         start=float(time[0]),
-        kind=recording.judged(),
+        kind=recording.assessed_force(),
         origin=f"recording {one.name}, {origin.calibration or 'calibration not known'}",
         checksum=origin.checksum,
         date=origin.date,
-        remarks=(*one.steps, f"noise of {one.noise.deviation:.3g} N remains"),
+        notes=(*one.steps, f"noise of {one.noise.deviation:.3g} N remains"),
     )
 
 
@@ -207,7 +207,7 @@ def _resampled(given: BlockedForce, rate: float) -> BlockedForce:
         f"Resampled from {given.sample_rate:g} Hz, band-limited; to {RECORDED_BAND:g} Hz the "
         f"spectrum has changed by up to {error:.1e} of its maximum"
     )
-    return replace(found, remarks=(*given.remarks, told))
+    return replace(found, notes=(*given.notes, told))
 
 
 def wav_files(force: BlockedForce, path: str) -> dict[str, bytes]:

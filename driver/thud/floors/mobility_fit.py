@@ -62,7 +62,7 @@ _ORDERS = (2, 4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64)
 _PATIENCE = 5
 # Error below which no more poles are tried: that of a table with eight digits.
 _EXACT = 1e-8
-# Error of the fit that is remarked, and of the change that makes it passive.
+# Error of the fit that raises a warning, and of the change that makes it passive.
 _POOR = 0.1
 _CHANGED = 1.5
 
@@ -122,7 +122,7 @@ class MobilityFit(Displayed):
         return found
 
     @property
-    def remarks(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:
         """What a reader of the fit has to know."""
         found = []
         negative = np.mean(self.measured.real < 0)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from thud.base._schema import FloorOptions, Room
 
 THIRDS = BANDWIDTHS[1]
-# Change of the force by a floor that gives way, dB, from which it is remarked.
+# Change of the force by a floor that gives way, dB, that raises a warning.
 NOTICED = 0.1
 
 
@@ -76,7 +76,7 @@ class RoomPrediction(Displayed):
     force_change : float
         Change of the peak of the force by the floor, dB; of a blocked force that which a linear
         source with the mass and the contact time of the impact would have.
-    floor_remarks : tuple of str
+    floor_warnings : tuple of str
         Where the floor is not what it claims to be.
     """
 
@@ -102,7 +102,7 @@ class RoomPrediction(Displayed):
     source: Impact | Recording
     force: Literal["contact", "blocked"]
     force_change: float
-    floor_remarks: tuple[str, ...]
+    floor_warnings: tuple[str, ...]
 
     @property
     def rating(self) -> Rating:
@@ -140,10 +140,10 @@ class RoomPrediction(Displayed):
         return np.minimum(self.floor_modes, self.room_modes) < self.few_modes
 
     @property
-    def remarks(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:
         """What a reader of the numbers has to know."""
         few = self.has_few_modes
-        found = [*self.floor_remarks]
+        found = [*self.floor_warnings]
         if few.any():
             bands = ", ".join(f"{f:g}" for f in self.frequency[few])
             found.append(
@@ -243,7 +243,7 @@ def predict_level(
         )
         change = 20 * math.log10(moved.peak("floor") / blocked)
     else:
-        mass = case.ball.mass if isinstance(source, Impact) else source.quantities["mass"].value
+        mass = case.ball.mass if isinstance(source, Impact) else source.estimates["mass"].value
         change = _force_change(mass, source.contact_time, 1 / bands["conductance"].max())
     return RoomPrediction(
         floor=floor,
@@ -251,7 +251,7 @@ def predict_level(
         source=moved or source,
         force="contact" if moved else "blocked",
         force_change=change,
-        floor_remarks=tuple(map(text, found.get("remarks", {}).values())),
+        floor_warnings=tuple(map(text, found.get("remarks", {}).values())),
         time_of_maximum=bands.pop("time"),
         few_modes=found["room"]["few_modes"],
         mass_per_area=found["room"]["surface_mass"],

@@ -145,7 +145,7 @@ class RoomLevels(Displayed):
         return float(10 / math.log(10) * error)
 
     @property
-    def remarks(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:
         """What a reader of the numbers has to know."""
         found = []
         if len(self.positions) < MIN_POSITIONS:

@@ -56,11 +56,11 @@ def impact_dataset(impact: Impact, histories: Mapping[str, NDArray[np.float64]])
         )
     for name, quantity in schema.QUANTITIES.items():
         variables[name] = ((), getattr(impact, name), attributes(quantity))
-    conforms = impact.conformity().conforms
+    conforms = impact.assess().conforms
     variables["conforms"] = ((), conforms, attributes(SAMPLE_RESULTS["conforms"]))
     coordinates = {"time": _time(impact.time), **band_coordinates(BANDWIDTHS)}
-    remarks = {"remarks": "\n".join(impact.remarks)}
-    found = xr.Dataset(variables, coordinates, origin(impact.case) | impact.facts | remarks)
+    warnings = {"warnings": "\n".join(impact.warnings)}
+    found = xr.Dataset(variables, coordinates, origin(impact.case) | impact.facts | warnings)
     # The arrays of the impact are read-only.
     return found.copy(deep=True)
 
@@ -136,7 +136,7 @@ def origin(case: Case) -> dict[str, str]:
     """Return the case of results and what has computed them."""
     return {
         "model": case.model.name if case.model else "",
-        "judged_force": case.levels.force,
+        "assessed_force": case.levels.force,
         "limits": case.limits.source,
         "case": f"{case.to_namelist()}",
         "thud_version": version(),

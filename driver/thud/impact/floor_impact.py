@@ -52,7 +52,7 @@ class FloorEnergy(Immutable):
 class FloorImpact(Impact):
     """Impact on a floor that moves: `floor_force` is the contact force.
 
-    The standards judge the force on a rigid floor, that of the `Impact` whose `on_floor` this is.
+    The standards assess the force on a rigid floor, that of the `Impact` whose `on_floor` this is.
 
     Attributes
     ----------

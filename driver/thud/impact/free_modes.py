@@ -46,8 +46,8 @@ class FreeModes(Displayed):
         Nodes relative to the centre of the ball, m; nine per element.
     shape : ndarray, shape (n_mode, n_line, n_ring, 2)
         Displacements of maximum length 1, the lowest point moving upwards.
-    remarks : tuple of str
-        As `Impact.remarks`.
+    warnings : tuple of str
+        As `Impact.warnings`.
     """
 
     ball: Ball
@@ -57,7 +57,7 @@ class FreeModes(Displayed):
     rigid_frequency: float
     start: NDArray[np.float64]
     shape: NDArray[np.float64]
-    remarks: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """Return the frequencies, without the shapes."""
@@ -104,7 +104,7 @@ def free_modes(
     Warns
     -----
     PlausibilityWarning
-        As `FreeModes.remarks`.
+        As `FreeModes.warnings`.
     """
     case = Case(
         ball=Ball() if ball is None else ball,
@@ -112,8 +112,8 @@ def free_modes(
         modes=Modes(count, radial_elements, polar_elements),
     )
     modes = new_modes(case.ball, ask("modes", case=case_text(case)))
-    for remark in modes.remarks:
-        warnings.warn(remark, PlausibilityWarning, stacklevel=3)
+    for warning in modes.warnings:
+        warnings.warn(warning, PlausibilityWarning, stacklevel=3)
     return modes
 
 

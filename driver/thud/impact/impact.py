@@ -14,7 +14,8 @@ from thud.base.display import Displayed
 from thud.base.extras import require_extra
 from thud.impact.contact_time import contact_span
 from thud.impact.motion import Motion, new_motion
-from thud.level.levels import FORCES, force_exposure_levels, judge, peak_count
+from thud.level.assessment import assess
+from thud.level.levels import FORCES, force_exposure_levels, peak_count
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from thud.base.bridge import Bundle
     from thud.case.case import Case
     from thud.impact.floor_impact import FloorImpact
-    from thud.level.criteria import Conformity
+    from thud.level.assessment import Verdict
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -59,7 +60,7 @@ class Impact(ImpactQuantities, Displayed):
         Other histories of the model, such as the contact radius; the names end with units.
     facts : dict of str to float
         Other numbers of the model, such as the bulk modulus; SI units.
-    remarks : tuple of str
+    warnings : tuple of str
         What is possible but not plausible, such as a wall with the density of no rubber.
     motion : Motion or None
         Snapshots of the deformed ball; None where the model has none.
@@ -77,7 +78,7 @@ class Impact(ImpactQuantities, Displayed):
     parts: dict[str, NDArray[np.float64]]
     channels: dict[str, NDArray[np.float64]]
     facts: dict[str, float]
-    remarks: tuple[str, ...]
+    warnings: tuple[str, ...]
     motion: Motion | None
     on_floor: FloorImpact | None = None
 
@@ -99,8 +100,8 @@ class Impact(ImpactQuantities, Displayed):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
-        remarks = [("remark", remark, "", "") for remark in self.remarks]
-        return [*self.conformity().rows(), *remarks]
+        warnings = [("warning", warning, "", "", "") for warning in self.warnings]
+        return [*self.assess().rows(), *warnings]
 
     @property
     def shell_force(self) -> NDArray[np.float64]:
@@ -126,16 +127,18 @@ class Impact(ImpactQuantities, Displayed):
     def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:
         """Return the ``"floor"`` or the ``"elastic"`` force, N, shape (n_sample,).
 
-        By default that which the case judges.
+        By default that which the case assesses.
         """
-        return self.elastic_force if self.judged(kind) == "elastic" else self.floor_force
+        return self.elastic_force if self.assessed_force(kind) == "elastic" else self.floor_force
 
     def peak(self, force: LevelsForce | None = None) -> float:
         """Return the maximum of a force, N; see `force` and `peak_force`."""
-        return self.peak_elastic_force if self.judged(force) == "elastic" else self.peak_force
+        return (
+            self.peak_elastic_force if self.assessed_force(force) == "elastic" else self.peak_force
+        )
 
-    def judged(self, force: LevelsForce | None = None) -> LevelsForce:
-        """Return a force, checked, or without it that which the case judges."""
+    def assessed_force(self, force: LevelsForce | None = None) -> LevelsForce:
+        """Return a force, checked, or without it that which the case assesses."""
         chosen = self.case.levels.force if force is None else force
         require_choice("force", chosen, FORCES)
         return chosen
@@ -169,9 +172,9 @@ class Impact(ImpactQuantities, Displayed):
             method or self.level_method,
         )
 
-    def conformity(
+    def assess(
         self, source: LimitsSource | None = None, force: LevelsForce | None = None
-    ) -> Conformity:
+    ) -> Verdict:
         """Return the verdict of the standards.
 
         Parameters
@@ -181,7 +184,7 @@ class Impact(ImpactQuantities, Displayed):
         force
             ``"floor"`` or ``"elastic"``; by default that of the case.
         """
-        return judge(
+        return assess(
             self.levels(force=force),
             self.contact_time,
             self.restitution,
@@ -192,7 +195,7 @@ class Impact(ImpactQuantities, Displayed):
         )
 
     def plot(self) -> Figure:
-        """Return a figure of the force that the case judges, and of its octave levels."""
+        """Return a figure of the force that the case assesses, and of its octave levels."""
         from thud.plot.overview_figure import overview
 
         return overview(self)
@@ -234,7 +237,7 @@ class Impact(ImpactQuantities, Displayed):
         return {}
 
 
-def history(case: Case, found: Bundle, remarks: tuple[str, ...]) -> dict[str, Any]:
+def history(case: Case, found: Bundle, warnings: tuple[str, ...]) -> dict[str, Any]:
     """Return what every history in a bundle has."""
     samples, quantities = found["samples"], found["quantities"]
     return {
@@ -244,7 +247,7 @@ def history(case: Case, found: Bundle, remarks: tuple[str, ...]) -> dict[str, An
         "parts": found["parts"],
         "channels": found.get("channels", {}),
         "facts": found.get("facts", {}),
-        "remarks": remarks,
+        "warnings": warnings,
         "motion": new_motion(**found["motion"]) if "motion" in found else None,
         **quantities,
     }

@@ -43,7 +43,7 @@ class Ensemble(SampleQuantities, Displayed):
     margin : ndarray, shape (n_set,)
         Minimum distance of an octave level of the judged force to its limits, dB, positive inside.
     conforms : ndarray of bool, shape (n_set,)
-        Verdict of the standards on the force that the case judges.
+        Verdict of the standards on the force that the case assesses.
     elastic_conforms, floor_conforms : ndarray of bool, shape (n_set,)
         The same on the elastic force and on the force on the floor.
     elastic_force, floor_force : ndarray, shape (n_set, n_sample), or None

@@ -1,4 +1,4 @@
-"""Force exposure levels of any force record, and the verdict of the standards."""
+"""Force exposure levels and peaks of any force record."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, get_args
 import numpy as np
 
 from thud.base._schema import BANDS, BandSet, LevelsForce, LevelsMethod, LimitsSource
-from thud.base.bridge import ask, text
-from thud.base.checks import refuse_value, require_array, require_choice, require_real
+from thud.base.bridge import ask
+from thud.base.checks import require_array, require_choice, require_real
 from thud.base.display import Displayed
 from thud.base.errors import InputError
-from thud.level.criteria import Conformity, Criterion
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
 BANDWIDTHS: tuple[BandSet, ...] = get_args(BandSet)
 SOURCES: tuple[LimitsSource, ...] = get_args(LimitsSource)
 FORCES: tuple[LevelsForce, ...] = ("elastic", "floor")
-_MAX_PEAKS = 2**31
 # Upper limit of the band of a force plate, Hz (paper, section 3).
 RECORDED_BAND = 1250.0
 
@@ -119,7 +117,7 @@ def force_exposure_levels(
     require_choice("bands", bands, BANDWIDTHS)
     require_choice("method", method, get_args(LevelsMethod))
     record = _record(force)
-    rate = _number("sample_rate", sample_rate)
+    rate = to_float("sample_rate", sample_rate)
     found = ask("levels", force=record, sample_rate=rate, bands=bands, method=method)
     levels: NDArray[np.float64] = found["levels"]
     return levels
@@ -147,83 +145,11 @@ def peak_count(force: ArrayLike, sample_rate: float) -> int:
         what = "holds a value that is not finite" if record.size else "has no samples"
         message = f"force {what}; allowed: real numbers, N"
         raise InputError(message)
-    rate = _number("sample_rate", sample_rate)
+    rate = to_float("sample_rate", sample_rate)
     if not 0 < rate < np.inf:
         message = f"sample_rate = {rate} is not allowed; allowed: sample_rate > 0"
         raise InputError(message)
     return int(ask("peak_count", force=record, sample_rate=rate)["peak_count"])
-
-
-def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
-    levels: ArrayLike,
-    contact_time: float,
-    restitution: float,
-    peaks: int,
-    mass: float,
-    drop_height: float,
-    source: LimitsSource = "rubber_ball",
-) -> Conformity:
-    """Return the verdict of the standards on a source.
-
-    Parameters
-    ----------
-    levels : array_like, shape (5,)
-        Force exposure levels of the octaves 31.5 to 500 Hz, dB.
-    contact_time
-        Contact time, s.
-    restitution
-        Coefficient of restitution.
-    peaks
-        Number of peaks of the force.
-    mass
-        Mass of the source, kg.
-    drop_height
-        Drop height, m.
-    source
-        ``"rubber_ball"`` or ``"tyre"``.
-
-    Raises
-    ------
-    InputError
-        Where the source is not known or `levels` are not five numbers.
-    """
-    require_choice("source", source, SOURCES)
-    octaves = _record(levels, "levels")
-    nominal = get_bands(BANDWIDTHS[0]).nominal
-    if octaves.shape != nominal.shape:
-        message = (
-            f"levels have the shape {octaves.shape}; allowed: {nominal.shape}, "
-            f"the octaves {nominal[0]:g} to {nominal[-1]:g}"
-        )
-        raise InputError(message)
-    if not isinstance(peaks, int | np.integer) or not 0 <= peaks < _MAX_PEAKS:
-        refuse_value("peaks", peaks, f"0 <= peaks < {_MAX_PEAKS}, whole")
-    numbers = {
-        "contact_time": contact_time,
-        "restitution": restitution,
-        "mass": mass,
-        "drop_height": drop_height,
-    }
-    time, bounce, kilograms, height = (_number(name, value) for name, value in numbers.items())
-    found = ask(
-        "criteria", source=source, levels=octaves, contact_time=time, restitution=bounce,
-        peak_count=peaks, mass=kilograms, drop_height=height,
-    )  # fmt: skip
-    units = {name: text(unit) for name, unit in found["unit"].items()}
-    return Conformity(
-        source,
-        tuple(
-            Criterion(name, units[name], float(value), float(lower), float(upper), bool(met))
-            for name, (value, lower, upper, met) in found["criterion"].items()
-        ),
-    )
-
-
-def octave_limits(source: LimitsSource) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the minimum and maximum conforming octave levels of a source, dB, shape (5,)."""
-    count = len(get_bands(BANDWIDTHS[0]).nominal)
-    octaves = judge(np.zeros(count), 0, 0, 0, 0, 0, source).criteria[:count]
-    return np.array([o.lower for o in octaves]), np.array([o.upper for o in octaves])
 
 
 def _record(values: ArrayLike, name: str = "force") -> NDArray[np.float64]:
@@ -231,7 +157,7 @@ def _record(values: ArrayLike, name: str = "force") -> NDArray[np.float64]:
     return require_real(name, require_array(name, values, dimensions=(1,)))
 
 
-def _number(name: str, value: object) -> float:
+def to_float(name: str, value: object) -> float:
     """Return a number as float; raise InputError where it is not one."""
     try:
         return float(value)  # type: ignore[arg-type]

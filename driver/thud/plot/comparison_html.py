@@ -5,7 +5,8 @@ from typing import Any
 
 from thud.base._schema import BandSet, LevelsForce, LimitsSource
 from thud.impact.impact import Impact
-from thud.level.levels import get_bands, octave_limits
+from thud.level.assessment import octave_limits
+from thud.level.levels import get_bands
 from thud.plot.force_history_figure import TIME_LABEL, contact_force, force_label
 from thud.plot.html_page import curve_look, curve_points, html_page, plot_layout
 from thud.plot.style import BAND_WORDS, iterate_curves, level_label

@@ -21,7 +21,7 @@ from thud.base._schema import (
 from thud.base.checks import refuse
 from thud.impact.impact import Impact
 from thud.impact.solve import solve
-from thud.level.levels import octave_limits
+from thud.level.assessment import octave_limits
 from thud.plot.style import (
     SIZE,
     Curve,

@@ -151,7 +151,7 @@ def iterate_curves(
 ) -> Iterator[tuple[str, Curve, LevelsForce]]:
     """Yield label, impact and kind of force of each curve.
 
-    Without `force` each case has the one that it judges. Labels say which where they differ.
+    Without `force` each case has the force that it assesses. Labels say which where they differ.
 
     Raises
     ------
@@ -163,7 +163,7 @@ def iterate_curves(
         raise InputError(message)
     for name, impact in impacts.items():
         require_kind(name, impact, Impact | Recording)
-    kinds = [impact.judged(force) for impact in impacts.values()]
+    kinds = [impact.assessed_force(force) for impact in impacts.values()]
     for (name, impact), kind in zip(impacts.items(), kinds, strict=True):
         which = f", {FORCE_WORDS[kind]}" if len(set(kinds)) > 1 else ""
         yield f"{name}{which}", impact, kind

@@ -12,14 +12,15 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.base.display import Displayed
-from thud.recordings.budgets import drop_quantities, find_deviant, told_restitution
+from thud.level.assessment import assess
+from thud.recordings.averages import level_estimates
+from thud.recordings.budgets import drop_estimates, find_deviant, told_restitution
 from thud.recordings.config import Config, checked_config
-from thud.recordings.excursion import doubt, scan
+from thud.recordings.excursion import check_peak, scan
 from thud.recordings.low_pass import describe_low_pass
 from thud.recordings.measure_drops import measure_signals
 from thud.recordings.recorded_levels import average_levels, compare_methods, measure_levels
 from thud.recordings.signal import Signal
-from thud.recordings.verdict import decide, level_quantities
 
 if TYPE_CHECKING:
     import os
@@ -29,12 +30,13 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base._schema import BandSet, LevelsForce, LimitsSource
+    from thud.level.assessment import Verdict
+    from thud.level.estimate import Estimate
     from thud.recordings.checkpoint import Checkpoint
     from thud.recordings.estimates import Drop
     from thud.recordings.measure_drops import Origin
     from thud.recordings.outliers import Outlier
     from thud.recordings.recorded_levels import AverageLevels
-    from thud.recordings.verdict import Quantity, Verdict
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +76,7 @@ class Recording(Displayed):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text: the criteria."""
-        return self.conformity().rows()
+        return self.assess().rows()
 
     @classmethod
     def from_array(  # noqa: PLR0913 - what a laboratory knows
@@ -113,8 +115,8 @@ class Recording(Displayed):
             calibration_uncertainty=calibration_uncertainty,
         )
         signal = Signal.from_array(force, sample_rate, name)
-        doubts = doubt(scan(signal.read, signal.n_sample, name), 1.0, name, assumed=False)
-        return cls.from_signals([replace(signal, remarks=doubts)], config)
+        warnings = check_peak(scan(signal.read, signal.n_sample, name), 1.0, name, assumed=False)
+        return cls.from_signals([replace(signal, warnings=warnings)], config)
 
     @classmethod
     def from_signals(
@@ -164,7 +166,7 @@ class Recording(Displayed):
         """Time of first touch of the first drop in its file, s."""
         return self.drops[0].onset
 
-    def judged(self, force: LevelsForce | None = None) -> LevelsForce:  # noqa: ARG002 - there is one
+    def assessed_force(self, force: LevelsForce | None = None) -> LevelsForce:  # noqa: ARG002 - there is one
         """Return the force that a force plate measures: ``"floor"``."""
         return "floor"
 
@@ -176,12 +178,12 @@ class Recording(Displayed):
     @property
     def contact_time(self) -> float:
         """Mean contact time, s."""
-        return self.quantities["contact_time"].value
+        return self.estimates["contact_time"].value
 
     @property
     def restitution(self) -> float:
         """Mean coefficient of restitution; NaN where it is not known."""
-        return self.quantities["restitution"].value
+        return self.estimates["restitution"].value
 
     @property
     def peak_force(self) -> float:
@@ -189,24 +191,24 @@ class Recording(Displayed):
         return float(np.mean([drop.peak_force.value for drop in self.drops]))
 
     @property
-    def remarks(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:
         """What is doubtful: of the whole, of files and of drops; a sentence each."""
-        found = [*self.doubts, *map(str, self.outliers)]
-        found += [remark for one in self.origins for remark in one.remarks]
-        found += [f"{drop.name}: {remark}" for drop in self.drops for remark in drop.remarks]
+        found = [*self.own_warnings, *map(str, self.outliers)]
+        found += [warning for one in self.origins for warning in one.warnings]
+        found += [f"{drop.name}: {warning}" for drop in self.drops for warning in drop.warnings]
         return tuple(dict.fromkeys(found))
 
     @cached_property
-    def doubts(self) -> tuple[str, ...]:
+    def own_warnings(self) -> tuple[str, ...]:
         """What is doubtful of the recording as a whole; a sentence each."""
         config, found = self.config, list[str]()
-        if math.isnan(self.quantities["peaks"].value):
+        if math.isnan(self.estimates["peaks"].value):
             found.append("the number of peaks is not known: noise may have made some")
         known = sum(math.isfinite(drop.restitution.value) for drop in self.drops)
         if 0 < known < len(self.drops):
             found.append(f"the restitution is known of {known} of {len(self.drops)} drops")
         found += told_restitution(self.drops, config, self.calibration_uncertainty)
-        if config.mass is None and math.isfinite(self.quantities["mass"].value):
+        if config.mass is None and math.isfinite(self.estimates["mass"].value):
             found.append("the mass is not given: the effective mass is judged")
         found += [f"force plate: {one.sentence}" for one in config.plate_checks if one.met is False]
         plate = config.resonance
@@ -284,9 +286,9 @@ class Recording(Displayed):
         }
 
     @cached_property
-    def quantities(self) -> dict[str, Quantity]:
+    def estimates(self) -> dict[str, Estimate]:
         """Contact time, restitution, peaks, mass and drop height with their budgets."""
-        return drop_quantities(self.drops, self.config, self.calibration_uncertainty)
+        return drop_estimates(self.drops, self.config, self.calibration_uncertainty)
 
     @cached_property
     def outliers(self) -> tuple[Outlier, ...]:
@@ -296,16 +298,16 @@ class Recording(Displayed):
         """
         return (*self.average().outliers, *find_deviant(self.drops))
 
-    def level_quantities(self, bands: BandSet = "octave") -> tuple[Quantity, ...]:
+    def level_estimates(self, bands: BandSet = "octave") -> tuple[Estimate, ...]:
         """Return the average levels with all that makes them uncertain, dB, shape (n_band,)."""
         plate = self.config.resonance
-        return level_quantities(
+        return level_estimates(
             self.average(bands),
             self.calibration_uncertainty,
             plate.level_uncertainty(bands) if plate else None,
         )
 
-    def conformity(
+    def assess(
         self,
         source: LimitsSource | None = None,
         force: LevelsForce | None = None,  # noqa: ARG002 - there is one
@@ -319,11 +321,11 @@ class Recording(Displayed):
         force
             Not used: a force plate measures the force on the floor.
         """
-        return decide(
-            self.level_quantities(),
+        return assess(
+            self.level_estimates(),
             source=source or self.config.source,
             limits=self.config.limits,
-            **self.quantities,
+            **self.estimates,
         )
 
     def plot(self, what: Literal["levels", "force"] = "levels") -> Figure:

@@ -127,7 +127,7 @@ def design_map(
     Returns
     -------
     DesignMap
-        Margin and verdict of the force that the case judges.
+        Margin and verdict of the force that the case assesses.
 
     Raises
     ------

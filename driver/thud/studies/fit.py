@@ -327,9 +327,9 @@ class FitKind(Kind[FitStudy, Fit]):
         """Return the fit as text."""
         return f"{study.name}\n\n{result.table(study.units)}"
 
-    def remarks(self, result: Fit) -> list[str]:
+    def warnings(self, result: Fit) -> list[str]:
         """Return the warnings, and what is not plausible in the impacts that were found."""
-        own = [remark for target in result.targets for remark in target.impact.remarks]
+        own = [warning for target in result.targets for warning in target.impact.warnings]
         return [*result.warnings, *dict.fromkeys(own)]
 
     def succeeded(self, result: Fit) -> bool:

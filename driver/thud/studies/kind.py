@@ -155,7 +155,7 @@ class Kind(ABC, Generic[S, R]):
         """Return the result as text."""
 
     @abstractmethod
-    def remarks(self, result: R) -> list[str]:
+    def warnings(self, result: R) -> list[str]:
         """Return warnings, as sentences."""
 
     @abstractmethod

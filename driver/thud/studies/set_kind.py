@@ -161,7 +161,7 @@ class SetKind(DropsKind[R]):
         """Return the identity of results."""
         return read_identity(path)
 
-    def remarks(self, result: R) -> list[str]:
+    def warnings(self, result: R) -> list[str]:
         """Return how many sets have no results, and why."""
         dataset = _sets(result)
         failed = dataset["status"].values != 0

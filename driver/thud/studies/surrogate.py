@@ -70,7 +70,7 @@ class SurrogateKind(DropsKind[Surrogate]):
         """Return the identity of results."""
         return read_surrogate(path).identity
 
-    def remarks(self, result: Surrogate) -> list[str]:
+    def warnings(self, result: Surrogate) -> list[str]:
         """Return how close it is, and what it does not answer."""
         return [result.sentence]
 

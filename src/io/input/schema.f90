@@ -1,7 +1,7 @@
 !> Keys, models and results as data for other programs, in JSON: what the Python package and the reference of
 !> all keys are made from.
 module thud_schema
-   use thud_band, only: band_set_names, band_type, get_bands
+   use thud_band, only: band_set_names, band_type, get_bands, octave_count
    use thud_case, only: case_type, get_fields, new_case
    use thud_constants, only: version
    use thud_error, only: error_type
@@ -11,7 +11,8 @@ module thud_schema
    use thud_quantities, only: quantities, quantity_type, sample_quantity_count
    use thud_rating, only: class_limits, find_rated_bands, rated_set_names
    use thud_registry, only: floor_names, model_names
-   use thud_source_limits, only: source_names
+   use thud_source_limits, only: criterion_count, criterion_type, get_criteria, get_source_limits, source_limits_type, &
+      source_names
    use thud_text, only: newline, to_text
    implicit none (type, external)
    private
@@ -48,6 +49,11 @@ contains
          text = text//newline//text_value(rated_set_names(i))//': '//numbers(bands%nominal) &
             //trim(merge(',', ' ', i < size(rated_set_names)))
       end do
+      text = text//'},'//newline//'"limits": {'
+      do i = 1, size(source_names)
+         call describe_limits(source_names(i), entry)
+         text = text//newline//entry//trim(merge(',', ' ', i < size(source_names)))
+      end do
       text = text//'},'//newline//'"class_limits": '//numbers(class_limits)//','//newline//'"quantities": ['
       do i = 1, size(quantities)
          call describe_quantity(quantities(i), entry)
@@ -60,6 +66,27 @@ contains
       end do
       text = text//']}'
    end subroutine get_schema
+
+   !> The criteria of a source.
+   subroutine describe_limits(source, text)
+      character(len=*), intent(in) :: source
+      !> A JSON member.
+      character(len=:), allocatable, intent(out) :: text
+      type(source_limits_type) :: limits
+      type(criterion_type) :: criteria(criterion_count)
+      type(error_type), allocatable :: error
+      integer :: i
+
+      call get_source_limits(source, limits, error)
+      criteria = get_criteria(limits, spread(0.0_wp, 1, octave_count), 0.0_wp, 0.0_wp, 0, 0.0_wp, 0.0_wp)
+      text = text_value(source)//': ['
+      do i = 1, criterion_count
+         text = text//'{"name": '//text_value(criteria(i)%name)//', "unit": '//text_value(criteria(i)%unit)//', "lower": ' &
+            //to_text(criteria(i)%lower)//', "upper": '//to_text(criteria(i)%upper)//'}' &
+            //trim(merge(',', ' ', i < criterion_count))
+      end do
+      text = text//']'
+   end subroutine describe_limits
 
    !> One quantity.
    subroutine describe_quantity(quantity, text)

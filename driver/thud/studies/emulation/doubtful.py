@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.level.levels import judge
+from thud.level.assessment import get_criteria
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     Values = NDArray[np.float64]
 
 
-def judge_many(
+def assess_many(
     values: tuple[Values, ...], errors: tuple[Values, ...], source: LimitsSource
 ) -> dict[str, NDArray[Any]]:
     """Return margin, verdict, and whether errors could change it, of many drops.
@@ -25,7 +25,7 @@ def judge_many(
     ----------
     values
         Octave levels, dB, shape (n, 5); contact time, s; restitution; number of peaks; mass, kg;
-        height, m, as in `thud.judge`, shape (n,) or of one value.
+        height, m, as in `thud.assess`, shape (n,) or of one value.
     errors
         The same of their errors, in the same units.
     source
@@ -33,7 +33,7 @@ def judge_many(
     """
     count, bands = values[0].shape
     judged, by = (_columns(part, count) for part in (values, errors))
-    criteria = judge(np.zeros(bands), 0, 0, 0, 0, 0, source).criteria
+    criteria = get_criteria(source)
     lower = np.array([one.lower for one in criteria])
     upper = np.array([one.upper for one in criteria])
     inside = np.minimum(judged - lower, upper - judged)

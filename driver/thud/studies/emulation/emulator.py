@@ -20,7 +20,7 @@ from thud.base.files import is_failure, read_input, replace_file
 from thud.case.case import Case, case_text
 from thud.case.keys import OF_FILES, put
 from thud.level.levels import get_bands
-from thud.studies.emulation.doubtful import judge_many
+from thud.studies.emulation.doubtful import assess_many
 from thud.studies.study import value_in
 
 if TYPE_CHECKING:
@@ -248,7 +248,7 @@ class Surrogate(Displayed):
         level = f"{case.levels.force}_level"
         rest = [given.get(n, np.asarray(value_in(case, n))) for n in ("mass", "height")]
         exact = [np.zeros(1)] * 3
-        verdicts = judge_many(
+        verdicts = assess_many(
             (found[level], *(found[n] for n in names), np.array([self.peaks]), *rest),
             (
                 self.error_of(level)[np.newaxis],
