@@ -12,7 +12,7 @@ import f90nml
 import numpy as np
 
 from thud.base._schema import MeasuredMobility
-from thud.base.bridge import call, mobility_api
+from thud.base.bridge import ask
 from thud.base.checks import (
     refuse,
     refuse_value,
@@ -287,9 +287,9 @@ def _fit(
     name: str, frequency: NDArray[np.float64], values: NDArray[np.complex128], order: int
 ) -> MobilityFit:
     """Return the fit with a number of poles."""
-    n = len(frequency)
-    routine = mobility_api.fit_mobility
-    found: dict[str, Any] = call(routine, frequency, values.real, values.imag, int(order), n)
+    found: dict[str, Any] = ask(
+        "mobility_fit", frequency=frequency, real=values.real, imaginary=values.imag, order=order
+    )
     lists: dict[str, Any] = {
         key: value if isinstance(value, float) else tuple(map(float, value))
         for key, value in found["floor"].items()

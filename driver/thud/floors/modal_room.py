@@ -16,7 +16,7 @@ import numpy as np
 from scipy.signal import lfilter, sosfilt
 
 from thud.base._schema import Plate, Room
-from thud.base.bridge import call, floor_api
+from thud.base.bridge import ask
 from thud.base.checks import (
     refuse,
     refuse_value,
@@ -207,10 +207,10 @@ def positions_below(
     heard = _positions("microphones", microphones, size, draw)
     numbers, plate_frequency = _plate_modes(floor)
     orders, room_frequency = _room_modes(size, room.sound_speed)
-    found = call(
-        floor_api.get_radiator,
-        case_text(Case(floor=floor, room=room)),
-        np.maximum(plate_frequency, 1.0),
+    found = ask(
+        "radiator",
+        case=case_text(Case(floor=floor, room=room)),
+        frequency=np.maximum(plate_frequency, 1.0),
     )
     losses = 2 * np.pi * plate_frequency * found["loss_factor"]
     decay = 6 * math.log(10) / _times(prediction, room_frequency)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from thud.base.bridge import call, floor_api, text
+from thud.base.bridge import ask, text
 from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
 from thud.case.case import Case, case_text
@@ -230,8 +230,8 @@ def predict_level(
     moved = _on_floor(source, asked)
     levels = (moved or source).levels(THIRDS, force="floor")
     rated = np.isin(get_bands(THIRDS).nominal, rated_bands(THIRDS))
-    found = call(floor_api.predict_room, case_text(asked), np.ascontiguousarray(levels[rated]))
-    bands = found["bands"]
+    found = ask("room_level", case=case_text(asked), levels=levels[rated])
+    bands = found["room_bands"]
     if moved:
         blocked = (
             source.blocked_force.max() if isinstance(source, FloorImpact) else source.peak("floor")
@@ -247,12 +247,12 @@ def predict_level(
         force_change=change,
         floor_warnings=tuple(map(text, found.get("remarks", {}).values())),
         time_of_maximum=bands.pop("time"),
-        few_modes=found["few_modes"],
-        mass_per_area=found["surface_mass"],
-        octave_level=found["octaves"]["level"],
-        octave_time=found["octaves"]["time"],
-        history_time=found["history"]["time"],
-        history=found["history"]["level"],
+        few_modes=found["room"]["few_modes"],
+        mass_per_area=found["room"]["surface_mass"],
+        octave_level=found["room_octaves"]["level"],
+        octave_time=found["room_octaves"]["time"],
+        history_time=found["room_history"]["time"],
+        history=found["room_history"]["level"],
         **bands,
     )
 
@@ -264,7 +264,7 @@ def _on_floor(source: ImpactResult, case: Case) -> FloorImpact | None:
         return known
     plain = replace(case, compression=None)
     blocked = source.blocked_force if isinstance(source, FloorImpact) else source.force("floor")
-    return new_floor_impact(case, call(floor_api.drop_on_floor, case_text(plain)), blocked)
+    return new_floor_impact(case, ask("floor_impact", case=case_text(plain)), blocked)
 
 
 def _force_change(mass: float, contact_time: float, resistance: float) -> float:

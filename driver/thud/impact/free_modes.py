@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base._schema import Ball, FiniteElement, Modes
-from thud.base.bridge import api, call, text
+from thud.base.bridge import ask, text
 from thud.base.checks import require_kind
 from thud.base.display import Displayed
 from thud.base.errors import InputError, PlausibilityWarning
@@ -111,7 +111,7 @@ def free_modes(
         model=None,
         modes=Modes(count, radial_elements, polar_elements),
     )
-    modes = new_modes(case.ball, call(api.free_modes, case_text(case)))
+    modes = new_modes(case.ball, ask("modes", case=case_text(case)))
     for warning in modes.warnings:
         warnings.warn(warning, PlausibilityWarning, stacklevel=3)
     return modes
@@ -155,7 +155,6 @@ def loss_factors(model: FiniteElement, frequency: ArrayLike) -> NDArray[np.float
     if wanted.ndim != 1 or not wanted.size or not np.all(wanted > 0):
         message = "frequency is not allowed; allowed: a list of frequencies above 0, Hz"
         raise InputError(message)
-    result: NDArray[np.float64] = call(api.loss_factors, case_text(Case(model=model)), wanted)[
-        "loss_factors"
-    ]
+    found = ask("loss_factors", case=case_text(Case(model=model)), frequency=wanted)
+    result: NDArray[np.float64] = found["loss_factors"]
     return result

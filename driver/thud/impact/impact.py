@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from thud.base._schema import ImpactQuantities
 from thud.base.checks import require_choice, require_whole
 from thud.base.display import Displayed
 from thud.base.extras import require_extra
@@ -37,9 +38,12 @@ if TYPE_CHECKING:
     from thud.level.assessment import Verdict
 
 
-@dataclass(frozen=True, eq=False)
-class Impact(Displayed):
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Impact(ImpactQuantities, Displayed):
     """Force and motion of one impact, sampled from first touch on.
+
+    It has the attributes of `ImpactQuantities`, and those below. Peak forces of finite elements
+    are those of the force below 1.25 kHz, which a force plate records.
 
     Attributes
     ----------
@@ -63,29 +67,6 @@ class Impact(Displayed):
         What is possible but not plausible, such as a wall with the density of no rubber.
     motion : Motion or None
         Snapshots of the deformed ball; None where the model has none.
-    sample_rate : float
-        Samples per second, Hz.
-    impact_velocity : float
-        Velocity at first touch, m/s.
-    contact_time : float
-        Time from first touch to release, s.
-    peak_force : float
-        Maximum force on the floor, N; below 1.25 kHz if the force has content above it, as that of
-        finite elements.
-    peak_elastic_force : float
-        Maximum elastic force, N, likewise.
-    max_deflection : float
-        Maximum deflection, m.
-    restitution : float
-        Velocity at release over velocity at first touch.
-    impulse : float
-        Time integral of the force on the floor, N s.
-    exact_contact_time : float
-        Contact time interpolated between samples, s, for models whose contact ends on a step.
-    touch_time : float
-        Time of first touch in the record, s.
-    impulse_residual, energy_residual : float
-        Relative residuals of the balances of impulse and energy.
     on_floor : FloorImpact or None
         The same drop on the floor of the case; None where there is none, it is rigid, or the model
         knows the force on a rigid floor only.
@@ -102,18 +83,6 @@ class Impact(Displayed):
     facts: dict[str, float]
     warnings: tuple[str, ...]
     motion: Motion | None
-    sample_rate: float
-    impact_velocity: float
-    contact_time: float
-    peak_force: float
-    peak_elastic_force: float
-    max_deflection: float
-    restitution: float
-    impulse: float
-    exact_contact_time: float
-    touch_time: float
-    impulse_residual: float
-    energy_residual: float
     on_floor: FloorImpact | None = None
 
     @property
@@ -308,15 +277,15 @@ class Impact(Displayed):
 
 def history(case: Case, found: Bundle, warnings: tuple[str, ...]) -> dict[str, Any]:
     """Return what every history in a bundle has."""
-    samples, scalars = found["samples"], found["scalars"]
+    samples, quantities = found["samples"], found["quantities"]
     return {
         "case": case,
-        "time": np.arange(len(samples["deflection"])) / scalars["sample_rate"],
+        "time": np.arange(len(samples["deflection"])) / quantities["sample_rate"],
         **samples,
         "parts": found["parts"],
         "channels": found.get("channels", {}),
         "facts": found.get("facts", {}),
         "warnings": warnings,
         "motion": new_motion(**found["motion"]) if "motion" in found else None,
-        **scalars,
+        **quantities,
     }

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import f90nml.scanner
 import numpy as np
 
-from thud.base._schema import SCALARS
+from thud.base._schema import QUANTITIES
 from thud.base.checks import refuse, shown
 from thud.base.errors import PlausibilityWarning, ThudError
 from thud.base.files import MANIFEST, checksum, locked, read_input, read_manifest
@@ -150,7 +150,7 @@ def _read_history(
         "channels": {name: values for name, values in found.items() if name != "time_s"},
         "facts": dict(facts),
         "motion": _read_motion(files, prefix) if f"{prefix}motion.pvd" in files else None,
-        **{name: scalars[name] for name in SCALARS},
+        **{name: scalars[name] for name in QUANTITIES},
     }
     return history, {name: force[name] for name in columns[last + 1 :]}
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.special import stdtr
 
-from thud.base.bridge import call_direct, level_api, trimmed
+from thud.base._schema import LIMITS
 from thud.base.checks import refuse, refuse_value, require_choice
 from thud.base.display import Displayed
 from thud.level.estimate import Estimate
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
     from thud.base._schema import LimitsSource
 
 RESULTS = ("conforms", "does not conform", "inconclusive")
-_N_CRITERION = level_api.count_names()[2]
 _MAX_PEAKS = 2**31
 
 
@@ -228,18 +226,11 @@ def assess(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
 def get_criteria(source: LimitsSource) -> tuple[Criterion, ...]:
     """Return the criteria of the standards for a source, their values unknown."""
     require_choice("source", source, SOURCES)
-    return _criteria(source)
-
-
-@lru_cache
-def _criteria(source: LimitsSource) -> tuple[Criterion, ...]:
-    octaves = np.zeros(len(get_bands(BANDWIDTHS[0]).nominal))
-    names, units, _, lower, upper, _ = call_direct(
-        level_api.judge, source, octaves, 0.0, 0.0, 0, 0.0, 0.0, _N_CRITERION
+    unknown = Estimate.unknown()
+    return tuple(
+        Criterion(name, replace(unknown, unit=unit), lower, upper)
+        for name, unit, lower, upper in LIMITS[source]
     )
-    unknown = (replace(Estimate.unknown(), unit=trimmed(unit)) for unit in units)
-    rows = zip(map(trimmed, names), unknown, lower.tolist(), upper.tolist(), strict=True)
-    return tuple(Criterion(*row) for row in rows)
 
 
 def octave_limits(source: LimitsSource) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

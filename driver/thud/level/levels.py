@@ -4,33 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, cast, get_args
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
-from thud.base._schema import LevelsForce, LevelsMethod
-from thud.base.bridge import call_direct, level_api, trimmed
+from thud.base._schema import BANDS, BandSet, LevelsForce, LevelsMethod, LimitsSource
+from thud.base.bridge import ask
 from thud.base.checks import require_array, require_choice, require_real
 from thud.base.display import Displayed
 from thud.base.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.base._schema import BandSet, LimitsSource
 
-
-def _names(values: Iterable[bytes]) -> tuple[str, ...]:
-    """Return names from the library."""
-    return tuple(map(trimmed, values))
-
-
-_N_SET, _N_SOURCE, _ = level_api.count_names()
-_sets, _sources = map(_names, level_api.get_names(_N_SET, _N_SOURCE))
-BANDWIDTHS = cast("tuple[BandSet, ...]", _sets)
-SOURCES = cast("tuple[LimitsSource, ...]", _sources)
+BANDWIDTHS: tuple[BandSet, ...] = get_args(BandSet)
+SOURCES: tuple[LimitsSource, ...] = get_args(LimitsSource)
 FORCES: tuple[LevelsForce, ...] = ("elastic", "floor")
 # Upper limit of the band of a force plate, Hz (paper, section 3).
 RECORDED_BAND = 1250.0
@@ -85,10 +74,9 @@ def get_bands(bands: BandSet = "octave") -> Bands:
 
 
 @lru_cache
-def _bands(name: str) -> Bands:
+def _bands(name: BandSet) -> Bands:
     """Return the bands of a name."""
-    (n_band,) = call_direct(level_api.count_bands, name)
-    return Bands(*level_api.get_bands(name, n_band))
+    return Bands(**{column: np.array(values) for column, values in BANDS[name].items()})
 
 
 def force_exposure_levels(
@@ -126,13 +114,13 @@ def force_exposure_levels(
         Where the record is empty, zero throughout, not finite or not one-dimensional, or the
         rate, the bands or the method are invalid.
     """
-    count = len(get_bands(bands).nominal)
+    require_choice("bands", bands, BANDWIDTHS)
     require_choice("method", method, get_args(LevelsMethod))
     record = _record(force)
     rate = to_float("sample_rate", sample_rate)
-    (levels,) = call_direct(level_api.force_exposure, record, rate, bands, method, count)
-    result: NDArray[np.float64] = levels
-    return result
+    found = ask("levels", force=record, sample_rate=rate, bands=bands, method=method)
+    levels: NDArray[np.float64] = found["levels"]
+    return levels
 
 
 def record_force(force: NDArray[np.float64], sample_rate: float) -> NDArray[np.float64]:
@@ -140,7 +128,8 @@ def record_force(force: NDArray[np.float64], sample_rate: float) -> NDArray[np.f
 
     Forces, N, have the shape (n_sample,) and start and end at zero; the rate is in Hz.
     """
-    recorded: NDArray[np.float64] = level_api.record_force(force, sample_rate)
+    recorded: NDArray[np.float64]
+    recorded = ask("recorded_force", force=force, sample_rate=sample_rate)["force"]
     return recorded
 
 
@@ -160,7 +149,7 @@ def peak_count(force: ArrayLike, sample_rate: float) -> int:
     if not 0 < rate < np.inf:
         message = f"sample_rate = {rate} is not allowed; allowed: sample_rate > 0"
         raise InputError(message)
-    return int(level_api.count_peaks(record, rate))
+    return int(ask("peak_count", force=record, sample_rate=rate)["peak_count"])
 
 
 def _record(values: ArrayLike, name: str = "force") -> NDArray[np.float64]:

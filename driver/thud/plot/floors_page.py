@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.transforms import Bbox
 
-from thud.level.rating import CLASS_LIMITS
+from thud.base._schema import CLASS_LIMITS
 from thud.plot.html_page import curve_look, curve_points, html_page, plot_layout
 from thud.plot.style import (
     BAND_WORDS,
