@@ -16,6 +16,7 @@ from thud import cli
 from thud.base.errors import PlausibilityWarning
 from thud.comparison.comparison import _cell, _digits, read_all
 from thud.level.assessment import Criterion
+from thud.level.impact_result import ImpactResult
 from thud.recordings.config import Config
 
 if TYPE_CHECKING:
@@ -262,3 +263,23 @@ def test_drops_of_different_speeds_are_refused_and_others_named() -> None:
     expected = f"{1e3 * found.run_times['heavy']:.1f}"
     assert rows["computed in, ms"][1] == expected
     assert rows["peak force, N"][0] == _digits(impact.peak())
+
+
+def test_impact_and_recording_answer_the_same_questions() -> None:
+    impact = thud.solve()
+    record = recorded(impact, height=1.0, mass=2.5)
+    for one in (impact, record):
+        assert isinstance(one, ImpactResult)
+        assert one.mass == 2.5
+        assert one.impact_velocity == pytest.approx(4.429, abs=1e-3)
+        assert one.peak("floor") == one.peak_force == pytest.approx(1574, rel=0.02)
+        assert one.impulse == pytest.approx(impact.impulse, rel=0.01)
+        assert one.limits_source in (None, "rubber_ball")
+        drop = one.drop_force()
+        assert drop.force.max() == pytest.approx(one.peak_force, rel=0.01)
+        assert drop.time[0] <= one.touch_time <= drop.time[-1]
+        assert one.to_dataframe().index.to_numpy() == pytest.approx(one.time)
+        dataset = one.to_xarray()
+        assert dataset["floor_level"].to_numpy() == pytest.approx(one.levels(force="floor"))
+        assert dataset["floor_third_level"].size == 15
+        assert one.plot().axes

@@ -192,9 +192,10 @@ def recording(tmp_path: Path) -> Path:
 def test_recording_gives_the_force_of_a_drop(recording: Path) -> None:
     found = read_recording(recording)
     force = blocked_force(found, drop=2)
-    time, expected = found.to_force_history(2)
-    assert np.array_equal(force.force, expected)
-    assert force.time == pytest.approx(time, abs=1e-12)
+    drop = found.drops[1]
+    gate = slice(*drop.gate)
+    assert np.array_equal(force.force, drop.force[gate])
+    assert force.time == pytest.approx(drop.time[gate], abs=1e-12)
     assert force.checksum == hashlib.sha256(recording.read_bytes()).hexdigest()
     assert "drop 2" in force.origin
     assert any("offset" in note for note in force.notes)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from itertools import chain, count
+from itertools import chain, combinations, count
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
@@ -20,15 +21,13 @@ from thud.base.errors import InputError, PlausibilityWarning, ThudError
 from thud.base.files import Results
 from thud.case.case import Case, read_case
 from thud.impact.compute import compute
-from thud.impact.impact import Impact
+from thud.level.impact_result import ImpactResult
 from thud.level.levels import FORCES, SOURCES, get_bands
 from thud.plot.comparison_html import comparison_html
 from thud.plot.comparison_page import comparison_page
 from thud.plot.levels_figure import common_source
 from thud.plot.style import page_files
 from thud.recordings.read_recording import read_recording
-from thud.recordings.recording import Recording
-from thud.recordings.restitution import DropConditions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,10 +37,6 @@ if TYPE_CHECKING:
 
 # Endings of namelist files; all others are recordings.
 NAMELISTS = (".nml", ".namelist", "")
-
-# Maximum ratio of the speeds of one drop with recordings: the limits of its height, 1 cm on both
-# sides of 0.85 m or more, make 1.2 %.
-MAX_SPREAD = 1.015
 
 # Criteria after the octaves: name and unit, size of the unit, decimals.
 _ROWS = (
@@ -69,7 +64,7 @@ class Comparison(Displayed):
         Source of the limits.
     """
 
-    impacts: dict[str, Impact | Recording]
+    impacts: dict[str, ImpactResult]
     run_times: dict[str, float]
     force: LevelsForce | None = None
     source: LimitsSource = "rubber_ball"
@@ -164,7 +159,7 @@ def _cell(criterion: Criterion, unit: float, decimals: int) -> str:
 # mypy infers the type of a dictionary of several kinds from the parameter of an overload only.
 @overload
 def compare(
-    impacts: Mapping[str, Case | Impact | Recording],
+    impacts: Mapping[str, Case | ImpactResult],
     force: LevelsForce | None = None,
     source: LimitsSource | None = None,
     *,
@@ -172,14 +167,14 @@ def compare(
 ) -> Comparison: ...
 @overload
 def compare(
-    impacts: Iterable[Case | Impact | Recording],
+    impacts: Iterable[Case | ImpactResult],
     force: LevelsForce | None = None,
     source: LimitsSource | None = None,
     *,
     progress: bool = False,
 ) -> Comparison: ...
 def compare(
-    impacts: Mapping[str, Case | Impact | Recording] | Iterable[Case | Impact | Recording],
+    impacts: Mapping[str, Case | ImpactResult] | Iterable[Case | ImpactResult],
     force: LevelsForce | None = None,
     source: LimitsSource | None = None,
     *,
@@ -221,7 +216,7 @@ def compare(
     if source is not None:
         require_choice("source", source, SOURCES)
     named = _named(impacts)
-    solved: dict[str, Impact | Recording] = {}
+    solved: dict[str, ImpactResult] = {}
     run_times = {}
     for name, given in tqdm(named.items(), unit="case", disable=not progress, leave=False):
         if isinstance(given, Case):
@@ -241,25 +236,22 @@ def compare(
     return found
 
 
-def _require_same_drop(impacts: Mapping[str, Impact | Recording]) -> None:
+def _require_same_drop(impacts: Mapping[str, ImpactResult]) -> None:
     """Raise InputError where drops differ; measured heights differ within their tolerance."""
-    computed = {n: i.impact_velocity for n, i in impacts.items() if isinstance(i, Impact)}
-    falls = {
-        n: DropConditions(i.config.height) for n, i in impacts.items() if isinstance(i, Recording)
-    }
-    speeds = computed | {n: fall.speed for n, fall in falls.items() if fall.height}
-    if not speeds:
-        return
-    spread = max(speeds.values()) / min(speeds.values())
-    if len(set(computed.values())) > 1 or spread > MAX_SPREAD:
-        listed = ", ".join(f"{name} falls with {speed:.4g} m/s" for name, speed in speeds.items())
+    known = {n: i for n, i in impacts.items() if not math.isnan(i.impact_velocity)}
+    for one, other in combinations(known.values(), 2):
+        tolerance = max(one.velocity_tolerance, other.velocity_tolerance)
+        slow, fast = sorted((one.impact_velocity, other.impact_velocity))
+        if fast <= slow * (1 + tolerance):
+            continue
+        listed = ", ".join(f"{n} falls with {i.impact_velocity:.4g} m/s" for n, i in known.items())
         refuse(
             f"&drop: height or gravity differs ({listed})",
-            f"the same drop, of recordings within {MAX_SPREAD - 1:.1%} of the speed",
+            f"the same drop, here within {tolerance:.1%} of the speed",
         )
 
 
-def _named(impacts: object) -> dict[str, Case | Impact | Recording]:
+def _named(impacts: object) -> dict[str, Case | ImpactResult]:
     """Return what is compared by name, checked."""
     allowed = (
         "one or more cases, impacts or recordings, by name or in a list "
@@ -268,28 +260,23 @@ def _named(impacts: object) -> dict[str, Case | Impact | Recording]:
     if isinstance(impacts, Mapping):
         pairs = list(impacts.items())
     else:
-        row = [impacts] if isinstance(impacts, Case | Impact | Recording) else impacts
+        row = [impacts] if isinstance(impacts, Case | ImpactResult) else impacts
         if not isinstance(row, Iterable) or isinstance(row, str | bytes | os.PathLike):
             refuse_value("impacts", row, allowed)
-        pairs = [(_name(given), given) for given in row]
+        pairs = [(getattr(given, "name", type(given).__name__.lower()), given) for given in row]
     if not pairs:
         refuse("impacts is empty", allowed)
-    named: dict[str, Case | Impact | Recording] = {}
+    named: dict[str, Case | ImpactResult] = {}
     for name, given in pairs:
         require_kind("name", name, str)
-        require_kind(name, given, Case | Impact | Recording)
+        require_kind(name, given, Case | ImpactResult)
         # Cases from Python often share their name.
         names = chain([name], (f"{name} ({n})" for n in count(2)))
         named[next(free for free in names if free not in named)] = given
     return named
 
 
-def _name(given: object) -> str:
-    named = given.case if isinstance(given, Impact) else given
-    return named.name if isinstance(named, Case | Recording) else type(named).__name__.lower()
-
-
-def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Recording]:
+def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | ImpactResult]:
     """Read namelist files (``.nml``) and recordings; their names are those of cases and files.
 
     Raises
@@ -297,9 +284,9 @@ def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Record
     InputError
         Names the file; also raised where two have the same name.
     """
-    found: dict[str, Case | Recording] = {}
+    found: dict[str, Case | ImpactResult] = {}
     for path in map(Path, paths):
-        given: Case | Recording
+        given: Case | ImpactResult
         given = read_case(path) if path.suffix.lower() in NAMELISTS else read_recording(path)
         name = given.name
         if name in found:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from thud.case.case import Case
     from thud.impact.impact import Impact
     from thud.level.assessment import Criterion
-    from thud.recordings.recording import Recording
+    from thud.level.impact_result import ImpactResult
 
     Answer = dict[str, Any]
 
@@ -100,7 +100,8 @@ def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answe
     start = time.perf_counter()
     try:
         recording = read_recording(path, **settings)
-        times, force = recording.to_force_history()
+        drop = recording.drop_force()
+        times, force = drop.time, drop.force
         kept = (times >= 0) & (times <= MARGIN * recording.contact_time)
         curve = 1e3 * times[kept], 1e-3 * force[kept]
         found = _answer(recording, *curve, recording.peak())
@@ -118,7 +119,7 @@ def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answe
 
 
 def _answer(
-    source: Impact | Recording, times: NDArray[np.float64], force: NDArray[np.float64], peak: float
+    source: ImpactResult, times: NDArray[np.float64], force: NDArray[np.float64], peak: float
 ) -> Answer:
     """Return what cases and recordings share; times in ms, the force in kN."""
     verdict = source.assess()

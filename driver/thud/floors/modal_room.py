@@ -36,8 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.impact.impact import Impact
-    from thud.recordings.recording import Recording
+    from thud.level.impact_result import ImpactResult
 
     Array = NDArray[np.float64]
     ComplexArray = NDArray[np.complex128]
@@ -149,7 +148,7 @@ class ModalRoom(Displayed):
 
 
 def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in them
-    source: Impact | Recording,
+    source: ImpactResult,
     floor: Plate | None = None,
     room: Room | None = None,
     *,
@@ -358,7 +357,7 @@ def _receptance(omega: Array, frequency: Array, decay: Array) -> ComplexArray:
     return (omega > 0) / divisor
 
 
-def _spectrum(source: Impact | Recording, duration: float) -> tuple[Array, ComplexArray]:
+def _spectrum(source: ImpactResult, duration: float) -> tuple[Array, ComplexArray]:
     """Return angular frequencies, rad/s, and the Fourier transform of the force, N s."""
     force = source.force("floor")
     # An even number, which the inverse transform takes its length for.

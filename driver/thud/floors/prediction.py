@@ -14,10 +14,9 @@ from thud.base.display import Displayed
 from thud.case.case import Case, case_text
 from thud.floors.survey import RoomLevels
 from thud.impact.floor_impact import FloorImpact, new_floor_impact
-from thud.impact.impact import Impact
+from thud.level.impact_result import ImpactResult
 from thud.level.levels import BANDWIDTHS, get_bands
 from thud.level.rating import Rating, rated_bands, rating, standardised_level
-from thud.recordings.recording import Recording
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -99,7 +98,7 @@ class RoomPrediction(Displayed):
     octave_time: NDArray[np.float64]
     history_time: NDArray[np.float64]
     history: NDArray[np.float64]
-    source: Impact | Recording
+    source: ImpactResult
     force: Literal["contact", "blocked"]
     force_change: float
     floor_warnings: tuple[str, ...]
@@ -199,7 +198,7 @@ class RoomPrediction(Displayed):
 
 
 def predict_level(
-    source: Impact | Recording, floor: FloorOptions | None = None, room: Room | None = None
+    source: ImpactResult, floor: FloorOptions | None = None, room: Room | None = None
 ) -> RoomPrediction:
     """Predict the level that an impact causes in the room below.
 
@@ -220,31 +219,26 @@ def predict_level(
     InputError
         Where floor or room are missing or out of range.
     """
-    require_kind("source", source, Impact | Recording)
-    case = source.case if isinstance(source, Impact) else Case()
+    require_kind("source", source, ImpactResult)
+    case = source.case
     floor, room = floor or case.floor, room or case.room
     if floor is None or room is None:
         refuse(
             f"{'floor' if floor is None else 'room'} is not given", "an object of Plate and of Room"
         )
     asked = replace(case, modes=None, floor=floor, room=room)
-    moved = _on_floor(source, asked) if isinstance(source, Impact) else None
-    levels = (
-        (moved or source).levels(THIRDS, force="floor")
-        if isinstance(source, Impact)
-        else source.levels(THIRDS)
-    )
+    moved = _on_floor(source, asked)
+    levels = (moved or source).levels(THIRDS, force="floor")
     rated = np.isin(get_bands(THIRDS).nominal, rated_bands(THIRDS))
     found = ask("room_level", case=case_text(asked), levels=levels[rated])
     bands = found["room_bands"]
-    if moved and isinstance(source, Impact):
+    if moved:
         blocked = (
             source.blocked_force.max() if isinstance(source, FloorImpact) else source.peak("floor")
         )
         change = 20 * math.log10(moved.peak("floor") / blocked)
     else:
-        mass = case.ball.mass if isinstance(source, Impact) else source.estimates["mass"].value
-        change = _force_change(mass, source.contact_time, 1 / bands["conductance"].max())
+        change = _force_change(source.mass, source.contact_time, 1 / bands["conductance"].max())
     return RoomPrediction(
         floor=floor,
         room=room,
@@ -263,13 +257,13 @@ def predict_level(
     )
 
 
-def _on_floor(source: Impact, case: Case) -> FloorImpact | None:
+def _on_floor(source: ImpactResult, case: Case) -> FloorImpact | None:
     """Return the impact on the floor of a case; None where its force is the blocked one."""
     known = source if isinstance(source, FloorImpact) else source.on_floor
-    if source.case.floor == case.floor:
+    if source.case.model is None or source.case.floor == case.floor:
         return known
     plain = replace(case, compression=None)
-    blocked = source.blocked_force if isinstance(source, FloorImpact) else source.floor_force
+    blocked = source.blocked_force if isinstance(source, FloorImpact) else source.force("floor")
     return new_floor_impact(case, ask("floor_impact", case=case_text(plain)), blocked)
 
 

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from thud.case.case import Case
     from thud.impact.impact import Impact
     from thud.impact.outcomes import Ensemble
+    from thud.level.impact_result import ImpactResult
 
 # Name and unit of a history.
 _HISTORY = re.compile(r"(.*?)_((?:m|s|N|Pa|J|Hz|kg)(?:_per_\w+)?)")
@@ -63,6 +64,25 @@ def impact_dataset(impact: Impact, histories: Mapping[str, NDArray[np.float64]])
     found = xr.Dataset(variables, coordinates, origin(impact.case) | impact.facts | warnings)
     # The arrays of the impact are read-only.
     return found.copy(deep=True)
+
+
+def recording_dataset(recording: ImpactResult) -> xr.Dataset:
+    """Return the dataset of a force on the floor, its levels and its numbers."""
+    variables: dict[str, Any] = {
+        "floor_force": ("time", recording.force(), _attributes("N", "floor force")),
+        **{
+            name: (bands, recording.levels(bands), attributes(SAMPLE_RESULTS[name]))
+            for name, (force, bands) in LEVELS.items()
+            if force == "floor"
+        },
+        **{
+            name: ((), getattr(recording, name), attributes(schema.QUANTITIES[name]))
+            for name in ("sample_rate", "contact_time", "peak_force", "restitution", "impulse")
+        },
+    }
+    coordinates = {"time": _time(recording.time), **band_coordinates(BANDWIDTHS)}
+    provenance = {"recording": recording.name, "warnings": "\n".join(recording.warnings)}
+    return xr.Dataset(variables, coordinates, provenance).copy(deep=True)
 
 
 def ensemble_dataset(ensemble: Ensemble) -> xr.Dataset:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -9,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.base._schema import ImpactQuantities
-from thud.base.checks import require_choice
+from thud.base.checks import require_choice, require_whole
 from thud.base.display import Displayed
 from thud.base.extras import require_extra
+from thud.case.case import case_text
 from thud.impact.contact_time import contact_span
 from thud.impact.motion import Motion, new_motion
 from thud.level.assessment import assess
+from thud.level.impact_result import DropForce
 from thud.level.levels import FORCES, force_exposure_levels, peak_count
 
 if TYPE_CHECKING:
@@ -81,6 +84,26 @@ class Impact(ImpactQuantities, Displayed):
     warnings: tuple[str, ...]
     motion: Motion | None
     on_floor: FloorImpact | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the case."""
+        return self.case.name
+
+    @property
+    def mass(self) -> float:
+        """Mass of the source, kg."""
+        return self.case.ball.mass
+
+    @property
+    def velocity_tolerance(self) -> float:
+        """Relative tolerance of the impact velocity: none."""
+        return 0.0
+
+    @property
+    def limits_source(self) -> LimitsSource:
+        """Source whose limits apply."""
+        return self.case.limits.source
 
     @property
     def measured_contact_time(self) -> float:
@@ -192,6 +215,21 @@ class Impact(ImpactQuantities, Displayed):
             self.case.ball.mass,
             self.case.drop.height,
             source or self.case.limits.source,
+        )
+
+    def drop_force(self, drop: int = 1) -> DropForce:
+        """Return the force that the case assesses; the only drop is 1."""
+        require_whole("drop", drop, 1, 1)
+        case = self.case
+        model = case.model.name if case.model else ""
+        return DropForce(
+            name=case.name,
+            force=self.force(),
+            sample_rate=self.sample_rate,
+            start=float(self.time[0] - self.touch_time),
+            kind=self.assessed_force(),
+            origin=f"case {case.name}, model {model}, drop height {case.drop.height:g} m",
+            checksum=hashlib.sha256(case_text(case)).hexdigest(),
         )
 
     def plot(self) -> Figure:

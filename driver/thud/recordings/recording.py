@@ -10,9 +10,12 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from thud.base.checks import refuse
+from thud.base.checks import require_whole
 from thud.base.display import Displayed
+from thud.base.extras import require_extra
+from thud.case.case import Case
 from thud.level.assessment import assess
+from thud.level.impact_result import DropForce
 from thud.recordings.averages import level_estimates
 from thud.recordings.budgets import drop_estimates, find_deviant, told_restitution
 from thud.recordings.config import Config, checked_config
@@ -20,16 +23,19 @@ from thud.recordings.excursion import check_peak, scan
 from thud.recordings.low_pass import describe_low_pass
 from thud.recordings.measure_drops import measure_signals
 from thud.recordings.recorded_levels import average_levels, compare_methods, measure_levels
+from thud.recordings.restitution import DropConditions
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Iterable
 
+    import pandas as pd
+    import xarray as xr
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.base._schema import BandSet, LevelsForce, LimitsSource
+    from thud.base._schema import BandSet, LevelsForce, LevelsMethod, LimitsSource
     from thud.level.assessment import Verdict
     from thud.level.estimate import Estimate
     from thud.recordings.checkpoint import Checkpoint
@@ -147,11 +153,6 @@ class Recording(Displayed):
         return self.drops[0].time
 
     @property
-    def record(self) -> NDArray[np.float64]:
-        """Force of the first drop, corrected, N, shape (n_sample,)."""
-        return self.drops[0].force
-
-    @property
     def sample_rate(self) -> float:
         """Samples per second of the first drop, Hz."""
         return self.drops[0].sample_rate
@@ -161,19 +162,43 @@ class Recording(Displayed):
         """Time of first touch, s: 0."""
         return 0.0
 
-    @property
-    def origin(self) -> float:
-        """Time of first touch of the first drop in its file, s."""
-        return self.drops[0].onset
-
     def assessed_force(self, force: LevelsForce | None = None) -> LevelsForce:  # noqa: ARG002 - there is one
         """Return the force that a force plate measures: ``"floor"``."""
         return "floor"
 
     @property
-    def level_method(self) -> str:
+    def level_method(self) -> LevelsMethod:
         """Method of the levels: ``"exact"``."""
         return "exact"
+
+    @property
+    def case(self) -> Case:
+        """Case without a model, a floor or a room."""
+        return Case(model=None)
+
+    @property
+    def on_floor(self) -> None:
+        """None: the force on a mobile floor is not known."""
+
+    @property
+    def limits_source(self) -> LimitsSource | None:
+        """Source of the configuration; None if it is the default, which nobody may have stated."""
+        return None if self.config.source == Config.source else self.config.source
+
+    @property
+    def mass(self) -> float:
+        """Stated or effective mass, kg; NaN if unknown."""
+        return self.estimates["mass"].value
+
+    @property
+    def impact_velocity(self) -> float:
+        """Velocity at first touch by the stated drop height, m/s; NaN without it."""
+        return DropConditions(self.config.height).speed
+
+    @property
+    def velocity_tolerance(self) -> float:
+        """Relative tolerance of the velocity: that of a drop height of 0.85 m or more ± 1 cm."""
+        return 0.015
 
     @property
     def contact_time(self) -> float:
@@ -189,6 +214,11 @@ class Recording(Displayed):
     def peak_force(self) -> float:
         """Mean maximum force below 1.25 kHz, N."""
         return float(np.mean([drop.peak_force.value for drop in self.drops]))
+
+    @property
+    def impulse(self) -> float:
+        """Mean time integral of the force, N s."""
+        return float(np.mean([drop.impulse.value for drop in self.drops]))
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -240,8 +270,8 @@ class Recording(Displayed):
         return tuple(dict.fromkeys(f"levels: {describe_low_pass(rate)}" for rate in rates))
 
     def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - there is one
-        """Return the force of the first drop, N, shape (n_sample,), for any `kind`."""
-        return self.record
+        """Return the force of the first drop, corrected, N, shape (n_sample,), for any `kind`."""
+        return self.drops[0].force
 
     def peak(self, force: LevelsForce | None = None) -> float:  # noqa: ARG002 - there is one
         """Return the mean maximum force, N."""
@@ -334,18 +364,45 @@ class Recording(Displayed):
 
         return recording_figure(self, what)
 
-    def to_force_history(self, drop: int = 1) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return time since first touch, s, and force, N, of one contact, shape (n_sample,).
+    def to_xarray(self) -> xr.Dataset:
+        """Return the force of the first drop, the average levels and the means over the drops.
 
-        The force is zero before and after: it may drive another program's floor.
-
-        Parameters
-        ----------
-        drop
-            Number of the drop, from 1.
+        Raise InputError where xarray is not installed.
         """
-        if not 1 <= drop <= len(self.drops):
-            refuse(f"drop = {drop} does not exist", f"1 to {len(self.drops)}")
+        with require_extra("studies"):
+            from thud.impact.datasets import recording_dataset
+
+        return recording_dataset(self)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the force of the first drop over time.
+
+        Raise InputError where pandas is not installed.
+        """
+        with require_extra("studies"):
+            import pandas as pd
+
+        index = pd.Index(self.time, name="time_s")
+        return pd.DataFrame({"floor_force_N": self.force()}, index=index)
+
+    def drop_force(self, drop: int = 1) -> DropForce:
+        """Return the force of a contact by its number, from 1; it is zero before and after."""
+        require_whole("drop", drop, 1, len(self.drops))
+        number = drop
+        for origin in self.origins:
+            if number <= origin.drops:
+                break
+            number -= origin.drops
         one = self.drops[drop - 1]
-        gate = slice(*one.gate)
-        return one.time[gate], one.force[gate].copy()
+        first, stop = one.gate
+        return DropForce(
+            name=self.name if len(self.drops) == 1 else f"{self.name}_drop_{drop}",
+            force=one.force[first:stop],
+            sample_rate=one.sample_rate,
+            start=float(one.time[first]),
+            kind=self.assessed_force(),
+            origin=f"recording {one.name}, {origin.calibration or 'calibration not known'}",
+            checksum=origin.checksum,
+            date=origin.date,
+            notes=(*one.steps, f"noise of {one.noise.deviation:.3g} N remains"),
+        )
