@@ -167,7 +167,7 @@ def test_places_without_results_stay_empty() -> None:
     result = thud.design_map(study)
     assert int(np.isnan(result.dataset["margin"]).sum()) == 3
     thud.plot.draw_design_map(result)
-    assert ("sets", "9") in result.table()
+    assert ("samples", "9") in result.table()
 
 
 @pytest.mark.parametrize(

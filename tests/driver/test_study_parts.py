@@ -154,7 +154,7 @@ def test_grids_and_lists_need_values_that_fit() -> None:
 
 def test_sets_of_saltelli_exchange_one_column_each() -> None:
     """A, A with one column of B for each parameter, B: the points of Saltelli's design."""
-    points = designs.unit_sets("saltelli", 3, 8, 5, 0, 40).reshape(8, 5, 3)
+    points = designs.unit_samples("saltelli", 3, 8, 5, 0, 40).reshape(8, 5, 3)
     first, second = points[:, 0], points[:, 4]
     for matrix in (first, second):
         # A point in each of eight strata.
@@ -164,9 +164,9 @@ def test_sets_of_saltelli_exchange_one_column_each() -> None:
         mixed = np.where(np.arange(3) == j, second, first)
         np.testing.assert_array_equal(points[:, 1 + j], mixed)
     np.testing.assert_array_equal(
-        designs.unit_sets("saltelli", 3, 8, 5, 7, 23), points.reshape(40, 3)[7:23]
+        designs.unit_samples("saltelli", 3, 8, 5, 7, 23), points.reshape(40, 3)[7:23]
     )
-    other = designs.unit_sets("saltelli", 3, 8, 6, 0, 40)
+    other = designs.unit_samples("saltelli", 3, 8, 6, 0, 40)
     assert not np.array_equal(other, points.reshape(40, 3))
     assert set(designs.makers("saltelli")) == {"scipy_version", "salib_version"}
     assert set(designs.makers("random")) == {"scipy_version"}
@@ -289,8 +289,8 @@ def test_verdict_is_in_doubt_where_errors_reach_a_limit() -> None:
 
 def test_range_of_a_surrogate_counts_doubtful_sets_twice() -> None:
     dataset = xr.Dataset(
-        {"conforms": ("set", [True, True, True, False, False, False, False, False]),
-         "doubtful": ("set", [True, False, False, True, True, False, False, False])}
+        {"conforms": ("sample", [True, True, True, False, False, False, False, False]),
+         "doubtful": ("sample", [True, False, False, True, True, False, False, False])}
     )  # fmt: skip
     found = Uncertainty(dataset, np.empty((8, 5)), "rubber_ball", 3, 8, 0)
     assert found.surrogate_range == (2 / 8, 5 / 8)
@@ -306,7 +306,7 @@ def test_table_of_the_uncertainty_has_the_shares_within_the_limits() -> None:
     levels[0], levels[1] = ([getattr(c, end) for c in criteria] for end in ("lower", "upper"))
     # A set without result has no rating.
     rating = draw.normal(50, 20, 201)
-    rated = xr.Dataset({RATING: ("set", rating), "status": ("set", [0] * 200 + [1])})
+    rated = xr.Dataset({RATING: ("sample", rating), "status": ("sample", [0] * 200 + [1])})
 
     def spread(level: np.ndarray) -> tuple[str, ...]:
         ordered = np.sort(level)
@@ -333,7 +333,7 @@ def test_best_place_of_a_map_is_shown_in_its_unit() -> None:
     margin = found.dataset["margin"].values
     rows = dict(found.table())
     i, j = np.unravel_index(margin.argmax(), margin.shape)
-    assert rows["sets"] == "6"
+    assert rows["samples"] == "6"
     assert float(rows["largest margin, dB"]) == pytest.approx(margin.max(), abs=0.006)
     assert float(rows["  at height, cm"]) == pytest.approx([90, 100, 110][i])
     assert float(rows["  at mass, kg"]) == [2.4, 2.6][j]

@@ -144,10 +144,12 @@ def test_multiples_are_exact() -> None:
 
 @pytest.mark.parametrize("design", ["random", "latin_hypercube", "sobol"])
 def test_drawn_designs_fill_their_range(design: str) -> None:
-    whole = designs.unit_sets(design, 3, 256, 5, 0, 256)
-    parts = [designs.unit_sets(design, 3, 256, 5, a, b) for a, b in ((0, 1), (1, 100), (100, 256))]
+    whole = designs.unit_samples(design, 3, 256, 5, 0, 256)
+    parts = [
+        designs.unit_samples(design, 3, 256, 5, a, b) for a, b in ((0, 1), (1, 100), (100, 256))
+    ]
     np.testing.assert_array_equal(np.concatenate(parts), whole)
-    assert not np.array_equal(designs.unit_sets(design, 3, 256, 6, 0, 256), whole)
+    assert not np.array_equal(designs.unit_samples(design, 3, 256, 6, 0, 256), whole)
     if design == "random":
         # Six standard errors of the mean of a uniform distribution.
         assert abs(whole.mean() - 0.5) < 6 / np.sqrt(12 * whole.size)
@@ -209,7 +211,7 @@ def test_list_pairs_values_and_entries_of_lists() -> None:
             },
         }
     )
-    assert found["contact_time"].dims == ("set",)
+    assert found["contact_time"].dims == ("sample",)
     options = {"damping_ratio": [0.04, 0.05], "effective_mass": [2.4, 0.1]}
     impact = thud.solve(model="measured_modes", frequency=[24.0, 80.0], **options)
     assert float(found["peak_force"][0]) == impact.peak_force
@@ -455,7 +457,7 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         (
             "parameters = {height=$, mass=$, gravity=$}".replace(
                 "$", "{low=1, high=2, count=10_000_000}"),
-            naming("sets", "2^63 - 1", "grid"),
+            naming("samples", "2^63 - 1", "grid"),
         ),
         (f"design.seed = 1{'0' * 5000}", naming("TOML")),
         ("parameters.height = {std=1}", naming("height", "values", "grid")),
@@ -557,7 +559,7 @@ def test_exploding_designs_are_reported_before_they_are_made(
 ) -> None:
     spread = {"low": 1, "high": 2, "count": 10**9}
     study = {"design": {"kind": design}, "parameters": {"mass": spread, "height": spread}}
-    with pytest.raises(thud.InputError, match=naming("sets", "hollow_sphere")):
+    with pytest.raises(thud.InputError, match=naming("samples", "hollow_sphere")):
         compute(study)
 
 
@@ -712,5 +714,5 @@ def test_design_that_exceeds_the_memory_is_told(
 def test_sets_that_exceed_the_memory_are_told_before_they_are_computed() -> None:
     height = thud.Parameter(low=0.5, high=1.0, count=2**30)
     mass = thud.Parameter(low=2.4, high=2.6, count=2**30)
-    with pytest.raises(thud.InputError, match=f"{2**60} sets"):
+    with pytest.raises(thud.InputError, match=f"{2**60} samples"):
         thud.sweep({"parameters": {"height": height, "mass": mass}}, yes=True)

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 MAX_THREADS = 1024
 # Approximate time of one call of the library, s: interrupts are handled between calls.
 _CALL_TIME = 1.0
-# Maximum number of sets of one call, whose results the library holds in memory.
+# Maximum number of samples of one call, whose results the library holds in memory.
 _MAX_CALL = 2**17
 
 
@@ -70,7 +70,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     forces and 1e-6 dB in the levels of bands that hold 1e-8 or more of the energy of the force, for
     the others bit for bit. Rounding counts in bands that hold less, as of slow contacts at 500 Hz:
     10 times less energy makes the difference 10 times greater. Results do not depend on the number
-    of threads or on the order of the sets.
+    of threads or on the order of the samples.
 
     Parameters
     ----------
@@ -92,9 +92,9 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         Bands of the levels in addition to octaves, such as ``"third"``; by default those of the
         case.
     forces
-        Keep the force histories: 16 bytes per sample and set.
+        Keep the force histories: 16 bytes for each instant of each sample.
     sample_rate, duration, substeps
-        As in `solve`, shared by all sets; by default those of the case.
+        As in `solve`, shared by all samples; by default those of the case.
     source
         ``"rubber_ball"`` or ``"tyre"``: the limits that apply; by default those of the case.
     progress
@@ -103,7 +103,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     Returns
     -------
     Ensemble
-        Outcomes, levels and verdicts. Sets that fail have a status, a reason and NaN, and do not
+        Outcomes, levels and verdicts. Samples that fail have a status, a reason and NaN, and do not
         affect the others.
 
     Raises
@@ -143,7 +143,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     try:
         columns, numbers = _columns(given, base)
     except MemoryError as error:
-        refuse("the parameters do not fit in memory", "fewer sets", error)
+        refuse("the parameters do not fit in memory", "fewer samples", error)
     shared = {
         "sample_rate": sample_rate,
         "duration": duration,
@@ -160,7 +160,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     work = int(np.clip(_CALL_TIME * width / sizes["cost"], 1, _MAX_CALL))
     parts = []
     try:
-        with tqdm(total=len(numbers), unit="set", disable=not progress, leave=False) as bar:
+        with tqdm(total=len(numbers), unit="sample", disable=not progress, leave=False) as bar:
             for start in range(0, max(len(numbers), 1), work):
                 some = numbers[start : start + work]
                 parts.append(
@@ -173,8 +173,8 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
             else {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         )
     except MemoryError as error:
-        size = f"{len(numbers)} sets" + (f" of {sizes['sample']:.0f} samples" if forces else "")
-        refuse(f"forces = {forces} for {size} does not fit in memory", "fewer sets", error)
+        size = f"{len(numbers)} samples" + (f" of {sizes['sample']:.0f} instants" if forces else "")
+        refuse(f"forces = {forces} for {size} does not fit in memory", "fewer samples", error)
     # They may fill the memory: once is enough.
     force = freeze(results["force"])
     return Ensemble(
@@ -239,7 +239,7 @@ def _compute(  # noqa: PLR0913 - those of the library
     judged: bool,
     forces: bool,
 ) -> dict[str, NDArray[Any]]:
-    """Return the results of some sets, the sets first."""
+    """Return the results of some samples, the samples first."""
     count = len(numbers)
     # f2py knows no empty arrays: one set stands in for none.
     given = numbers if count else np.zeros((1, numbers.shape[1]))

@@ -29,43 +29,43 @@ class Ensemble(Displayed):
     ----------
     case : Case
         All other keys.
-    parameters : dict of str to ndarray, shape (n_set,)
+    parameters : dict of str to ndarray, shape (n_sample,)
         Parameters in which the drops differ.
-    status : ndarray of int, shape (n_set,)
+    status : ndarray of int, shape (n_sample,)
         0, or the exit code of the error: 1 bad input, 2 numerical failure.
-    reason : ndarray of str, shape (n_set,)
+    reason : ndarray of str, shape (n_sample,)
         The sentence of the error.
-    contact_time : ndarray, shape (n_set,)
+    contact_time : ndarray, shape (n_sample,)
         Time from first touch to release, s.
-    peak_force, peak_elastic_force : ndarray, shape (n_set,)
+    peak_force, peak_elastic_force : ndarray, shape (n_sample,)
         Maximum of the force on the floor and of the elastic force, N.
-    max_deflection : ndarray, shape (n_set,)
+    max_deflection : ndarray, shape (n_sample,)
         Maximum deflection, m.
-    restitution : ndarray, shape (n_set,)
+    restitution : ndarray, shape (n_sample,)
         Velocity at release over velocity at first touch.
-    impulse : ndarray, shape (n_set,)
+    impulse : ndarray, shape (n_sample,)
         Impulse given to the floor, N s.
-    levels : dict of (force, bands) to ndarray, shape (n_set, n_band)
+    levels : dict of (force, bands) to ndarray, shape (n_sample, n_band)
         Force exposure levels, dB: of ``"elastic"`` and ``"floor"``, in octaves, on which the
         verdict is based, and in the other bands of the case.
-    margin : ndarray, shape (n_set,)
+    margin : ndarray, shape (n_sample,)
         Minimum distance of an octave level of the judged force to its limits, dB, positive inside.
-    conforms : ndarray of bool, shape (n_set,)
+    conforms : ndarray of bool, shape (n_sample,)
         Verdict of the standards on the force that the case judges.
-    elastic_conforms, floor_conforms : ndarray of bool, shape (n_set,)
+    elastic_conforms, floor_conforms : ndarray of bool, shape (n_sample,)
         The same on the elastic force and on the force on the floor.
-    elastic_force, floor_force : ndarray, shape (n_set, n_sample), or None
+    elastic_force, floor_force : ndarray, shape (n_sample, n_time), or None
         Forces, N; None unless requested.
     sample_rate : float
         Samples per second, Hz.
-    contact_levels : dict of bands to ndarray, shape (n_set, n_band)
+    contact_levels : dict of bands to ndarray, shape (n_sample, n_band)
         Of cases with a floor: levels of the force on it, dB; on a rigid floor, and of models that
         know no other, those of the force there.
-    floor_work : ndarray, shape (n_set,), or None
+    floor_work : ndarray, shape (n_sample,), or None
         Likewise the energy that the source gives to the floor, J.
-    room_level : ndarray, shape (n_set, 12), or None
+    room_level : ndarray, shape (n_sample, 12), or None
         Of cases with a room: maximum Fast levels in the thirds from 50 to 630 Hz, dB re 20 uPa.
-    room_rating, standardised_rating : ndarray, shape (n_set,), or None
+    room_rating, standardised_rating : ndarray, shape (n_sample,), or None
         Their A-weighted sum L_iA,Fmax, dB, and that of the standardised levels; see `rating`.
     """
 
@@ -94,7 +94,7 @@ class Ensemble(Displayed):
     standardised_rating: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
-        """Return the number of sets."""
+        """Return the number of samples."""
         return len(self.status)
 
     def __repr__(self) -> str:
@@ -125,7 +125,7 @@ class Ensemble(Displayed):
         return rows
 
     def to_xarray(self) -> xr.Dataset:
-        """Return the outcomes along the dimension ``set``, with units and provenance.
+        """Return the outcomes along the dimension ``sample``, with units and provenance.
 
         Raise InputError where xarray is not installed.
         """
@@ -136,10 +136,10 @@ class Ensemble(Displayed):
 
     @property
     def elastic_octaves(self) -> NDArray[np.float64]:
-        """Octave levels of the elastic force, dB, shape (n_set, 5)."""
+        """Octave levels of the elastic force, dB, shape (n_sample, 5)."""
         return self.levels["elastic", BANDWIDTHS[0]]
 
     @property
     def floor_octaves(self) -> NDArray[np.float64]:
-        """Octave levels of the force on the floor, dB, shape (n_set, 5)."""
+        """Octave levels of the force on the floor, dB, shape (n_sample, 5)."""
         return self.levels["floor", BANDWIDTHS[0]]

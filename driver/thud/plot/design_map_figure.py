@@ -28,7 +28,7 @@ _TINY = 0.05
 
 @own_style()
 def draw_design_map(result: DesignMap) -> Figure:
-    """Draw the margin of a design map, dB, its zero as a line, and the sets that conform.
+    """Draw the margin of a design map, dB, its zero as a line, and the samples that conform.
 
     The margin is positive where all octave levels lie within their limits. Of a case with a room
     draw the rating of the standardised levels there.

@@ -1,4 +1,4 @@
-"""Designs: which sets a study has, and the points of those that are drawn."""
+"""Designs: which samples a study has, and the points of those that are drawn."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 DRAWN = ("random", "latin_hypercube", "sobol", "saltelli")
 # Fewer base samples than this give no Sobol indices.
-MIN_SAMPLES = 4
+MIN_BASE_SAMPLES = 4
 # Maximum of NumPy's integers.
-_MAX_SETS = 2**63 - 1
+_MAX_SAMPLES = 2**63 - 1
 
 
 def makers(design: str) -> dict[str, str]:
@@ -53,12 +53,12 @@ def read_design(
             )
     if design == "list" and len({p.size for p in parameters}) > 1:
         refuse("[parameters] differ in their number of values", "the same for all")
-    if design == "grid" and math.prod(p.size for p in parameters) > _MAX_SETS:
-        refuse("[parameters] make too many sets", "up to 2^63 - 1 in a grid")
+    if design == "grid" and math.prod(p.size for p in parameters) > _MAX_SAMPLES:
+        refuse("[parameters] make too many samples", "up to 2^63 - 1 in a grid")
     if design not in DRAWN:
         return {"design": design}
     size, seed = given.get("size", 0), given.get("seed", 0)
-    minimum = MIN_SAMPLES if design == "saltelli" else 1
+    minimum = MIN_BASE_SAMPLES if design == "saltelli" else 1
     require_whole("[design] size", size, minimum, MAX_VALUES)
     require_whole("[design] seed", seed, 0, LARGEST_SEED)
     if design in {"sobol", "saltelli"} and size & (size - 1):
@@ -70,7 +70,7 @@ def read_design(
     return {"design": design, "size": size, "seed": seed}
 
 
-def unit_sets(  # noqa: PLR0913, PLR0917 - the numbers of a design
+def unit_samples(  # noqa: PLR0913, PLR0917 - the numbers of a design
     design: str, dimension: int, size: int, seed: int, start: int, stop: int
 ) -> NDArray[np.float64]:
     """Return points of a design in the unit cube, shape (stop - start, dimension)."""

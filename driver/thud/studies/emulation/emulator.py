@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 # Share of the held-out drops within the error that is stated, and the confidence of that.
 SHARE = 0.95
-# Sets that are computed together: their kernel stays in the cache.
+# Samples that are computed together: their kernel stays in the cache.
 _TOGETHER = 250
 # Values beyond the region by this part of its width are rounding.
 _ROUNDING = 1e-9
@@ -198,10 +198,10 @@ class Surrogate(Displayed):
             refuse(f"{key} = {now.get(key)}: the surrogate was trained with {before[key]}", "that")
 
     def predict(self, case: Case, columns: Columns) -> Columns:
-        """Return the results of sets of a case that differ in some keys, shape (n_set,) each.
+        """Return the results of samples of a case that differ in some keys, shape (n_sample,) each.
 
         They are those of `thud.studies.evaluation.evaluate`, and ``doubtful``: the verdict could
-        change by the errors. Sets outside the region have a status and a reason instead. Raises
+        change by the errors. Samples outside the region have a status and a reason instead. Raises
         InputError as `require`.
         """
         self.require(case, columns)
