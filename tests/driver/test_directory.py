@@ -493,7 +493,7 @@ def test_results_that_cannot_be_read_for_now_stay(
     with monkeypatch.context() as patch:
         patch.setattr("xarray.open_zarr", fail)
         patch.setattr("thud.studies.blocks.read_input", fail)
-        patch.setattr("thud.studies.emulation.emulator.read_input", fail)
+        patch.setattr("thud.studies.trained_surrogate.read_input", fail)
         with pytest.raises(OSError, match=os.strerror(number)):
             run(study, tmp_path, replace=True)
     assert (tmp_path / name).stat().st_ino == inode

@@ -10,7 +10,7 @@ from conftest import REPOSITORY, naming
 
 import thud
 from thud import cli
-from thud.studies.designs import unit_samples
+from thud.studies.sampling import unit_samples
 from thud.studies.sensitivity import sobol_indices
 
 if TYPE_CHECKING:

@@ -26,7 +26,7 @@ from thud.base._schema import MODELS
 from thud.base.units import MULTIPLES, scaled
 from thud.case.keys import known_keys, put
 from thud.impact.ensemble import get_cost
-from thud.studies import designs, directory, evaluation, fit, sweep
+from thud.studies import directory, evaluation, fit, sampling, sweep
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -116,8 +116,8 @@ def test_other_makers_of_points_are_another_study(monkeypatch: pytest.MonkeyPatc
     found = thud.sweep(drawn)
     assert found.attrs["scipy_version"] == scipy.__version__
     assert "salib_version" not in found.attrs
-    assert "salib_version" in designs.makers("saltelli")
-    monkeypatch.setattr(designs, "version", lambda _: "0.0.1")
+    assert "salib_version" in sampling.sampler_versions("saltelli")
+    monkeypatch.setattr(sampling, "version", lambda _: "0.0.1")
     assert drawn.identity != before[0]
     assert grid.identity == before[1]
 
@@ -144,12 +144,12 @@ def test_multiples_are_exact() -> None:
 
 @pytest.mark.parametrize("design", ["random", "latin_hypercube", "sobol"])
 def test_drawn_designs_fill_their_range(design: str) -> None:
-    whole = designs.unit_samples(design, 3, 256, 5, 0, 256)
+    whole = sampling.unit_samples(design, 3, 256, 5, 0, 256)
     parts = [
-        designs.unit_samples(design, 3, 256, 5, a, b) for a, b in ((0, 1), (1, 100), (100, 256))
+        sampling.unit_samples(design, 3, 256, 5, a, b) for a, b in ((0, 1), (1, 100), (100, 256))
     ]
     np.testing.assert_array_equal(np.concatenate(parts), whole)
-    assert not np.array_equal(designs.unit_samples(design, 3, 256, 6, 0, 256), whole)
+    assert not np.array_equal(sampling.unit_samples(design, 3, 256, 6, 0, 256), whole)
     if design == "random":
         # Six standard errors of the mean of a uniform distribution.
         assert abs(whole.mean() - 0.5) < 6 / np.sqrt(12 * whole.size)
@@ -552,7 +552,7 @@ def test_bad_studies_are_reported(
 
 
 @pytest.mark.parametrize(
-    ("compute", "design"), [(thud.sweep, "grid"), (thud.sweep, "list"), (thud.design_map, "grid")]
+    ("compute", "design"), [(thud.sweep, "grid"), (thud.sweep, "list"), (thud.design, "grid")]
 )
 def test_exploding_designs_are_reported_before_they_are_made(
     compute: Callable[[dict[str, Any]], object], design: str
@@ -644,7 +644,7 @@ def test_study_without_results_is_a_failure(
 
 def test_study_of_another_kind_is_reported() -> None:
     study = thud.read_study(HEIGHTS)
-    for function in (thud.sensitivity, thud.design_map, thud.uncertainty):
+    for function in (thud.sensitivity, thud.design, thud.uncertainty):
         with pytest.raises(thud.InputError, match=naming("python", "sweep")):
             function(study)
 

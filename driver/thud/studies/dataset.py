@@ -10,8 +10,8 @@ import xarray as xr
 from thud.impact.datasets import band_coordinates, origin, room_coordinates
 from thud.impact.quantities import ALL_QUANTITIES, BANDS, CONTACT_LEVELS, ROOM_BAND, ROOM_LEVEL
 from thud.level.levels import get_bands
-from thud.studies.designs import makers
 from thud.studies.evaluation import level_names
+from thud.studies.sampling import sampler_versions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -92,7 +92,7 @@ def provenance(study: SampleStudy) -> dict[str, str]:
         "seed": str(study.seed) if study.size else "none",
         "parameters": " ".join(parameter.coordinate for parameter in study.parameters),
         **({"surrogate": study.surrogate.sentence} if study.surrogate else {}),
-        **makers(study.design),
+        **sampler_versions(study.design),
         **origin(study.case),
     }
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from thud.base._schema import BandSet, LevelsForce
     from thud.case.case import Case
-    from thud.studies.emulation.emulator import Surrogate
+    from thud.studies.trained_surrogate import Surrogate
 
     Columns = dict[str, NDArray[Any]]
 

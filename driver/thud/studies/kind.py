@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from thud.base.files import Results
     from thud.case.case import Case
     from thud.case.keys import Value
-    from thud.studies.emulation.emulator import Surrogate
     from thud.studies.parameter import Parameter
     from thud.studies.study import Source
+    from thud.studies.trained_surrogate import Surrogate
 
 S = TypeVar("S", bound=Study)
 R = TypeVar("R")

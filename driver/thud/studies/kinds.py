@@ -35,7 +35,7 @@ class KindInfo(NamedTuple):
 KINDS = {
     "sweep": KindInfo("sweep", "drops over a grid, a list or a random design of parameters"),
     "sensitivity": KindInfo("sensitivity", "Sobol indices: which parameter matters for what"),
-    "design": KindInfo("design_map", "which geometry and material conform to the standards"),
+    "design": KindInfo("design", "which geometry and material conform to the standards"),
     "uncertainty": KindInfo("uncertainty", "how tolerances spread levels and conformity"),
     "surrogate": KindInfo("surrogate", "what other studies ask instead of a slow model"),
     "fit": KindInfo("fit", "parameters of a model from a force or from levels", has_samples=False),

@@ -15,16 +15,16 @@ from thud.studies.backends import checked_backend
 from thud.studies.blocks import read_identity, result_names
 from thud.studies.computing import compute_samples
 from thud.studies.dataset import disk_space
-from thud.studies.designs import read_design
 from thud.studies.directory import FORMATS
-from thud.studies.emulation.emulator import Surrogate, read_surrogate
-from thud.studies.emulation.plan import read_plan
-from thud.studies.emulation.training import surrogate_name, train
 from thud.studies.kind import Kind
 from thud.studies.parameter import varied
 from thud.studies.samples import SampleStudy
+from thud.studies.sampling import read_design
 from thud.studies.study import table_of
+from thud.studies.surrogate_plan import read_plan
+from thud.studies.surrogate_training import surrogate_name, train
 from thud.studies.temperature import read_temperature
+from thud.studies.trained_surrogate import Surrogate, read_surrogate
 
 if TYPE_CHECKING:
     import os

@@ -10,15 +10,15 @@ import numpy as np
 
 from thud.case.keys import DENSITY
 from thud.impact.ensemble import get_cost
-from thud.studies.designs import makers, unit_samples
+from thud.studies.sampling import sampler_versions, unit_samples
 from thud.studies.study import Study, wall_volume
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.studies.emulation.emulator import Surrogate
-    from thud.studies.emulation.plan import Plan
+    from thud.studies.surrogate_plan import Plan
     from thud.studies.temperature import Temperature
+    from thud.studies.trained_surrogate import Surrogate
 
     Columns = dict[str, NDArray[Any]]
 
@@ -62,7 +62,7 @@ class SampleStudy(Study):
 
     def own_identity(self) -> dict[str, str]:
         """Return design and temperature law."""
-        found = makers(self.design) | {"[design] kind": self.design}
+        found = sampler_versions(self.design) | {"[design] kind": self.design}
         if self.size:
             found |= {"[design] size": f"{self.size}", "[design] seed": f"{self.seed}"}
         if self.temperature:

@@ -12,8 +12,8 @@ from thud.base.checks import refuse
 from thud.base.display import Displayed
 from thud.impact.quantities import FLOOR_QUANTITIES
 from thud.level.levels import get_bands
-from thud.studies.designs import MIN_BASE_SAMPLES
 from thud.studies.sample_kind import SampleKind
+from thud.studies.sampling import MIN_BASE_SAMPLES
 
 if TYPE_CHECKING:
     import os

@@ -6,10 +6,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Unpack
 
 from thud.base.checks import refuse
-from thud.studies.emulation.emulator import Surrogate, read_surrogate
-from thud.studies.emulation.training import surrogate_name, train
 from thud.studies.parameter import Parameter
 from thud.studies.sample_kind import DropsKind
+from thud.studies.surrogate_training import surrogate_name, train
+from thud.studies.trained_surrogate import Surrogate, read_surrogate
 
 if TYPE_CHECKING:
     import os

@@ -19,8 +19,7 @@ from thud.base.extras import require_extra
 from thud.base.files import is_failure, read_input, replace_file
 from thud.case.case import Case, case_text
 from thud.case.keys import OF_FILES, put
-from thud.level.levels import get_bands
-from thud.studies.emulation.doubtful import judge_many
+from thud.level.levels import get_bands, judge
 from thud.studies.study import value_in
 
 if TYPE_CHECKING:
@@ -28,6 +27,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from numpy.typing import NDArray
+
+    from thud.base._schema import LimitsSource
 
     Columns = dict[str, NDArray[Any]]
     Values = NDArray[np.float64]
@@ -248,7 +249,7 @@ class Surrogate(Displayed):
         level = f"{case.levels.force}_level"
         rest = [given.get(n, np.asarray(value_in(case, n))) for n in ("mass", "height")]
         exact = [np.zeros(1)] * 3
-        verdicts = judge_many(
+        verdicts = assess_many(
             (found[level], *(found[n] for n in names), np.array([self.peaks]), *rest),
             (
                 self.error_of(level)[np.newaxis],
@@ -319,6 +320,41 @@ class Surrogate(Displayed):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write it to a file ``.npz``, completely or not at all; `read_surrogate` reads it."""
         replace_file(path, self.to_bytes())
+
+
+def assess_many(
+    values: tuple[Values, ...], errors: tuple[Values, ...], source: LimitsSource
+) -> dict[str, NDArray[Any]]:
+    """Return margin, verdict, and whether errors could change it, of many drops.
+
+    Parameters
+    ----------
+    values
+        Octave levels, dB, shape (n, 5); contact time, s; restitution; number of peaks; mass, kg;
+        height, m, as in `thud.judge`, shape (n,) or of one value.
+    errors
+        The same of their errors, in the same units.
+    source
+        Source whose limits apply.
+    """
+    count, bands = values[0].shape
+    judged, by = (_columns(part, count) for part in (values, errors))
+    criteria = judge(np.zeros(bands), 0, 0, 0, 0, 0, source).criteria
+    lower = np.array([one.lower for one in criteria])
+    upper = np.array([one.upper for one in criteria])
+    inside = np.minimum(judged - lower, upper - judged)
+    surely, perhaps = ((inside >= sign * by).all(axis=1) for sign in (1, -1))
+    return {
+        "margin": inside[:, :bands].min(axis=1),
+        "conforms": (inside >= 0).all(axis=1),
+        "doubtful": perhaps & ~surely,
+    }
+
+
+def _columns(parts: tuple[Values, ...], count: int) -> Values:
+    """Return the values of all criteria, shape (count, n_criterion)."""
+    levels = np.broadcast_to(parts[0], (count, parts[0].shape[-1]))
+    return np.column_stack([levels, *(np.broadcast_to(part, count) for part in parts[1:])])
 
 
 def keys_of(case: Case) -> dict[str, str]:

@@ -18,24 +18,24 @@ from thud.case.keys import find_key
 from thud.impact.quantities import LEVELS, SCALAR_QUANTITIES
 from thud.studies.blocks import read_identity, result_names
 from thud.studies.computing import compute_samples
-from thud.studies.designs import unit_samples
 from thud.studies.directory import require_version
-from thud.studies.emulation.emulator import (
+from thud.studies.parameter import Parameter
+from thud.studies.samples import SampleStudy
+from thud.studies.sampling import unit_samples
+from thud.studies.trained_surrogate import (
     SMOOTHNESS,
     Surrogate,
     read_surrogate,
 )
-from thud.studies.parameter import Parameter
-from thud.studies.samples import SampleStudy
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
     from thud.base.files import Results
-    from thud.studies.emulation.plan import Plan
     from thud.studies.kind import RunOptions
     from thud.studies.samples import Columns
+    from thud.studies.surrogate_plan import Plan
 
     Values = NDArray[np.float64]
 

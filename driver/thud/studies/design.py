@@ -31,7 +31,7 @@ _AXES = 2
 
 
 @dataclass(frozen=True, eq=False)
-class DesignMap(Displayed):
+class Design(Displayed):
     """Margin and verdict over two parameters.
 
     Attributes
@@ -57,7 +57,7 @@ class DesignMap(Displayed):
         """Return the axes, and how much conforms."""
         conforms = self.dataset["conforms"]
         count = f"{int(conforms.sum())} of {conforms.size} samples conform"
-        return f"<DesignMap, {' and '.join(self.axes)}: {count}>"
+        return f"<Design, {' and '.join(self.axes)}: {count}>"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
@@ -84,7 +84,7 @@ class DesignMap(Displayed):
         return rows
 
 
-class DesignMapKind(SampleKind[DesignMap]):
+class DesignKind(SampleKind[Design]):
     """Maps of a design as a kind of study."""
 
     name = "design"
@@ -97,24 +97,24 @@ class DesignMapKind(SampleKind[DesignMap]):
             refuse("[parameters] do not make a map", "two numeric ones of two values or more")
         return found
 
-    def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> DesignMap:
+    def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> Design:
         """Return the map of all samples."""
         first, second = (parameter.coordinate for parameter in study.parameters)
-        return DesignMap(dataset.load().sortby([first, second]), (first, second), *_mark(study))
+        return Design(dataset.load().sortby([first, second]), (first, second), *_mark(study))
 
-    def draw(self, result: DesignMap) -> Figure:
+    def draw(self, result: Design) -> Figure:
         """Return the margin over both parameters."""
-        from thud.plot import draw_design_map
+        from thud.plot import draw_design
 
-        return draw_design_map(result)
-
-
-KIND = DesignMapKind()
+        return draw_design(result)
 
 
-def design_map(
+KIND = DesignKind()
+
+
+def design(
     study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[RunOptions]
-) -> DesignMap:
+) -> Design:
     """Compute which geometry and material conform to the standards.
 
     Parameters
@@ -126,7 +126,7 @@ def design_map(
 
     Returns
     -------
-    DesignMap
+    Design
         Margin and verdict of the force that the case judges.
 
     Raises
