@@ -30,7 +30,7 @@ from thud.impact.free_modes import FreeModes
 from thud.impact.impact import Impact
 from thud.plot.comparison_page import comparison_page as comparison_page
 from thud.plot.compression_figure import compression as compression
-from thud.plot.design_map_figure import draw_design_map as draw_design_map
+from thud.plot.design_figure import draw_design as draw_design
 from thud.plot.fit_figure import draw_fit as draw_fit
 from thud.plot.floor_figure import draw_floor as draw_floor
 from thud.plot.floor_mobilities_figure import floor_mobilities as floor_mobilities

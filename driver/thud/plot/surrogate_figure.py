@@ -11,7 +11,7 @@ from thud.plot.style import COLOURS, SIZE, empty_axes, legend_above, own_style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from thud.studies.emulation.emulator import Surrogate
+    from thud.studies.trained_surrogate import Surrogate
 
 
 @own_style()

@@ -41,7 +41,7 @@ _TINY = 0.05
 
 
 class _Judged(NamedTuple):
-    """Levels minus nominal levels of each set, minimum and maximum tolerance, dB."""
+    """Levels minus nominal levels of each sample, minimum and maximum tolerance, dB."""
 
     excess: NDArray[np.float64]
     tolerance: tuple[float, float]
@@ -87,7 +87,7 @@ def draw_sweep(dataset: xr.Dataset) -> Figure:
 
 
 def _columns(dataset: xr.Dataset) -> Columns:
-    """Return the parameters of each set."""
+    """Return the parameters of each sample."""
     names = [str(name) for name in dataset.coords if name not in BANDWIDTHS]
     whole = dataset["status"]
     return {name: dataset[name].broadcast_like(whole).values.ravel() for name in names}
@@ -125,7 +125,7 @@ def _draw_octaves(
     levels: NDArray[np.float64],
     max_marks: int,
 ) -> None:
-    """Draw the octave levels of sets, those that are not NaN, against a parameter."""
+    """Draw the octave levels of samples, those that are not NaN, against a parameter."""
     places, members, names = _classes(values)
     if names is None:
         places = places * show_parameter(axes, "x", parameter)
@@ -147,7 +147,7 @@ def _draw_octaves(
 def _classes(
     values: NDArray[Any],
 ) -> tuple[NDArray[np.float64], list[NDArray[np.bool_]], list[str] | None]:
-    """Return places on an axis, the sets of each, and the names of texts."""
+    """Return places on an axis, the samples of each, and the names of texts."""
     found = np.unique(values)
     if values.dtype.kind not in "iuf":
         members = [values == value for value in found]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.plot.parameter_axis import Which
-    from thud.studies.design_map import DesignMap
+    from thud.studies.design import Design
 
     Values = NDArray[np.float64]
 
@@ -27,8 +27,8 @@ _TINY = 0.05
 
 
 @own_style()
-def draw_design_map(result: DesignMap) -> Figure:
-    """Draw the margin of a design map, dB, its zero as a line, and the sets that conform.
+def draw_design(result: Design) -> Figure:
+    """Draw the margin of a design map, dB, its zero as a line, and the samples that conform.
 
     The margin is positive where all octave levels lie within their limits. Of a case with a room
     draw the rating of the standardised levels there.
