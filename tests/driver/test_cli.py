@@ -269,10 +269,10 @@ def test_errors_that_nobody_can_read_change_no_exit_code(
 def test_interruption_is_not_a_traceback(
     case_file: CaseFile, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def interrupt(*_: object) -> None:
+    def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(sys.modules["thud.cli.run_command"], "call", interrupt)
+    monkeypatch.setattr(sys.modules["thud.cli.run_command"], "ask", interrupt)
     assert cli.main(["run", str(case_file(MINIMAL))]) == 130
     assert "interrupted" in capsys.readouterr().err
 
