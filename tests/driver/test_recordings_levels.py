@@ -20,9 +20,8 @@ import thud
 from thud.level.assessment import assess
 from thud.level.estimate import Contribution, Estimate
 from thud.level.levels import RECORDED_BAND
-from thud.recordings.averages import average_estimates, level_estimates
 from thud.recordings.band_noise import band_noise
-from thud.recordings.budgets import find_deviant
+from thud.recordings.budgets import average_estimates, find_deviant, level_estimates
 from thud.recordings.contact import cells_between, even_edges
 from thud.recordings.low_pass import attenuation, low_pass_force
 from thud.recordings.noise import Background

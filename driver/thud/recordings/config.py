@@ -16,6 +16,7 @@ from thud.recordings.channel import MIB, shown_path, shown_text
 from thud.recordings.excursion import POLARITIES
 from thud.recordings.force_units import read_chain, require_unit
 from thud.recordings.plate import Plate, check_plate
+from thud.recordings.restitution import DropConditions
 from thud.recordings.signal_files import regular_file
 
 if TYPE_CHECKING:
@@ -120,6 +121,16 @@ class Config:
         if plate is None or plate.f0 is None or plate.Q is None:
             return None
         return Plate(plate.f0, plate.Q, frequency_uncertainty=plate.f0_uncertainty or 0.0)
+
+    def conditions(self, calibration: float | None) -> DropConditions:
+        """Return the conditions of the drops; an unknown uncertainty counts as zero."""
+        return DropConditions(
+            self.height,
+            self.mass,
+            calibration or 0.0,
+            self.mass_uncertainty or 0.0,
+            self.height_uncertainty or 0.0,
+        )
 
     @property
     def plate_checks(self) -> tuple[PlateCheck, ...]:

@@ -68,14 +68,14 @@ class Contact(Immutable):
         First sample of the part with its background removed, and the one behind it.
     force : ndarray, shape (span[1] - span[0],)
         Force of the part, N.
-    under : ndarray, shape (span[1] - span[0],)
+    removed : ndarray, shape (span[1] - span[0],)
         Background that was removed, N.
     gate : tuple of int
         First sample of the contact with its margins, and the one behind it.
     covariance : ndarray, shape (n_cell, n_cell)
         Covariance of the background's error in even cells of the gate, N2.
-    quiet : tuple of float
-        Quiet before and after, s.
+    background_lengths : tuple of float
+        Lengths of the background before and after, s.
     background : Background
         The noise, fitted.
     sample_rate : float
@@ -89,10 +89,10 @@ class Contact(Immutable):
     peak: float
     span: tuple[int, int]
     force: NDArray[np.float64]
-    under: NDArray[np.float64]
+    removed: NDArray[np.float64]
     gate: tuple[int, int]
     covariance: NDArray[np.float64]
-    quiet: tuple[float, float]
+    background_lengths: tuple[float, float]
     background: Background
     sample_rate: float
 
