@@ -140,10 +140,9 @@ class Config:
             return ()
         return check_plate(
             self.resonance,
-            corrected=True,
             time_constant=plate.time_constant,
             full_scale=plate.full_scale,
-            calibration=plate.linearity or None,
+            linearity=plate.linearity or None,
         )
 
 

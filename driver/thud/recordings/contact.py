@@ -139,7 +139,7 @@ def _quiet_edges(length: int, rate: float) -> NDArray[np.intp]:
 
 def _spread(rate: float, plate: Plate | None) -> int:
     """Return the samples over which filters spread an edge."""
-    periods = int(PLATE_PERIODS * rate / plate.resonance / 2) if plate else 0
+    periods = int(PLATE_PERIODS * rate / plate.frequency / 2) if plate else 0
     return int((GATE_RATE / rate) ** 2) + periods
 
 
@@ -182,7 +182,7 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
     (t0, s0), begin = edges.touch.edge()
     (t1, s1), end = edges.release.edge()
     t1 = -t1
-    left_by_plate = PLATE_LEFT / window.plate.resonance if window.plate else 0.0
+    left_by_plate = PLATE_LEFT / window.plate.frequency if window.plate else 0.0
     margin = GATE_SAMPLES + _spread(rate, window.plate)
     gate = (
         max(int((t0 - 3 * s0) * rate) - margin, 0),
@@ -328,7 +328,7 @@ def find_edge(  # noqa: PLR0913, PLR0917 - what a flank is
 @lru_cache(maxsize=4)
 def _response(plate: Plate, rate: float) -> NDArray[np.float64]:
     """Return what the correction of a plate makes of one sample; its middle is that sample."""
-    reach = int(PLATE_PERIODS * rate / plate.resonance)
+    reach = int(PLATE_PERIODS * rate / plate.frequency)
     unit = np.zeros(2 * reach + 1)
     unit[reach] = 1
     return correct_plate(unit, rate, plate)

@@ -18,7 +18,7 @@ from thud.base.threads import limit_threads, one_thread
 from thud.recordings.checkpoint import Checkpoint
 from thud.recordings.drops import find_windows
 from thud.recordings.measured_drop import measure_drop
-from thud.recordings.plate_correction import correct_window
+from thud.recordings.plate import correct_window
 from thud.recordings.ringing import check_ringing
 
 if TYPE_CHECKING:
