@@ -127,12 +127,14 @@ contains
    end subroutine continue_to_zero
 
    !> A history of zero force.
-   pure function new_force_history(sample_rate, n_sample, part_name) result(history)
+   pure function new_force_history(sample_rate, n_sample, part_name, channel_name) result(history)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
       integer, intent(in) :: n_sample
       !> Names of the parts of the force: [n_part].
       character(len=*), intent(in) :: part_name(:)
+      !> Names of the channels (default: there are none): [n_channel].
+      character(len=*), intent(in), optional :: channel_name(:)
       !> The history, all arrays allocated and zero.
       type(force_history_type) :: history
 
@@ -143,6 +145,10 @@ contains
          history%floor_force(n_sample), source=0.0_wp)
       allocate (history%part(n_sample, size(part_name)), source=0.0_wp)
       allocate (history%fact_name(0), history%fact_unit(0), history%fact(0))
+      if (.not. present(channel_name)) return
+      allocate (history%channel_name(size(channel_name)))
+      history%channel_name = channel_name
+      allocate (history%channel(n_sample, size(channel_name)), source=0.0_wp)
    end function new_force_history
 
 end module thud_force_history

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
-    from thud.recordings.estimates import Drop
+    from thud.recordings.measured_drop import Drop
     from thud.recordings.recording import Recording
 
 # Height without the legend, inch: two of them stand side by side on a report.
