@@ -217,12 +217,14 @@ contains
    end subroutine loss_factors
 
    !> Runs a namelist file as the executable does, and keeps what it has computed.
-   subroutine run(path, output, replace, progress, status, handle, n_byte, n_value)
+   subroutine run(path, output, replace, channels, progress, status, handle, n_byte, n_value)
       ! Not threadsafe: functions with deferred-length texts keep the length in static memory.
       !> Path of the file; output directory, empty for the default.
       character(len=*), intent(in) :: path, output
       !> 1 to replace files that thud has not written, too.
       integer, intent(in) :: replace
+      !> 1 to write the channels of the histories, too.
+      integer, intent(in) :: channels
       !> 1 to show progress on a terminal.
       integer, intent(in) :: progress
       !> Status, handle and sizes as in `leave`.
@@ -239,7 +241,7 @@ contains
       call begin_call()
       allocate (bundle)
       if (progress == 1) call begin_progress()
-      call run_case(path, output, replace == 1, case, results, outcome, error)
+      call run_case(path, output, replace == 1, channels == 1, case, results, outcome, error)
       call end_progress()
       if (.not. allocated(error)) then
          call get_case_text(case, text)

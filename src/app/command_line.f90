@@ -30,7 +30,7 @@ module thud_command_line
    real(wp), parameter :: blas_memory = 160.0e6_wp
 
    !> Options by their long names.
-   character(len=*), parameter :: known_options(*) = [character(len=9) :: '--output', '--replace', '--sets', '--threads', &
+   character(len=*), parameter :: known_options(*) = [character(len=9) :: '--output', '--replace', '--all', '--sets', '--threads', &
       '--check', '--quiet', '--keys', '--schema', '--help', '--version']
 
    !> What the command line asks for.
@@ -41,6 +41,8 @@ module thud_command_line
       character(len=:), allocatable :: output
       !> Replace also files that thud has not written.
       logical :: replace = .false.
+      !> Write also the channels of the model.
+      logical :: all = .false.
       !> Path of a table of sets, empty where not given.
       character(len=:), allocatable :: sets
       !> Threads for them.
@@ -81,7 +83,7 @@ contains
          if (allocated(error)) then
             continue
          else if (request%sets == '') then
-            call run_case(request%case_file, request%output, request%replace, case, results, outcome, error)
+            call run_case(request%case_file, request%output, request%replace, request%all, case, results, outcome, error)
          else
             call run_sets(request%case_file, request%sets, request%threads, request%output, request%replace, outcome, error)
          end if
@@ -130,20 +132,13 @@ contains
       do while (i <= command_argument_count())
          argument = get_argument(i)
          select case (argument)
-         case ('-h', '--help')
-            request%information = help()
-            return
-         case ('--version')
-            request%information = 'thud '//version
-            return
-         case ('--keys')
-            call describe_keys(request%information)
-            return
-         case ('--schema')
-            call get_schema(request%information)
+         case ('-h', '--help', '--version', '--keys', '--schema')
+            call get_information(argument, request%information)
             return
          case ('--replace')
             request%replace = .true.
+         case ('--all')
+            request%all = .true.
          case ('--check')
             request%check = .true.
          case ('--quiet', '-q')
@@ -159,7 +154,7 @@ contains
             if (index(argument, '-') == 1) then
                call get_suggestion(argument, known_options, suggestion)
                error = input_error(quoted(argument)//' is not a known option'//suggestion//'; allowed: --output DIR, ' &
-                  //'--replace, --sets TABLE, --threads N, --check, --quiet, --keys, --schema, --help, --version')
+                  //'--replace, --all, --sets TABLE, --threads N, --check, --quiet, --keys, --schema, --help, --version')
             else if (allocated(request%case_file)) then
                error = input_error(quoted(argument)//' is a second case; allowed: one')
             else
@@ -173,8 +168,28 @@ contains
          error = input_error('no case is given')
       else if (request%sets == '' .and. allocated(number)) then
          error = input_error('--threads does nothing without --sets; allowed: both')
+      else if (request%sets /= '' .and. request%all) then
+         error = input_error('--all does nothing with --sets; allowed: one of them')
       end if
    end subroutine parse_arguments
+
+   !> The text that an option shows instead of a run.
+   subroutine get_information(option, information)
+      !> One of -h, --help, --version, --keys and --schema.
+      character(len=*), intent(in) :: option
+      character(len=:), allocatable, intent(out) :: information
+
+      select case (option)
+      case ('--version')
+         information = 'thud '//version
+      case ('--keys')
+         call describe_keys(information)
+      case ('--schema')
+         call get_schema(information)
+      case default
+         information = help()
+      end select
+   end subroutine get_information
 
    !> The value of an option.
    subroutine take_value(i, option, allowed, value, error)
@@ -222,7 +237,7 @@ contains
    pure function usage() result(text)
       character(len=:), allocatable :: text
 
-      text = 'thud CASE.nml [--sets TABLE.csv [--threads N]] [--output DIR] [--replace] [--check] [--quiet] | ' &
+      text = 'thud CASE.nml [--sets TABLE.csv [--threads N]] [--output DIR] [--replace] [--all] [--check] [--quiet] | ' &
          //'--keys | --schema | --help | --version'
    end function usage
 
@@ -236,6 +251,7 @@ contains
          //'  CASE.nml           input, a namelist file; inputs/ holds examples'//newline &
          //'  -o, --output DIR   directory for the results (default: outputs/<case>, of sets <case>_sets)'//newline &
          //'  --replace          replace also files that thud has not written'//newline &
+         //'  --all              write also channels.csv: energies and other quantities of the model against time'//newline &
          //'  --sets TABLE.csv   many drops: keys in the first line, one drop in each other; the rest is as in'//newline &
          //'                     CASE.nml'//newline &
          //'  --threads N        threads for them (default: 1)'//newline &

@@ -26,7 +26,7 @@ import thud
 from thud.base.errors import ReportWarning
 from thud.base.files import Results
 from thud.level.levels import record_force
-from thud.plot.recording_figure import recording_forces, recording_levels
+from thud.plot.recordings import recording_forces, recording_levels
 from thud.recordings.config import Config, PlateConfig
 from thud.recordings.estimates import Estimate
 from thud.recordings.read_recording import read_recording

@@ -17,13 +17,14 @@ from thud.impact.floor_impact import FloorImpact, new_floor_impact
 from thud.impact.impact import Impact
 from thud.level.levels import BANDWIDTHS, get_bands
 from thud.level.rating import Rating, rated_bands, rating, standardised_level
-from thud.recordings.recording import Recording
+from thud.recordings.source import require_source
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import FloorOptions, Room
+    from thud.recordings.recording import Recording
 
 THIRDS = BANDWIDTHS[1]
 # Change of the force by a floor that gives way, dB, from which it is remarked.
@@ -186,7 +187,7 @@ class RoomPrediction(Displayed):
 
     def plot(self, measured: RoomLevels | None = None) -> Figure:
         """Draw the chain: force, energy, floor and room, with measured levels if given."""
-        from thud.plot.prediction_figure import draw_prediction
+        from thud.plot.rooms import draw_prediction
 
         return draw_prediction(self, measured)
 
@@ -220,7 +221,7 @@ def predict_level(
     InputError
         Where floor or room are missing or out of range.
     """
-    require_kind("source", source, Impact | Recording)
+    require_source("source", source)
     case = source.case if isinstance(source, Impact) else Case()
     floor, room = floor or case.floor, room or case.room
     if floor is None or room is None:

@@ -224,7 +224,7 @@ class Impact(Displayed):
 
     def plot(self) -> Figure:
         """Return a figure of the force that the case judges, and of its octave levels."""
-        from thud.plot.overview_figure import overview
+        from thud.plot.impacts import overview
 
         return overview(self)
 

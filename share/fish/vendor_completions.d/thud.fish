@@ -88,6 +88,7 @@ complete -c thud -f
 
 complete -c thud -n _shtab_thud_using -s o -l output -xka "(__fish_complete_directories)" -d 'directory for the results (default: outputs/<case>, of sets <case>_sets)'
 complete -c thud -n _shtab_thud_using -l replace -d 'replace also files that thud has not written'
+complete -c thud -n _shtab_thud_using -l all -d 'write also channels.csv: energies and other quantities of the model against time'
 complete -c thud -n _shtab_thud_using -l sets -xka "(_shtab_glob_compgen_3930277c)" -d 'many drops: keys in the first line, one drop in each other; the rest is as in CASE.nml'
 complete -c thud -n _shtab_thud_using -l threads -x -d 'threads for them (default: 1)'
 complete -c thud -n _shtab_thud_using -l check -d 'exit with 3 where the source does not conform to the limits'
