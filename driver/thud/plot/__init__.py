@@ -61,7 +61,7 @@ from thud.plot.rooms import (
     room_levels as room_levels,
 )
 from thud.plot.studies import (
-    draw_design_map as draw_design_map,
+    draw_design as draw_design,
     draw_sensitivity as draw_sensitivity,
     draw_surrogate as draw_surrogate,
     draw_sweep as draw_sweep,

@@ -14,8 +14,8 @@ from thud.base._schema import (
     LimitsSource,
 )
 from thud.base.checks import refuse
-from thud.impact.impact import Impact
-from thud.level.levels import octave_limits, record_force
+from thud.level.assessment import octave_limits
+from thud.level.levels import record_force
 from thud.plot.style import (
     empty_axes,
     escape_label,
@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from thud.impact.impact import Impact
     from thud.plot.style import Curve
-    from thud.recordings.recording import Recording
 
 # Fraction of the maximum force that a contact exceeds.
 NOISE = 0.01
@@ -170,11 +170,8 @@ def common_source(impacts: Mapping[str, Curve], source: LimitsSource | None = No
     """
     if source is not None:
         return source
-    sources = {
-        impact.case.limits.source if isinstance(impact, Impact) else impact.config.source
-        for impact in impacts.values()
-        if isinstance(impact, Impact) or impact.config.source != Limits.source
-    }
+    stated = (impact.limits_source for impact in impacts.values())
+    sources = {one for one in stated if one}
     if len(sources) > 1:
         what = f"&limits: source differs ({', '.join(sorted(sources))})"
         refuse(what, "cases and recordings with one source, or the choice of one")
@@ -223,20 +220,14 @@ def level_changes(
 
 
 @own_style()
-def overview(impact: Impact | Recording, source: LimitsSource = "rubber_ball") -> Figure:
-    """Draw the assessed force and its octave levels.
-
-    The limits are those of the source of the case, or for a recording those of `source`.
-    """
-    name = "recording"
-    if isinstance(impact, Impact):
-        source = impact.case.limits.source
-        name = impact.case.model.name.replace("_", " ") if impact.case.model else ""
+def overview(impact: Impact) -> Figure:
+    """Draw the assessed force and its octave levels."""
+    name = impact.case.model.name.replace("_", " ") if impact.case.model else ""
     named = {name: impact}
     figure = new_figure(5)
     history, octaves = figure.subplots(2, 1)
     draw_forces(history, named, None)
-    draw_levels({"octave": octaves}, named, None, source)
+    draw_levels({"octave": octaves}, named, None, impact.limits_source)
     octaves.set_ylabel(level_label(named, None))
     legend_above(octaves)
     return figure

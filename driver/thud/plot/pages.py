@@ -14,8 +14,9 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 from plotly.offline import get_plotlyjs
 
-from thud.level.levels import get_bands, octave_limits
-from thud.level.rating import CLASS_LIMITS
+from thud.base._schema import CLASS_LIMITS
+from thud.level.assessment import octave_limits
+from thud.level.levels import get_bands
 from thud.plot.impacts import TIME_LABEL, contact_force, draw_forces, draw_levels, force_label
 from thud.plot.style import (
     BAND_WORDS,
@@ -45,8 +46,7 @@ if TYPE_CHECKING:
     from thud.base._schema import BandSet, LevelsForce, LimitsSource
     from thud.floors.floor_comparison import FloorComparison
     from thud.floors.prediction import RoomPrediction
-    from thud.impact.impact import Impact
-    from thud.recordings.recording import Recording
+    from thud.level.impact_result import ImpactResult
 
 
 # Line styles and markers of `thud.plot.style` by the names of plotly.
@@ -185,7 +185,7 @@ _AXIS = 0.8
 
 @own_style()
 def comparison_page(
-    impacts: Mapping[str, Impact | Recording],
+    impacts: Mapping[str, ImpactResult],
     force: LevelsForce | None,
     source: LimitsSource,
     table: Sequence[Sequence[str]],
@@ -230,7 +230,7 @@ def _add_table(figure: Figure, grid: GridSpec, rows: Sequence[Sequence[str]]) ->
 
 
 def comparison_html(
-    impacts: Mapping[str, Impact | Recording],
+    impacts: Mapping[str, ImpactResult],
     force: LevelsForce | None,
     source: LimitsSource,
     table: Sequence[Sequence[str]],

@@ -17,7 +17,8 @@ from matplotlib.ticker import (
 from thud.base.units import display_unit
 from thud.case.keys import humanize
 from thud.impact.quantities import RATING
-from thud.level.levels import BANDWIDTHS, FORCES, get_bands, octave_limits
+from thud.level.assessment import octave_limits
+from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 from thud.plot.style import (
     COLORS,
     FORCE_WORDS,
@@ -40,9 +41,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.studies.design_map import DesignMap
-    from thud.studies.emulation.emulator import Surrogate
+    from thud.studies.design import Design
     from thud.studies.sensitivity import Sensitivity
+    from thud.studies.trained_surrogate import Surrogate
     from thud.studies.uncertainty import Uncertainty
 
     Values = NDArray[np.float64]
@@ -109,10 +110,10 @@ _MAX_PANELS = 6
 _TINY = 0.05
 
 
-class _Judged(NamedTuple):
-    """Levels minus nominal levels of each set, minimum and maximum tolerance, dB."""
+class _Excess(NamedTuple):
+    """Levels minus nominal levels of each sample, minimum and maximum tolerance, dB."""
 
-    excess: NDArray[np.float64]
+    level: NDArray[np.float64]
     tolerance: tuple[float, float]
 
 
@@ -120,7 +121,7 @@ class _Judged(NamedTuple):
 def draw_sweep(dataset: xr.Dataset) -> Figure:
     """Draw octave levels against the first numeric parameter that has several values.
 
-    Levels are those of the judged force relative to the nominal ones, dB. Each value of the first
+    Levels are those of the assessed force relative to the nominal ones, dB. Each value of the first
     text parameter, up to six of them, has its panel. Lines are medians over the other parameters,
     shades extend from the minimum to the maximum.
     """
@@ -130,7 +131,7 @@ def draw_sweep(dataset: xr.Dataset) -> Figure:
     name = (numeric or varied or list(columns))[0]
     texts = [n for n in varied if n not in numeric and n != name]
     split = next((n for n in texts if len(np.unique(columns[n])) <= _MAX_PANELS), None)
-    judged = _judge(dataset, columns)
+    excess = _excess(dataset, columns)
     parts = {"": np.ones(len(columns[name]), dtype=bool)}
     if split:
         parts = {str(value): columns[split] == value for value in np.unique(columns[split])}
@@ -139,8 +140,8 @@ def draw_sweep(dataset: xr.Dataset) -> Figure:
     figure = new_figure(1.1 + (1.9 if across == 1 else 1.6) * down)
     panels = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False).ravel()
     for i, (axes, (title, panel)) in enumerate(zip(panels, parts.items(), strict=False)):
-        _draw_tolerance(axes, judged.tolerance)
-        levels = np.where(panel[:, np.newaxis], judged.excess, np.nan)
+        _draw_tolerance(axes, excess.tolerance)
+        levels = np.where(panel[:, np.newaxis], excess.level, np.nan)
         _draw_octaves(axes, dataset[name], columns[name], levels, _MAX_MARKS // across)
         axes.set_title(title.replace("_", " "))
         lowest = i + across >= len(parts)
@@ -148,28 +149,28 @@ def draw_sweep(dataset: xr.Dataset) -> Figure:
         axes.xaxis.label.set_visible(lowest)
     for axes in panels[len(parts) :]:
         axes.remove()
-    words = "judged force" if "force" in columns else FORCE_WORDS[dataset.attrs["judged_force"]]
+    words = "assessed force" if "force" in columns else FORCE_WORDS[dataset.attrs["assessed_force"]]
     figure.supylabel(f"Level − nominal, dB\n({words})")
     others = [n for n in varied if n not in {name, split}]
-    legend_above(panels[0], title=_meaning(judged, split, others))
+    legend_above(panels[0], title=_meaning(excess, split, others))
     return figure
 
 
 def _columns(dataset: xr.Dataset) -> Columns:
-    """Return the parameters of each set."""
+    """Return the parameters of each sample."""
     names = [str(name) for name in dataset.coords if name not in BANDWIDTHS]
     whole = dataset["status"]
     return {name: dataset[name].broadcast_like(whole).values.ravel() for name in names}
 
 
-def _judge(dataset: xr.Dataset, columns: Columns) -> _Judged:
-    """Return the levels of the judged force relative to the nominal levels of the source."""
+def _excess(dataset: xr.Dataset, columns: Columns) -> _Excess:
+    """Return the levels of the assessed force relative to the nominal levels of the source."""
     levels = {
         force: dataset[f"{force}_level"].values.reshape(-1, len(dataset["octave"]))
         for force in FORCES
     }
     count = len(dataset["status"].values.ravel())
-    forces = columns.get("force", np.full(count, dataset.attrs["judged_force"]))
+    forces = columns.get("force", np.full(count, dataset.attrs["assessed_force"]))
     sources = columns.get("source", np.full(count, dataset.attrs["limits"]))
     found = np.where((forces == "floor")[:, np.newaxis], levels["floor"], levels["elastic"])
     tolerances: list[float] = []
@@ -177,7 +178,7 @@ def _judge(dataset: xr.Dataset, columns: Columns) -> _Judged:
         lower, upper = octave_limits(source)
         found[sources == source] -= (lower + upper) / 2
         tolerances.extend((upper - lower) / 2)
-    return _Judged(found, (min(tolerances), max(tolerances)))
+    return _Excess(found, (min(tolerances), max(tolerances)))
 
 
 def _draw_tolerance(axes: Axes, tolerance: tuple[float, float]) -> None:
@@ -194,7 +195,7 @@ def _draw_octaves(
     levels: NDArray[np.float64],
     max_marks: int,
 ) -> None:
-    """Draw the octave levels of sets, those that are not NaN, against a parameter."""
+    """Draw the octave levels of samples, those that are not NaN, against a parameter."""
     places, members, names = _classes(values)
     if names is None:
         places = places * show_parameter(axes, "x", parameter)
@@ -216,7 +217,7 @@ def _draw_octaves(
 def _classes(
     values: NDArray[Any],
 ) -> tuple[NDArray[np.float64], list[NDArray[np.bool_]], list[str] | None]:
-    """Return places on an axis, the sets of each, and the names of texts."""
+    """Return places on an axis, the samples of each, and the names of texts."""
     found = np.unique(values)
     if values.dtype.kind not in "iuf":
         members = [values == value for value in found]
@@ -235,9 +236,9 @@ def _of(part: NDArray[np.float64], function: Any) -> float:  # noqa: ANN401 - of
     return float(function(known)) if known.size else np.nan
 
 
-def _meaning(judged: _Judged, split: str | None, others: list[str]) -> str:
+def _meaning(excess: _Excess, split: str | None, others: list[str]) -> str:
     """Return what panels, lines, shades and grey mean."""
-    minimum, maximum = judged.tolerance
+    minimum, maximum = excess.tolerance
     lines = [f"Grey: tolerances of the octaves, ±{minimum:g} to ±{maximum:g} dB"]
     if others:
         over = humanize(others[0]) if len(others) == 1 else f"{len(others)} other parameters"
@@ -251,8 +252,8 @@ _TINY = 0.05
 
 
 @own_style()
-def draw_design_map(result: DesignMap) -> Figure:
-    """Draw the margin of a design map, dB, its zero as a line, and the sets that conform.
+def draw_design(result: Design) -> Figure:
+    """Draw the margin of a design map, dB, its zero as a line, and the samples that conform.
 
     The margin is positive where all octave levels lie within their limits. Of a case with a room
     draw the rating of the standardised levels there.
@@ -274,7 +275,7 @@ def draw_design_map(result: DesignMap) -> Figure:
     conforms = dataset["conforms"].transpose(*result.axes).values.T
     if margin.count():
         bar = _draw_margin(figure, axes, (x, y), margin)
-        bar.set_label(f"Margin ({FORCE_WORDS[dataset.attrs['judged_force']]}), dB")
+        bar.set_label(f"Margin ({FORCE_WORDS[dataset.attrs['assessed_force']]}), dB")
     doubtful = np.zeros_like(conforms)
     if "doubtful" in dataset:
         doubtful = dataset["doubtful"].transpose(*result.axes).values.T
@@ -370,7 +371,7 @@ def draw_sensitivity(result: Sensitivity) -> Figure:
     axes.set_yticks(place, outputs)
     axes.set_ylim(len(outputs) - 0.5, -0.5)
     axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
-    words = FORCE_WORDS[result.dataset.attrs["judged_force"]]
+    words = FORCE_WORDS[result.dataset.attrs["assessed_force"]]
     axes.set_xlabel(f"Sobol index, with its interval of 95 %\n({words})")
     legend_above(axes)
     return figure
@@ -378,7 +379,7 @@ def draw_sensitivity(result: Sensitivity) -> Figure:
 
 @own_style()
 def draw_surrogate(result: Surrogate) -> Figure:
-    """Draw the error of each judged quantity in held-out drops, dB, and the bound.
+    """Draw the error of each assessed quantity in held-out drops, dB, and the bound.
 
     Quantities that are not levels have errors in 20 lg of their ratio.
     """
@@ -409,7 +410,7 @@ def draw_surrogate(result: Surrogate) -> Figure:
 def draw_uncertainty(result: Uncertainty) -> Figure:
     """Draw the distribution of octave levels over the tolerances of the standards.
 
-    Levels are relative to the nominal ones, dB; bars cover 95 % of the sets.
+    Levels are relative to the nominal ones, dB; bars cover 95 % of the samples.
     """
     lower, upper = octave_limits(result.source)
     nominal = (lower + upper) / 2
@@ -426,10 +427,10 @@ def draw_uncertainty(result: Uncertainty) -> Figure:
     low, middle, high = np.quantile(levels, [0.025, 0.5, 0.975], axis=0)
     axes.errorbar(
         place, middle, (middle - low, high - middle), fmt="o", color="black", markersize=2.5,
-        elinewidth=0.8, capsize=2, label="Median, 95 % of sets",
+        elinewidth=0.8, capsize=2, label="Median, 95 % of samples",
     )  # fmt: skip
     octave_axis(axes)
-    words = FORCE_WORDS[result.dataset.attrs["judged_force"]]
+    words = FORCE_WORDS[result.dataset.attrs["assessed_force"]]
     axes.set_ylabel(f"Level − nominal, dB\n({words})")
     low, high = result.interval
     share = f"{100 * result.probability:.1f} % ({100 * low:.1f} to {100 * high:.1f} %)"

@@ -13,9 +13,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
+from thud.base.checks import require_kind
 from thud.base.errors import InputError
+from thud.level.impact_result import ImpactResult
 from thud.level.levels import get_bands
-from thud.recordings.source import require_source
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -26,9 +27,8 @@ if TYPE_CHECKING:
 
     from thud.base._schema import BandSet, LevelsForce
     from thud.impact.impact import Impact
-    from thud.recordings.recording import Recording
 
-    Curve = TypeVar("Curve", bound=Impact | Recording)
+    Curve = TypeVar("Curve", bound=ImpactResult)
 
 # Okabe and Ito's colors, for any color vision; line styles distinguish curves in print.
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -151,7 +151,7 @@ def iterate_curves(
 ) -> Iterator[tuple[str, Curve, LevelsForce]]:
     """Yield label, impact and kind of force of each curve.
 
-    Without `force` each case has the one that it assesses. Labels say which where they differ.
+    Without `force` each case has the force that it assesses. Labels say which where they differ.
 
     Raises
     ------
@@ -162,8 +162,8 @@ def iterate_curves(
         message = "impacts are not given; allowed: a mapping of names to one or more impacts"
         raise InputError(message)
     for name, impact in impacts.items():
-        require_source(name, impact)
-    kinds = [impact.judged(force) for impact in impacts.values()]
+        require_kind(name, impact, ImpactResult)
+    kinds = [impact.assessed_force(force) for impact in impacts.values()]
     for (name, impact), kind in zip(impacts.items(), kinds, strict=True):
         which = f", {FORCE_WORDS[kind]}" if len(set(kinds)) > 1 else ""
         yield f"{name}{which}", impact, kind

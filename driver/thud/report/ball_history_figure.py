@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 # Marker and its filling by verdict: distinct in grey as well.
 MARKS = {
     "conforms": ("o", COLORS[0]),
-    "cannot be decided": ("s", "white"),
+    "inconclusive": ("s", "white"),
     "does not conform": ("X", COLORS[1]),
 }
 # Margin before the first and after the last report, as fraction of the time between, and minimum.

@@ -1,4 +1,4 @@
-"""Kinds of studies that compute sets of drops: design, blocks, backend, dataset."""
+"""Kinds of studies that compute samples of drops: design, blocks, backend, dataset."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from thud.base.tables import format_rows
 from thud.case.keys import OF_FILES, users
 from thud.studies.backends import checked_backend
 from thud.studies.blocks import read_identity, result_names
-from thud.studies.computing import compute_sets
+from thud.studies.computing import compute_samples
 from thud.studies.dataset import disk_space
-from thud.studies.designs import read_design
 from thud.studies.directory import FORMATS
-from thud.studies.emulation.emulator import Surrogate, read_surrogate
-from thud.studies.emulation.plan import read_plan
-from thud.studies.emulation.training import surrogate_name, train
 from thud.studies.kind import Kind
 from thud.studies.parameter import varied
-from thud.studies.sets import SetStudy
+from thud.studies.samples import SampleStudy
+from thud.studies.sampling import read_design
 from thud.studies.study import table_of
+from thud.studies.surrogate_plan import read_plan
+from thud.studies.surrogate_training import surrogate_name, train
 from thud.studies.temperature import read_temperature
+from thud.studies.trained_surrogate import Surrogate, read_surrogate
 
 if TYPE_CHECKING:
     import os
@@ -43,8 +43,8 @@ if TYPE_CHECKING:
 
 R = TypeVar("R")
 
-# More sets than this have to be confirmed.
-MAX_SETS = 100_000
+# More samples than this have to be confirmed.
+MAX_SAMPLES = 100_000
 _FILE_FORMATS = ("auto", "netcdf", "zarr")
 
 
@@ -54,7 +54,7 @@ def _require_no_floor(case: Case) -> None:
         refuse("[surrogate] knows no floors", "a case without &floor")
 
 
-class DropsKind(Kind[SetStudy, R]):
+class DropsKind(Kind[SampleStudy, R]):
     """A kind of study that needs drops around its case."""
 
     words: ClassVar[tuple[str, ...]] = ("format", "design", "temperature", "surrogate")
@@ -66,24 +66,26 @@ class DropsKind(Kind[SetStudy, R]):
     ) -> Parameter:
         """Return a parameter that varies."""
         if name == "bands":
-            refuse("[parameters] bands is not allowed", "bands in [fixed], the same for all sets")
+            refuse(
+                "[parameters] bands is not allowed", "bands in [fixed], the same for all samples"
+            )
         return varied(name, given, users(case), centre)
 
-    def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SetStudy:
+    def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SampleStudy:
         """Return a study with its design."""
         written = given.get("format", _FILE_FORMATS[0])
         require_choice("format", written, _FILE_FORMATS)
         law = table_of(given, "temperature") if "temperature" in given else None
         temperature = read_temperature(law, study.case, study.parameters)
         design = read_design(table_of(given, "design"), self.designs, study.parameters)
-        # Sets need neither snapshots nor free modes nor a compression.
+        # Samples need neither snapshots nor free modes nor a compression.
         case = replace(study.case, modes=None, compression=None)
         owned = (key for key in KEYS if key.owner == study.model)
         files = {key.name: 0.0 for key in owned if key.group == OF_FILES}
         if case.model and files:
             case = replace(case, model=replace(case.model, **files))  # type: ignore[arg-type]
         head = {**vars(study), "case": case}
-        found = SetStudy(**head, **design, temperature=temperature, format=written)
+        found = SampleStudy(**head, **design, temperature=temperature, format=written)
         if "surrogate" not in given:
             return found
         _require_no_floor(case)
@@ -93,43 +95,43 @@ class DropsKind(Kind[SetStudy, R]):
         return replace(found, plan=plan)
 
     def with_surrogate(
-        self, study: SetStudy, given: Surrogate | str | os.PathLike[str]
-    ) -> SetStudy:
-        """Return a study whose sets a surrogate answers. Raises InputError where it cannot."""
+        self, study: SampleStudy, given: Surrogate | str | os.PathLike[str]
+    ) -> SampleStudy:
+        """Return a study whose samples a surrogate answers. Raises InputError where it cannot."""
         _require_no_floor(study.case)
         surrogate = given if isinstance(given, Surrogate) else read_surrogate(given)
         surrogate.require(study.case, study.key_columns(study.parameter_columns(0, 1)))
         return replace(study, plan=None, surrogate=surrogate)
 
-    def require(self, study: SetStudy, **how: Unpack[RunOptions]) -> None:
-        """Raise InputError where there are too many sets, or no such backend."""
-        if study.count > MAX_SETS and not how.get("yes"):
-            refuse(self.describe(study), f"up to {MAX_SETS} sets, more with yes=True (--yes)")
+    def require(self, study: SampleStudy, **how: Unpack[RunOptions]) -> None:
+        """Raise InputError where there are too many samples, or no such backend."""
+        if study.count > MAX_SAMPLES and not how.get("yes"):
+            refuse(self.describe(study), f"up to {MAX_SAMPLES} samples, more with yes=True (--yes)")
         checked_backend(how.get("backend"), how.get("workers"), how.get("scheduler"))
 
     @abstractmethod
     def draw(self, result: R) -> Figure:
         """Return the figure of a result."""
 
-    def listed_files(self, study: SetStudy) -> list[str]:
+    def listed_files(self, study: SampleStudy) -> list[str]:
         """Return the names of the figures, and of the surrogate that is trained."""
         trained = [surrogate_name(study)] if study.plan else []
         return [*trained, *(f"{study.name}{ending}" for ending in FORMATS)]
 
-    def table(self, result: R, study: SetStudy) -> str:  # noqa: ARG002 - sets know their units
+    def table(self, result: R, study: SampleStudy) -> str:  # noqa: ARG002 - samples know their units
         """Return the result as text."""
         return format_rows(result.table())  # type: ignore[attr-defined]
 
-    def figures(self, result: R, study: SetStudy) -> dict[str, Figure]:
+    def figures(self, result: R, study: SampleStudy) -> dict[str, Figure]:
         """Return the figure by the name of the study."""
         return {study.name: self.draw(result)} if self.succeeded(result) else {}
 
 
-class SetKind(DropsKind[R]):
-    """A kind of study that computes sets of drops."""
+class SampleKind(DropsKind[R]):
+    """A kind of study that computes samples of drops."""
 
-    def describe(self, study: SetStudy) -> str:
-        """Return how many sets a study has and how much disk it needs."""
+    def describe(self, study: SampleStudy) -> str:
+        """Return how many samples a study has and how much disk it needs."""
         space = disk_space(study) / 1e6
         amount = f"{space / 1e3:.3g} GB" if space > 1e3 else f"{space:.2g} MB"  # noqa: PLR2004
         by = ""
@@ -137,23 +139,23 @@ class SetKind(DropsKind[R]):
             by = f" by a surrogate, which is trained on up to {study.plan.size} drops"
         elif study.surrogate:
             by = f" by a surrogate of {len(study.surrogate.points)} drops"
-        return f"{study.name}: {study.count} sets of {study.model}{by}, about {amount} on disk"
+        return f"{study.name}: {study.count} samples of {study.model}{by}, about {amount} on disk"
 
-    def compute(self, study: SetStudy, results: Results | None, **how: Unpack[RunOptions]) -> R:
-        """Return the result of all sets, computed or continued."""
+    def compute(self, study: SampleStudy, results: Results | None, **how: Unpack[RunOptions]) -> R:
+        """Return the result of all samples, computed or continued."""
         try:
             if study.plan:
                 study = replace(study, surrogate=train(study, results, how))
             folder = results.folder if results else None
-            return self.conclude(study, compute_sets(study, folder, how))
+            return self.conclude(study, compute_samples(study, folder, how))
         except MemoryError as error:
-            refuse(f"{study.count} sets do not fit in memory", "fewer sets", error)
+            refuse(f"{study.count} samples do not fit in memory", "fewer samples", error)
 
     @abstractmethod
-    def conclude(self, study: SetStudy, dataset: xr.Dataset) -> R:
-        """Return the result of all sets."""
+    def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> R:
+        """Return the result of all samples."""
 
-    def identity_files(self, study: SetStudy) -> list[str]:
+    def identity_files(self, study: SampleStudy) -> list[str]:
         """Return the names of the dataset and of the directory of blocks."""
         return result_names(study)
 
@@ -161,14 +163,14 @@ class SetKind(DropsKind[R]):
         """Return the identity of results."""
         return read_identity(path)
 
-    def remarks(self, result: R) -> list[str]:
-        """Return how many sets have no results, and why."""
-        dataset = _sets(result)
+    def warnings(self, result: R) -> list[str]:
+        """Return how many samples have no results, and why."""
+        dataset = _samples(result)
         failed = dataset["status"].values != 0
         found = []
         if failed.any():
             ((reason, _),) = Counter(dataset["reason"].values[failed]).most_common(1)
-            found = [f"{failed.sum()} of {failed.size} sets have no results, such as: {reason}"]
+            found = [f"{failed.sum()} of {failed.size} samples have no results, such as: {reason}"]
         if "surrogate" in dataset.attrs:
             doubtful = int(dataset["doubtful"].sum())
             share = f"it leaves {doubtful} of {failed.size} verdicts in doubt"
@@ -176,9 +178,9 @@ class SetKind(DropsKind[R]):
         return found
 
     def succeeded(self, result: R) -> bool:
-        """Return whether any set has results."""
-        return bool((_sets(result)["status"] == 0).any())
+        """Return whether any sample has results."""
+        return bool((_samples(result)["status"] == 0).any())
 
 
-def _sets(result: Any) -> xr.Dataset:  # noqa: ANN401 - a dataset, or what has one
+def _samples(result: Any) -> xr.Dataset:  # noqa: ANN401 - a dataset, or what has one
     return getattr(result, "dataset", result)  # type: ignore[no-any-return]

@@ -1,4 +1,4 @@
-"""Studies of many sets: designs, and the values of keys in their sets."""
+"""Studies of many samples: designs, and the values of keys in their samples."""
 
 from __future__ import annotations
 
@@ -10,43 +10,43 @@ import numpy as np
 
 from thud.case.keys import DENSITY
 from thud.impact.ensemble import get_cost
-from thud.studies.designs import makers, unit_sets
+from thud.studies.sampling import sampler_versions, unit_samples
 from thud.studies.study import Study, wall_volume
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.studies.emulation.emulator import Surrogate
-    from thud.studies.emulation.plan import Plan
+    from thud.studies.surrogate_plan import Plan
     from thud.studies.temperature import Temperature
+    from thud.studies.trained_surrogate import Surrogate
 
     Columns = dict[str, NDArray[Any]]
 
 
-# A block of sets should take about this time, s.
+# A block of samples should take about this time, s.
 _BLOCK_TIME = 0.5
-# Sets of a block that a surrogate answers, in about this time.
+# Samples of a block that a surrogate answers, in about this time.
 _ANSWERED = 2**16
 
 
 @dataclass(frozen=True)
-class SetStudy(Study):
-    """A study whose sets differ from its case in the values of its parameters.
+class SampleStudy(Study):
+    """A study whose samples differ from its case in the values of its parameters.
 
     Attributes
     ----------
     design : str
         ``"grid"``, ``"list"``, ``"random"``, ``"latin_hypercube"``, ``"sobol"`` or ``"saltelli"``.
     size, seed : int
-        Number of sets that are drawn (of base samples for ``"saltelli"``), and the seed.
+        Number of samples that are drawn (of base samples for ``"saltelli"``), and the seed.
     temperature : Temperature or None
         Law of the material where the temperature varies.
     format : str
         ``"netcdf"``, ``"zarr"``, or ``"auto"``: Zarr for what is large.
     plan : Plan or None
-        How a surrogate is trained for its sets.
+        How a surrogate is trained for its samples.
     surrogate : Surrogate or None
-        What answers its sets instead of the model.
+        What answers its samples instead of the model.
     """
 
     design: str = "grid"
@@ -57,12 +57,12 @@ class SetStudy(Study):
     plan: Plan | None = None
     surrogate: Surrogate | None = None
 
-    # Whether the peaks of the judged force are counted in each set.
+    # Whether the peaks of the judged force are counted in each sample.
     counts_peaks: ClassVar[bool] = False
 
     def own_identity(self) -> dict[str, str]:
         """Return design and temperature law."""
-        found = makers(self.design) | {"[design] kind": self.design}
+        found = sampler_versions(self.design) | {"[design] kind": self.design}
         if self.size:
             found |= {"[design] size": f"{self.size}", "[design] seed": f"{self.seed}"}
         if self.temperature:
@@ -75,7 +75,7 @@ class SetStudy(Study):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of values of each parameter of a grid, or the one number of all sets."""
+        """Number of values of each parameter of a grid, or the one number of all samples."""
         if self.design == "grid":
             return tuple(parameter.size for parameter in self.parameters)
         if self.design == "list":
@@ -86,12 +86,12 @@ class SetStudy(Study):
 
     @property
     def count(self) -> int:
-        """Number of sets."""
+        """Number of samples."""
         return math.prod(self.shape)
 
     @property
     def block_size(self) -> int:
-        """Number of sets that are computed together, the same for all backends."""
+        """Number of samples that are computed together, the same for all backends."""
         if self.plan or self.surrogate:
             return _ANSWERED
         if self.design in {"grid", "list"}:
@@ -103,17 +103,17 @@ class SetStudy(Study):
         return max(1, round(_BLOCK_TIME / get_cost(self.case, keys)))
 
     def parameter_columns(self, start: int, stop: int) -> Columns:
-        """Return sets `start` to `stop` - 1: values by parameter, units of keys, shape (n_set,)."""
+        """Return values of samples `start` to `stop` - 1 by parameter, shape (n_sample,)."""
         if self.design == "grid":
             places = np.unravel_index(np.arange(start, stop), self.shape)
             return {p.name: p.grid()[i] for p, i in zip(self.parameters, places, strict=True)}
         if self.design == "list":
             return {p.name: p.grid()[start:stop] for p in self.parameters}
-        shares = unit_sets(self.design, len(self.parameters), self.size, self.seed, start, stop)
+        shares = unit_samples(self.design, len(self.parameters), self.size, self.seed, start, stop)
         return {p.name: p.quantile(shares[:, i]) for i, p in enumerate(self.parameters)}
 
     def key_columns(self, columns: Columns) -> Columns:
-        """Return sets of `parameter_columns` as values of keys of the library, shape (n_set,).
+        """Return samples of `parameter_columns` as values of keys, shape (n_sample,).
 
         The density determines the mass, the temperature modulus and loss factor.
         """

@@ -11,7 +11,7 @@ from thud.base.display import Displayed
 from thud.case.case import Case
 from thud.case.keys import DENSITY
 from thud.impact.quantities import RATING
-from thud.studies.set_kind import SetKind
+from thud.studies.sample_kind import SampleKind
 from thud.studies.study import value_in, wall_volume
 
 if TYPE_CHECKING:
@@ -24,20 +24,20 @@ if TYPE_CHECKING:
 
     from thud.studies.kind import RunOptions
     from thud.studies.parameter import Parameter
-    from thud.studies.sets import SetStudy
+    from thud.studies.samples import SampleStudy
     from thud.studies.study import Source, Study
 
 _AXES = 2
 
 
 @dataclass(frozen=True, eq=False)
-class DesignMap(Displayed):
+class Design(Displayed):
     """Margin and verdict over two parameters.
 
     Attributes
     ----------
     dataset : Dataset
-        Every set, on a grid of the two parameters in ascending order; ``margin`` is the minimum
+        Every sample, on a grid of the two parameters in ascending order; ``margin`` is the minimum
         distance of an octave level to its limits, dB, and ``conforms`` the whole verdict; of a case
         with a room ``standardised_rating`` is drawn, dB.
     axes : tuple of str
@@ -56,8 +56,8 @@ class DesignMap(Displayed):
     def __repr__(self) -> str:
         """Return the axes, and how much conforms."""
         conforms = self.dataset["conforms"]
-        count = f"{int(conforms.sum())} of {conforms.size} sets conform"
-        return f"<DesignMap, {' and '.join(self.axes)}: {count}>"
+        count = f"{int(conforms.sum())} of {conforms.size} samples conform"
+        return f"<Design, {' and '.join(self.axes)}: {count}>"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
@@ -66,7 +66,7 @@ class DesignMap(Displayed):
     def table(self) -> list[tuple[str, ...]]:
         """Return header and rows of text: the best place, and how much conforms."""
         margin = self.dataset["margin"]
-        rows: list[tuple[str, ...]] = [("sets", f"{margin.size}")]
+        rows: list[tuple[str, ...]] = [("samples", f"{margin.size}")]
         rows.append(("octave levels conform", f"{int((margin >= 0).sum())}"))
         rows.append(("all criteria conform", f"{int(self.dataset['conforms'].sum())}"))
         if "doubtful" in self.dataset:
@@ -84,37 +84,37 @@ class DesignMap(Displayed):
         return rows
 
 
-class DesignMapKind(SetKind[DesignMap]):
+class DesignKind(SampleKind[Design]):
     """Maps of a design as a kind of study."""
 
     name = "design"
     designs = ("grid",)
 
-    def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SetStudy:
+    def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SampleStudy:
         """Return a study of two numeric parameters."""
         found = super().complete(study, given, folder)
         if len(found.parameters) != _AXES or not all(map(_is_axis, found.parameters)):
             refuse("[parameters] do not make a map", "two numeric ones of two values or more")
         return found
 
-    def conclude(self, study: SetStudy, dataset: xr.Dataset) -> DesignMap:
-        """Return the map of all sets."""
+    def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> Design:
+        """Return the map of all samples."""
         first, second = (parameter.coordinate for parameter in study.parameters)
-        return DesignMap(dataset.load().sortby([first, second]), (first, second), *_mark(study))
+        return Design(dataset.load().sortby([first, second]), (first, second), *_mark(study))
 
-    def draw(self, result: DesignMap) -> Figure:
+    def draw(self, result: Design) -> Figure:
         """Return the margin over both parameters."""
-        from thud.plot import draw_design_map
+        from thud.plot import draw_design
 
-        return draw_design_map(result)
-
-
-KIND = DesignMapKind()
+        return draw_design(result)
 
 
-def design_map(
+KIND = DesignKind()
+
+
+def design(
     study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[RunOptions]
-) -> DesignMap:
+) -> Design:
     """Compute which geometry and material conform to the standards.
 
     Parameters
@@ -126,8 +126,8 @@ def design_map(
 
     Returns
     -------
-    DesignMap
-        Margin and verdict of the force that the case judges.
+        Design
+        Margin and verdict of the force that the case assesses.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def _is_axis(parameter: Parameter) -> bool:
     return parameter.numeric and (parameter.values is None or len(set(parameter.values)) > 1)
 
 
-def _mark(study: SetStudy) -> tuple[tuple[float, float] | None, str]:
+def _mark(study: SampleStudy) -> tuple[tuple[float, float] | None, str]:
     """Return the place of the paper's ball if all else is as in the paper, else of the case."""
     names = [parameter.name for parameter in study.parameters]
     paper, ours = _ball_and_drop(Case(), None), _ball_and_drop(study.case, study.density)

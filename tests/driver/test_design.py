@@ -27,7 +27,7 @@ MODAL: dict[str, Any] = {
 def test_margin_of_a_source_with_known_levels() -> None:
     # With a given contact time the level is 20 lg M + 10 lg h + c.
     options = {"contact_time": 0.02, "restitution": 0.8}
-    found = thud.design_map(
+    found = thud.design(
         {
             "fixed": {"model": "hunt_crossley", "source": "tyre", **options},
             "parameters": {
@@ -40,13 +40,13 @@ def test_margin_of_a_source_with_known_levels() -> None:
     gain = 20 * np.log10(found["mass"]) + 10 * np.log10(found["height"])
     expected = [
         np.minimum(level + gain - limit.lower, limit.upper - level - gain)
-        for level, limit in zip(one.levels(), one.conformity("tyre").criteria[:5], strict=True)
+        for level, limit in zip(one.levels(), one.assess("tyre").criteria[:5], strict=True)
     ]
     np.testing.assert_allclose(found["margin"], np.min(expected, axis=0), atol=1e-6)
 
 
 def test_map_holds_the_verdicts_of_single_drops() -> None:
-    result = thud.design_map(MODAL)
+    result = thud.design(MODAL)
     assert result.axes == ("wall_thickness", "youngs_modulus")
     assert result.dataset["wall_thickness"].values.tolist() == [0.029, 0.0306, 0.032]
     verdicts = []
@@ -54,7 +54,7 @@ def test_map_holds_the_verdicts_of_single_drops() -> None:
         for modulus in (1.6e6, 1.8e6, 2.0e6):
             ball = thud.Ball(wall_thickness=thickness, youngs_modulus=modulus)
             options = {"damping_law": "rising", "loss_factor": 0.2}
-            verdicts.append(bool(thud.solve(ball, model="modal_ball", **options).conformity()))
+            verdicts.append(bool(thud.solve(ball, model="modal_ball", **options).assess()))
     assert result.dataset["conforms"].values.ravel().tolist() == verdicts
     assert any(verdicts)
     assert not all(verdicts)
@@ -62,9 +62,9 @@ def test_map_holds_the_verdicts_of_single_drops() -> None:
 
 
 def test_ball_of_the_paper_is_marked() -> None:
-    result = thud.design_map(MODAL)
+    result = thud.design(MODAL)
     assert (result.mark, result.mark_name) == ((0.032, 1.6e6), "paper's ball")
-    figure = thud.plot.draw_design_map(result)
+    figure = thud.plot.draw_design(result)
     axes, bar = figure.axes
     (star,) = [line for line in axes.lines if line.get_marker() == "*"]
     assert (star.get_xdata()[0], star.get_ydata()[0]) == pytest.approx((32, 1.6))
@@ -78,8 +78,8 @@ def test_ball_of_the_paper_is_marked() -> None:
 def test_scale_of_the_study_is_that_of_the_axes() -> None:
     modulus = {"low": 1e5, "high": 1e8, "count": 7, "scale": "log"}
     height = {"low": 1, "high": 2, "count": 2, "scale": "log"}
-    result = thud.design_map({"parameters": {"youngs_modulus": modulus, "height": height}})
-    figure = thud.plot.draw_design_map(result)
+    result = thud.design({"parameters": {"youngs_modulus": modulus, "height": height}})
+    figure = thud.plot.draw_design(result)
     axes, _ = figure.axes
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
     # 1e8 Pa would need a power of ten beside the axis, over the legend.
@@ -90,15 +90,15 @@ def test_scale_of_the_study_is_that_of_the_axes() -> None:
     assert {"0.1", "1", "10", "100"} <= set(shown)
     shown = [text.get_text() for text in axes.get_yticklabels()]
     assert {"1", "1.2", "1.4"} <= set(shown)
-    assert thud.plot.draw_design_map(thud.design_map(MODAL)).axes[0].get_xscale() == "linear"
+    assert thud.plot.draw_design(thud.design(MODAL)).axes[0].get_xscale() == "linear"
 
 
 def test_colours_of_a_map_without_conformity_end_at_zero() -> None:
     heights = {"low": 0.1, "high": 0.5, "count": 4}
     study = {"parameters": {"height": heights, "mass": {"values": [2.0, 2.5]}}}
-    axes, bar = thud.plot.draw_design_map(thud.design_map(study)).axes
+    axes, bar = thud.plot.draw_design(thud.design(study)).axes
     low, high = bar.get_ylim()
-    margin = thud.design_map(study).dataset["margin"].values
+    margin = thud.design(study).dataset["margin"].values
     assert low <= margin.min()
     assert margin.max() < 0 == high
     # The zero is white, and round margins have lines with their numbers.
@@ -110,12 +110,12 @@ def test_colours_of_a_map_without_conformity_end_at_zero() -> None:
 def test_map_of_nearly_one_margin_is_drawn() -> None:
     heights = {"low": 0.1, "high": 0.1001, "count": 2}
     study = {"parameters": {"height": heights, "mass": {"values": [2.0, 2.0001]}}}
-    axes, _ = thud.plot.draw_design_map(thud.design_map(study)).axes
+    axes, _ = thud.plot.draw_design(thud.design(study)).axes
     assert not axes.texts
 
 
 def test_star_on_the_edge_is_whole() -> None:
-    axes, _ = thud.plot.draw_design_map(thud.design_map(MODAL)).axes
+    axes, _ = thud.plot.draw_design(thud.design(MODAL)).axes
     (star,) = [line for line in axes.lines if line.get_marker() == "*"]
     assert not star.get_clip_on()
 
@@ -125,23 +125,23 @@ def test_base_case_is_marked_where_the_paper_has_no_value() -> None:
         "fixed": {"model": "modal_ball"},
         "parameters": {"loss_factor": {"values": [0.1, 0.2]}, "height": {"values": [2.0, 1.5]}},
     }
-    result = thud.design_map(study)
+    result = thud.design(study)
     assert (result.mark, result.mark_name) == (None, "case")
-    axes, _ = thud.plot.draw_design_map(result).axes
+    axes, _ = thud.plot.draw_design(result).axes
     assert axes.get_legend() is None
     study["parameters"]["height"] = {"values": [1.0, 1.5]}
-    assert thud.design_map(study).mark == (0.1, 1.0)
+    assert thud.design(study).mark == (0.1, 1.0)
 
 
 def test_ball_is_that_of_the_paper_only_if_all_of_it_is() -> None:
     axes: dict[str, Any] = {"mass": {"values": [2, 3]}, "height": {"values": [0.5, 1.5]}}
-    result = thud.design_map({"parameters": axes})
+    result = thud.design({"parameters": axes})
     assert (result.mark, result.mark_name) == ((2.5, 1.0), "paper's ball")
     # The values of the case for what is varied do not count.
-    result = thud.design_map({"case": {"drop": {"height": 1.4}}, "parameters": axes})
+    result = thud.design({"case": {"drop": {"height": 1.4}}, "parameters": axes})
     assert (result.mark, result.mark_name) == ((2.5, 1.0), "paper's ball")
     for fixed in ({"outer_radius": 0.07}, {"gravity": 1.6}):
-        result = thud.design_map({"fixed": fixed, "parameters": axes})
+        result = thud.design({"fixed": fixed, "parameters": axes})
         assert (result.mark, result.mark_name) == ((2.5, 1.0), "case")
 
 
@@ -149,25 +149,25 @@ def test_density_of_the_paper_is_marked() -> None:
     density = 2.5 / (4 / 3 * np.pi * (0.089**3 - 0.057**3))
     height: dict[str, Any] = {"height": {"values": [0.5, 1.5]}}
     axes = {"density": {"values": [1000, 1200]}, **height}
-    result = thud.design_map({"parameters": axes})
+    result = thud.design({"parameters": axes})
     assert (result.mark, result.mark_name) == (pytest.approx((density, 1.0)), "paper's ball")
-    result = thud.design_map({"fixed": {"outer_radius": 0.088}, "parameters": axes})
+    result = thud.design({"fixed": {"outer_radius": 0.088}, "parameters": axes})
     heavier = 2.5 / (4 / 3 * np.pi * (0.088**3 - 0.056**3))
     assert (result.mark, result.mark_name) == (pytest.approx((heavier, 1.0)), "case")
     with pytest.raises(thud.InputError, match=naming("[fixed]", "&ball: outer_radius", 0.0)):
-        thud.design_map({"fixed": {"outer_radius": 0}, "parameters": axes})
+        thud.design({"fixed": {"outer_radius": 0}, "parameters": axes})
     axes = {"wall_thickness": {"values": [0.03, 0.034]}, **height}
     for given, name in ((density, "paper's ball"), (1000, "case")):
-        result = thud.design_map({"fixed": {"density": given}, "parameters": axes})
+        result = thud.design({"fixed": {"density": given}, "parameters": axes})
         assert (result.mark, result.mark_name) == ((0.032, 1.0), name)
 
 
 def test_places_without_results_stay_empty() -> None:
     study = {"parameters": {"height": {"values": [0.5, 1, -1]}, "mass": {"values": [2, 3, 4]}}}
-    result = thud.design_map(study)
+    result = thud.design(study)
     assert int(np.isnan(result.dataset["margin"]).sum()) == 3
-    thud.plot.draw_design_map(result)
-    assert ("sets", "9") in result.table()
+    thud.plot.draw_design(result)
+    assert ("samples", "9") in result.table()
 
 
 @pytest.mark.parametrize(
@@ -181,7 +181,7 @@ def test_places_without_results_stay_empty() -> None:
 )
 def test_what_is_no_map_is_reported(parameters: dict[str, Any]) -> None:
     with pytest.raises(thud.InputError, match=naming("[parameters]")):
-        thud.design_map({"parameters": parameters})
+        thud.design({"parameters": parameters})
 
 
 def test_command_writes_figure_and_table(

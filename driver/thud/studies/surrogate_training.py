@@ -17,29 +17,29 @@ from thud.base.threads import one_thread
 from thud.case.keys import find_key
 from thud.impact.quantities import LEVELS, SCALAR_QUANTITIES
 from thud.studies.blocks import read_identity, result_names
-from thud.studies.computing import compute_sets
-from thud.studies.designs import unit_sets
+from thud.studies.computing import compute_samples
 from thud.studies.directory import require_version
-from thud.studies.emulation.emulator import (
+from thud.studies.parameter import Parameter
+from thud.studies.samples import SampleStudy
+from thud.studies.sampling import unit_samples
+from thud.studies.trained_surrogate import (
     SMOOTHNESS,
     Surrogate,
     read_surrogate,
 )
-from thud.studies.parameter import Parameter
-from thud.studies.sets import SetStudy
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
     from thud.base.files import Results
-    from thud.studies.emulation.plan import Plan
     from thud.studies.kind import RunOptions
-    from thud.studies.sets import Columns
+    from thud.studies.samples import Columns
+    from thud.studies.surrogate_plan import Plan
 
     Values = NDArray[np.float64]
 
-# Sets that are scanned together for the extent of their keys.
+# Samples that are scanned together for the extent of their keys.
 _SCANNED = 2**17
 # Variations of this part of a mean are rounding errors.
 _ROUNDING = 1e-10
@@ -47,7 +47,7 @@ _GROUPS_OF_RECORDS = ("sampling", "levels", "limits")
 
 
 @dataclass(frozen=True)
-class TrainingStudy(SetStudy):
+class TrainingStudy(SampleStudy):
     """Drops `first` to `size` - 1 of the design of a surrogate, and their numbers of peaks."""
 
     first: int = 0
@@ -68,14 +68,14 @@ class TrainingStudy(SetStudy):
         return super().parameter_columns(self.first + start, self.first + stop)
 
 
-def train(study: SetStudy, results: Results | None, how: RunOptions) -> Surrogate:
-    """Return the surrogate of all sets of a study, trained or read from its directory.
+def train(study: SampleStudy, results: Results | None, how: RunOptions) -> Surrogate:
+    """Return the surrogate of all samples of a study, trained or read from its directory.
 
-    Its drops are kept there, as sets of a study of their own. Raises InputError where a key cannot
-    be learned or a drop has no result, NumericalError where the error exceeds its bound.
+    Its drops are kept there, as samples of a study of their own. Raises InputError where a key
+    cannot be learned or a drop has no result, NumericalError where the error exceeds its bound.
     """
     plan = study.plan
-    assert plan is not None  # noqa: S101 - see `SetKind.compute`
+    assert plan is not None  # noqa: S101 - see `SampleKind.compute`
     parameters = _ranges(study)
     name = surrogate_name(study)
     folder = results.folder if results else None
@@ -95,7 +95,7 @@ def train(study: SetStudy, results: Results | None, how: RunOptions) -> Surrogat
         if results:
             paths = {results.folder / one: read_identity for one in result_names(drops)}
             require_version(paths, drops, results)
-        stages.append(compute_sets(drops, folder, how).load())
+        stages.append(compute_samples(drops, folder, how).load())
         found = _learn(drops, stages, plan, study.identity)
         label, error = found.worst
         tried.append(f"{error:.3g} dB with {stop}")
@@ -111,13 +111,13 @@ def train(study: SetStudy, results: Results | None, how: RunOptions) -> Surrogat
     raise NumericalError(message)
 
 
-def surrogate_name(study: SetStudy) -> str:
+def surrogate_name(study: SampleStudy) -> str:
     """Return the name of the file of a study's surrogate."""
     return f"{study.name}_surrogate.npz"
 
 
-def _ranges(study: SetStudy) -> tuple[Parameter, ...]:
-    """Return the keys of the library that differ among the sets, from minimum to maximum."""
+def _ranges(study: SampleStudy) -> tuple[Parameter, ...]:
+    """Return the keys of the library that differ among the samples, from minimum to maximum."""
     low: dict[str, float] = {}
     high: dict[str, float] = {}
     for start in range(0, study.count, _SCANNED):
@@ -161,7 +161,7 @@ def _learn(
         str(n): _decibels(str(n), v) for n, v in whole.items() if n in SCALAR_QUANTITIES | LEVELS
     }
     region = np.array([(p.low, p.high) for p in drops.parameters])
-    points = unit_sets(drops.design, len(region), drops.size, drops.seed, 0, drops.size)
+    points = unit_samples(drops.design, len(region), drops.size, drops.seed, 0, drops.size)
     points[:, region[:, 0] == region[:, 1]] = 0.0
     values = np.concatenate(list(quantities.values()), axis=1)
     outputs = {name: part.shape[1] for name, part in quantities.items()}

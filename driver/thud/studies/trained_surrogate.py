@@ -19,8 +19,8 @@ from thud.base.extras import require_extra
 from thud.base.files import is_failure, read_input, replace_file
 from thud.case.case import Case, case_text
 from thud.case.keys import OF_FILES, put
+from thud.level.assessment import get_criteria
 from thud.level.levels import get_bands
-from thud.studies.emulation.doubtful import judge_many
 from thud.studies.study import value_in
 
 if TYPE_CHECKING:
@@ -29,12 +29,14 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from thud.base._schema import LimitsSource
+
     Columns = dict[str, NDArray[Any]]
     Values = NDArray[np.float64]
 
 # Share of the held-out drops within the error that is stated, and the confidence of that.
 SHARE = 0.95
-# Sets that are computed together: their kernel stays in the cache.
+# Samples that are computed together: their kernel stays in the cache.
 _TOGETHER = 250
 # Values beyond the region by this part of its width are rounding.
 _ROUNDING = 1e-9
@@ -198,10 +200,10 @@ class Surrogate(Displayed):
             refuse(f"{key} = {now.get(key)}: the surrogate was trained with {before[key]}", "that")
 
     def predict(self, case: Case, columns: Columns) -> Columns:
-        """Return the results of sets of a case that differ in some keys, shape (n_set,) each.
+        """Return the results of samples of a case that differ in some keys, shape (n_sample,) each.
 
         They are those of `thud.studies.evaluation.evaluate`, and ``doubtful``: the verdict could
-        change by the errors. Sets outside the region have a status and a reason instead. Raises
+        change by the errors. Samples outside the region have a status and a reason instead. Raises
         InputError as `require`.
         """
         self.require(case, columns)
@@ -248,7 +250,7 @@ class Surrogate(Displayed):
         level = f"{case.levels.force}_level"
         rest = [given.get(n, np.asarray(value_in(case, n))) for n in ("mass", "height")]
         exact = [np.zeros(1)] * 3
-        verdicts = judge_many(
+        verdicts = assess_many(
             (found[level], *(found[n] for n in names), np.array([self.peaks]), *rest),
             (
                 self.error_of(level)[np.newaxis],
@@ -319,6 +321,41 @@ class Surrogate(Displayed):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write it to a file ``.npz``, completely or not at all; `read_surrogate` reads it."""
         replace_file(path, self.to_bytes())
+
+
+def assess_many(
+    values: tuple[Values, ...], errors: tuple[Values, ...], source: LimitsSource
+) -> dict[str, NDArray[Any]]:
+    """Return margin, verdict, and whether errors could change it, of many drops.
+
+    Parameters
+    ----------
+    values
+        Octave levels, dB, shape (n, 5); contact time, s; restitution; number of peaks; mass, kg;
+        height, m, as in `thud.assess`, shape (n,) or of one value.
+    errors
+        The same of their errors, in the same units.
+    source
+        Source whose limits apply.
+    """
+    count, bands = values[0].shape
+    judged, by = (_columns(part, count) for part in (values, errors))
+    criteria = get_criteria(source)
+    lower = np.array([one.lower for one in criteria])
+    upper = np.array([one.upper for one in criteria])
+    inside = np.minimum(judged - lower, upper - judged)
+    surely, perhaps = ((inside >= sign * by).all(axis=1) for sign in (1, -1))
+    return {
+        "margin": inside[:, :bands].min(axis=1),
+        "conforms": (inside >= 0).all(axis=1),
+        "doubtful": perhaps & ~surely,
+    }
+
+
+def _columns(parts: tuple[Values, ...], count: int) -> Values:
+    """Return the values of all criteria, shape (count, n_criterion)."""
+    levels = np.broadcast_to(parts[0], (count, parts[0].shape[-1]))
+    return np.column_stack([levels, *(np.broadcast_to(part, count) for part in parts[1:])])
 
 
 def keys_of(case: Case) -> dict[str, str]:

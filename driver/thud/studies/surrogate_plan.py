@@ -13,7 +13,7 @@ from thud.base.checks import (
     require_words,
 )
 from thud.base.extras import require_extra
-from thud.studies.emulation.emulator import Surrogate, read_surrogate
+from thud.studies.trained_surrogate import Surrogate, read_surrogate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
     from thud.case.case import Case
     from thud.impact.impact import Impact
-    from thud.studies.emulation.emulator import Surrogate
     from thud.studies.fitting.misfit import Misfit
     from thud.studies.fitting.ranges import Range
     from thud.studies.fitting.result import Fit
+    from thud.studies.trained_surrogate import Surrogate
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class Answer:
     values: NDArray[np.float64]
 
 
-class AnsweredLevels(LevelMisfit):
+class SurrogateLevels(LevelMisfit):
     """How far a surrogate's levels are from a target.
 
     Where the uncertainties of the target are given, the mean square of the surrogate's held-out
@@ -79,12 +79,12 @@ class AnsweredLevels(LevelMisfit):
         return impact.values if isinstance(impact, Answer) else super().values(impact)
 
 
-def answered(misfit: Misfit, surrogate: Surrogate, case: Case, names: list[str]) -> AnsweredLevels:
+def answered(misfit: Misfit, surrogate: Surrogate, case: Case, names: list[str]) -> SurrogateLevels:
     """Return the comparison of a target with answers of a surrogate."""
     if not isinstance(misfit, LevelMisfit):
         refuse("surrogate is not allowed for a force", "levels as target: it knows no histories")
     surrogate.require(case, names)
-    return AnsweredLevels(misfit, surrogate, case)
+    return SurrogateLevels(misfit, surrogate, case)
 
 
 def within_region(entry: Range, surrogate: Surrogate) -> Range:
@@ -106,7 +106,7 @@ def confirmed(found: Fit) -> Fit:
     targets = []
     missed = share = 0.0
     for target in found.targets:
-        misfit = cast("AnsweredLevels", target.misfit)
+        misfit = cast("SurrogateLevels", target.misfit)
         impact = compute(target.case)
         off = np.abs(misfit.values(impact) - misfit.values(target.impact))
         # What all training drops share has no error.

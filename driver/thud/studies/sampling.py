@@ -1,4 +1,4 @@
-"""Designs: which sets a study has, and the points of those that are drawn."""
+"""Designs: which samples a study has, and the points of those that are sampled."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-DRAWN = ("random", "latin_hypercube", "sobol", "saltelli")
+SAMPLED = ("random", "latin_hypercube", "sobol", "saltelli")
 # Fewer base samples than this give no Sobol indices.
-MIN_SAMPLES = 4
+MIN_BASE_SAMPLES = 4
 # Maximum of NumPy's integers.
-_MAX_SETS = 2**63 - 1
+_MAX_SAMPLES = 2**63 - 1
 
 
-def makers(design: str) -> dict[str, str]:
-    """Return the versions of the packages that draw a design; others may draw other points."""
-    names = {"saltelli": ("scipy", "SALib")}.get(design, ("scipy",) if design in DRAWN else ())
+def sampler_versions(design: str) -> dict[str, str]:
+    """Return the versions of the packages that sample a design; others may give other points."""
+    names = {"saltelli": ("scipy", "SALib")}.get(design, ("scipy",) if design in SAMPLED else ())
     return {f"{name.lower()}_version": version(name) for name in names}
 
 
@@ -38,27 +38,27 @@ def read_design(
     design = given.get("kind", allowed[0])
     if design not in allowed:
         refuse_value("[design] kind", design, ", ".join(allowed))
-    words = ("kind", "size", "seed") if design in DRAWN else ("kind",)
+    words = ("kind", "size", "seed") if design in SAMPLED else ("kind",)
     require_words(f"[design] of kind {design}", given, words)
     for parameter in parameters:
-        if design in DRAWN and parameter.count:
+        if design in SAMPLED and parameter.count:
             refuse(
                 f"[parameters] {parameter.name}: count has no use in a {design} design",
                 "low, high and scale",
             )
-        if design not in DRAWN and not parameter.size:
+        if design not in SAMPLED and not parameter.size:
             refuse(
                 f"[parameters] {parameter.name} has no values for a {design} design",
                 "values = [...], or low, high and count",
             )
     if design == "list" and len({p.size for p in parameters}) > 1:
         refuse("[parameters] differ in their number of values", "the same for all")
-    if design == "grid" and math.prod(p.size for p in parameters) > _MAX_SETS:
-        refuse("[parameters] make too many sets", "up to 2^63 - 1 in a grid")
-    if design not in DRAWN:
+    if design == "grid" and math.prod(p.size for p in parameters) > _MAX_SAMPLES:
+        refuse("[parameters] make too many samples", "up to 2^63 - 1 in a grid")
+    if design not in SAMPLED:
         return {"design": design}
     size, seed = given.get("size", 0), given.get("seed", 0)
-    minimum = MIN_SAMPLES if design == "saltelli" else 1
+    minimum = MIN_BASE_SAMPLES if design == "saltelli" else 1
     require_whole("[design] size", size, minimum, MAX_VALUES)
     require_whole("[design] seed", seed, 0, LARGEST_SEED)
     if design in {"sobol", "saltelli"} and size & (size - 1):
@@ -70,7 +70,7 @@ def read_design(
     return {"design": design, "size": size, "seed": seed}
 
 
-def unit_sets(  # noqa: PLR0913, PLR0917 - the numbers of a design
+def unit_samples(  # noqa: PLR0913, PLR0917 - the numbers of a design
     design: str, dimension: int, size: int, seed: int, start: int, stop: int
 ) -> NDArray[np.float64]:
     """Return points of a design in the unit cube, shape (stop - start, dimension)."""
@@ -92,14 +92,14 @@ def unit_sets(  # noqa: PLR0913, PLR0917 - the numbers of a design
 
 @lru_cache(maxsize=1)
 def _whole(design: str, dimension: int, size: int, seed: int) -> NDArray[np.float64]:
-    """Return all points of a design that cannot be drawn in parts."""
+    """Return all points of a design that cannot be sampled in parts."""
     try:
-        return _drawn(design, dimension, size, seed)
+        return _sampled(design, dimension, size, seed)
     except MemoryError as error:
         refuse(f"[design] size = {size} of kind {design} does not fit in memory", "fewer", error)
 
 
-def _drawn(design: str, dimension: int, size: int, seed: int) -> NDArray[np.float64]:
+def _sampled(design: str, dimension: int, size: int, seed: int) -> NDArray[np.float64]:
     if design == "latin_hypercube":
         from scipy.stats import qmc
 
