@@ -30,8 +30,8 @@ module thud_command_line
    real(wp), parameter :: blas_memory = 160.0e6_wp
 
    !> Options by their long names.
-   character(len=*), parameter :: known_options(*) = [character(len=9) :: '--output', '--replace', '--samples', &
-      '--threads', '--check', '--quiet', '--keys', '--schema', '--help', '--version']
+   character(len=*), parameter :: known_options(*) = [character(len=9) :: '--output', '--replace', '--all', &
+      '--samples', '--threads', '--check', '--quiet', '--keys', '--schema', '--help', '--version']
 
    !> What the command line asks for.
    type :: request_type
@@ -41,6 +41,8 @@ module thud_command_line
       character(len=:), allocatable :: output
       !> Replace also files that thud has not written.
       logical :: replace = .false.
+      !> Write also the channels of the model.
+      logical :: all = .false.
       !> Path of a table of samples, empty where not given.
       character(len=:), allocatable :: samples
       !> Threads for them.
@@ -81,7 +83,7 @@ contains
          if (allocated(error)) then
             continue
          else if (request%samples == '') then
-            call run_case(request%case_file, request%output, request%replace, case, results, outcome, error)
+            call run_case(request%case_file, request%output, request%replace, request%all, case, results, outcome, error)
          else
             call run_samples(request%case_file, request%samples, request%threads, request%output, request%replace, &
                outcome, error)
@@ -131,20 +133,13 @@ contains
       do while (i <= command_argument_count())
          argument = get_argument(i)
          select case (argument)
-         case ('-h', '--help')
-            request%information = help()
-            return
-         case ('--version')
-            request%information = 'thud '//version
-            return
-         case ('--keys')
-            call describe_keys(request%information)
-            return
-         case ('--schema')
-            call get_schema(request%information)
+         case ('-h', '--help', '--version', '--keys', '--schema')
+            call get_information(argument, request%information)
             return
          case ('--replace')
             request%replace = .true.
+         case ('--all')
+            request%all = .true.
          case ('--check')
             request%check = .true.
          case ('--quiet', '-q')
@@ -160,7 +155,7 @@ contains
             if (index(argument, '-') == 1) then
                call get_suggestion(argument, known_options, suggestion)
                error = input_error(quoted(argument)//' is not a known option'//suggestion//'; allowed: --output DIR, ' &
-                  //'--replace, --samples TABLE, --threads N, --check, --quiet, --keys, --schema, --help, --version')
+                  //'--replace, --all, --samples TABLE, --threads N, --check, --quiet, --keys, --schema, --help, --version')
             else if (allocated(request%case_file)) then
                error = input_error(quoted(argument)//' is a second case; allowed: one')
             else
@@ -174,8 +169,28 @@ contains
          error = input_error('no case is given')
       else if (request%samples == '' .and. allocated(number)) then
          error = input_error('--threads does nothing without --samples; allowed: both')
+      else if (request%samples /= '' .and. request%all) then
+         error = input_error('--all does nothing with --samples; allowed: one of them')
       end if
    end subroutine parse_arguments
+
+   !> The text that an option shows instead of a run.
+   subroutine get_information(option, information)
+      !> One of -h, --help, --version, --keys and --schema.
+      character(len=*), intent(in) :: option
+      character(len=:), allocatable, intent(out) :: information
+
+      select case (option)
+      case ('--version')
+         information = 'thud '//version
+      case ('--keys')
+         call describe_keys(information)
+      case ('--schema')
+         call get_schema(information)
+      case default
+         information = help()
+      end select
+   end subroutine get_information
 
    !> The value of an option.
    subroutine take_value(i, option, allowed, value, error)
@@ -223,8 +238,8 @@ contains
    pure function usage() result(text)
       character(len=:), allocatable :: text
 
-      text = 'thud CASE.nml [--samples TABLE.csv [--threads N]] [--output DIR] [--replace] [--check] [--quiet] | ' &
-         //'--keys | --schema | --help | --version'
+      text = 'thud CASE.nml [--samples TABLE.csv [--threads N]] [--output DIR] [--replace] [--all] [--check] ' &
+         //'[--quiet] | --keys | --schema | --help | --version'
    end function usage
 
    !> The help text.
@@ -238,6 +253,8 @@ contains
          //'  -o, --output DIR     directory for the results (default: outputs/<case>, with'//newline &
          //'                       --samples outputs/<case>_samples)'//newline &
          //'  --replace            replace also files that thud has not written'//newline &
+         //'  --all                write also channels.csv: energies and other quantities of'//newline &
+         //'                       the model against time'//newline &
          //'  --samples TABLE.csv  a header row of keys and one drop, a sample, in each'//newline &
          //'                       further row; all other keys are those of CASE.nml'//newline &
          //'  --threads N          threads for the samples (default: 1)'//newline &

@@ -82,12 +82,12 @@ contains
    end subroutine add_remark
 
    !> Runs a namelist file and writes its results.
-   subroutine run_case(path, output, replace, case, results, outcome, error)
+   subroutine run_case(path, output, replace, channels, case, results, outcome, error)
       character(len=*), intent(in) :: path
       !> Directory for the results; empty for `outputs/<name of the case>`.
       character(len=*), intent(in) :: output
-      !> Files that thud has not written are replaced, too.
-      logical, intent(in) :: replace
+      !> Files that thud has not written are replaced, too; the channels of the histories are written, too.
+      logical, intent(in) :: replace, channels
       type(case_type), target, intent(out) :: case
       type(results_type), intent(out) :: results
       !> Table, verdict and place of the results.
@@ -97,19 +97,19 @@ contains
 
       call load_case(path, case, error)
       if (allocated(error)) return
-      call store_case(path, case, output, replace, results, outcome, error)
+      call store_case(path, case, output, replace, channels, results, outcome, error)
       if (allocated(error)) error%message = path//': '//error%message
    end subroutine run_case
 
    !> Computes a case and writes its results.
-   subroutine store_case(path, case, output, replace, results, outcome, error)
+   subroutine store_case(path, case, output, replace, channels, results, outcome, error)
       !> The file of the case.
       character(len=*), intent(in) :: path
       type(case_type), intent(in), target :: case
       !> Directory for the results; empty for `outputs/<name of the case>`.
       character(len=*), intent(in) :: output
-      !> Files that thud has not written are replaced, too.
-      logical, intent(in) :: replace
+      !> Files that thud has not written are replaced, too; the channels of the histories are written, too.
+      logical, intent(in) :: replace, channels
       type(results_type), intent(out) :: results
       !> Table, verdict and place of the results.
       type(outcome_type), intent(out) :: outcome
@@ -128,7 +128,7 @@ contains
       if (.not. allocated(error)) call check_space(case, outcome%directory, error)
       if (.not. allocated(error)) call compute(case, scope_type(), results, error)
       if (allocated(error)) return
-      call describe(case, results, files, outcome)
+      call describe(case, results, channels, files, outcome)
       call write_results(outcome%directory, input, files, [path], replace, differs, error)
       if (allocated(error)) return
       if (differs) call outcome%add_remark(path, replaces//outcome%directory)
@@ -156,9 +156,11 @@ contains
    end subroutine check_space
 
    !> Table, verdict and files of results.
-   subroutine describe(case, results, files, outcome)
+   subroutine describe(case, results, channels, files, outcome)
       type(case_type), intent(in) :: case
       type(results_type), intent(in) :: results
+      !> Channels of the histories, too.
+      logical, intent(in) :: channels
       !> The files: [n_file].
       type(text_file_type), allocatable, intent(out) :: files(:)
       !> Gets table and verdict.
@@ -181,7 +183,7 @@ contains
       call add_file(files, file_names(1), get_force_csv(results%impact%history))
       call add_file(files, file_names(2), get_levels_csv(case, results%impact%assessment))
       summary = get_summary(case, results%impact%history, results%impact%assessment, results%remark)
-      call add_history_files(results%impact%history, '', files)
+      call add_history_files(results%impact%history, '', channels, files)
       if (allocated(results%on_floor)) then
          call get_floor_table(case, results%impact, results%on_floor, results%floor, text)
          outcome%table = outcome%table//newline//text
@@ -191,7 +193,7 @@ contains
          call add_file(files, floor_names(2), text)
          call get_floor_summary(results%on_floor, text)
          summary = summary//text
-         call add_history_files(results%on_floor, 'floor_', files)
+         call add_history_files(results%on_floor, 'floor_', channels, files)
       end if
       call add_file(files, file_names(3), summary)
       if (case%has_room) then
@@ -208,19 +210,19 @@ contains
    end subroutine describe
 
    !> Adds the files of a history of models that have channels or snapshots.
-   subroutine add_history_files(history, prefix, files)
+   subroutine add_history_files(history, prefix, channels, files)
       type(force_history_type), intent(in) :: history
-      !> What their names begin with.
+      !> Beginning of their names.
       character(len=*), intent(in) :: prefix
+      !> Channels, too.
+      logical, intent(in) :: channels
       !> The files: [n_file].
       type(text_file_type), allocatable, intent(inout) :: files(:)
-      integer :: n
 
-      if (allocated(history%channel)) call add_file(files, prefix//channel_file, get_channels_csv(history))
-      n = size(files)
+      if (channels .and. allocated(history%channel)) call add_file(files, prefix//channel_file, get_channels_csv(history))
       if (history%motion%n_frame == 0) return
-      call extend(files, history%motion%n_frame + size(motion_names))
-      call get_motion_files(history%motion, prefix, files(n + 1:))
+      call extend(files, size(motion_names))
+      call get_motion_files(history%motion, prefix, files(size(files) - size(motion_names) + 1:))
    end subroutine add_history_files
 
    !> Adds a file.

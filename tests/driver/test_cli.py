@@ -34,10 +34,8 @@ def test_run_writes_results_and_figures(
         ".thud",
         "effective.nml",
         "force.csv",
-        "force.png",
         "force.svg",
         "levels.csv",
-        "levels.png",
         "levels.svg",
         "summary.nml",
     ]
@@ -146,10 +144,10 @@ def test_figure_that_cannot_be_replaced_is_named(
 ) -> None:
     case = str(case_file(MINIMAL))
     assert cli.main(["run", "-q", case]) == 0
-    (tmp_path / "outputs/case/force.png").unlink()
-    (tmp_path / "outputs/case/force.png").mkdir()
+    (tmp_path / "outputs/case/force.svg").unlink()
+    (tmp_path / "outputs/case/force.svg").mkdir()
     assert cli.main(["run", "-q", case]) == 1
-    assert "outputs/case/force.png" in capsys.readouterr().err
+    assert "outputs/case/force.svg" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

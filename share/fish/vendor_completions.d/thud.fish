@@ -88,6 +88,7 @@ complete -c thud -f
 
 complete -c thud -n _shtab_thud_using -s o -l output -xka "(__fish_complete_directories)" -d 'directory for the results (default: outputs/<case>, with --samples outputs/<case>_samples)'
 complete -c thud -n _shtab_thud_using -l replace -d 'replace also files that thud has not written'
+complete -c thud -n _shtab_thud_using -l all -d 'write also channels.csv: energies and other quantities of the model against time'
 complete -c thud -n _shtab_thud_using -l samples -xka "(_shtab_glob_compgen_3930277c)" -d 'a header row of keys and one drop, a sample, in each further row; all other keys are those of CASE.nml'
 complete -c thud -n _shtab_thud_using -l threads -x -d 'threads for the samples (default: 1)'
 complete -c thud -n _shtab_thud_using -l check -d 'exit with 3 where the source does not conform to the limits'

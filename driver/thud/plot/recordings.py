@@ -8,9 +8,8 @@ import numpy as np
 
 from thud.base.checks import require_choice
 from thud.level.levels import BANDWIDTHS, record_force
-from thud.plot.force_history_figure import MARGIN, TIME_LABEL
-from thud.plot.levels_figure import draw_tolerance
-from thud.plot.style import COLOURS, GREY, SIZE, empty_axes, legend_above, octave_axis, own_style
+from thud.plot.impacts import MARGIN, TIME_LABEL, draw_tolerance
+from thud.plot.style import COLORS, GREY, empty_axes, legend_above, octave_axis, own_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     from thud.base._schema import BandSet
     from thud.recordings.measured_drop import Drop
     from thud.recordings.recording import Recording
+
 
 # Height without the legend, inch: two of them stand side by side on a report.
 HEIGHT = 2.15
@@ -32,16 +32,16 @@ POINTS = 400
 # Backgrounds further below the lowest level than this, dB, are not drawn: they change nothing.
 DEEPEST = 20.0
 THIN: dict[str, Any] = {"color": "0.55", "linewidth": 0.5}
-DEVIANT: dict[str, Any] = {"color": COLOURS[1], "linewidth": 0.7, "linestyle": (0, (3, 1))}
-AVERAGE: dict[str, Any] = {"color": COLOURS[0], "linewidth": 1.4}
+DEVIANT: dict[str, Any] = {"color": COLORS[1], "linewidth": 0.7, "linestyle": (0, (3, 1))}
+AVERAGE: dict[str, Any] = {"color": COLORS[0], "linewidth": 1.4}
 BARS: dict[str, Any] = {
-    "color": COLOURS[0], "linestyle": "none", "capsize": 2.5, "elinewidth": 0.9, "capthick": 0.9,
+    "color": COLORS[0], "linestyle": "none", "capsize": 2.5, "elinewidth": 0.9, "capthick": 0.9,
 }  # fmt: skip
 
 
 @own_style()
 def recording_forces(recording: Recording) -> Figure:
-    """Draw the force of every drop, below 1.25 kHz, and their average, against time.
+    """Draw the force of every drop, low-passed at 1.25 kHz, and their average, against time.
 
     The contact time has its limits and the bar of its expanded uncertainty (95 %).
     """
@@ -61,14 +61,14 @@ def recording_forces(recording: Recording) -> Figure:
         marker="o", markersize=2.5, **BARS,
     )  # fmt: skip
     axes.set_xlim(1e3 * time[0], 1e3 * time[-1])
-    axes.set_xlabel(TIME_LABEL, fontsize=SIZE)
-    axes.set_ylabel("Force on the floor\nbelow 1.25 kHz, kN", fontsize=SIZE)
+    axes.set_xlabel(TIME_LABEL)
+    axes.set_ylabel("Force on the floor,\nlow-passed at 1.25 kHz, kN")
     legend_above(axes)
     return figure
 
 
 def _recorded(drop: Drop, time: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the force of a drop below 1.25 kHz, N, at times since first touch, s."""
+    """Return the force of a drop, low-passed at 1.25 kHz, N, at times since first touch, s."""
     ends = ((np.array([time[0] - ROOM, time[-1] + ROOM]) - drop.begin) * drop.sample_rate).astype(
         int
     )
@@ -109,27 +109,27 @@ def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
             np.array([one.upper for one in octaves]),
             verdict.source.replace("_", " ") + ", own limits" * own,
         )
-    place = np.arange(len(average.level), dtype=float)
-    _draw_drops(axes, place, average.drops, recording)
+    x = np.arange(len(average.level), dtype=float)
+    _draw_drops(axes, x, average.drops, recording)
     expanded = np.array([one.expanded for one in recording.level_estimates(bands)])
     mark = "average, 95 %" if len(average.drops) > 1 else "drop, 95 %"
     axes.errorbar(
-        place, average.level, yerr=_bar(expanded), label=mark, marker="o", markersize=3, **BARS,
+        x, average.level, yerr=_bar(expanded), label=mark, marker="o", markersize=3, **BARS,
     )  # fmt: skip
     bounds = average.flag == "background"
     if bounds.any():
         axes.plot(
-            place[bounds], average.level[bounds], label="upper bound", linestyle="none", marker="v",
-            markersize=6, markerfacecolor="white", color=COLOURS[0], zorder=3,
+            x[bounds], average.level[bounds], label="upper bound", linestyle="none", marker="v",
+            markersize=6, markerfacecolor="white", color=COLORS[0], zorder=3,
         )  # fmt: skip
     lowest = np.nanmin(average.level) if np.isfinite(average.level).any() else 0.0
     near = np.where(average.background > lowest - DEEPEST, average.background, np.nan)
     axes.plot(
-        place, near, label=_background_label(average.background, near), color="black",
+        x, near, label=_background_label(average.background, near), color="black",
         linewidth=0.8, linestyle=":", marker="_", markersize=7,
     )  # fmt: skip
     octave_axis(axes, bands)
-    axes.set_ylabel("Force exposure level\n(force on the floor), dB", fontsize=SIZE)
+    axes.set_ylabel("Force exposure level\n(force on the floor), dB")
     legend_above(axes)
     return figure
 
