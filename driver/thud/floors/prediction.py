@@ -245,7 +245,7 @@ def predict_level(
         source=moved or source,
         force="contact" if moved else "blocked",
         force_change=change,
-        floor_warnings=tuple(map(text, found.get("remarks", {}).values())),
+        floor_warnings=tuple(map(text, found.get("warnings", {}).values())),
         time_of_maximum=bands.pop("time"),
         few_modes=found["room"]["few_modes"],
         mass_per_area=found["room"]["surface_mass"],

@@ -111,7 +111,7 @@ def _new_impact(files: _Files) -> Impact:
     case = Case.from_text(files.read("effective.nml"))
     numbers = f90nml.reads(files.read("summary.nml"))
     history, _ = _read_history(files, "", numbers["summary"], numbers.get("facts", {}))
-    found = _texts(numbers.get("remarks", {}).get("remark", []))
+    found = _texts(numbers.get("warnings", {}).get("warning", []))
     if not files.listed:
         warning = f"{MANIFEST} is missing: nothing shows that the files belong together"
         warnings.warn(f"{files.folder}: {warning}", PlausibilityWarning, stacklevel=3)

@@ -9,7 +9,8 @@ module thud_floor_report
    use thud_kinds, only: wp
    use thud_quantities, only: get_quantities, quantities, sample_quantity_count
    use thud_report, only: get_fact_group, get_force_csv, get_quantity_lines, line
-   use thud_text, only: fixed, newline, to_text
+   use thud_table, only: is_peak_of_other
+   use thud_text, only: fixed, flush_right, newline, padded, to_text
    implicit none (type, external)
    private
 
@@ -112,6 +113,7 @@ contains
       values(:, 1) = get_quantities(impact%history)
       values(:, 2) = get_quantities(contact)
       do i = 1, sample_quantity_count
+         if (is_peak_of_other(quantities(i), case)) cycle
          associate (quantity => quantities(i))
             call add_row(trim(quantity%title), quantity%display_scale*values(i, 1), quantity%display_scale*values(i, 2), &
                quantity%decimals, trim(quantity%display_unit))
@@ -159,15 +161,11 @@ contains
       !> Their units: [n].
       character(len=*), intent(in) :: units(:)
       character(len=:), allocatable, intent(out) :: text
-      character(len=:), allocatable :: number
-      character(len=unit_column) :: unit
       integer :: i
 
       text = ''
       do i = 1, size(values)
-         number = fixed(values(i), decimals)
-         unit = units(i)
-         text = text//repeat(' ', max(number_column - len(number), 0))//number//' '//unit
+         text = text//flush_right(fixed(values(i), decimals), number_column)//' '//padded(units(i), unit_column)
       end do
       text = trim(text)
    end subroutine get_cells
