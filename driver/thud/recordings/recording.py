@@ -24,7 +24,7 @@ from thud.recordings.budgets import (
 )
 from thud.recordings.config import Config, checked_config
 from thud.recordings.excursion import check_peak, scan
-from thud.recordings.low_pass import describe_low_pass
+from thud.recordings.filters import describe_low_pass
 from thud.recordings.measure_drops import measure_signals
 from thud.recordings.recorded_levels import average_levels, compare_methods, measure_levels
 from thud.recordings.signal import Signal
