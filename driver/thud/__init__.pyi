@@ -90,13 +90,9 @@ from .studies.compression_fit import (
     CompressionFit as CompressionFit,
     fit_compression as fit_compression,
 )
-from .studies.design_map import (
-    DesignMap as DesignMap,
-    design_map as design_map,
-)
-from .studies.emulation.emulator import (
-    Surrogate as Surrogate,
-    read_surrogate as read_surrogate,
+from .studies.design import (
+    Design as Design,
+    design as design,
 )
 from .studies.fit import fit as fit
 from .studies.fitting.force_target import ForceTarget as ForceTarget
@@ -111,6 +107,10 @@ from .studies.sensitivity import (
 from .studies.study import Study as Study
 from .studies.surrogate import surrogate as surrogate
 from .studies.sweep import sweep as sweep
+from .studies.trained_surrogate import (
+    Surrogate as Surrogate,
+    read_surrogate as read_surrogate,
+)
 from .studies.uncertainty import (
     Uncertainty as Uncertainty,
     uncertainty as uncertainty,

@@ -34,7 +34,7 @@ module thud_contact_source
       procedure :: get_center
       procedure :: get_inner_energy
       procedure :: get_failure
-      procedure :: get_reach
+      procedure :: get_amplitude
    end type contact_source_type
 
    abstract interface
@@ -138,17 +138,15 @@ contains
          //to_text(state(1))//' m; allowed: lower drops')
    end function get_failure
 
-   !> Line that the source in flight does not cross: no part of it sinks below.
-   pure subroutine get_reach(self, state, displacement, velocity)
+   !> How far motion between the masses can bring the first one below the center of mass in flight, m.
+   pure function get_amplitude(self, state) result(amplitude)
       class(contact_source_type), intent(in) :: self
       !> State: [n_state].
       real(wp), intent(in) :: state(:)
-      !> Displacement of the line towards the floor, m, and its constant velocity, m/s.
-      real(wp), intent(out) :: displacement, velocity
+      real(wp) :: amplitude
 
-      displacement = state(1)
-      velocity = state(2)
-   end subroutine get_reach
+      amplitude = 0.0_wp
+   end function get_amplitude
 
    !> Error of steps that are too long for the source.
    pure function coarse_error(finding) result(error)

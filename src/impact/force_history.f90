@@ -8,7 +8,7 @@ module thud_force_history
    implicit none (type, external)
    private
 
-   public :: check_samples, continue_to_zero, force_count, force_history_type, force_names, holds_impulse
+   public :: check_samples, clear_flight, continue_to_zero, force_count, force_history_type, force_names, holds_impulse
    public :: max_residual, new_force_history
 
    !> Residual of the balances of impulse and energy above which models that integrate or sum one
@@ -107,6 +107,18 @@ contains
       error = input_error('&sampling: sample_rate = '//to_text(history%sample_rate)//' Hz misses the force: its samples ' &
          //'hold an impulse of '//to_text(sampled)//' N s of '//to_text(history%impulse)//' N s; allowed: a higher one')
    end subroutine check_samples
+
+   !> Sets the samples of the motion after the last contact to zero.
+   pure subroutine clear_flight(history)
+      !> The history, with its contact time.
+      type(force_history_type), intent(inout) :: history
+      integer :: last
+
+      last = floor(history%contact_time*history%sample_rate) + 1
+      history%deflection(last + 1:) = 0.0_wp
+      history%velocity(last + 1:) = 0.0_wp
+      if (allocated(history%channel)) history%channel(last + 1:, :) = 0.0_wp
+   end subroutine clear_flight
 
    !> Finds the contact time between samples: the force is continued to zero in a straight line from the last two
    !> samples of the first contact.

@@ -239,7 +239,7 @@ contains
       allocate (sweep%status(n_sample), sweep%reason(n_sample), sweep%quantity(sample_quantity_count, n_sample), &
          sweep%level(size(sweep%bands), force_count, n_sample), sweep%conforms(force_count, n_sample), &
          sweep%margin(n_sample), sweep%verdict(n_sample), sweep%floor_value(size(sweep%floor_column), n_sample))
-      allocate (sweep%force(n_time, force_count, merge(n_sample, 0, n_time > 0)), stat=status, errmsg=message)
+      allocate (sweep%force(n_time, force_count, n_sample), stat=status, errmsg=message)
       if (status /= 0) then
          error = input_error('the forces of '//to_text(n_sample)//' samples have no space in memory; allowed: fewer at ' &
             //'a time')

@@ -36,7 +36,7 @@ def results() -> list[Displayed]:
     modes = thud.free_modes(count=2, radial_elements=2, polar_elements=16)
     grid = {"mass": {**MASS["mass"], "count": 2}, "height": {"values": [0.5, 1.0]}}
     studies = [
-        thud.design_map({"parameters": grid}),
+        thud.design({"parameters": grid}),
         thud.uncertainty({"parameters": MASS, "design": {"size": 4}}),
         thud.sensitivity({"parameters": MASS, "design": {"size": 4}}),
         thud.fit(thud.solve(), ["mass"]),

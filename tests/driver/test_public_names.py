@@ -93,7 +93,7 @@ def test_users_script_touches_every_name_and_runs(tmp_path: Path) -> None:
     command = [sys.executable, SCRIPT]
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     assert done.returncode == 0, done.stderr
-    assert "<Uncertainty, rubber_ball: 0 of 8 sets conform>" in done.stdout
+    assert "<Uncertainty, rubber_ball: 0 of 8 samples conform>" in done.stdout
 
 
 @pytest.fixture(scope="module")

@@ -13,10 +13,9 @@ from scipy.stats import binom, norm
 
 import thud
 from thud import cli
-from thud.studies.emulation.doubtful import assess_many
-from thud.studies.emulation.emulator import keys_of
-from thud.studies.emulation.plan import Plan
-from thud.studies.emulation.training import regress
+from thud.studies.surrogate_plan import Plan
+from thud.studies.surrogate_training import regress
+from thud.studies.trained_surrogate import assess_many, keys_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -318,7 +317,7 @@ def test_training_resumes_and_results_are_kept(
     folder = tmp_path / "results"
     names = {entry.name for entry in folder.iterdir()}
     assert names == {
-        ".thud", "lumped_surrogate.npz", "lumped_training_64.nc", "lumped.png", "lumped.svg"
+        ".thud", "lumped_surrogate.npz", "lumped_training_64.nc", "lumped.svg"
     }  # fmt: skip
     first = thud.read_surrogate(folder / "lumped_surrogate.npz")
     drops = thud.read_sweep(folder / "lumped_training_64.nc")
@@ -358,12 +357,12 @@ def test_map_shows_verdicts_in_doubt(trained: thud.Surrogate) -> None:
             "youngs_modulus": {"low": 1.7, "high": 1.9, "count": 21, "unit": "MPa"},
         },
     }
-    margin = np.abs(thud.design_map(study, surrogate=trained).dataset["margin"].values)
+    margin = np.abs(thud.design(study, surrogate=trained).dataset["margin"].values)
     # Errors of the levels as large as half of the margins.
     error = float(np.median(margin))
     level = ["level" in name for name in trained.labels]
     residuals = np.full_like(trained.residuals, error) * level
-    found = thud.design_map(study, surrogate=replace(trained, residuals=residuals, bound=error))
+    found = thud.design(study, surrogate=replace(trained, residuals=residuals, bound=error))
     doubtful = found.dataset["doubtful"]
     limits = {one.name: one for one in thud.assess([0] * 5, 0, 0, 1, 0, 0).criteria}
     rest = [
@@ -376,7 +375,7 @@ def test_map_shows_verdicts_in_doubt(trained: thud.Surrogate) -> None:
     )
     assert 0 < int(doubtful.sum()) < doubtful.size
     assert ("in doubt by the surrogate", f"{int(doubtful.sum())}") in found.table()
-    labels = [text.get_text() for text in thud.plot.draw_design_map(found).legends[0].get_texts()]
+    labels = [text.get_text() for text in thud.plot.draw_design(found).legends[0].get_texts()]
     assert "In doubt by surrogate" in labels
 
 

@@ -86,7 +86,7 @@ modulus = {"youngs_modulus": thud.Parameter(values=[1.6, 2.08], unit="MPa")}
 study: thud.Study = thud.read_study({"parameters": height})
 thud.sweep(study, folder / "sweep")
 kept = thud.read_sweep(folder / f"sweep/{study.name}.nc")
-chart: thud.DesignMap = thud.design_map({"parameters": height | modulus})
+chart: thud.Design = thud.design({"parameters": height | modulus})
 learned: thud.Surrogate = thud.surrogate({"parameters": mass})
 learned.save(folder / "mass.npz")
 trained = thud.read_surrogate(folder / "mass.npz")

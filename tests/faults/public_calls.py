@@ -126,7 +126,7 @@ def slow_calls(folder: Path) -> Calls:
         "read_sweep": lambda: thud.read_sweep(folder / "kept.nc").peak_elastic_force,
         "uncertainty": lambda: str(thud.uncertainty(set_study).table()),
         "sensitivity": lambda: str(thud.sensitivity(set_study).table()),
-        "design_map": lambda: str(thud.design_map({"parameters": _plane()}).table()),
+        "design": lambda: str(thud.design({"parameters": _plane()}).table()),
         "surrogate": lambda: str(thud.surrogate({"parameters": MASS})),
         "read_surrogate": lambda: str(thud.read_surrogate(folder / "mass.npz")),
         "plot": saved,

@@ -425,7 +425,7 @@ class FiniteElement(Group):
     prony_time: Sequence[float] = field(default=(), metadata={"group": "material"})
     friction: float = field(default=0.0, metadata={"group": "contact"})
     layer_stiffness: float = field(default=0.0, metadata={"group": "contact"})
-    snapshot_interval: float = field(default=0.001, metadata={"group": "output"})
+    snapshot_interval: float = field(default=0.0, metadata={"group": "output"})
 
 
 @dataclass(frozen=True, eq=False)

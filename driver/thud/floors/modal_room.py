@@ -133,7 +133,7 @@ class ModalRoom(Displayed):
 
     def plot(self) -> Figure:
         """Draw the levels of all positions against the statistical answer."""
-        from thud.plot.modal_room_figure import draw_modal_room
+        from thud.plot.rooms import draw_modal_room
 
         return draw_modal_room(self)
 

@@ -86,26 +86,26 @@ def recording_dataset(recording: ImpactResult) -> xr.Dataset:
 
 
 def ensemble_dataset(ensemble: Ensemble) -> xr.Dataset:
-    """Return the dataset of many drops, along the dimension ``set``."""
+    """Return the dataset of many drops, along the dimension ``sample``."""
     assert ensemble.case.model is not None  # noqa: S101 - `solve_many` has set it
     coordinates: dict[str, Any] = band_coordinates(bands for _, bands in ensemble.levels)
     for name, values in ensemble.parameters.items():
         key, _ = find_key(name, users(ensemble.case))
         words = attributes(key)
-        coordinates[coordinate(name, key)] = ("set", values, words)
+        coordinates[coordinate(name, key)] = ("sample", values, words)
     variables: dict[str, Any] = {}
     for name, quantity in SAMPLE_RESULTS.items():
         if name not in LEVELS:
-            variables[name] = ("set", getattr(ensemble, name), attributes(quantity))
+            variables[name] = ("sample", getattr(ensemble, name), attributes(quantity))
         elif LEVELS[name] in ensemble.levels:
             values = ensemble.levels[LEVELS[name]]
-            variables[name] = (("set", LEVELS[name][1]), values, attributes(quantity))
+            variables[name] = (("sample", LEVELS[name][1]), values, attributes(quantity))
     for bands, level in ensemble.contact_levels.items():
         name = f"contact_{bands}_level"
-        variables[name] = (("set", bands), level, attributes(ALL_QUANTITIES[name]))
+        variables[name] = (("sample", bands), level, attributes(ALL_QUANTITIES[name]))
     for name, quantity in FLOOR_QUANTITIES.items():
         if (values := getattr(ensemble, name)) is not None:
-            dimensions = ("set", ROOM_BAND) if name == ROOM_LEVEL else ("set",)
+            dimensions = ("sample", ROOM_BAND) if name == ROOM_LEVEL else ("sample",)
             variables[name] = (dimensions, values, attributes(quantity))
             coordinates |= room_coordinates() if name == ROOM_LEVEL else {}
     for force in ("elastic", "floor"):
@@ -113,7 +113,7 @@ def ensemble_dataset(ensemble: Ensemble) -> xr.Dataset:
             seconds = np.arange(values.shape[1]) / ensemble.sample_rate
             coordinates["time"] = _time(seconds)
             words = _attributes("N", f"{force} force")
-            variables[f"{force}_force"] = (("set", "time"), values, words)
+            variables[f"{force}_force"] = (("sample", "time"), values, words)
     return xr.Dataset(variables, coordinates, origin(ensemble.case)).copy(deep=True)
 
 

@@ -71,7 +71,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     forces and 1e-6 dB in the levels of bands that hold 1e-8 or more of the energy of the force, for
     the others bit for bit. Rounding counts in bands that hold less, as of slow contacts at 500 Hz:
     10 times less energy makes the difference 10 times greater. Results do not depend on the number
-    of threads or on the order of the sets.
+    of threads or on the order of the samples.
 
     Parameters
     ----------
@@ -93,9 +93,9 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         Bands of the levels in addition to octaves, such as ``"third"``; by default those of the
         case.
     forces
-        Keep the force histories: 16 bytes per sample and set.
+        Keep the force histories: 16 bytes for each instant of each sample.
     sample_rate, duration, substeps
-        As in `solve`, shared by all sets; by default those of the case.
+        As in `solve`, shared by all samples; by default those of the case.
     source
         ``"rubber_ball"`` or ``"tyre"``: the limits that apply; by default those of the case.
     progress
@@ -104,7 +104,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     Returns
     -------
     Ensemble
-        Outcomes, levels and verdicts. Sets that fail have a status, a reason and NaN, and do not
+        Outcomes, levels and verdicts. Samples that fail have a status, a reason and NaN, and do not
         affect the others.
 
     Raises
@@ -144,7 +144,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     try:
         columns, numbers = _columns(given, base)
     except MemoryError as error:
-        refuse("the parameters do not fit in memory", "fewer sets", error)
+        refuse("the parameters do not fit in memory", "fewer samples", error)
     shared = {
         "sample_rate": sample_rate,
         "duration": duration,

@@ -31,33 +31,33 @@ class Ensemble(SampleQuantities, Displayed):
     ----------
     case : Case
         All other keys.
-    parameters : dict of str to ndarray, shape (n_set,)
+    parameters : dict of str to ndarray, shape (n_sample,)
         Parameters in which the drops differ.
-    status : ndarray of int, shape (n_set,)
+    status : ndarray of int, shape (n_sample,)
         0, or the exit code of the error: 1 bad input, 2 numerical failure.
-    reason : ndarray of str, shape (n_set,)
+    reason : ndarray of str, shape (n_sample,)
         The sentence of the error.
-    levels : dict of (force, bands) to ndarray, shape (n_set, n_band)
+    levels : dict of (force, bands) to ndarray, shape (n_sample, n_band)
         Force exposure levels, dB: of ``"elastic"`` and ``"floor"``, in octaves, on which the
         verdict is based, and in the other bands of the case.
-    margin : ndarray, shape (n_set,)
+    margin : ndarray, shape (n_sample,)
         Minimum distance of an octave level of the judged force to its limits, dB, positive inside.
-    conforms : ndarray of bool, shape (n_set,)
+    conforms : ndarray of bool, shape (n_sample,)
         Verdict of the standards on the force that the case assesses.
-    elastic_conforms, floor_conforms : ndarray of bool, shape (n_set,)
+    elastic_conforms, floor_conforms : ndarray of bool, shape (n_sample,)
         The same on the elastic force and on the force on the floor.
-    elastic_force, floor_force : ndarray, shape (n_set, n_sample), or None
+    elastic_force, floor_force : ndarray, shape (n_sample, n_time), or None
         Forces, N; None unless requested.
     sample_rate : float
         Samples per second, Hz.
-    contact_levels : dict of bands to ndarray, shape (n_set, n_band)
+    contact_levels : dict of bands to ndarray, shape (n_sample, n_band)
         Of cases with a floor: levels of the force on it, dB; on a rigid floor, and of models that
         know no other, those of the force there.
-    floor_work : ndarray, shape (n_set,), or None
+    floor_work : ndarray, shape (n_sample,), or None
         Likewise the energy that the source gives to the floor, J.
-    room_level : ndarray, shape (n_set, 12), or None
+    room_level : ndarray, shape (n_sample, 12), or None
         Of cases with a room: maximum Fast levels in the thirds from 50 to 630 Hz, dB re 20 uPa.
-    room_rating, standardised_rating : ndarray, shape (n_set,), or None
+    room_rating, standardised_rating : ndarray, shape (n_sample,), or None
         Their A-weighted sum L_iA,Fmax, dB, and that of the standardised levels; see `rating`.
     """
 
@@ -80,7 +80,7 @@ class Ensemble(SampleQuantities, Displayed):
     standardised_rating: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
-        """Return the number of sets."""
+        """Return the number of samples."""
         return len(self.status)
 
     def __repr__(self) -> str:
@@ -111,7 +111,7 @@ class Ensemble(SampleQuantities, Displayed):
         return rows
 
     def to_xarray(self) -> xr.Dataset:
-        """Return the outcomes along the dimension ``set``, with units and provenance.
+        """Return the outcomes along the dimension ``sample``, with units and provenance.
 
         Raise InputError where xarray is not installed.
         """
@@ -122,10 +122,10 @@ class Ensemble(SampleQuantities, Displayed):
 
     @property
     def elastic_octaves(self) -> NDArray[np.float64]:
-        """Octave levels of the elastic force, dB, shape (n_set, 5)."""
+        """Octave levels of the elastic force, dB, shape (n_sample, 5)."""
         return self.levels["elastic", BANDWIDTHS[0]]
 
     @property
     def floor_octaves(self) -> NDArray[np.float64]:
-        """Octave levels of the force on the floor, dB, shape (n_set, 5)."""
+        """Octave levels of the force on the floor, dB, shape (n_sample, 5)."""
         return self.levels["floor", BANDWIDTHS[0]]

@@ -358,9 +358,9 @@ class Fit(Displayed):
         contents = self.files()
         if figures:
             with left_out("the figure of the fit"):
-                from thud.plot import picture_files
+                from thud.plot import figure_files
 
-                contents |= picture_files(self.figures(units))
+                contents |= figure_files(self.figures(units))
         return Results(Path(directory), "fit", replace=replace).write(contents)
 
 
