@@ -28,9 +28,9 @@ from thud.recordings import calibration
 from thud.recordings.calibration import calibrate
 from thud.recordings.channel import BoundedFile
 from thud.recordings.config import PlateConfig, read_config
-from thud.recordings.excursion import Excursions, check_peak, scan
 from thud.recordings.force_units import Calibration, newtons_per_unit
 from thud.recordings.grid import even_grid
+from thud.recordings.polarity import Extremes, check_peak, scan
 from thud.recordings.signal import Signal
 from thud.recordings.signal_files import open_signals
 
@@ -203,12 +203,12 @@ def test_quiet_is_found_at_either_end() -> None:
         np.append(np.full(15, 500.0), force[::-1]),
     ):
         seen = scan(lambda start, stop, one=record: one[start:stop], record.size, "t.csv")
-        assert seen.quiet == 500
+        assert seen.background == 500
 
 
 def test_polarity_is_doubted_from_half_as_much_again_on() -> None:
     for low, expected in ((-1490.0, False), (-1510.0, True)):
-        told = check_peak(Excursions(low, 1000.0, 0.0), 1.0, "t.csv", assumed=False)
+        told = check_peak(Extremes(low, 1000.0, 0.0), 1.0, "t.csv", assumed=False)
         assert any("polarity" in one for one in told) == expected
 
 

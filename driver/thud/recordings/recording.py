@@ -23,9 +23,9 @@ from thud.recordings.budgets import (
     level_estimates,
 )
 from thud.recordings.config import Config, checked_config
-from thud.recordings.excursion import check_peak, scan
-from thud.recordings.low_pass import describe_low_pass
+from thud.recordings.filters import describe_low_pass
 from thud.recordings.measure_drops import measure_signals
+from thud.recordings.polarity import check_peak, scan
 from thud.recordings.recorded_levels import average_levels, compare_methods, measure_levels
 from thud.recordings.signal import Signal
 
