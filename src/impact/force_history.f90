@@ -8,8 +8,8 @@ module thud_force_history
    implicit none (type, external)
    private
 
-   public :: check_samples, clear_flight, continue_to_zero, force_count, force_history_type, force_names, get_scalars, holds_impulse
-   public :: max_residual, new_force_history, outcome_count, scalar_fields
+   public :: check_samples, clear_flight, continue_to_zero, force_count, force_history_type, force_names, get_scalars
+   public :: holds_impulse, max_residual, new_force_history, outcome_count, scalar_fields
 
    !> Residual of the balances of impulse and energy above which models that integrate or sum one
    !> equation of motion refuse their result; at the default step they have less than 1e-9.
