@@ -718,9 +718,9 @@ class JoistFloor(Group):
     loss_factor : float
         Loss factor of the floor and its edges, without radiation; 0 < loss_factor <= 1.
     source_x : float
-        Relative source position along the joists; 0 < source_x < 1.
+        Relative source position along the length; 0 < source_x < 1.
     source_y : float
-        Relative source position across the joists; 0 < source_y < 1.
+        Relative source position along the width; 0 < source_y < 1.
     source_on : str
         Impact location: sheathing between joists, or a joist; "sheathing", "joist".
     point_x : sequence of float
@@ -1072,8 +1072,8 @@ KEYS = (
     Key("joist_floor", "joist_floor", "joist_modulus", "real", "Pa", "modulus of elasticity of the joists", (), 10000000.0, 1000000000000.0),
     Key("joist_floor", "joist_floor", "connection", "real", "", "composite action of sheathing and joists, from 0, loose, to 1, glued (EN 1995-1-1 annex B)", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "loss_factor", "real", "", "loss factor of the floor and its edges, without radiation", (), 0.0, 1.0),
-    Key("joist_floor", "joist_floor", "source_x", "real", "", "relative source position along the joists", (), 0.0, 1.0),
-    Key("joist_floor", "joist_floor", "source_y", "real", "", "relative source position across the joists", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "source_x", "real", "", "relative source position along the length", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_on", "choice", "", "impact location: sheathing between joists, or a joist", ('sheathing', 'joist')),
     Key("joist_floor", "joist_floor", "point_x", "list", "m", "places of further points along the length", (), 0.0, 1000.0),
     Key("joist_floor", "joist_floor", "point_y", "list", "m", "their places along the width", (), 0.0, 1000.0),
