@@ -84,7 +84,6 @@ from .level.rating import (
 from .recordings.read_recording import read_recording as read_recording
 from .recordings.recording import Recording as Recording
 from .report.write import write_report as write_report
-from .studies.blocks import read_sweep as read_sweep
 from .studies.compression_fit import (
     CompressionFit as CompressionFit,
     fit_compression as fit_compression,
@@ -105,7 +104,11 @@ from .studies.sensitivity import (
 )
 from .studies.study import Study as Study
 from .studies.surrogate import surrogate as surrogate
-from .studies.sweep import sweep as sweep
+from .studies.sweep import (
+    Sweep as Sweep,
+    read_sweep as read_sweep,
+    sweep as sweep,
+)
 from .studies.trained_surrogate import (
     Surrogate as Surrogate,
     read_surrogate as read_surrogate,

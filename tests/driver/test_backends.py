@@ -63,7 +63,7 @@ def cluster() -> Iterator[LocalCluster]:
 
 @pytest.mark.slow
 def test_every_backend_gives_the_same(cluster: LocalCluster) -> None:
-    one = thud.sweep(STUDY, workers=1)
+    one = thud.sweep(STUDY, workers=1).dataset
     assert set(one["status"].values) == {0, 1, 2}
     assert one.sizes["sample"] > KIND.read_study(STUDY).block_size
     for how in (
@@ -71,7 +71,7 @@ def test_every_backend_gives_the_same(cluster: LocalCluster) -> None:
         {"backend": "processes", "workers": 2},
         {"scheduler": cluster.scheduler_address},
     ):
-        other = thud.sweep(STUDY, **how)  # type: ignore[arg-type]
+        other = thud.sweep(STUDY, **how).dataset  # type: ignore[arg-type]
         assert other.drop_attrs(deep=False).identical(one.drop_attrs(deep=False)), how
 
 
@@ -138,9 +138,9 @@ def test_stopped_worker_of_dask_does_not_hold_the_study(
 @pytest.mark.parametrize("written", ["netcdf", "zarr"])
 @pytest.mark.slow
 def test_dask_writes_the_same(written: str, cluster: LocalCluster, tmp_path: Path) -> None:
-    expected = thud.sweep(STUDY)
+    expected = thud.sweep(STUDY).dataset
     study = {**STUDY, "format": written}
-    found = thud.sweep(study, tmp_path, scheduler=cluster.scheduler_address).load()
+    found = thud.sweep(study, tmp_path, scheduler=cluster.scheduler_address).dataset.load()
     assert found.drop_attrs(deep=False).identical(expected.drop_attrs(deep=False))
 
 
@@ -160,8 +160,8 @@ def test_killed_worker_of_dask_leaves_no_gap_on_disk(
         keep(store, block, found)
 
     monkeypatch.setattr(Blocks, "keep", kill_and_keep)
-    found = thud.sweep(study, tmp_path, scheduler=cluster.scheduler_address)
-    assert found.drop_attrs(deep=False).identical(thud.sweep(study).drop_attrs(deep=False))
+    found = thud.sweep(study, tmp_path, scheduler=cluster.scheduler_address).dataset
+    assert found.drop_attrs(deep=False).identical(thud.sweep(study).dataset.drop_attrs(deep=False))
 
 
 @pytest.mark.parametrize("rest", [{"backend": "processes", "workers": 2}, {"scheduler": True}])
@@ -190,12 +190,12 @@ def test_lost_scheduler_is_reported_and_its_study_goes_on_elsewhere(
     assert process.returncode == 2
     assert re.search(naming(study, "backend", "CancelledError"), errors)
     assert errors.count("\n") == 1
-    finished = thud.read_sweep(tmp_path / "some.partial")
+    finished = thud.read_sweep(tmp_path / "some.partial").dataset
     assert 0 < finished.sizes["sample"] < 600
     if "scheduler" in rest:
         rest = {"scheduler": cluster.scheduler_address}
-    found = thud.sweep(study, tmp_path, **rest)
-    assert found.drop_attrs(deep=False).identical(thud.sweep(study).drop_attrs(deep=False))
+    found = thud.sweep(study, tmp_path, **rest).dataset
+    assert found.drop_attrs(deep=False).identical(thud.sweep(study).dataset.drop_attrs(deep=False))
 
 
 def test_killed_process_is_reported_and_loses_nothing() -> None:

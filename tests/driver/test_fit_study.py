@@ -79,7 +79,7 @@ def test_units_are_those_of_the_file(tmp_path: Path) -> None:
     # The table of the record has times of its own.
     assert fit.time_shift == pytest.approx(0.2, abs=1e-6)
     assert fit.values["youngs_modulus"] == pytest.approx(1.6e6, rel=1e-6)
-    assert "1.6" in fit.table(study.units)
+    assert "1.6" in fit.table()
 
 
 def test_values_are_those_of_the_file_to_the_last_bit(tmp_path: Path) -> None:

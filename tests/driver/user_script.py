@@ -84,7 +84,7 @@ mass = {"mass": thud.Parameter(low=2.4, high=2.6)}
 modulus = {"youngs_modulus": thud.Parameter(values=[1.6, 2.08], unit="MPa")}
 study: thud.Study = thud.read_study({"parameters": height})
 thud.sweep(study, folder / "sweep")
-kept = thud.read_sweep(folder / f"sweep/{study.name}.nc")
+kept: thud.Sweep = thud.read_sweep(folder / f"sweep/{study.name}.nc")
 chart: thud.Design = thud.design({"parameters": height | modulus})
 learned: thud.Surrogate = thud.surrogate({"parameters": mass})
 learned.save(folder / "mass.npz")
@@ -109,6 +109,7 @@ results = [
     bands,
     many,
     *found,
+    kept,
     chart,
     spread,
     shares,

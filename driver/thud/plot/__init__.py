@@ -31,7 +31,7 @@ from thud.impact.impact import Impact
 from thud.plot.comparison_page import comparison_page as comparison_page
 from thud.plot.compression_figure import compression as compression
 from thud.plot.design_figure import draw_design as draw_design
-from thud.plot.fit_figure import draw_fit as draw_fit
+from thud.plot.fit_figure import draw_fit as draw_fit, target_and_fit as target_and_fit
 from thud.plot.floor_figure import draw_floor as draw_floor
 from thud.plot.floor_mobilities_figure import floor_mobilities as floor_mobilities
 from thud.plot.force_history_figure import force_history as force_history

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from thud.studies.sweep import Sweep
+
     Columns = dict[str, NDArray[Any]]
 
 # More values of a parameter are grouped in classes.
@@ -47,13 +49,14 @@ class _Judged(NamedTuple):
 
 
 @own_style()
-def draw_sweep(dataset: xr.Dataset) -> Figure:
+def draw_sweep(result: Sweep) -> Figure:
     """Draw octave levels against the first numeric parameter that has several values.
 
     Levels are those of the judged force relative to the nominal ones, dB. Each value of the first
     text parameter, up to six of them, has its panel. Lines are medians over the other parameters,
     shades extend from the minimum to the maximum.
     """
+    dataset = result.dataset
     columns = _columns(dataset)
     varied = [name for name, values in columns.items() if len(np.unique(values)) > 1]
     numeric = [name for name in varied if columns[name].dtype.kind in "iuf"]

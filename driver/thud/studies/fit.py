@@ -19,7 +19,6 @@ from thud.base.checks import (
 from thud.base.errors import FitWarning, InputError
 from thud.base.files import read_input
 from thud.base.key import check_keywords
-from thud.base.units import scaled
 from thud.case.case import Case, check_case
 from thud.studies.directory import FORMATS
 from thud.studies.fitting.force_target import ForceTarget
@@ -39,7 +38,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence, Set as AbstractSet
     from pathlib import Path
 
-    from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
 
     from thud.base.files import Results
@@ -221,12 +219,6 @@ class FitStudy(Study):
     options: dict[str, Any] = field(default_factory=lambda: dict(OPTIONS))
     surrogate: Surrogate | None = None
 
-    @property
-    def units(self) -> dict[str, tuple[str, float]]:
-        """Units of the file by parameter: name, and how many SI units it is."""
-        shown = {p.name: p.shown_unit for p in self.parameters if p.unit}
-        return {name: (unit, scaled(1.0, power)) for name, (unit, power) in shown.items()}
-
     def own_identity(self) -> dict[str, str]:
         """Return target and search."""
         tables = self.tables["target"]
@@ -323,26 +315,9 @@ class FitKind(Kind[FitStudy, Fit]):
         ]
         return [*files, *figures]
 
-    def table(self, result: Fit, study: FitStudy) -> str:
-        """Return the fit as text."""
-        return f"{study.name}\n\n{result.table(study.units)}"
-
-    def remarks(self, result: Fit) -> list[str]:
-        """Return the warnings, and what is not plausible in the impacts that were found."""
-        own = [remark for target in result.targets for remark in target.impact.remarks]
-        return [*result.warnings, *dict.fromkeys(own)]
-
-    def succeeded(self, result: Fit) -> bool:
-        """Return whether the search has converged."""
-        return result.converged
-
     def files(self, result: Fit, study: FitStudy) -> dict[str, bytes]:
         """Return the numbers of the fit and its case."""
         return result.files(study=study.tables, identity=study.identity)
-
-    def figures(self, result: Fit, study: FitStudy) -> dict[str, Figure]:
-        """Return target and fit, and confidence regions."""
-        return result.figures(study.units)
 
 
 KIND = FitKind()

@@ -14,18 +14,19 @@ from scipy.stats import binom
 
 from thud.base.bridge import version
 from thud.base.checks import refuse, require_kind
-from thud.base.display import Displayed
 from thud.base.extras import require_extra
 from thud.base.files import is_failure, read_input, replace_file
 from thud.case.case import Case, case_text
 from thud.case.keys import OF_FILES, put
 from thud.level.levels import get_bands, judge
+from thud.studies.result import StudyResult
 from thud.studies.study import value_in
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Iterable
 
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import LimitsSource
@@ -45,7 +46,7 @@ _ARRAYS = ("region", "points", "length", "weights", "mean", "scale", "residuals"
 
 
 @dataclass(frozen=True, eq=False)
-class Surrogate(Displayed):
+class Surrogate(StudyResult):
     """What has been learned from some drops of a model, for others of the same region.
 
     A Gaussian process interpolates all quantities, in dB: levels, and 20 lg of what has another
@@ -112,7 +113,18 @@ class Surrogate(Displayed):
                 rows.append((name, *(f"{number:.3f}" for number in numbers), note))
         return rows
 
-    table = rows
+    warnings = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """How close it is, and what it does not answer."""
+        return (self.sentence,)
+
+    def plot(self) -> Figure:
+        """Return the errors of the held-out drops."""
+        from thud.plot import draw_surrogate
+
+        return draw_surrogate(self)
 
     @property
     def labels(self) -> list[str]:

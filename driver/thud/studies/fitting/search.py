@@ -181,6 +181,7 @@ def _conclude(
         failures=objective.failures,
         converged=converged,
         warnings=(),
+        given_units={r.name: r.given_unit for r in objective.ranges if r.given_unit},
         identifiability=(),
         targets=tuple(
             FittedTarget(
