@@ -66,15 +66,16 @@ from .impact.motion import Motion as Motion
 from .impact.outcomes import Ensemble as Ensemble
 from .impact.results import read_results as read_results
 from .impact.solve import solve as solve
-from .level.criteria import (
-    Conformity as Conformity,
+from .level.assessment import (
     Criterion as Criterion,
+    Verdict as Verdict,
+    assess as assess,
 )
+from .level.estimate import Estimate as Estimate
 from .level.levels import (
     Bands as Bands,
     force_exposure_levels as force_exposure_levels,
     get_bands as get_bands,
-    judge as judge,
 )
 from .level.rating import (
     Rating as Rating,

@@ -2,12 +2,11 @@
 module thud_run
    use thud_case, only: case_type, get_model_number
    use thud_case_text, only: get_case_text, read_case
-   use thud_compute, only: compute_case, is_conforming, judge_case, predict_room, results_type
+   use thud_compute, only: compute, is_conforming, results_type, scope_type
    use thud_constants, only: version
    use thud_error, only: error_type, input_error
    use thud_file, only: get_file_stem, read_text_file, text_file_type
    use thud_floor_report, only: get_floor_force_csv, get_floor_levels_csv, get_floor_summary, get_floor_table
-   use thud_floor_result, only: get_floor_result
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_mesh_files, only: estimate_motion_bytes, get_modes_files, get_motion_files, modes_names, &
@@ -126,17 +125,7 @@ contains
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)
       call check_owner(outcome%directory, input, replace, differs, error)
       if (.not. allocated(error)) call check_space(case, outcome%directory, error)
-      if (.not. allocated(error)) call compute_case(case, results, error)
-      if (case%has_impact .and. .not. allocated(error)) call judge_case(case, results%history, results%verdict, error)
-      if (allocated(results%on_floor) .and. .not. allocated(error)) call get_floor_result(case, results%history, &
-         results%on_floor, results%floor, error)
-      if (case%has_room .and. .not. allocated(error)) then
-         if (allocated(results%on_floor)) then
-            call predict_room(case, results%on_floor%floor_force, results%on_floor%sample_rate, results%room, error)
-         else
-            call predict_room(case, results%history%floor_force, results%history%sample_rate, results%room, error)
-         end if
-      end if
+      if (.not. allocated(error)) call compute(case, scope_type(), results, error)
       if (allocated(error)) return
       call describe(case, results, files, outcome)
       call write_results(outcome%directory, input, files, [path], replace, differs, error)
@@ -186,18 +175,18 @@ contains
       end if
       if (.not. case%has_impact) outcome%table = outcome%table//get_defaults_line(case)
       if (.not. case%has_impact) return
-      outcome%conforms = is_conforming(case, results%verdict)
-      outcome%table = outcome%table//newline//get_table(case, results%history, results%verdict)
-      call add_file(files, file_names(1), get_force_csv(results%history))
-      call add_file(files, file_names(2), get_levels_csv(case, results%verdict))
-      summary = get_summary(case, results%history, results%verdict, results%remark)
-      call add_history_files(results%history, '', files)
+      outcome%conforms = is_conforming(case, results%impact%assessment)
+      outcome%table = outcome%table//newline//get_table(case, results%impact%history, results%impact%assessment)
+      call add_file(files, file_names(1), get_force_csv(results%impact%history))
+      call add_file(files, file_names(2), get_levels_csv(case, results%impact%assessment))
+      summary = get_summary(case, results%impact%history, results%impact%assessment, results%remark)
+      call add_history_files(results%impact%history, '', files)
       if (allocated(results%on_floor)) then
-         call get_floor_table(case, results%history, results%on_floor, results%floor, text)
+         call get_floor_table(case, results%impact, results%on_floor, results%floor, text)
          outcome%table = outcome%table//newline//text
-         call get_floor_force_csv(results%history, results%on_floor, results%floor, text)
+         call get_floor_force_csv(results%impact%history, results%on_floor, results%floor, text)
          call add_file(files, floor_names(1), text)
-         call get_floor_levels_csv(results%floor, text)
+         call get_floor_levels_csv(results%impact, results%floor, text)
          call add_file(files, floor_names(2), text)
          call get_floor_summary(results%on_floor, text)
          summary = summary//text
@@ -205,7 +194,7 @@ contains
       end if
       call add_file(files, file_names(3), summary)
       if (case%has_room) then
-         call get_room_table(case, results%room, results%history%contact_time, allocated(results%on_floor), text)
+         call get_room_table(case, results%room, results%impact%history%contact_time, allocated(results%on_floor), text)
          outcome%table = outcome%table//newline//text
          call extend(files, size(room_file_names))
          call get_room_files(results%room, files(size(files) - size(room_file_names) + 1:))

@@ -4,12 +4,12 @@ module thud_sets_run
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
    use thud_case, only: case_type
    use thud_case_text, only: get_case_text
-   use thud_compute, only: get_judged_force
+   use thud_compute, only: get_assessed_force
    use thud_constants, only: version
    use thud_error, only: error_type, input_error
    use thud_file, only: text_file_type
    use thud_kinds, only: wp
-   use thud_many, only: many_type, new_many, solve_many
+   use thud_sweep, only: new_sweep, solve_sweep, sweep_type
    use thud_progress, only: report_progress
    use thud_result_directory, only: add_text, begin_file, check_owner, close_results, open_results, result_directory_type
    use thud_run, only: load_case, outcome_type, replaces
@@ -100,29 +100,29 @@ contains
       type(tally_type), intent(out) :: tally
       !> What went wrong before; or a value is not a number, the sampling cannot be used, the file cannot be written.
       type(error_type), allocatable, intent(inout) :: error
-      type(many_type) :: many
+      type(sweep_type) :: sweep
       type(text_file_type) :: parts(threads)
       real(wp), allocatable :: values(:, :)
       character(len=:), allocatable :: text
       integer :: n, i
 
-      call new_many(case, table%columns, .true., many)
-      allocate (values(size(table%columns), get_chunk_size(many%cost, threads)))
+      call new_sweep(case, table%columns, .true., sweep)
+      allocate (values(size(table%columns), get_chunk_size(sweep%cost, threads)))
       call begin_file(results, result_file, error)
-      call get_set_header(table, many, text)
+      call get_set_header(table, sweep, text)
       call add_text(results, text, error)
       do while (.not. allocated(error))
          call read_sets(table, values, n, error)
          if (allocated(error) .or. n == 0) exit
-         call solve_many(case, table%columns, values(:, :n), threads, .false., many, error)
+         call solve_sweep(case, table%columns, values(:, :n), threads, .false., sweep, error)
          if (allocated(error)) exit
          ! Writing numbers takes longer than computing them.
          !$omp parallel do num_threads(threads)
          do i = 1, threads
-            call get_set_rows(table, tally%sets, values(:, :n), (i - 1)*n/threads + 1, i*n/threads, many, parts(i)%content)
+            call get_set_rows(table, tally%sets, values(:, :n), (i - 1)*n/threads + 1, i*n/threads, sweep, parts(i)%content)
          end do
          !$omp end parallel do
-         call add(tally, many, get_judged_force(case))
+         call add(tally, sweep, get_assessed_force(case))
          do i = 1, threads
             call add_text(results, parts(i)%content, error)
          end do
@@ -145,23 +145,23 @@ contains
    end function get_chunk_size
 
    !> Adds sets to a tally.
-   pure subroutine add(tally, many, force)
+   pure subroutine add(tally, sweep, force)
       type(tally_type), intent(inout) :: tally
-      type(many_type), intent(in) :: many
+      type(sweep_type), intent(in) :: sweep
       !> Number of the force whose levels are summed up.
       integer, intent(in) :: force
       real(wp) :: values(octave_count + 1)
       integer :: i
 
-      tally%sets = tally%sets + size(many%status)
-      do i = 1, size(many%status)
-         if (many%status(i) /= 0) then
-            if (tally%failure == '') tally%failure = many%reason(i)%text
+      tally%sets = tally%sets + size(sweep%status)
+      do i = 1, size(sweep%status)
+         if (sweep%status(i) /= 0) then
+            if (tally%failure == '') tally%failure = sweep%reason(i)%text
             cycle
          end if
          tally%computed = tally%computed + 1
-         if (many%verdict(i)) tally%conforming = tally%conforming + 1
-         values = [many%outcome(1, i), many%level(:octave_count, force, i)]
+         if (sweep%verdict(i)) tally%conforming = tally%conforming + 1
+         values = [sweep%quantity(1, i), sweep%level(:octave_count, force, i)]
          tally%span(:, 1) = min(tally%span(:, 1), values)
          tally%span(:, 2) = max(tally%span(:, 2), values)
       end do

@@ -56,7 +56,7 @@ def test_page_has_the_curves_of_the_picture() -> None:
 def test_tolerance_is_that_of_the_octaves() -> None:
     _, octaves, thirds = plots(comparison_html(IMPACTS, None, "tyre", TABLE))
     (box,) = [curve for curve in octaves["data"] if curve.get("type") == "bar"]
-    criteria = SHELL.conformity("tyre").criteria[:5]
+    criteria = SHELL.assess("tyre").criteria[:5]
     assert box["base"] == [c.lower for c in criteria]
     assert np.add(box["base"], box["y"]) == pytest.approx([c.upper for c in criteria])
     assert "Tolerance, tyre" in box["name"]
@@ -111,5 +111,5 @@ def test_table_of_any_rows_fits_on_the_picture(count: int) -> None:
 
 
 def test_no_cell_is_minus_zero() -> None:
-    criterion = thud.Criterion("level", "dB", -0.001, -1.0, 1.0, conforms=True)
+    criterion = thud.Criterion("level", thud.Estimate(-0.001), -1.0, 1.0)
     assert _cell(criterion, 1.0, 2) == "0.00"

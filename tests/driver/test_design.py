@@ -40,7 +40,7 @@ def test_margin_of_a_source_with_known_levels() -> None:
     gain = 20 * np.log10(found["mass"]) + 10 * np.log10(found["height"])
     expected = [
         np.minimum(level + gain - limit.lower, limit.upper - level - gain)
-        for level, limit in zip(one.levels(), one.conformity("tyre").criteria[:5], strict=True)
+        for level, limit in zip(one.levels(), one.assess("tyre").criteria[:5], strict=True)
     ]
     np.testing.assert_allclose(found["margin"], np.min(expected, axis=0), atol=1e-6)
 
@@ -54,7 +54,7 @@ def test_map_holds_the_verdicts_of_single_drops() -> None:
         for modulus in (1.6e6, 1.8e6, 2.0e6):
             ball = thud.Ball(wall_thickness=thickness, youngs_modulus=modulus)
             options = {"damping_law": "rising", "loss_factor": 0.2}
-            verdicts.append(bool(thud.solve(ball, model="modal_ball", **options).conformity()))
+            verdicts.append(bool(thud.solve(ball, model="modal_ball", **options).assess()))
     assert result.dataset["conforms"].values.ravel().tolist() == verdicts
     assert any(verdicts)
     assert not all(verdicts)

@@ -42,7 +42,7 @@ def test_floor_leaves_the_blocked_impact_as_it_is(
     alone = thud.solve()
     assert alone.on_floor is None
     assert np.array_equal(impact.floor_force, alone.floor_force)
-    assert impact.conformity() == alone.conformity()
+    assert impact.assess() == alone.assess()
     assert np.array_equal(moved.blocked_force, alone.floor_force)
     assert thud.solve(floor=thud.Rigid()).on_floor is None
 

@@ -191,7 +191,8 @@ def test_ignored_interrupt_is_ignored() -> None:
 def test_forked_process_does_not_wait_for_calls_of_its_parent() -> None:
     code = """
 import os, signal, threading, time, thud
-long = lambda: thud.solve(model="finite_element", radial_elements=16, polar_elements=512)
+solve = thud.solve
+long = lambda: solve(model="finite_element", radial_elements=16, polar_elements=512)
 threading.Thread(target=long, daemon=True).start()
 time.sleep(0.3)
 child = os.fork()

@@ -56,7 +56,7 @@ def test_levels_show_the_tolerance_band(source: str) -> None:
     assert axes.get_xlabel().endswith(", Hz")
     assert axes.get_ylabel() == "Force exposure level, dB re 1 N\n(force on the floor)"
     boxes = [box.get_datalim(axes.transData).intervaly for box in axes.collections]
-    limits = [(c.lower, c.upper) for c in impact.conformity(source).criteria[:5]]
+    limits = [(c.lower, c.upper) for c in impact.assess(source).criteria[:5]]
     np.testing.assert_allclose(boxes, limits)
     curves = {str(line.get_label()): line.get_ydata() for line in axes.lines}
     np.testing.assert_array_equal(curves["ball"], impact.levels(force="floor"))

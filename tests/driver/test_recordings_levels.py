@@ -17,10 +17,13 @@ from scipy.stats import binom, t as student
 from synthetic import make_drop
 
 import thud
+from thud.level.assessment import assess
+from thud.level.estimate import Contribution, Estimate
 from thud.level.levels import RECORDED_BAND
+from thud.recordings.averages import average_estimates, level_estimates
 from thud.recordings.band_noise import band_noise
 from thud.recordings.budgets import find_deviant
-from thud.recordings.contact import Estimate, cells_between, even_edges
+from thud.recordings.contact import cells_between, even_edges
 from thud.recordings.low_pass import attenuation, low_pass_force
 from thud.recordings.noise import Background
 from thud.recordings.outliers import find_outliers
@@ -31,13 +34,6 @@ from thud.recordings.recorded_levels import (
     average_levels,
     compare_methods,
     measure_levels,
-)
-from thud.recordings.verdict import (
-    Contribution,
-    Quantity,
-    average_estimates,
-    decide,
-    level_quantities,
 )
 
 if TYPE_CHECKING:
@@ -575,11 +571,12 @@ def test_budget_after_the_gum() -> None:
     """JCGM 100, H.1: end gauge; combined 32 nm, 16 degrees of freedom, 93 nm at 99 %."""
     parts = [(25.0, 18), (5.8, 24), (3.9, 5), (6.7, 8), (2.9, 50), (16.6, 2)]
     # Only the kinds of the lines count here: 31.7 nm and 16.7, which the GUM truncates to 16.
-    gauge = Quantity(838.0, tuple(Contribution(str(i), u, v) for i, (u, v) in enumerate(parts)))
+    lines = (Contribution(str(i), u, v) for i, (u, v) in enumerate(parts))
+    gauge = Estimate.from_budget(838.0, *lines)
     expected = math.sqrt(sum(u**2 for u, _ in parts))
     assert gauge.uncertainty == pytest.approx(expected)
     assert gauge.freedom == pytest.approx(expected**4 / sum(u**4 / v for u, v in parts))
-    exact = Quantity(1.0)
+    exact = Estimate(1.0)
     assert (exact.uncertainty, exact.freedom, exact.expanded) == (0.0, math.inf, 0.0)
     # Of five drops alone: t = 2.776.
     drops = average_estimates([Estimate(v, 0.1) for v in (1.0, 2.0, 3.0, 4.0, 5.0)])
@@ -590,7 +587,8 @@ def test_budget_after_the_gum() -> None:
     assert average_estimates([Estimate(1.0, 0.1)]).expanded == pytest.approx(0.196, abs=1e-3)
     pair = average_estimates([Estimate(1.0, 0.1), Estimate(1.2, 0.1)])
     assert pair.coverage_factor == pytest.approx(12.706, abs=1e-3)
-    shared = replace(pair, contributions=(*pair.contributions, Contribution("calibration", 0.3)))
+    calibration = Contribution("calibration", 0.3)
+    shared = Estimate.from_budget(pair.value, *pair.contributions, calibration)
     assert shared.uncertainty == pytest.approx(math.hypot(0.1, 0.3))
     assert shared.freedom == pytest.approx((0.1**2 + 0.3**2) ** 2 / 0.1**4)
     assert math.isnan(average_estimates([]).value)
@@ -638,7 +636,7 @@ def test_average_of_levels_is_that_of_energies_with_its_budget() -> None:
     # What is wrong with the method is wrong alike.
     np.testing.assert_allclose(found.contributions["method"], weights @ method)
     np.testing.assert_allclose(found.uncertainty, math.hypot(repeated, weights @ method))
-    (one, *_) = level_quantities(found, calibration=0.02)
+    (one, *_) = level_estimates(found, calibration=0.02)
     freedom = {part.name: (part.freedom, part.counted) for part in one.contributions}
     assert freedom == {
         "repeatability": (2, True), "noise": (math.inf, False), "method": (math.inf, True),
@@ -647,7 +645,7 @@ def test_average_of_levels_is_that_of_energies_with_its_budget() -> None:
     alone = average_levels(estimates[:1])
     assert np.isnan(alone.spread).all()
     np.testing.assert_allclose(alone.uncertainty, math.hypot(noise[0], method[0]))
-    (one, *_) = level_quantities(alone)
+    (one, *_) = level_estimates(alone)
     assert all(part.counted and part.freedom == math.inf for part in one.contributions)
 
 
@@ -671,7 +669,7 @@ def test_mean_of_estimates_has_its_budget() -> None:
 def test_level_budget_has_calibration_and_plate() -> None:
     average = average_levels(measure_levels([make_drop(1.0, seed=i) for i in range(3)]))
     plate = np.full(5, 0.02)
-    levels = level_quantities(average, calibration=0.01, plate=plate)
+    levels = level_estimates(average, calibration=0.01, plate=plate)
     names = [c.name for c in levels[0].contributions]
     assert names == [
         "repeatability", "noise", "method", "filter", "calibration", "plate",
@@ -685,84 +683,80 @@ def test_level_budget_has_calibration_and_plate() -> None:
 
 
 def test_plate_of_unstated_resonance_is_no_line_of_zero() -> None:
-    """The budget had a plate of 0 dB beside the remark that its uncertainty is not given."""
+    """The budget had a plate of 0 dB beside the warning that its uncertainty is not given."""
     average = average_levels(measure_levels([make_drop(1.0)]))
     for uncertainty, stated in ((0.0, False), (0.01, True)):
         plate = Plate(1600.0, 20.0, frequency_uncertainty=uncertainty)
-        (level, *_) = level_quantities(average, plate=plate.level_uncertainty())
+        (level, *_) = level_estimates(average, plate=plate.level_uncertainty())
         assert ("plate" in [c.name for c in level.contributions]) == stated
 
 
-def with_levels(level: Quantity, band: int = 0, **others: Any) -> str:  # noqa: ANN401
+def with_levels(level: Estimate, band: int = 0, **others: Any) -> str:  # noqa: ANN401
     levels: list[Any] = list(NOMINAL)
     levels[band] = level
     options = {
         "contact_time": 0.02, "restitution": 0.8, "peaks": 1, "mass": 2.5, "drop_height": 1.0,
         **others,
     }  # fmt: skip
-    verdict = decide(levels, **options)
-    return verdict.verdict
+    verdict = assess(levels, **options)
+    return verdict.result
 
 
 def test_verdict_has_a_guard_band_on_both_sides() -> None:
-    def level(value: float, uncertainty: float) -> Quantity:
-        return Quantity(value, (Contribution("noise", uncertainty),))
-
     # Limits 38 to 40 dB; 1.96 times 0.1 dB.
     for value, word in (
-        (37.80, "does not conform"), (37.81, "cannot be decided"), (38.19, "cannot be decided"),
-        (38.20, "conforms"), (39.80, "conforms"), (39.81, "cannot be decided"),
-        (40.19, "cannot be decided"), (40.20, "does not conform"),
+        (37.80, "does not conform"), (37.81, "inconclusive"), (38.19, "inconclusive"),
+        (38.20, "conforms"), (39.80, "conforms"), (39.81, "inconclusive"),
+        (40.19, "inconclusive"), (40.20, "does not conform"),
     ):  # fmt: skip
-        assert with_levels(level(value, 0.1)) == word
+        assert with_levels(Estimate(value, 0.1)) == word
     # An exact value on the limit conforms; one that is uncertain by more than the range never.
-    assert with_levels(level(38.0, 0.0)) == "conforms"
-    assert with_levels(level(39.0, 1.0)) == "cannot be decided"
-    assert with_levels(level(39.0, math.nan)) == "cannot be decided"
-    assert with_levels(level(math.nan, 0.1)) == "cannot be decided"
+    assert with_levels(Estimate(38.0, 0.0)) == "conforms"
+    assert with_levels(Estimate(39.0, 1.0)) == "inconclusive"
+    assert with_levels(Estimate(39.0, math.nan)) == "inconclusive"
+    assert with_levels(Estimate(math.nan, 0.1)) == "inconclusive"
     # An upper bound can only fail.
-    bound = (Contribution("noise", 0.1),)
-    assert with_levels(Quantity(39.0, bound, upper_bound=True)) == "cannot be decided"
-    assert with_levels(Quantity(45.0, bound, upper_bound=True)) == "cannot be decided"
-    assert with_levels(Quantity(37.0, bound, upper_bound=True)) == "does not conform"
+    assert with_levels(Estimate(39.0, 0.1, upper_bound=True)) == "inconclusive"
+    assert with_levels(Estimate(45.0, 0.1, upper_bound=True)) == "inconclusive"
+    assert with_levels(Estimate(37.0, 0.1, upper_bound=True)) == "does not conform"
 
 
 def test_verdict_names_each_criterion_of_the_library() -> None:
-    verdict = decide(NOMINAL, contact_time=Estimate(0.02, 1e-4), restitution=0.8, peaks=2)
-    expected = thud.judge(NOMINAL, 0.02, 0.8, 2, math.nan, math.nan)
-    assert [d.name for d in verdict.decisions] == [c.name for c in expected.criteria]
-    assert [(d.lower, d.upper) for d in verdict.decisions] == [
+    verdict = assess(NOMINAL, contact_time=Estimate(0.02, 1e-4), restitution=0.8, peaks=2)
+    expected = assess(NOMINAL, 0.02, 0.8, 2)
+    assert [d.name for d in verdict.criteria] == [c.name for c in expected.criteria]
+    assert [(d.lower, d.upper) for d in verdict.criteria] == [
         (c.lower, c.upper) for c in expected.criteria
     ]
-    assert [d.verdict for d in verdict.decisions] == [
-        *["conforms"] * 7, "does not conform", *["cannot be decided"] * 2,
+    assert [d.result for d in verdict.criteria] == [
+        *["conforms"] * 7, "does not conform", *["inconclusive"] * 2,
     ]  # fmt: skip
-    assert verdict.verdict == "does not conform"
+    assert verdict.result == "does not conform"
     assert not verdict
-    first = verdict.decisions[0]
+    first = verdict.criteria[0]
     assert (first.margin, first.probability) == (1.0, 1.0)
-    assert verdict.decisions[7].margin == -1
-    assert with_levels(Quantity(39.0)) == "conforms"
-    assert with_levels(Quantity(39.0), mass=math.nan) == "cannot be decided"
-    assert with_levels(Quantity(39.0), restitution=0.95, mass=math.nan) == "does not conform"
-    with pytest.raises(thud.InputError, match=naming("levels", "(4,)", "(5,)")):
-        decide(NOMINAL[:4])
+    assert verdict.criteria[7].margin == -1
+    assert with_levels(Estimate(39.0)) == "conforms"
+    assert with_levels(Estimate(39.0), mass=math.nan) == "inconclusive"
+    assert with_levels(Estimate(39.0), restitution=0.95, mass=math.nan) == "does not conform"
+    with pytest.raises(thud.InputError, match=naming("levels", 4, 5)):
+        assess(NOMINAL[:4])
     with pytest.raises(thud.InputError, match=naming("'bowling_ball'", "'rubber_ball'")):
-        decide(NOMINAL, source="bowling_ball")
+        assess(NOMINAL, source="bowling_ball")
 
 
 def test_probability_of_conformity_counts_both_limits() -> None:
-    half = Quantity(40.0, (Contribution("noise", 0.1),))
-    wide = Quantity(39.0, (Contribution("noise", 1.0),))
-    decisions = [decide([q, *NOMINAL[1:]]).decisions[0] for q in (half, wide)]
+    half = Estimate(40.0, 0.1)
+    wide = Estimate(39.0, 1.0)
+    decisions = [assess([q, *NOMINAL[1:]]).criteria[0] for q in (half, wide)]
     assert decisions[0].probability == pytest.approx(0.5)
     assert decisions[1].probability == pytest.approx(0.6827, abs=1e-4)
     # Of four drops, Student's t; what is not known or an upper bound has no probability.
-    few = Quantity(39.5, (Contribution("repeatability", 0.4, 3),))
+    few = Estimate(39.5, 0.4, freedom=3)
     expected = student.cdf(0.5 / 0.4, 3) - student.cdf(-1.5 / 0.4, 3)
-    assert decide([few, *NOMINAL[1:]]).decisions[0].probability == pytest.approx(expected)
+    assert assess([few, *NOMINAL[1:]]).criteria[0].probability == pytest.approx(expected)
     bound = replace(few, upper_bound=True)
-    assert math.isnan(decide([bound, *NOMINAL[1:]]).decisions[0].probability)
+    assert math.isnan(assess([bound, *NOMINAL[1:]]).criteria[0].probability)
 
 
 @pytest.mark.parametrize(("scatter", "calibration"), [(0.5, 0.0), (0.5, 0.1), (0.3, 0.5)])
@@ -783,7 +777,7 @@ def test_coverage_and_errors_of_the_verdict_by_monte_carlo(
                 [Estimate(float(d), 0.0) for d in drops], Contribution("calibration", calibration)
             )
             covered += abs(quantity.value - true) <= quantity.expanded
-            words[true].append(_decide_level(quantity))
+            words[true].append(_assess_level(quantity))
     # Welch and Satterthwaite are exact for one contribution, and within a percent here for two.
     lowest, highest = binom.ppf([1e-4, 1 - 1e-4], 4 * trials, [0.95 - 0.01, 0.95 + 0.015])
     assert lowest <= covered <= highest
@@ -796,8 +790,8 @@ def test_coverage_and_errors_of_the_verdict_by_monte_carlo(
     assert words[39.0].count("does not conform") == 0
 
 
-def _decide_level(quantity: Quantity) -> str:
-    return decide([quantity, *NOMINAL[1:]]).decisions[0].verdict
+def _assess_level(quantity: Estimate) -> str:
+    return assess([quantity, *NOMINAL[1:]]).criteria[0].result
 
 
 def test_energy_of_bands_adds_up_to_neighbours() -> None:

@@ -28,7 +28,7 @@ from thud.recordings import calibration
 from thud.recordings.calibration import calibrate
 from thud.recordings.channel import BoundedFile
 from thud.recordings.config import PlateConfig, read_config
-from thud.recordings.excursion import Excursions, doubt, scan
+from thud.recordings.excursion import Excursions, check_peak, scan
 from thud.recordings.force_units import Calibration, newtons_per_unit
 from thud.recordings.grid import even_grid
 from thud.recordings.signal import Signal
@@ -208,7 +208,7 @@ def test_quiet_is_found_at_either_end() -> None:
 
 def test_polarity_is_doubted_from_half_as_much_again_on() -> None:
     for low, expected in ((-1490.0, False), (-1510.0, True)):
-        told = doubt(Excursions(low, 1000.0, 0.0), 1.0, "t.csv", assumed=False)
+        told = check_peak(Excursions(low, 1000.0, 0.0), 1.0, "t.csv", assumed=False)
         assert any("polarity" in one for one in told) == expected
 
 
@@ -216,7 +216,7 @@ def test_wrong_polarity_is_doubted(tmp_path: Path) -> None:
     force = np.concatenate([half_sine(8000.0), -0.25 * half_sine(8000.0)])
     path = write_sound(tmp_path / "plate.wav", force)
     (signal,) = open_signals(path, unit="N", polarity="negative")
-    assert "polarity" in signal.remarks[-1]
+    assert "polarity" in signal.warnings[-1]
 
 
 @pytest.mark.parametrize(
@@ -237,11 +237,11 @@ def test_wrong_units_are_told(factor: float, unit: str | None, words: str, tmp_p
     assert re.search(naming("plate.wav", 300, "15000 N"), str(caught.value))
 
 
-def test_small_peaks_are_remarked(tmp_path: Path) -> None:
+def test_small_peaks_raise_a_warning(tmp_path: Path) -> None:
     path = write_sound(tmp_path / "plate.wav", 0.1 * half_sine(8000.0))
     (signal,) = open_signals(path, unit="N")
-    (remark,) = signal.remarks
-    assert re.search(naming("peak", "150 N", 300, "15000 N"), remark)
+    (warning,) = signal.warnings
+    assert re.search(naming("peak", "150 N", 300, "15000 N"), warning)
 
 
 def test_units_and_rates_that_are_replaced_are_told(tmp_path: Path) -> None:

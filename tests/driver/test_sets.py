@@ -281,7 +281,7 @@ def test_verdict_is_on_the_force_and_source_of_each_set(
     expected = []
     for row in rows:
         impact = thud.solve(base)
-        verdict = impact.conformity(row["source"], row["force"])
+        verdict = impact.assess(row["source"], row["force"])
         expected.append(verdict.conforms)
         assert (float(row["margin_dB"]) >= 0) == verdict.conforms
     assert [row["conforms"] == "yes" for row in rows] == expected

@@ -62,7 +62,7 @@ def test_grid_holds_what_single_drops_give() -> None:
                     np.testing.assert_allclose(
                         cell[f"{force}_level"], impact.levels(force=force), rtol=0, atol=1e-6
                     )
-                verdict = impact.conformity()
+                verdict = impact.assess()
                 assert bool(cell["conforms"]) == verdict.conforms
                 margins = [min(c.value - c.lower, c.upper - c.value) for c in verdict.criteria[:5]]
                 assert float(cell["margin"]) == pytest.approx(min(margins), abs=1e-6)
@@ -341,7 +341,7 @@ def test_sets_give_what_single_drops_give(fixed: dict[str, str]) -> None:
         for force in ("elastic", "floor"):
             levels = impact.levels(force=force)
             np.testing.assert_allclose(one[f"{force}_level"], levels, rtol=0, atol=1e-6)
-        verdict = impact.conformity(study.case.limits.source, study.case.levels.force)
+        verdict = impact.assess(study.case.limits.source, study.case.levels.force)
         assert bool(one["conforms"]) == verdict.conforms
 
 

@@ -21,9 +21,10 @@ import numpy as np
 import thud
 from thud.base.errors import InputError
 from thud.impact.contact_time import THRESHOLD, contact_span
+from thud.level.estimate import Estimate
 from thud.recordings import contact as contact_module
 from thud.recordings.band_noise import band_functionals
-from thud.recordings.contact import Contact, Estimate
+from thud.recordings.contact import Contact
 from thud.recordings.drops import Window
 from thud.recordings.noise import MAINS, Background
 from thud.recordings.recorded_levels import ENERGY_DECIBEL, measure_levels

@@ -85,19 +85,19 @@ def results_of(
 
 # Endings of the files of a page.
 PAGE = (".png", ".svg", ".html")
-QUIET = argument("-q", "--quiet", action="store_true", help="show only errors and remarks")
+QUIET = argument("-q", "--quiet", action="store_true", help="show only errors and warnings")
 NO_FIGURES = argument("--no-figures", action="store_true", help="results only")
 
 
-def print_notes(remarks: Iterable[object]) -> None:
-    """Print remarks; a progress bar stays below them."""
-    for remark in remarks:
-        tqdm.write(f"thud-driver: {remark}", file=sys.stderr)
+def print_notes(warnings: Iterable[object]) -> None:
+    """Print warnings; a progress bar stays below them."""
+    for warning in warnings:
+        tqdm.write(f"thud-driver: {warning}", file=sys.stderr)
 
 
 @contextmanager
 def shown_at_once() -> Iterator[None]:
-    """Print warnings of reports, locks and workers as remarks, at once: the work may go on."""
+    """Print warnings of reports, locks and workers as warnings, at once: the work may go on."""
     usual = warnings.showwarning
     kinds = ReportWarning, LockWarning, WorkerWarning
 
@@ -122,7 +122,7 @@ def save_result(  # noqa: PLR0913, PLR0917 - each of them differs
     file: tuple[str, bytes],
     figure: str,
 ) -> int:
-    """Save a file and the figure of a result, print its text and remarks; return the exit code.
+    """Save a file and the figure of a result, print its text and warnings; return the exit code.
 
     The source is the file that the result is from.
     """
@@ -136,7 +136,7 @@ def save_result(  # noqa: PLR0913, PLR0917 - each of them differs
     results.write(contents)
     if not options.quiet:
         print(shown)
-    print_notes(found.remarks)
+    print_notes(found.warnings)
     if not options.quiet:
         print(f"Results: {results.folder}")
     return 0

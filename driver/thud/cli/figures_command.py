@@ -32,7 +32,7 @@ def compare_cases(options: argparse.Namespace) -> int:
             options.source,
             progress=not options.quiet and sys.stderr.isatty(),
         )
-    print_notes(page.remarks)
+    print_notes(page.warnings)
     paths = results.write(page.files())
     if not options.quiet:
         print(format_rows(page.table()))

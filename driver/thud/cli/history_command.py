@@ -27,8 +27,8 @@ def run_history(options: argparse.Namespace) -> int:
     if not options.quiet:
         print(history.title)
         print(format_rows(history.table()))
-        for remark in history.remarks():
-            print(remark)
+        for warning in history.warnings():
+            print(warning)
         if paths:
             print(f"Chart: {paths[0]}")
     return 0

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud.base.bridge import api, call, text
+from thud.base.bridge import ask, text
 from thud.base.display import left_out
 from thud.base.errors import InputError, ThudError
 from thud.base.files import Results
@@ -62,11 +62,12 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
         )
         raise InputError(message)
     options.done[case.name] = path
-    found = call(
-        api.run, os.fsencode(path), os.fsencode(output), options.replace, not options.quiet
-    )
-    for remark in found.get("run_remarks", {}).values():
-        tqdm.write(f"thud-driver: {text(remark)}", file=sys.stderr)
+    found = ask(
+        "run", path=os.fsencode(path), output=os.fsencode(output), replace=options.replace,
+        progress=not options.quiet,
+    )  # fmt: skip
+    for warning in found.get("run_remarks", {}).values():
+        tqdm.write(f"thud-driver: {text(warning)}", file=sys.stderr)
     folder = Path(output or os.fsdecode(found["directory"]))
     pictures = _pictures(found, figures=not options.no_figures, animation=options.animation)
     if pictures:

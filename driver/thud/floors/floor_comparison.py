@@ -39,10 +39,10 @@ class FloorComparison(Displayed):
     predictions: dict[str, RoomPrediction]
 
     @property
-    def remarks(self) -> list[str]:
+    def warnings(self) -> list[str]:
         """What a reader of the numbers has to know, with the names of the floors."""
         found = self.predictions.items()
-        return [f"{name}: {remark}" for name, one in found for remark in one.remarks]
+        return [f"{name}: {warning}" for name, one in found for warning in one.warnings]
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text; columns are the floors."""

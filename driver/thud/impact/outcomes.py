@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base._schema import OUTCOMES, SCALARS
+from thud.base._schema import SampleQuantities
 from thud.base.display import Displayed
 from thud.base.extras import require_extra
-from thud.impact.quantities import FLOOR_QUANTITIES, ROOM_LEVEL
+from thud.impact.quantities import FLOOR_QUANTITIES, ROOM_LEVEL, SAMPLE_RESULTS, SCALAR_QUANTITIES
 from thud.level.levels import BANDWIDTHS
 
 if TYPE_CHECKING:
@@ -21,9 +21,11 @@ if TYPE_CHECKING:
     from thud.case.case import Case
 
 
-@dataclass(frozen=True, eq=False)
-class Ensemble(Displayed):
-    """Outcomes of many drops; NaN where a drop could not be computed.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Ensemble(SampleQuantities, Displayed):
+    """Results of many samples of a case; NaN where a sample could not be computed.
+
+    It has the attributes of `SampleQuantities`, and those below.
 
     Attributes
     ----------
@@ -35,23 +37,13 @@ class Ensemble(Displayed):
         0, or the exit code of the error: 1 bad input, 2 numerical failure.
     reason : ndarray of str, shape (n_sample,)
         The sentence of the error.
-    contact_time : ndarray, shape (n_sample,)
-        Time from first touch to release, s.
-    peak_force, peak_elastic_force : ndarray, shape (n_sample,)
-        Maximum of the force on the floor and of the elastic force, N.
-    max_deflection : ndarray, shape (n_sample,)
-        Maximum deflection, m.
-    restitution : ndarray, shape (n_sample,)
-        Velocity at release over velocity at first touch.
-    impulse : ndarray, shape (n_sample,)
-        Impulse given to the floor, N s.
     levels : dict of (force, bands) to ndarray, shape (n_sample, n_band)
         Force exposure levels, dB: of ``"elastic"`` and ``"floor"``, in octaves, on which the
         verdict is based, and in the other bands of the case.
     margin : ndarray, shape (n_sample,)
         Minimum distance of an octave level of the judged force to its limits, dB, positive inside.
     conforms : ndarray of bool, shape (n_sample,)
-        Verdict of the standards on the force that the case judges.
+        Verdict of the standards on the force that the case assesses.
     elastic_conforms, floor_conforms : ndarray of bool, shape (n_sample,)
         The same on the elastic force and on the force on the floor.
     elastic_force, floor_force : ndarray, shape (n_sample, n_time), or None
@@ -73,12 +65,6 @@ class Ensemble(Displayed):
     parameters: dict[str, NDArray[np.generic]]
     status: NDArray[np.int32]
     reason: NDArray[np.object_]
-    contact_time: NDArray[np.float64]
-    peak_force: NDArray[np.float64]
-    peak_elastic_force: NDArray[np.float64]
-    max_deflection: NDArray[np.float64]
-    restitution: NDArray[np.float64]
-    impulse: NDArray[np.float64]
     levels: dict[tuple[LevelsForce, BandSet], NDArray[np.float64]]
     margin: NDArray[np.float64]
     conforms: NDArray[np.bool_]
@@ -109,9 +95,10 @@ class Ensemble(Displayed):
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
         rows: list[tuple[str, ...]] = [("", "minimum", "median", "maximum")]
-        units = {name: SCALARS[name][0] for name in OUTCOMES} | {"margin": "dB"}
-        units |= {name: unit for name, (unit, _) in FLOOR_QUANTITIES.items() if name != ROOM_LEVEL}
-        for name, unit in units.items():
+        shown = SCALAR_QUANTITIES | {"margin": SAMPLE_RESULTS["margin"]} | FLOOR_QUANTITIES
+        for name, quantity in shown.items():
+            if name == ROOM_LEVEL:
+                continue
             values = getattr(self, name)
             if values is None:
                 continue
@@ -120,8 +107,7 @@ class Ensemble(Displayed):
             if not known.size:
                 continue
             shares = np.quantile(known, [0, 0.5, 1])
-            label = f"{name.replace('_', ' ')}, {unit}".removesuffix(", ")
-            rows.append((label, *(f"{value:.4g}" for value in shares)))
+            rows.append((quantity.label, *map(quantity.show, shares)))
         return rows
 
     def to_xarray(self) -> xr.Dataset:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import f90nml.scanner
 import numpy as np
 
-from thud.base._schema import SCALARS
+from thud.base._schema import QUANTITIES
 from thud.base.checks import refuse, shown
 from thud.base.errors import PlausibilityWarning, ThudError
 from thud.base.files import MANIFEST, checksum, locked, read_input, read_manifest
@@ -64,7 +64,7 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
     Warns
     -----
     PlausibilityWarning
-        Where the file that says so, ``.thud``, is missing; also in `Impact.remarks`.
+        Where the file that says so, ``.thud``, is missing; also in `Impact.warnings`.
     """
     try:
         folder = Path(directory)
@@ -112,18 +112,18 @@ def _new_impact(files: _Files) -> Impact:
     case = Case.from_text(files.read("effective.nml"))
     numbers = f90nml.reads(files.read("summary.nml"))
     history, _ = _read_history(files, "", numbers["summary"], numbers.get("facts", {}))
-    remarks = _texts(numbers.get("remarks", {}).get("remark", []))
+    found = _texts(numbers.get("remarks", {}).get("remark", []))
     if not files.listed:
-        remark = f"{MANIFEST} is missing: nothing shows that the files belong together"
-        warnings.warn(f"{files.folder}: {remark}", PlausibilityWarning, stacklevel=3)
-        remarks += (remark,)
+        warning = f"{MANIFEST} is missing: nothing shows that the files belong together"
+        warnings.warn(f"{files.folder}: {warning}", PlausibilityWarning, stacklevel=3)
+        found += (warning,)
     on_floor = None
     if "floor_summary" in numbers:
         scalars, facts = numbers["floor_summary"], numbers.get("floor_facts", {})
         moving, columns = _read_history(files, "floor_", scalars, facts)
         on_floor = FloorImpact(
             case=case,
-            remarks=(),
+            warnings=(),
             blocked_force=columns.pop("blocked_force_N"),
             floor_displacement=columns.pop("floor_displacement_m"),
             floor_velocity=columns.pop("floor_velocity_m_per_s"),
@@ -131,7 +131,7 @@ def _new_impact(files: _Files) -> Impact:
             point_velocity=np.array([*columns.values()]).reshape(-1, len(moving["time"])),
             **moving,
         )
-    return Impact(case=case, remarks=remarks, on_floor=on_floor, **history)
+    return Impact(case=case, warnings=found, on_floor=on_floor, **history)
 
 
 def _read_history(
@@ -150,7 +150,7 @@ def _read_history(
         "channels": {name: values for name, values in found.items() if name != "time_s"},
         "facts": dict(facts),
         "motion": _read_motion(files, prefix) if f"{prefix}motion.pvd" in files else None,
-        **{name: scalars[name] for name in SCALARS},
+        **{name: scalars[name] for name in QUANTITIES},
     }
     return history, {name: force[name] for name in columns[last + 1 :]}
 

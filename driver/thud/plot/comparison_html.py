@@ -4,16 +4,16 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from thud.base._schema import BandSet, LevelsForce, LimitsSource
-from thud.impact.impact import Impact
-from thud.level.levels import get_bands, octave_limits
+from thud.level.assessment import octave_limits
+from thud.level.impact_result import ImpactResult
+from thud.level.levels import get_bands
 from thud.plot.force_history_figure import TIME_LABEL, contact_force, force_label
 from thud.plot.html_page import curve_look, curve_points, html_page, plot_layout
 from thud.plot.style import BAND_WORDS, iterate_curves, level_label
-from thud.recordings.recording import Recording
 
 
 def comparison_html(
-    impacts: Mapping[str, Impact | Recording],
+    impacts: Mapping[str, ImpactResult],
     force: LevelsForce | None,
     source: LimitsSource,
     table: Sequence[Sequence[str]],

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
 from thud.base._schema import LevelsForce, LimitsSource
-from thud.impact.impact import Impact
+from thud.level.impact_result import ImpactResult
 from thud.plot.force_history_figure import draw_forces
 from thud.plot.levels_figure import draw_levels
 from thud.plot.style import (
@@ -20,7 +20,6 @@ from thud.plot.style import (
     own_style,
     style_axes,
 )
-from thud.recordings.recording import Recording
 
 # Size of a letter and of a line of the table, inch; letters of a name on one line.
 _LETTER, _LINE = 0.062, 0.17
@@ -29,7 +28,7 @@ _LETTERS = 20
 
 @own_style()
 def comparison_page(
-    impacts: Mapping[str, Impact | Recording],
+    impacts: Mapping[str, ImpactResult],
     force: LevelsForce | None,
     source: LimitsSource,
     table: Sequence[Sequence[str]],

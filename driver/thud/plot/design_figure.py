@@ -50,7 +50,7 @@ def draw_design(result: Design) -> Figure:
     conforms = dataset["conforms"].transpose(*result.axes).values.T
     if margin.count():
         bar = _draw_margin(figure, axes, (x, y), margin)
-        bar.set_label(f"Margin ({FORCE_WORDS[dataset.attrs['judged_force']]}), dB", fontsize=SIZE)
+        bar.set_label(f"Margin ({FORCE_WORDS[dataset.attrs['assessed_force']]}), dB", fontsize=SIZE)
     doubtful = np.zeros_like(conforms)
     if "doubtful" in dataset:
         doubtful = dataset["doubtful"].transpose(*result.axes).values.T

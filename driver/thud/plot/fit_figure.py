@@ -140,6 +140,8 @@ def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: Axes) -
     if count > MAX_UPRIGHT:
         below.tick_params(axis="x", labelrotation=90)
     below.set_xlabel(f"{BAND_WORDS[misfit.bands]}, Hz", fontsize=SIZE)
-    above.set_ylabel(f"{LEVEL}\n({FORCE_WORDS[fitted.impact.judged(misfit.kind)]})", fontsize=SIZE)
+    above.set_ylabel(
+        f"{LEVEL}\n({FORCE_WORDS[fitted.impact.assessed_force(misfit.kind)]})", fontsize=SIZE
+    )
     below.set_ylabel("(Fit − target)\n/ uncertainty", fontsize=SIZE)
     legend_above(above)

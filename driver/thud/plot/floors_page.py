@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.transforms import Bbox
 
-from thud.level.rating import CLASS_LIMITS
+from thud.base._schema import CLASS_LIMITS
 from thud.plot.html_page import curve_look, curve_points, html_page, plot_layout
 from thud.plot.style import (
     BAND_WORDS,
@@ -109,7 +109,7 @@ def floors_html(found: FloorComparison) -> str:
     ]
     text = (
         "Levels in the room below, and the chain that leads to them: force, energy, floor, room. "
-        "Statistical means over positions, floors and rooms: see the remarks of each prediction."
+        "Statistical means over positions, floors and rooms: see the warnings of each prediction."
     )
     # The level in the room, of full width, comes first.
     return html_page("Comparison of floors", text, found.rows(), [plots[-1], *plots[:-1]])

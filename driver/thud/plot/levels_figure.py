@@ -16,12 +16,13 @@ from thud.base._schema import (
     Levels,
     LevelsForce,
     LevelsMethod,
+    Limits,
     LimitsSource,
 )
 from thud.base.checks import refuse
 from thud.impact.impact import Impact
 from thud.impact.solve import solve
-from thud.level.levels import octave_limits
+from thud.level.assessment import octave_limits
 from thud.plot.style import (
     SIZE,
     Curve,
@@ -38,8 +39,6 @@ from thud.plot.style import (
     own_style,
     style_axes,
 )
-from thud.recordings.config import Config
-from thud.recordings.recording import Recording
 
 
 @own_style()
@@ -113,13 +112,12 @@ def common_source(impacts: Mapping[str, Curve], source: LimitsSource | None = No
     """
     if source is not None:
         return source
-    found = {i.case.limits.source for i in impacts.values() if isinstance(i, Impact)}
-    recorded = {i.config.source for i in impacts.values() if isinstance(i, Recording)}
-    found |= recorded - {Config.source}
+    stated = (impact.limits_source for impact in impacts.values())
+    found = {one for one in stated if one}
     if len(found) > 1:
         what = f"&limits: source differs ({', '.join(sorted(found))})"
         refuse(what, "cases and recordings with one source, or the choice of one")
-    return found.pop() if found else Config.source
+    return found.pop() if found else Limits.source
 
 
 def draw_tolerance(

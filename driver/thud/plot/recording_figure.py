@@ -46,7 +46,7 @@ def recording_forces(recording: Recording) -> Figure:
     The contact time has its limits and the bar of its expanded uncertainty (95 %).
     """
     figure, axes = empty_axes(HEIGHT)
-    limits = next(d for d in recording.conformity().decisions if d.name == "contact_time")
+    limits = next(d for d in recording.assess().criteria if d.name == "contact_time")
     longest = max(drop.contact_time.value for drop in recording.drops)
     longest = max(longest, recording.contact_time, limits.upper if limits.upper < 1 else 0)
     time = longest * np.linspace(-MARGIN, 1 + MARGIN, POINTS)
@@ -57,7 +57,7 @@ def recording_forces(recording: Recording) -> Figure:
     if len(forces) > 1:
         axes.plot(1e3 * time, forces.mean(axis=0), label="average", **AVERAGE)
     axes.errorbar(
-        1e3 * limits.value, 0, xerr=_bar(limits.quantity.expanded, 1e3), label="contact time",
+        1e3 * limits.value, 0, xerr=_bar(limits.estimate.expanded, 1e3), label="contact time",
         marker="o", markersize=2.5, **BARS,
     )  # fmt: skip
     axes.set_xlim(1e3 * time[0], 1e3 * time[-1])
@@ -100,8 +100,8 @@ def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
     average = recording.average(bands)
     figure, axes = empty_axes(HEIGHT)
     if bands == BANDWIDTHS[0]:
-        verdict = recording.conformity()
-        octaves = verdict.decisions[: len(average.level)]
+        verdict = recording.assess()
+        octaves = verdict.criteria[: len(average.level)]
         own = any(one.name in recording.config.limits for one in octaves)
         draw_tolerance(
             axes,
@@ -111,7 +111,7 @@ def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
         )
     place = np.arange(len(average.level), dtype=float)
     _draw_drops(axes, place, average.drops, recording)
-    expanded = np.array([one.expanded for one in recording.level_quantities(bands)])
+    expanded = np.array([one.expanded for one in recording.level_estimates(bands)])
     mark = "average, 95 %" if len(average.drops) > 1 else "drop, 95 %"
     axes.errorbar(
         place, average.level, yerr=_bar(expanded), label=mark, marker="o", markersize=3, **BARS,

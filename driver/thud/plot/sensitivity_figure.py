@@ -48,7 +48,7 @@ def draw_sensitivity(result: Sensitivity) -> Figure:
     axes.set_yticks(place, outputs)
     axes.set_ylim(len(outputs) - 0.5, -0.5)
     axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
-    words = FORCE_WORDS[result.dataset.attrs["judged_force"]]
+    words = FORCE_WORDS[result.dataset.attrs["assessed_force"]]
     axes.set_xlabel(f"Sobol index, with its interval of 95 %\n({words})", fontsize=SIZE)
     legend_above(axes)
     return figure

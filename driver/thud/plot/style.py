@@ -22,10 +22,10 @@ from thud.base.display import draw_all, left_out
 from thud.base.errors import InputError
 from thud.base.files import Results, replace_file
 from thud.impact.impact import Impact
+from thud.level.impact_result import ImpactResult
 from thud.level.levels import get_bands
-from thud.recordings.recording import Recording
 
-Curve = TypeVar("Curve", bound=Impact | Recording)
+Curve = TypeVar("Curve", bound=ImpactResult)
 
 # Okabe and Ito's colours, for any colour vision; line styles distinguish curves in print.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -151,7 +151,7 @@ def iterate_curves(
 ) -> Iterator[tuple[str, Curve, LevelsForce]]:
     """Yield label, impact and kind of force of each curve.
 
-    Without `force` each case has the one that it judges. Labels say which where they differ.
+    Without `force` each case has the force that it assesses. Labels say which where they differ.
 
     Raises
     ------
@@ -162,8 +162,8 @@ def iterate_curves(
         message = "impacts are not given; allowed: a mapping of names to one or more impacts"
         raise InputError(message)
     for name, impact in impacts.items():
-        require_kind(name, impact, Impact | Recording)
-    kinds = [impact.judged(force) for impact in impacts.values()]
+        require_kind(name, impact, ImpactResult)
+    kinds = [impact.assessed_force(force) for impact in impacts.values()]
     for (name, impact), kind in zip(impacts.items(), kinds, strict=True):
         which = f", {FORCE_WORDS[kind]}" if len(set(kinds)) > 1 else ""
         yield f"{name}{which}", impact, kind

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from thud.case.keys import humanize
-from thud.level.levels import BANDWIDTHS, FORCES, get_bands, octave_limits
+from thud.level.assessment import octave_limits
+from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 from thud.plot.parameter_axis import show_parameter, words
 from thud.plot.style import (
     COLOURS,
@@ -81,7 +82,7 @@ def draw_sweep(result: Sweep) -> Figure:
         axes.xaxis.label.set_visible(lowest)
     for axes in panels[len(parts) :]:
         axes.remove()
-    words = "judged force" if "force" in columns else FORCE_WORDS[dataset.attrs["judged_force"]]
+    words = "judged force" if "force" in columns else FORCE_WORDS[dataset.attrs["assessed_force"]]
     figure.supylabel(f"Level − nominal, dB\n({words})", fontsize=SIZE)
     others = [n for n in varied if n not in {name, split}]
     legend_above(panels[0], _meaning(judged, split, others))
@@ -102,7 +103,7 @@ def _judge(dataset: xr.Dataset, columns: Columns) -> _Judged:
         for force in FORCES
     }
     count = len(dataset["status"].values.ravel())
-    forces = columns.get("force", np.full(count, dataset.attrs["judged_force"]))
+    forces = columns.get("force", np.full(count, dataset.attrs["assessed_force"]))
     sources = columns.get("source", np.full(count, dataset.attrs["limits"]))
     found = np.where((forces == "floor")[:, np.newaxis], levels["floor"], levels["elastic"])
     tolerances: list[float] = []

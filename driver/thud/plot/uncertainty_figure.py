@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from thud.level.levels import octave_limits
+from thud.level.assessment import octave_limits
 from thud.plot.style import (
     COLOURS,
     FORCE_WORDS,
@@ -49,7 +49,7 @@ def draw_uncertainty(result: Uncertainty) -> Figure:
         elinewidth=0.8, capsize=2, label="Median, 95 % of sets",
     )  # fmt: skip
     octave_axis(axes)
-    words = FORCE_WORDS[result.dataset.attrs["judged_force"]]
+    words = FORCE_WORDS[result.dataset.attrs["assessed_force"]]
     axes.set_ylabel(f"Level − nominal, dB\n({words})", fontsize=SIZE)
     low, high = result.interval
     share = f"{100 * result.probability:.1f} % ({100 * low:.1f} to {100 * high:.1f} %)"

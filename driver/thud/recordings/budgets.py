@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thud.level.estimate import Contribution, Estimate
 from thud.level.levels import RECORDED_BAND, peak_count
-from thud.recordings.contact import Estimate
+from thud.recordings.averages import average_estimates
 from thud.recordings.outliers import SIGNIFICANCE, find_outliers
 from thud.recordings.restitution import BOUNCES, IMPULSE, DropConditions
-from thud.recordings.verdict import Contribution, Quantity, average_estimates
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,10 +33,10 @@ DEVIANT = (
 )
 
 
-def drop_quantities(
+def drop_estimates(
     drops: Sequence[Drop], config: Config, calibration: float | None
-) -> dict[str, Quantity]:
-    """Return contact time, restitution, peaks, mass and drop height, as `decide` names them.
+) -> dict[str, Estimate]:
+    """Return contact time, restitution, peaks, mass and drop height, as `assess` names them.
 
     A mass that is not stated is the effective mass; `calibration` is the relative standard
     uncertainty of the force.
@@ -50,7 +50,7 @@ def drop_quantities(
     return {
         "contact_time": average_estimates(times, *edges),
         "restitution": average_restitution(drops, fall)[0],
-        "peaks": Quantity(float(np.max([_peaks(drop) for drop in drops]))),
+        "peaks": Estimate(float(np.max([_peaks(drop) for drop in drops]))),
         "mass": average_mass(drops, fall) if config.mass is None else mass,
         "drop_height": _stated(config.height, config.height_uncertainty),
     }
@@ -84,7 +84,7 @@ def told_restitution(
     return (told,)
 
 
-def average_restitution(drops: Sequence[Drop], fall: DropConditions) -> tuple[Quantity, Quantity]:
+def average_restitution(drops: Sequence[Drop], fall: DropConditions) -> tuple[Estimate, Estimate]:
     """Return the restitution, and impulse minus bounces, with their budgets; NaN where not known.
 
     Where the ways differ by more than the expanded uncertainty of the difference, one of them is
@@ -105,14 +105,14 @@ def average_restitution(drops: Sequence[Drop], fall: DropConditions) -> tuple[Qu
     return average_estimates([drop.restitution for drop in known], *shared), difference
 
 
-def _difference(drops: Sequence[Drop], fall: DropConditions) -> Quantity:
+def _difference(drops: Sequence[Drop], fall: DropConditions) -> Estimate:
     """Return restitution by impulse minus that by bounces."""
     differences = []
     parts: dict[str, list[float]] = {}
     for drop in drops:
         by, other = (drop.restitutions[way] for way in (IMPULSE, BOUNCES))
-        doubt = math.hypot(by.uncertainty, other.uncertainty)
-        differences.append(Estimate(by.value - other.value, doubt))
+        combined = math.hypot(by.uncertainty, other.uncertainty)
+        differences.append(Estimate(by.value - other.value, combined))
         one, two = (fall.shared(drop.restitutions, drop.impulse)[w] for w in (IMPULSE, BOUNCES))
         for name in one:
             parts.setdefault(name, []).append(one[name] - two.get(name, 0.0))
@@ -120,11 +120,11 @@ def _difference(drops: Sequence[Drop], fall: DropConditions) -> Quantity:
     return average_estimates(differences, *shared)
 
 
-def average_mass(drops: Sequence[Drop], fall: DropConditions) -> Quantity:
+def average_mass(drops: Sequence[Drop], fall: DropConditions) -> Estimate:
     """Return the effective mass with its budget, kg; NaN where bounces or height are not known."""
     known = [drop for drop in drops if math.isfinite(drop.effective_mass.value)]
     if not known or not fall.height:
-        return Quantity(math.nan)
+        return Estimate.unknown()
     value = float(np.mean([drop.effective_mass.value for drop in known]))
     # Of m = J/(v0 + g (t_f/2 + t_c)), in which the height changes v0 alone.
     change = float(np.mean([drop.impulse.value for drop in known])) / value
@@ -152,11 +152,12 @@ def find_deviant(drops: Sequence[Drop]) -> tuple[Outlier, ...]:
     return tuple(found)
 
 
-def _stated(value: float | None, uncertainty: float | None) -> Quantity:
+def _stated(value: float | None, uncertainty: float | None) -> Estimate:
     """Return what the laboratory states."""
     if value is None:
-        return Quantity(math.nan)
-    return Quantity(value, () if uncertainty is None else (Contribution("stated", uncertainty),))
+        return Estimate.unknown()
+    stated = () if uncertainty is None else (Contribution("stated", uncertainty),)
+    return Estimate.from_budget(value, *stated)
 
 
 def _peaks(drop: Drop) -> float:

@@ -8,11 +8,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from thud.base.checks import refuse, require_choice, require_number, shown
 from thud.base.errors import InputError
-from thud.level.levels import SOURCES, get_bands, judge
+from thud.level.assessment import get_criteria
+from thud.level.levels import SOURCES
 from thud.recordings.channel import MIB, shown_path, shown_text
 from thud.recordings.excursion import POLARITIES
 from thud.recordings.force_units import read_chain, require_unit
@@ -304,10 +303,9 @@ def _flag(value: object, place: str) -> bool:
 
 def _limits(value: object, place: str) -> dict[str, tuple[float, float]]:
     """Return limits by criterion."""
-    octaves = np.zeros(len(get_bands().nominal))
-    criteria = judge(octaves, 0.0, 0.0, 0, 0.0, 0.0).criteria
+    names = [one.name for one in get_criteria(SOURCES[0])]
     found = {}
-    for key, span in _table(value, place, [one.name for one in criteria]).items():
+    for key, span in _table(value, place, names).items():
         if not isinstance(span, list | tuple) or len(span) != 2:  # noqa: PLR2004 - minimum, maximum
             refuse(f"{place}: {key} = {shown(span)} is not allowed", "[minimum, maximum]")
         low, high = (_number(one, f"{place}: {key}", -1e6, 1e6) for one in span)

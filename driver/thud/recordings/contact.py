@@ -11,6 +11,7 @@ import numpy as np
 from scipy.ndimage import convolve1d, uniform_filter1d
 
 from thud.base.immutable import Immutable
+from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND
 from thud.recordings.flanks import SMOOTHING, Flank, Posterior, find_touch
 from thud.recordings.noise import Background, fit_background
@@ -49,23 +50,6 @@ PLATE_PERIODS = 2.0
 PLATE_LEFT = 0.03
 # Errors of samples that are no noise, as part of the peak: digits, the filter of the recorder.
 FLOOR = 2e-4
-
-
-@dataclass(frozen=True, eq=False)
-class Estimate(Immutable):
-    """A value and its standard uncertainty, in the same unit; NaN where not known."""
-
-    value: float
-    uncertainty: float
-
-    def __float__(self) -> float:
-        """Return the value."""
-        return float(self.value)
-
-    @classmethod
-    def unknown(cls) -> Estimate:
-        """Return the estimate of what is not known."""
-        return cls(math.nan, math.nan)
 
 
 @dataclass(frozen=True, eq=False)

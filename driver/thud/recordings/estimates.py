@@ -13,8 +13,9 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.base.immutable import Immutable
+from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND, record_force
-from thud.recordings.contact import Contact, Estimate, find_contact, find_edges
+from thud.recordings.contact import Contact, find_contact, find_edges
 from thud.recordings.faults import least_quiet, repair
 from thud.recordings.noise import Noise
 from thud.recordings.recorded_levels import measure_levels
@@ -25,8 +26,6 @@ if TYPE_CHECKING:
 
     from thud.base._schema import BandSet
     from thud.recordings.drops import Window
-
-__all__ = ["Drop", "Estimate", "measure_drop"]
 
 # Draws of noise that show what it adds to the maximum.
 PEAK_DRAWS = 32
@@ -79,7 +78,7 @@ class Drop(Immutable):
     bounces : tuple of float
         Times at which the later bounces that were measured begin, since the onset, s: of one
         where the drop height is known, else of up to two.
-    steps, remarks : tuple of str
+    steps, warnings : tuple of str
         What was done to the signal, and what is doubtful; a sentence each.
     """
 
@@ -100,7 +99,7 @@ class Drop(Immutable):
     noise: Noise
     bounces: tuple[float, ...]
     steps: tuple[str, ...]
-    remarks: tuple[str, ...]
+    warnings: tuple[str, ...]
     contact: Contact
 
     @property
@@ -147,7 +146,7 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
     InputError
         Where the pulse is clipped, cut, doubled or full of dropouts.
     """
-    force, steps, remarks = repair(window)
+    force, steps, warnings = repair(window)
     try:
         contact = find_contact(window, force)
     except np.linalg.LinAlgError as error:
@@ -155,7 +154,7 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
     steps += _told_background(contact)
     for side, quiet in zip(("before", "after"), contact.quiet, strict=True):
         if quiet < SHORT_QUIET:
-            remarks += (f"there are {1e3 * quiet:.1f} ms of quiet {side} the contact",)
+            warnings += (f"there are {1e3 * quiet:.1f} ms of quiet {side} the contact",)
     rate = window.sample_rate
     # The flight behind the drop gives the restitution; without the height two flights are compared.
     landings = _landings(window, contact, 1 if height else 2)
@@ -180,7 +179,7 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
                 f"the pulse {1e3 * flight:.0f} ms behind the contact has {peak:.2g} of its peak: "
                 f"it is no bounce from {height:g} m"
             )
-            remarks += (unlike,)
+            warnings += (unlike,)
     flights = []
     leaving = contact.end
     for landing, again in landings:
@@ -207,7 +206,7 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
         noise=_noise(contact),
         bounces=tuple(landing.value - contact.touch.value for landing, _ in landings),
         steps=steps,
-        remarks=(*window.remarks, *remarks, *_told_aliased(contact), *told),
+        warnings=(*window.warnings, *warnings, *_told_aliased(contact), *told),
         contact=contact,
     )
 

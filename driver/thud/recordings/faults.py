@@ -33,7 +33,7 @@ REPAIRED = 1e-3
 
 
 def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
-    """Return the force with its dropouts filled, what was done, and doubts.
+    """Return the force with its dropouts filled, what was done, and warnings.
 
     Raises
     ------
@@ -49,9 +49,9 @@ def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[
             f"{'before' if first < least else 'behind'} it",
             "quiet of 1 ms or more, better 100 ms, before and after the contact",
         )
-    for remark in window.remarks:
-        if remark.startswith("two impacts"):
-            refuse(f"{name}: {remark}", "one impact, with quiet before and after it")
+    for warning in window.warnings:
+        if warning.startswith("two impacts"):
+            refuse(f"{name}: {warning}", "one impact, with quiet before and after it")
     force = window.force
     _refuse_clipped(window, force)
     return _fill(window, force)
@@ -96,7 +96,7 @@ def _refuse_clipped(window: Window, whole: NDArray[np.float64]) -> None:
 def _fill(
     window: Window, force: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
-    """Return the force with dropouts filled from both sides, what was done, and doubts."""
+    """Return the force with dropouts filled from both sides, what was done, and warnings."""
     first, stop = window.contact
     rate = window.sample_rate
     guard = int(MIN_QUIET * rate)

@@ -48,7 +48,7 @@ class Origin:
         Samples per second, Hz.
     drops : int
         Number of drops that were found.
-    steps, remarks : tuple of str
+    steps, warnings : tuple of str
         What reading has done, and what is doubtful; a sentence each.
     """
 
@@ -60,7 +60,7 @@ class Origin:
     sample_rate: float
     drops: int
     steps: tuple[str, ...]
-    remarks: tuple[str, ...]
+    warnings: tuple[str, ...]
 
     @classmethod
     def of(cls, signal: Signal, drops: int) -> Origin:
@@ -74,7 +74,7 @@ class Origin:
             signal.sample_rate,
             drops,
             signal.steps,
-            signal.remarks,
+            signal.warnings,
         )
 
 
@@ -186,10 +186,10 @@ class _Processes(ExitStack):
 
 def measure_window(window: Window, config: Config) -> Drop:
     """Return what the drop in a window tells, the resonance of the plate taken out before."""
-    steps, remarks = tuple[str, ...](), tuple[str, ...]()
+    steps, warnings = tuple[str, ...](), tuple[str, ...]()
     plate = config.resonance
     if plate is not None:
-        window, steps, remarks = correct_window(window, plate)
+        window, steps, warnings = correct_window(window, plate)
     drop = measure_drop(
         window,
         height=config.height,
@@ -201,7 +201,7 @@ def measure_window(window: Window, config: Config) -> Drop:
     # Factors that the background has cached serve the fit alone, and are larger than all else.
     contact = replace(drop.contact, background=replace(drop.contact.background))
     ringing = check_ringing(contact, plate)
-    drop = replace(drop, contact=contact, remarks=(*drop.remarks, *ringing))
+    drop = replace(drop, contact=contact, warnings=(*drop.warnings, *ringing))
     if plate is None:
         return drop
-    return replace(drop, steps=(*steps, *drop.steps), remarks=(*remarks, *drop.remarks))
+    return replace(drop, steps=(*steps, *drop.steps), warnings=(*warnings, *drop.warnings))

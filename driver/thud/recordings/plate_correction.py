@@ -22,7 +22,7 @@ PERIODS = 2.0
 
 
 def correct_window(window: Window, plate: Plate) -> tuple[Window, tuple[str, ...], tuple[str, ...]]:
-    """Return a window of the force that was applied to a plate, what was done, and doubts.
+    """Return a window of the force that was applied to a plate, what was done, and warnings.
 
     Raises
     ------
@@ -30,12 +30,12 @@ def correct_window(window: Window, plate: Plate) -> tuple[Window, tuple[str, ...
         Where the pulse is cut, clipped, doubled or has long dropouts.
     """
     # What clips or drops out is what was recorded; corrected, a dropout would ring.
-    force, steps, remarks = repair(window)
+    force, steps, warnings = repair(window)
     repaired = replace(window.signal, samples=_Repaired(window.signal, window.start, force))
     applied = replace(window.signal, samples=_Corrected(repaired, plate), full_scale=None)
     bounces = tuple(replace(bounce, signal=applied, plate=plate) for bounce in window.bounces)
     told = plate.correction(window.sample_rate)
-    return replace(window, signal=applied, bounces=bounces, plate=plate), (*steps, told), remarks
+    return replace(window, signal=applied, bounces=bounces, plate=plate), (*steps, told), warnings
 
 
 @dataclass(frozen=True, eq=False)

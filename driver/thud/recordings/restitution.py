@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from thud.base._schema import Drop
-from thud.recordings.contact import Estimate
+from thud.level.estimate import Estimate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,14 +43,14 @@ class DropConditions:
     def restitutions(
         self, impulse: Estimate, contact_time: Estimate, flights: Sequence[Estimate]
     ) -> tuple[dict[str, Estimate], tuple[str, ...]]:
-        """Return the restitution by each way that is known, and remarks."""
+        """Return the restitution by each way that is known, and warnings."""
         ways: dict[str, Estimate] = {}
         speed = self.speed
         if self.height and self.mass:
             momentum = self.mass * speed
             value = impulse.value / momentum - 1 - GRAVITY * contact_time.value / speed
-            doubt = (impulse.uncertainty / momentum, GRAVITY * contact_time.uncertainty / speed)
-            ways[IMPULSE] = Estimate(value, math.hypot(*doubt))
+            parts = (impulse.uncertainty / momentum, GRAVITY * contact_time.uncertainty / speed)
+            ways[IMPULSE] = Estimate(value, math.hypot(*parts))
         if self.height and flights:
             scale = GRAVITY / (2 * speed)
             ways[BOUNCES] = Estimate(scale * flights[0].value, scale * flights[0].uncertainty)
@@ -96,12 +96,12 @@ class DropConditions:
         total = sum(weight.values())
         weight = {way: one / total for way, one in weight.items()}
         value = sum(weight[way] * one.value for way, one in ways.items())
-        doubt = math.hypot(*(weight[way] * one for way, one in own.items()))
+        own_part = math.hypot(*(weight[way] * one for way, one in own.items()))
         parts: dict[str, float] = {}
         for way, found in shared.items():
             for name, part in found.items():
                 parts[name] = parts.get(name, 0.0) + weight[way] * part
-        return Estimate(value, doubt), {name: part for name, part in parts.items() if part}
+        return Estimate(value, own_part), {name: part for name, part in parts.items() if part}
 
     def effective_mass(
         self, impulse: Estimate, contact_time: Estimate, restitution: Estimate | None

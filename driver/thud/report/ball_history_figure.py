@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 # Marker and its filling by verdict: distinct in grey as well.
 MARKS = {
     "conforms": ("o", COLOURS[0]),
-    "cannot be decided": ("s", "white"),
+    "inconclusive": ("s", "white"),
     "does not conform": ("X", COLOURS[1]),
 }
 # Room beyond the first and the last report, as part of the time between them, and at least.

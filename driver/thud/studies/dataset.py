@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from thud.impact.datasets import band_coordinates, origin, room_coordinates
+from thud.impact.datasets import attributes, band_coordinates, origin, room_coordinates
 from thud.impact.quantities import ALL_QUANTITIES, BANDS, CONTACT_LEVELS, ROOM_BAND, ROOM_LEVEL
 from thud.level.levels import get_bands
 from thud.studies.evaluation import level_names
@@ -55,12 +55,11 @@ def new_dataset(study: SampleStudy, columns: Columns, found: Columns) -> xr.Data
         )
     variables = {}
     for name, values in found.items():
-        unit, meaning = ALL_QUANTITIES[name]
         dimensions = ("sample", dimension[name]) if name in dimension else ("sample",)
-        attributes: dict[str, Any] = {"units": unit, "long_name": meaning}
+        words: dict[str, Any] = {**attributes(ALL_QUANTITIES[name])}
         if study.surrogate and name in study.surrogate.outputs:
-            attributes["surrogate_error"] = study.surrogate.error_of(name)
-        variables[name] = (dimensions, values, attributes)
+            words["surrogate_error"] = study.surrogate.error_of(name)
+        variables[name] = (dimensions, values, words)
     return in_order(xr.Dataset(variables, coordinates, provenance(study)))
 
 

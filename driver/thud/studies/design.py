@@ -123,7 +123,7 @@ def design(
     Returns
     -------
     Design
-        Margin and verdict of the force that the case judges.
+        Margin and verdict of the force that the case assesses.
 
     Raises
     ------

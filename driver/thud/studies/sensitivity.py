@@ -129,7 +129,7 @@ def sensitivity(
     Returns
     -------
     Sensitivity
-        Indices of the force that the case judges, with confidence intervals.
+        Indices of the force that the case assesses, with confidence intervals.
 
     Raises
     ------

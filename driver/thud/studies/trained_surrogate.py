@@ -18,7 +18,8 @@ from thud.base.extras import require_extra
 from thud.base.files import is_failure, read_input, replace_file
 from thud.case.case import Case, case_text
 from thud.case.keys import OF_FILES, put
-from thud.level.levels import get_bands, judge
+from thud.level.assessment import get_criteria
+from thud.level.levels import get_bands
 from thud.studies.result import StudyResult
 from thud.studies.study import value_in
 
@@ -343,7 +344,7 @@ def assess_many(
     ----------
     values
         Octave levels, dB, shape (n, 5); contact time, s; restitution; number of peaks; mass, kg;
-        height, m, as in `thud.judge`, shape (n,) or of one value.
+        height, m, as in `thud.assess`, shape (n,) or of one value.
     errors
         The same of their errors, in the same units.
     source
@@ -351,7 +352,7 @@ def assess_many(
     """
     count, bands = values[0].shape
     judged, by = (_columns(part, count) for part in (values, errors))
-    criteria = judge(np.zeros(bands), 0, 0, 0, 0, 0, source).criteria
+    criteria = get_criteria(source)
     lower = np.array([one.lower for one in criteria])
     upper = np.array([one.upper for one in criteria])
     inside = np.minimum(judged - lower, upper - judged)

@@ -11,7 +11,8 @@ from scipy.stats import binomtest
 
 from thud.base.checks import refuse
 from thud.impact.quantities import RATING
-from thud.level.levels import get_bands, octave_limits
+from thud.level.assessment import octave_limits
+from thud.level.levels import get_bands
 from thud.studies.result import SampleResult
 from thud.studies.sample_kind import SampleKind
 
@@ -175,7 +176,7 @@ def uncertainty(
     Returns
     -------
     Uncertainty
-        Levels of the force that the case judges, and the probability of conformity.
+        Levels of the force that the case assesses, and the probability of conformity.
 
     Raises
     ------

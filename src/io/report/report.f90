@@ -3,10 +3,11 @@ module thud_report
    use thud_band, only: octave_count
    use thud_case, only: case_type
    use thud_compression, only: compression_type
-   use thud_compute, only: get_judged_force, is_conforming, verdict_type
+   use thud_compute, only: get_assessed_force, is_conforming, assessment_type
    use thud_constants, only: version
-   use thud_force_history, only: force_count, force_history_type, force_names, get_scalars, scalar_fields
+   use thud_force_history, only: force_count, force_history_type, force_names
    use thud_kinds, only: wp
+   use thud_quantities, only: get_quantities, quantities
    use thud_source_limits, only: conforms, criterion_type
    use thud_text, only: join_quoted, newline, quoted, to_text
    use thud_text_buffer, only: text_buffer_type
@@ -115,9 +116,9 @@ contains
    end function get_channels_csv
 
    !> Levels, limits and verdict per band.
-   function get_levels_csv(case, verdict) result(text)
+   function get_levels_csv(case, assessment) result(text)
       type(case_type), intent(in) :: case
-      type(verdict_type), intent(in) :: verdict
+      type(assessment_type), intent(in) :: assessment
       !> Text of `levels.csv`.
       character(len=:), allocatable :: text
       integer :: i, j
@@ -128,17 +129,17 @@ contains
       end do
       text = text//',lower_limit_dB,upper_limit_dB,verdict_'//trim(case%level_force)//newline
       ! The octaves serve the verdict even where only other bands are asked for.
-      do i = verdict%first_band, size(verdict%bands)
-         associate (band => verdict%bands(i))
+      do i = assessment%first_band, size(assessment%bands)
+         associate (band => assessment%bands(i))
             text = text//trim(band%set)
-            associate (numbers => [band%nominal, band%lower, band%upper, verdict%level(i, :)])
+            associate (numbers => [band%nominal, band%lower, band%upper, assessment%level(i, :)])
                do j = 1, size(numbers)
                   text = text//','//to_text(numbers(j))
                end do
             end associate
          end associate
          if (i <= octave_count) then
-            associate (criterion => verdict%criteria(i, get_judged_force(case)))
+            associate (criterion => assessment%criteria(i, get_assessed_force(case)))
                text = text//','//to_text(criterion%lower)//','//to_text(criterion%upper)//','//get_word(criterion)
             end associate
          else
@@ -149,10 +150,10 @@ contains
    end function get_levels_csv
 
    !> The scalars of a run as a namelist file.
-   function get_summary(case, history, verdict, remark) result(text)
+   function get_summary(case, history, assessment, remark) result(text)
       type(case_type), intent(in) :: case
       type(force_history_type), intent(in) :: history
-      type(verdict_type), intent(in) :: verdict
+      type(assessment_type), intent(in) :: assessment
       !> Remarks on the case: [n].
       character(len=*), intent(in) :: remark(:)
       !> Text of `summary.nml`.
@@ -165,8 +166,8 @@ contains
          //line('source', quoted(case%source), '') &
          //line('level_method', quoted(case%level_method), '') &
          //line('level_force', quoted(case%level_force), '') &
-         //line('conforms', to_text(is_conforming(case, verdict)), '')
-      associate (criteria => verdict%criteria(:, get_judged_force(case)))
+         //line('conforms', to_text(is_conforming(case, assessment)), '')
+      associate (criteria => assessment%criteria(:, get_assessed_force(case)))
          text = text//line('criterion', join_quoted(criteria%name), '') &
             //line('unit', join_quoted(criteria%unit), '') &
             //line('value', joined(criteria%value), '') &
@@ -180,13 +181,13 @@ contains
    function get_scalar_lines(history) result(text)
       type(force_history_type), intent(in) :: history
       character(len=:), allocatable :: text
-      real(wp) :: scalars(size(scalar_fields))
+      real(wp) :: values(size(quantities))
       integer :: i
 
-      scalars = get_scalars(history)
+      values = get_quantities(history)
       text = ''
-      do i = 1, size(scalars)
-         text = text//line(trim(scalar_fields(i)%name), to_text(scalars(i)), trim(scalar_fields(i)%unit))
+      do i = 1, size(quantities)
+         text = text//line(trim(quantities(i)%name), to_text(values(i)), trim(quantities(i)%unit))
       end do
    end function get_scalar_lines
 

@@ -1,9 +1,10 @@
 !> Results of many drops as rows of a table.
 module thud_set_report
    use thud_band, only: get_band_name
-   use thud_force_history, only: force_count, force_names, outcome_count, scalar_fields
+   use thud_force_history, only: force_count, force_names
    use thud_kinds, only: wp
-   use thud_many, only: many_type
+   use thud_quantities, only: quantities, sample_quantity_count
+   use thud_sweep, only: sweep_type
    use thud_set_table, only: set_table_type
    use thud_text, only: newline, replaced, to_text
    implicit none (type, external)
@@ -14,10 +15,10 @@ module thud_set_report
 contains
 
    !> First line of the results.
-   subroutine get_set_header(table, many, text)
+   subroutine get_set_header(table, sweep, text)
       type(set_table_type), intent(in) :: table
       !> The results, whose bands are known.
-      type(many_type), intent(in) :: many
+      type(sweep_type), intent(in) :: sweep
       character(len=:), allocatable, intent(out) :: text
       integer :: i, j
 
@@ -25,26 +26,27 @@ contains
       do i = 1, size(table%names)
          text = text//','//trim(table%names(i))
       end do
-      do i = 1, outcome_count
-         text = text//','//trim(scalar_fields(i)%name)
-         if (scalar_fields(i)%unit /= '') text = text//'_'//replaced(trim(scalar_fields(i)%unit), ' ', '_')
+      do i = 1, sample_quantity_count
+         text = text//','//trim(quantities(i)%name)
+         if (quantities(i)%unit /= '') text = text//'_'//replaced(trim(quantities(i)%unit), ' ', '_')
       end do
       do j = 1, force_count
-         do i = many%first_band, size(many%bands)
-            text = text//','//trim(force_names(j))//'_'//trim(many%bands(i)%set)//'_'//get_band_name(many%bands(i))//'_Hz_dB'
+         do i = sweep%first_band, size(sweep%bands)
+            text = text//','//trim(force_names(j))//'_'//trim(sweep%bands(i)%set)//'_'//get_band_name(sweep%bands(i)) &
+               //'_Hz_dB'
          end do
       end do
       do j = 1, force_count
          text = text//','//trim(force_names(j))//'_conforms'
       end do
-      do i = 1, size(many%further_name)
-         text = text//','//trim(many%further_name(i))
+      do i = 1, size(sweep%floor_column)
+         text = text//','//trim(sweep%floor_column(i))
       end do
       text = text//',margin_dB,conforms,status,reason'//newline
    end subroutine get_set_header
 
    !> Lines of the results, 17 digits; what could not be computed is left out.
-   subroutine get_set_rows(table, before, values, first, last, many, text)
+   subroutine get_set_rows(table, before, values, first, last, sweep, text)
       type(set_table_type), intent(in) :: table
       !> Number of drops before the first of `values`.
       integer, intent(in) :: before
@@ -52,16 +54,16 @@ contains
       real(wp), intent(in) :: values(:, :)
       !> The first and the last of them to be written.
       integer, intent(in) :: first, last
-      type(many_type), intent(in) :: many
+      type(sweep_type), intent(in) :: sweep
       character(len=:), allocatable, intent(out) :: text
       !> Width of a number with its comma.
       integer, parameter :: number_width = 26
       character(len=*), parameter :: numbers_form = '(*(:,",",es24.16e3))'
-      character(len=number_width*(size(table%names) + outcome_count + size(many%level(:, :, 1)) + size(many%further_name)) &
-         + get_rest_width(many)) :: row
+      character(len=number_width*(size(table%names) + sample_quantity_count + size(sweep%level(:, :, 1)) &
+         + size(sweep%floor_column)) + get_rest_width(sweep)) :: row
       integer :: i, j, at, end_of_text
 
-      allocate (character(len=(len(row) - get_rest_width(many) + 64)*max(0, last - first + 1)) :: text)
+      allocate (character(len=(len(row) - get_rest_width(sweep) + 64)*max(0, last - first + 1)) :: text)
       end_of_text = 0
       do i = first, last
          row = to_text(before + i)
@@ -76,18 +78,18 @@ contains
             end associate
          end do
          at = len_trim(row) + 1
-         if (many%status(i) == 0) then
-            write (row(at:), numbers_form) many%outcome(:, i), many%level(many%first_band:, :, i)
+         if (sweep%status(i) == 0) then
+            write (row(at:), numbers_form) sweep%quantity(:, i), sweep%level(sweep%first_band:, :, i)
             do j = 1, force_count
-               row(len_trim(row) + 1:) = ','//trim(merge('yes', 'no ', many%conforms(j, i)))
+               row(len_trim(row) + 1:) = ','//trim(merge('yes', 'no ', sweep%conforms(j, i)))
             end do
-            if (size(many%further_name) > 0) write (row(len_trim(row) + 1:), numbers_form) many%further(:, i)
-            write (row(len_trim(row) + 1:), numbers_form) many%margin(i)
-            row(len_trim(row) + 1:) = ','//trim(merge('yes', 'no ', many%verdict(i)))//',0,'//newline
+            if (size(sweep%floor_column) > 0) write (row(len_trim(row) + 1:), numbers_form) sweep%floor_value(:, i)
+            write (row(len_trim(row) + 1:), numbers_form) sweep%margin(i)
+            row(len_trim(row) + 1:) = ','//trim(merge('yes', 'no ', sweep%verdict(i)))//',0,'//newline
          else
-            row(at:) = repeat(',', outcome_count + size(many%level(many%first_band:, :, i)) + force_count &
-               + size(many%further_name) + 3) &
-               //to_text(many%status(i))//','//trim(in_quotes(many%reason(i)%text))//newline
+            row(at:) = repeat(',', sample_quantity_count + size(sweep%level(sweep%first_band:, :, i)) + force_count &
+               + size(sweep%floor_column) + 3) &
+               //to_text(sweep%status(i))//','//trim(in_quotes(sweep%reason(i)%text))//newline
          end if
          at = index(row, newline)
          if (end_of_text + at > len(text)) text = text//repeat(' ', len(text) + len(row))
@@ -98,16 +100,16 @@ contains
    end subroutine get_set_rows
 
    !> Width of all that is no number: names, verdicts, and the longest reason with its quotes doubled.
-   pure function get_rest_width(many) result(width)
+   pure function get_rest_width(sweep) result(width)
       !> The results.
-      type(many_type), intent(in) :: many
+      type(sweep_type), intent(in) :: sweep
       !> The width.
       integer :: width
       integer :: i
 
       width = 1024
-      do i = 1, size(many%reason)
-         if (allocated(many%reason(i)%text)) width = max(width, 1024 + 2*len(many%reason(i)%text))
+      do i = 1, size(sweep%reason)
+         if (allocated(sweep%reason(i)%text)) width = max(width, 1024 + 2*len(sweep%reason(i)%text))
       end do
    end function get_rest_width
 

@@ -3,10 +3,11 @@ module thud_table
    use thud_band, only: get_band_name, octave_count
    use thud_case, only: case_type
    use thud_compression, only: compression_type
-   use thud_compute, only: get_judged_force, verdict_type
+   use thud_compute, only: assessment_type, get_assessed_force
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
+   use thud_quantities, only: get_quantities, quantities, sample_quantity_count
    use thud_report, only: get_word
    use thud_source_limits, only: conforms, criterion_type
    use thud_text, only: fixed, newline, replaced, to_text
@@ -18,21 +19,22 @@ module thud_table
 contains
 
    !> The table that a run shows on the screen.
-   function get_table(case, history, verdict) result(text)
+   function get_table(case, history, assessment) result(text)
       type(case_type), intent(in) :: case
       type(force_history_type), intent(in) :: history
-      type(verdict_type), intent(in) :: verdict
+      type(assessment_type), intent(in) :: assessment
       character(len=:), allocatable :: text
-      integer :: i, judged, other
+      real(wp) :: values(size(quantities))
+      integer :: i, assessed, other
 
-      judged = get_judged_force(case)
-      other = force_count + 1 - judged
+      assessed = get_assessed_force(case)
+      other = force_count + 1 - assessed
       ! Most models have the same force twice.
-      if (.not. any(abs(verdict%level(:, other) - verdict%level(:, judged)) > 0.0_wp)) other = 0
+      if (.not. any(abs(assessment%level(:, other) - assessment%level(:, assessed)) > 0.0_wp)) other = 0
       text = '  '//padded(get_force_title(case%level_force), 27)//padded('value', 16)//padded('limits', 13)//'verdict'
       if (other > 0) text = text//'    '//get_force_title(force_names(other))
       text = text//newline
-      associate (criteria => verdict%criteria(:, judged))
+      associate (criteria => assessment%criteria(:, assessed))
          do i = 1, octave_count
             text = text//level_row(i, criteria(i))
          end do
@@ -41,14 +43,19 @@ contains
             //row('peaks of the force', criteria(octave_count + 3)%value, 0, '', criteria(octave_count + 3), 1.0_wp) &
             //row('mass', case%ball%mass, 3, 'kg', criteria(octave_count + 4), 1.0_wp) &
             //row('drop height', case%drop%height, 3, 'm', criteria(octave_count + 5), 1.0_wp)//newline
-         do i = octave_count + 1, size(verdict%bands)
+         do i = octave_count + 1, size(assessment%bands)
             text = text//level_row(i)
          end do
-         if (size(verdict%bands) > octave_count) text = text//newline
-         text = text//row('peak force', merge(history%peak_force, history%peak_elastic_force, &
-            case%level_force == 'floor'), 1, 'N') &
-            //row('maximum deflection', history%max_deflection*1000, 3, 'mm') &
-            //row('impulse', history%impulse, 3, 'N s')//facts(history)//newline
+         if (size(assessment%bands) > octave_count) text = text//newline
+         values = get_quantities(history)
+         do i = 1, sample_quantity_count
+            ! Those with limits stand above.
+            if (any(criteria%name == quantities(i)%name)) cycle
+            if (quantities(i)%name == merge('peak_elastic_force', 'peak_force        ', case%level_force == 'floor')) cycle
+            text = text//row(trim(quantities(i)%title), quantities(i)%display_scale*values(i), quantities(i)%decimals, &
+               trim(quantities(i)%display_unit))
+         end do
+         text = text//facts(history)//newline
          text = text//'  The source '//trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
             //' to the limits of the '//replaced(trim(case%source), '_', ' ')//': it meets ' &
             //to_text(count(conforms(criteria)))//' of '//to_text(size(criteria))//' criteria.'//newline &
@@ -65,10 +72,10 @@ contains
          type(criterion_type), intent(in), optional :: criterion
          character(len=:), allocatable :: line
 
-         line = row('level, '//get_band_name(verdict%bands(band))//' Hz '//trim(verdict%bands(band)%set), &
-            verdict%level(band, judged), 2, 'dB', criterion, 1.0_wp)
+         line = row('level, '//get_band_name(assessment%bands(band))//' Hz '//trim(assessment%bands(band)%set), &
+            assessment%level(band, assessed), 2, 'dB', criterion, 1.0_wp)
          if (other == 0) return
-         line = line(:len(line) - 1)//right(fixed(verdict%level(band, other), 2), 79 - len(line))//' dB'//newline
+         line = line(:len(line) - 1)//right(fixed(assessment%level(band, other), 2), 79 - len(line))//' dB'//newline
       end function level_row
 
    end function get_table

@@ -164,7 +164,7 @@ class Fit(Estimates):
     @property
     def notes(self) -> tuple[str, ...]:
         """What is not plausible in the impacts at the result."""
-        return tuple(dict.fromkeys(r for target in self.targets for r in target.impact.remarks))
+        return tuple(dict.fromkeys(r for target in self.targets for r in target.impact.warnings))
 
     @property
     def succeeded(self) -> bool:

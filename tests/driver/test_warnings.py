@@ -1,4 +1,4 @@
-"""Remarks on what is possible but not plausible."""
+"""Warnings on what is possible but not plausible."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-# What each remark names, and input that earns it.
+# What each warning names, and input that earns it.
 DOUBTFUL = {
     naming("&ball", "density", "mass", 800, 2200): "&ball mass = 25 / &sampling duration = 0.2 /",
     naming("&ball: youngs_modulus", "1.6 Pa", "10000.0", "3.0e9"):
@@ -33,7 +33,7 @@ DOUBTFUL = {
 
 @pytest.mark.parametrize("words", DOUBTFUL)
 @pytest.mark.slow
-def test_doubtful_input_is_remarked_by_every_command(
+def test_doubtful_input_raises_a_warning_by_every_command(
     words: str,
     case_file: Callable[..., Path],
     tmp_path: Path,
@@ -44,17 +44,17 @@ def test_doubtful_input_is_remarked_by_every_command(
     path = case_file(DOUBTFUL[words])
     with pytest.warns(thud.PlausibilityWarning) as caught:
         impact = thud.solve(thud.read_case(path))
-    assert [bool(re.search(words, remark)) for remark in impact.remarks].count(True) == 1
-    assert [str(warning.message) for warning in caught] == list(impact.remarks)
+    assert [bool(re.search(words, warning)) for warning in impact.warnings].count(True) == 1
+    assert [str(warning.message) for warning in caught] == list(impact.warnings)
     assert {warning.filename for warning in caught} == {__file__}
     assert cli.main(["run", "--no-figures", "-q", str(path)]) == 0
     assert any(
         str(path) in line and re.search(words, line)
         for line in capsys.readouterr().err.splitlines()
     )
-    assert thud.read_results(tmp_path / "outputs/case").remarks == impact.remarks
+    assert thud.read_results(tmp_path / "outputs/case").warnings == impact.warnings
     with warnings.catch_warnings():
-        warnings.simplefilter("error")  # the command prints remarks itself
+        warnings.simplefilter("error")  # the command prints warnings itself
         assert cli.main(["compare", "-q", str(path)]) == 0
     assert any(re.search(words, line) for line in capsys.readouterr().err.splitlines())
 
@@ -69,10 +69,10 @@ def test_doubtful_input_is_remarked_by_every_command(
         "&ball mass = 7.3 / &model name = 'hunt_crossley' / &hunt_crossley contact_time = 0.02 /",
     ],
 )
-def test_plausible_input_earns_no_remark(text: str, case_file: Callable[..., Path]) -> None:
+def test_plausible_input_raises_no_warning(text: str, case_file: Callable[..., Path]) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert thud.solve(thud.read_case(case_file(text))).remarks == ()
+        assert thud.solve(thud.read_case(case_file(text))).warnings == ()
 
 
 OUTSIDE = {
@@ -111,28 +111,31 @@ OUTSIDE = {
 }
 
 
-def test_values_at_the_limits_of_rubbers_are_not_remarked(case_file: Callable[..., Path]) -> None:
+def test_values_at_the_limits_of_rubbers_raise_no_warning(case_file: Callable[..., Path]) -> None:
     text = "&ball poisson_ratio = {}, youngs_modulus = 3e9 / &sampling sample_rate = 1e6 /"
     for ratio, number in ((0.45, 0), (0.4499, 1)):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            remarks = thud.solve(thud.read_case(case_file(text.format(ratio)))).remarks
-        assert sum("rubbers have" in remark for remark in remarks) == number, remarks
+            impact = thud.solve(thud.read_case(case_file(text.format(ratio))))
+        found = impact.warnings
+        assert sum("rubbers have" in warning for warning in found) == number, found
 
 
 @pytest.mark.parametrize("words", OUTSIDE)
 @pytest.mark.slow
-def test_answer_outside_the_theory_is_remarked(words: str, case_file: Callable[..., Path]) -> None:
+def test_answer_outside_the_theory_raises_a_warning(
+    words: str, case_file: Callable[..., Path]
+) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        remarks = thud.solve(thud.read_case(case_file(OUTSIDE[words]))).remarks
-    assert [bool(re.search(words, remark)) for remark in remarks].count(True) == 1, remarks
+        found = thud.solve(thud.read_case(case_file(OUTSIDE[words]))).warnings
+    assert [bool(re.search(words, warning)) for warning in found].count(True) == 1, found
 
 
-def test_free_modes_with_the_modulus_of_the_shell_are_remarked() -> None:
+def test_free_modes_with_the_modulus_of_the_shell_raise_a_warning() -> None:
     with pytest.warns(thud.PlausibilityWarning, match=naming("'finite_element'", "2.08 MPa")):
         found = thud.free_modes(radial_elements=4, polar_elements=16)
-    assert len(found.remarks) == 1
+    assert len(found.warnings) == 1
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         thud.free_modes(thud.Ball.standard(), radial_elements=4, polar_elements=16)
