@@ -6,7 +6,6 @@ from .base.errors import (
     NumericalError as NumericalError,
     PlausibilityWarning as PlausibilityWarning,
     ThudError as ThudError,
-    WorkerWarning as WorkerWarning,
 )
 from .base.units import quantity as quantity
 from .case.case import (

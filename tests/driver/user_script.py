@@ -102,7 +102,6 @@ with warnings.catch_warnings(action="ignore", category=thud.FitWarning):
     found: list[thud.Fit] = [thud.fit(target, ["youngs_modulus"]) for target in targets]
 warnings.simplefilter("ignore", thud.PlausibilityWarning)
 warnings.simplefilter("ignore", thud.LockWarning)
-warnings.simplefilter("ignore", thud.WorkerWarning)
 results = [
     thud.compare(impacts),
     *again,
