@@ -17,6 +17,10 @@ from .comparison.comparison import (
     Comparison as Comparison,
     compare as compare,
 )
+from .export.force_files import (
+    BlockedForce as BlockedForce,
+    blocked_force as blocked_force,
+)
 from .floors.floor_comparison import (
     FloorComparison as FloorComparison,
     compare_floors as compare_floors,

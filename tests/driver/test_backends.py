@@ -23,7 +23,7 @@ import thud
 from thud import cli
 from thud.studies.backends import run_blocks
 from thud.studies.blocks import Blocks
-from thud.studies.evaluation import Block, evaluate
+from thud.studies.samples import Block, evaluate
 from thud.studies.sweep import KIND
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from conftest import REPOSITORY, naming
 import thud
 from thud import cli
 from thud.base.files import own_path
-from thud.studies import blocks, evaluation, fit
+from thud.studies import blocks, fit, samples
 from thud.studies.blocks import Blocks
 from thud.studies.dataset import disk_space
 from thud.studies.sweep import KIND
@@ -149,9 +149,9 @@ def test_ended_study_goes_on_where_it_stopped(
     assert values(finished).identical(values(whole.isel(set=known)))
 
     computed = []
-    evaluate = evaluation.evaluate
+    evaluate = samples.evaluate
 
-    def count(block: evaluation.Block) -> dict[str, Any]:
+    def count(block: samples.Block) -> dict[str, Any]:
         computed.append(len(block.columns["height"]))
         return evaluate(block)
 
@@ -366,8 +366,8 @@ def keep_one_block(study: SampleStudy, folder: Path) -> None:
     """Begin a study and finish its first set only."""
     blocks = Blocks(folder, study, 1)
     blocks.open()
-    block = evaluation.Block(0, study.case, {"height": np.array([0.5])}, thud.__version__)
-    blocks.keep(block, evaluation.evaluate(block))
+    block = samples.Block(0, study.case, {"height": np.array([0.5])}, thud.__version__)
+    blocks.keep(block, samples.evaluate(block))
 
 
 def test_replace_leaves_nothing_of_an_older_version(tmp_path: Path) -> None:

@@ -181,8 +181,6 @@ def test_fit_that_cannot_be_saved_is_refused_before_it_is_made(
         ("[target]", "starts = 1.5\n[target]", naming("starts", 1.5, 1)),
         ("[target]", "seed = -1\n[target]", naming("seed", -1, 0)),
         ("[target]", "confidence = 2\n[target]", naming("confidence", 2, 0, 1)),
-        ("[target]", "level = 0.9\n[target]", naming("'level'", "'confidence'")),
-        ("[target]", "base = 'no.nml'\n[target]", naming("'base'", "'case'")),
         ("[target]", "fixed.mass = -1\n[target]", naming("[fixed]", "&ball: mass", -1.0)),
         ("[target]", "fixed.density = -1\n[target]", naming("[fixed]", "&ball: mass", "kg")),
         (

@@ -21,10 +21,16 @@ from thud.studies.design import KIND as DESIGN, Design, _mark
 from thud.studies.parameter import MAX_VALUES, Parameter, varied
 from thud.studies.sensitivity import sobol_indices
 from thud.studies.surrogate_levels import SurrogateLevels, confirmed, within_region
-from thud.studies.surrogate_plan import MAX_DROPS, MIN_DROPS, Plan, read_plan
 from thud.studies.surrogate_training import regress
 from thud.studies.temperature import Temperature, read_temperature
-from thud.studies.trained_surrogate import Surrogate, assess_many
+from thud.studies.trained_surrogate import (
+    MAX_DROPS,
+    MIN_DROPS,
+    Plan,
+    Surrogate,
+    assess_many,
+    read_plan,
+)
 from thud.studies.uncertainty import Uncertainty
 
 OWNERS = ("modal_ball",)

@@ -13,9 +13,9 @@ from scipy.stats import binom, norm
 
 import thud
 from thud import cli
-from thud.studies.surrogate_plan import Plan
+from thud.studies import samples
 from thud.studies.surrogate_training import regress
-from thud.studies.trained_surrogate import assess_many, keys_of
+from thud.studies.trained_surrogate import Plan, assess_many, keys_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -188,9 +188,7 @@ def test_leave_one_out_is_what_it_says() -> None:
 
 
 def test_a_response_with_a_jump_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    from thud.studies import evaluation
-
-    smooth = evaluation.solve_many
+    smooth = samples.solve_many
 
     def jump(columns: dict[str, Any], *rest: Any, **words: Any) -> thud.Ensemble:  # noqa: ANN401
         found = smooth(columns, *rest, **words)
@@ -200,7 +198,7 @@ def test_a_response_with_a_jump_is_refused(monkeypatch: pytest.MonkeyPatch) -> N
 
     study = {**LUMPED, "surrogate": {"size": 128}}
     assert thud.surrogate(study).worst[1] < 0.01
-    monkeypatch.setattr(evaluation, "solve_many", jump)
+    monkeypatch.setattr(samples, "solve_many", jump)
     words = naming("floor level 500 Hz", 64, 128, "0.1 dB", "[surrogate] error")
     with pytest.raises(thud.NumericalError, match=words):
         thud.surrogate(study)
@@ -221,9 +219,7 @@ def test_drops_are_added_until_the_bound_holds() -> None:
 
 
 def test_peaks_that_differ_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    from thud.studies import evaluation
-
-    monkeypatch.setattr(evaluation, "peak_count", lambda force, _: 1 + (force.max() > 1500))
+    monkeypatch.setattr(samples, "peak_count", lambda force, _: 1 + (force.max() > 1500))
     with pytest.raises(thud.InputError, match=naming("peaks", 1, 2)):
         thud.surrogate(LUMPED)
 

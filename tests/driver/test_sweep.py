@@ -26,7 +26,7 @@ from thud.base._schema import MODELS
 from thud.base.units import MULTIPLES, scaled
 from thud.case.keys import known_keys, put
 from thud.impact.ensemble import get_cost
-from thud.studies import directory, evaluation, fit, sampling, sweep
+from thud.studies import directory, fit, samples, sampling, sweep
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -56,7 +56,7 @@ def test_grid_holds_what_single_drops_give() -> None:
                 cell = found.sel(
                     wall_thickness=thickness, momentum_flux=flux, youngs_modulus=modulus
                 )
-                for name in evaluation.SCALAR_QUANTITIES:
+                for name in samples.SCALAR_QUANTITIES:
                     assert float(cell[name]) == pytest.approx(getattr(impact, name), rel=1e-9)
                 for force in ("elastic", "floor"):
                     np.testing.assert_allclose(
@@ -354,7 +354,7 @@ def test_each_worker_computes_blocks_on_one_thread(monkeypatch: pytest.MonkeyPat
         asked.append(options["threads"])
         return solve_many(parameters, case, **options)
 
-    monkeypatch.setattr(evaluation, "solve_many", count)
+    monkeypatch.setattr(samples, "solve_many", count)
     thud.sweep(HEIGHTS, workers=3)
     thud.sweep({**HEIGHTS, "fixed": {"method": "fft"}})
     thud.sweep({"parameters": {"sample_rate": {"values": [44100, 48000]}}})

@@ -97,6 +97,8 @@ targets = (
     thud.ForceTarget(impacts["hollow_sphere"]),
     thud.LevelTarget(many.floor_octaves[1].tolist()),
 )
+exported: thud.BlockedForce = thud.blocked_force(impacts["hollow_sphere"])
+exported.save(folder / "force.csv")
 problems: list[type[thud.ThudError]] = [thud.InputError, thud.NumericalError]
 with warnings.catch_warnings(action="ignore", category=thud.FitWarning):
     found: list[thud.Fit] = [thud.fit(target, ["youngs_modulus"]) for target in targets]
@@ -109,6 +111,7 @@ results = [
     bands,
     many,
     *found,
+    exported,
     kept,
     chart,
     spread,

@@ -22,7 +22,7 @@ from thud.base.errors import NumericalError, ThudError
 from thud.base.extras import require_extra
 from thud.base.processes import no_interrupt_in_processes, process_pool
 from thud.impact.ensemble import MAX_THREADS
-from thud.studies.evaluation import Block, evaluate
+from thud.studies.samples import Block, evaluate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from thud.studies.evaluation import Block
-    from thud.studies.samples import Columns, SampleStudy
+    from thud.studies.samples import Block, Columns, SampleStudy
 
 # Results that need more bytes than this are written as Zarr.
 LARGE = 256 * 2**20
@@ -245,9 +244,8 @@ def _write(dataset: xr.Dataset, path: Path) -> None:
 
 def _require_whole(path: Path) -> None:
     """Raise ValueError for a damaged NetCDF file: HDF5 may never return from one."""
-    content, seal, digest = read_input(path).rpartition(_SEAL)
-    # Files of an older thud have no checksum.
-    if seal and sha256(content).digest() != digest:
+    content, _, digest = read_input(path).rpartition(_SEAL)
+    if sha256(content).digest() != digest:
         message = "wrong checksum"
         raise ValueError(message)
 

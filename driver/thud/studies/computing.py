@@ -14,7 +14,7 @@ from thud.base.checks import refuse
 from thud.studies.backends import run_blocks
 from thud.studies.blocks import Blocks, read_dataset
 from thud.studies.dataset import disk_space, grid_of, new_dataset
-from thud.studies.evaluation import Block
+from thud.studies.samples import Block
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -10,7 +10,7 @@ import xarray as xr
 from thud.impact.datasets import attributes, band_coordinates, origin, room_coordinates
 from thud.impact.quantities import ALL_QUANTITIES, BANDS, CONTACT_LEVELS, ROOM_BAND, ROOM_LEVEL
 from thud.level.levels import get_bands
-from thud.studies.evaluation import level_names
+from thud.studies.samples import level_names
 from thud.studies.sampling import sampler_versions
 
 if TYPE_CHECKING:

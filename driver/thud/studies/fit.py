@@ -30,8 +30,7 @@ from thud.studies.fitting.search import search
 from thud.studies.kind import Kind
 from thud.studies.study import Study, fix_keys, table_of, with_density
 from thud.studies.surrogate_levels import answered, confirmed, within_region
-from thud.studies.surrogate_plan import read_plan
-from thud.studies.trained_surrogate import Surrogate, read_surrogate
+from thud.studies.trained_surrogate import Surrogate, read_plan, read_surrogate
 
 if TYPE_CHECKING:
     import os

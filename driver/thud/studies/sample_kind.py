@@ -20,10 +20,9 @@ from thud.studies.result import StudyResult
 from thud.studies.samples import SampleStudy
 from thud.studies.sampling import read_design
 from thud.studies.study import table_of
-from thud.studies.surrogate_plan import read_plan
 from thud.studies.surrogate_training import surrogate_name, train
 from thud.studies.temperature import read_temperature
-from thud.studies.trained_surrogate import Surrogate, read_surrogate
+from thud.studies.trained_surrogate import Surrogate, read_plan, read_surrogate
 
 if TYPE_CHECKING:
     import os

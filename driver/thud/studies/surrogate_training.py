@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from thud.base.files import Results
     from thud.studies.kind import RunOptions
     from thud.studies.samples import Columns
-    from thud.studies.surrogate_plan import Plan
+    from thud.studies.trained_surrogate import Plan
 
     Values = NDArray[np.float64]
 
