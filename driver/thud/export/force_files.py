@@ -24,10 +24,7 @@ from thud.recordings.channel import library
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-KINDS = {
-    "floor": "force on the floor",
-    "elastic": "elastic force",
-}
+KINDS = {"floor": "force on the floor", "elastic": "elastic force"}
 CONVENTION = (
     "F(f) = integral of F(t) exp(-i 2 pi f t) dt, N s, t = 0 at first touch; frequencies from 0, "
     "not doubled: F(-f) is the complex conjugate, the energy of a band is 2 * integral of |F|^2 df"

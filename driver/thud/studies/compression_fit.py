@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
     from thud.base._schema import CompressionGas, ModelName, ModelOptions
 
+    Array = NDArray[np.float64]
+
 # Points of the curves of the model, between which it is interpolated.
 _POINTS = 81
 # Data that two parameters leave something of.
@@ -50,8 +52,8 @@ class CompressionFit(Estimates):
         The curve of the model, its deflection counted from first touch.
     """
 
-    deflection: NDArray[np.float64]
-    force: NDArray[np.float64]
+    deflection: Array
+    force: Array
     curve: CompressionCurve
 
     def __repr__(self) -> str:
@@ -142,7 +144,7 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
             )  # fmt: skip
         return curves[modulus]
 
-    def residuals(place: NDArray[np.float64]) -> NDArray[np.float64]:
+    def residuals(place: Array) -> Array:
         found = curve(float(np.exp(place[0])) * start.youngs_modulus)
         depth = measured - measured[0] - place[1] * span
         model_force = PchipInterpolator(found.deflection, found.force)(np.maximum(depth, 0))
@@ -179,9 +181,7 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
     )
 
 
-def _data(
-    deflection: ArrayLike, force: ArrayLike
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _data(deflection: ArrayLike, force: ArrayLike) -> tuple[Array, Array]:
     """Return both columns; raise InputError where they are no curve."""
     measured, wanted = (
         require_real(name, require_array(name, values, {1}))
@@ -206,9 +206,7 @@ def _data(
     return measured, wanted
 
 
-def _ratio(
-    curve: CompressionCurve, measured: NDArray[np.float64], wanted: NDArray[np.float64]
-) -> float:
+def _ratio(curve: CompressionCurve, measured: Array, wanted: Array) -> float:
     """Return the factor that brings the work of a curve to the measured one.
 
     Raise InputError where the model has no force at such deflections.
@@ -225,9 +223,7 @@ def _ratio(
     return max(work, 0.01 * float(wanted[-1] * np.ptp(measured))) / model_work
 
 
-def _warnings(
-    residuals: NDArray[np.float64], place: float, bounds: tuple[list[float], list[float]]
-) -> list[str]:
+def _warnings(residuals: Array, place: float, bounds: tuple[list[float], list[float]]) -> list[str]:
     """Return why the intervals may be wrong."""
     found = []
     if min(place - bounds[0][1], bounds[1][1] - place) < 1e-6:  # noqa: PLR2004 - of the span

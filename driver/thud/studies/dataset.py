@@ -48,11 +48,7 @@ def new_dataset(study: SampleStudy, columns: Columns, found: Columns) -> xr.Data
         coordinates |= room_coordinates()
     for parameter in study.parameters:
         values = _objects(columns[parameter.name])
-        coordinates[parameter.coordinate] = (
-            "sample",
-            values,
-            _attributes(study, parameter),
-        )
+        coordinates[parameter.coordinate] = ("sample", values, _attributes(study, parameter))
     variables = {}
     for name, values in found.items():
         dimensions = ("sample", dimension[name]) if name in dimension else ("sample",)

@@ -9,13 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Unpack
 
-from thud.base.checks import (
-    LARGEST_SEED,
-    refuse,
-    refuse_value,
-    require_kind,
-    require_whole,
-)
+from thud.base.checks import LARGEST_SEED, refuse, refuse_value, require_kind, require_whole
 from thud.base.errors import FitWarning, InputError
 from thud.base.files import read_input
 from thud.base.key import check_keywords

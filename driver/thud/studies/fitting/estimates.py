@@ -15,6 +15,8 @@ from thud.studies.result import StudyResult
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Estimates(StudyResult):
@@ -42,12 +44,12 @@ class Estimates(StudyResult):
 
     names: tuple[str, ...]
     units: tuple[str, ...]
-    estimate: NDArray[np.float64]
-    covariance: NDArray[np.float64]
-    limits: NDArray[np.float64]
+    estimate: Array
+    covariance: Array
+    limits: Array
     confidence: float
     noise: float
-    residuals: NDArray[np.float64]
+    residuals: Array
     warnings: tuple[str, ...]
 
     @property
@@ -62,11 +64,11 @@ class Estimates(StudyResult):
         return dict(zip(self.names, map(float, errors), strict=True))
 
     @property
-    def correlation(self) -> NDArray[np.float64]:
+    def correlation(self) -> Array:
         """Correlation of the parameters, shape (n, n); NaN where a variance is infinite."""
         errors = np.sqrt(np.diag(self.covariance))
         with np.errstate(invalid="ignore"):
-            result: NDArray[np.float64] = self.covariance / np.outer(errors, errors)
+            result: Array = self.covariance / np.outer(errors, errors)
         return result
 
     @property

@@ -293,11 +293,7 @@ class Fit(Estimates):
         return files
 
     def save(
-        self,
-        directory: str | os.PathLike[str],
-        *,
-        figures: bool = True,
-        replace: bool = False,
+        self, directory: str | os.PathLike[str], *, figures: bool = True, replace: bool = False
     ) -> list[Path]:
         """Write the files of `files`, and figures as PNG and SVG; return their paths.
 
