@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-# Former words of studies, and those that replace them.
-OLD_WORDS = {"base": "case", "lower": "low", "upper": "high", "level": "confidence"}
 # Longer values are shown by their kind.
 LONGEST_SHOWN = 80
 # No key takes a larger number, and Python refuses to print much larger ones.
@@ -129,16 +127,9 @@ def shown(value: object) -> str:
 def require_words(
     place: str, given: Iterable[str], known: Iterable[str], also: Iterable[str] = ()
 ) -> None:
-    """Raise InputError where a word is not known; of a former word, name the new one.
-
-    What was meant may be one of other words, too.
-    """
+    """Raise InputError where a word is not known; what was meant may be one of other words, too."""
     allowed = list(known)
     for word in given:
         if word not in allowed:
-            new = OLD_WORDS.get(word)
-            listed = ", ".join(allowed)
-            if new in allowed:
-                refuse(f"{place}: {word!r} is now {new!r}", listed)
             hint = suggestion(word, [*allowed, *also])
-            refuse(f"{place}: {shown(word)} is not known{hint}", listed)
+            refuse(f"{place}: {shown(word)} is not known{hint}", ", ".join(allowed))

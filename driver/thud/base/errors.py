@@ -29,10 +29,6 @@ class LockWarning(RuntimeWarning):
     """A file system has no locks, so that runs that write to one directory are not kept apart."""
 
 
-class WorkerWarning(RuntimeWarning):
-    """A worker of a study is not heard of; others do its work."""
-
-
 class InputError(ThudError, ValueError):
     """The input is invalid; the message names group, key, value and allowed range."""
 
