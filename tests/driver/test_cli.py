@@ -267,7 +267,7 @@ def test_errors_that_nobody_can_read_change_no_exit_code(
 def test_interruption_is_not_a_traceback(
     case_file: CaseFile, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def interrupt(*_: object) -> None:
+    def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(sys.modules["thud.cli.run_command"], "ask", interrupt)
