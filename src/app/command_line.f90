@@ -10,7 +10,7 @@ module thud_command_line
    use thud_progress_line, only: begin_progress, end_progress
    use thud_run, only: outcome_type, run_case
    use thud_schema, only: get_schema
-   use thud_sets_run, only: run_sets
+   use thud_samples_run, only: run_samples
    use thud_suggestion, only: get_suggestion
    use thud_system, only: get_system_message, is_closed, prepare_process, standard_error, standard_output, write_text
    use thud_text, only: newline, quoted
@@ -30,8 +30,8 @@ module thud_command_line
    real(wp), parameter :: blas_memory = 160.0e6_wp
 
    !> Options by their long names.
-   character(len=*), parameter :: known_options(*) = [character(len=9) :: '--output', '--replace', '--all', '--sets', '--threads', &
-      '--check', '--quiet', '--keys', '--schema', '--help', '--version']
+   character(len=*), parameter :: known_options(*) = [character(len=9) :: '--output', '--replace', '--all', &
+      '--samples', '--threads', '--check', '--quiet', '--keys', '--schema', '--help', '--version']
 
    !> What the command line asks for.
    type :: request_type
@@ -43,8 +43,8 @@ module thud_command_line
       logical :: replace = .false.
       !> Write also the channels of the model.
       logical :: all = .false.
-      !> Path of a table of sets, empty where not given.
-      character(len=:), allocatable :: sets
+      !> Path of a table of samples, empty where not given.
+      character(len=:), allocatable :: samples
       !> Threads for them.
       integer :: threads = 1
       !> Exit with 3 where the source does not conform.
@@ -82,10 +82,11 @@ contains
             error, mostly_unused=.true.)
          if (allocated(error)) then
             continue
-         else if (request%sets == '') then
+         else if (request%samples == '') then
             call run_case(request%case_file, request%output, request%replace, request%all, case, results, outcome, error)
          else
-            call run_sets(request%case_file, request%sets, request%threads, request%output, request%replace, outcome, error)
+            call run_samples(request%case_file, request%samples, request%threads, request%output, request%replace, &
+               outcome, error)
          end if
          call end_progress()
          if (allocated(error)) then
@@ -127,7 +128,7 @@ contains
       integer :: i
 
       request%output = ''
-      request%sets = ''
+      request%samples = ''
       i = 1
       do while (i <= command_argument_count())
          argument = get_argument(i)
@@ -145,8 +146,8 @@ contains
             request%quiet = .true.
          case ('--output', '-o')
             call take_value(i, '--output', 'a directory', request%output, error)
-         case ('--sets')
-            call take_value(i, '--sets', 'a table of sets', request%sets, error)
+         case ('--samples')
+            call take_value(i, '--samples', 'a table of samples', request%samples, error)
          case ('--threads')
             call take_value(i, '--threads', threads_allowed, number, error)
             if (.not. allocated(error)) call take_threads(number, request%threads, error)
@@ -154,7 +155,7 @@ contains
             if (index(argument, '-') == 1) then
                call get_suggestion(argument, known_options, suggestion)
                error = input_error(quoted(argument)//' is not a known option'//suggestion//'; allowed: --output DIR, ' &
-                  //'--replace, --all, --sets TABLE, --threads N, --check, --quiet, --keys, --schema, --help, --version')
+                  //'--replace, --all, --samples TABLE, --threads N, --check, --quiet, --keys, --schema, --help, --version')
             else if (allocated(request%case_file)) then
                error = input_error(quoted(argument)//' is a second case; allowed: one')
             else
@@ -166,10 +167,10 @@ contains
       end do
       if (.not. allocated(request%case_file)) then
          error = input_error('no case is given')
-      else if (request%sets == '' .and. allocated(number)) then
-         error = input_error('--threads does nothing without --sets; allowed: both')
-      else if (request%sets /= '' .and. request%all) then
-         error = input_error('--all does nothing with --sets; allowed: one of them')
+      else if (request%samples == '' .and. allocated(number)) then
+         error = input_error('--threads does nothing without --samples; allowed: both')
+      else if (request%samples /= '' .and. request%all) then
+         error = input_error('--all does nothing with --samples; allowed: one of them')
       end if
    end subroutine parse_arguments
 
@@ -237,8 +238,8 @@ contains
    pure function usage() result(text)
       character(len=:), allocatable :: text
 
-      text = 'thud CASE.nml [--sets TABLE.csv [--threads N]] [--output DIR] [--replace] [--all] [--check] [--quiet] | ' &
-         //'--keys | --schema | --help | --version'
+      text = 'thud CASE.nml [--samples TABLE.csv [--threads N]] [--output DIR] [--replace] [--all] [--check] ' &
+         //'[--quiet] | --keys | --schema | --help | --version'
    end function usage
 
    !> The help text.
@@ -248,19 +249,21 @@ contains
 
       text = 'Force of a heavy/soft impact source on the floor, its levels and a verdict.'//newline &
          //newline//'Usage: '//usage()//newline//newline &
-         //'  CASE.nml           input, a namelist file; inputs/ holds examples'//newline &
-         //'  -o, --output DIR   directory for the results (default: outputs/<case>, of sets <case>_sets)'//newline &
-         //'  --replace          replace also files that thud has not written'//newline &
-         //'  --all              write also channels.csv: energies and other quantities of the model against time'//newline &
-         //'  --sets TABLE.csv   many drops: keys in the first line, one drop in each other; the rest is as in'//newline &
-         //'                     CASE.nml'//newline &
-         //'  --threads N        threads for them (default: 1)'//newline &
-         //'  --check            exit with 3 where the source does not conform to the limits'//newline &
-         //'  -q, --quiet        show nothing but errors and remarks'//newline &
-         //'  --keys             show every key with default, range and meaning'//newline &
-         //'  --schema           the same and more as JSON, for programs'//newline &
-         //'  -h, --help         show this text'//newline &
-         //'  --version          show the version'//newline//newline &
+         //'  CASE.nml             input, a namelist file; inputs/ holds examples'//newline &
+         //'  -o, --output DIR     directory for the results (default: outputs/<case>, with'//newline &
+         //'                       --samples outputs/<case>_samples)'//newline &
+         //'  --replace            replace also files that thud has not written'//newline &
+         //'  --all                write also channels.csv: energies and other quantities of'//newline &
+         //'                       the model against time'//newline &
+         //'  --samples TABLE.csv  a header row of keys and one drop, a sample, in each'//newline &
+         //'                       further row; all other keys are those of CASE.nml'//newline &
+         //'  --threads N          threads for the samples (default: 1)'//newline &
+         //'  --check              exit with 3 where the source does not conform to the limits'//newline &
+         //'  -q, --quiet          show only errors and warnings'//newline &
+         //'  --keys               show every key with default, range and meaning'//newline &
+         //'  --schema             the same and more as JSON, for programs'//newline &
+         //'  -h, --help           show this text'//newline &
+         //'  --version            show the version'//newline//newline &
          //'Exit codes: 0 done, 1 bad input or usage, 2 numerical failure, 3 not conforming (--check),'//newline &
          //'130 interrupted, 143 terminated.'
    end function help

@@ -4,6 +4,7 @@ module thud_run
    use thud_case_text, only: get_case_text, read_case
    use thud_compute, only: compute, is_conforming, results_type, scope_type
    use thud_constants, only: version
+   use thud_csv, only: get_history_csv
    use thud_error, only: error_type, input_error
    use thud_file, only: get_file_stem, read_text_file, text_file_type
    use thud_floor_report, only: get_floor_force_csv, get_floor_levels_csv, get_floor_summary, get_floor_table
@@ -11,7 +12,7 @@ module thud_run
    use thud_kinds, only: wp
    use thud_mesh_files, only: estimate_motion_bytes, get_modes_files, get_motion_files, modes_names, &
       motion_names
-   use thud_report, only: get_channels_csv, get_compression_csv, get_force_csv, get_levels_csv, get_summary
+   use thud_report, only: get_channels_csv, get_force_csv, get_levels_csv, get_summary
    use thud_result_directory, only: check_owner, write_results
    use thud_room_report, only: get_room_files, get_room_table, room_file_names
    use thud_system, only: get_free_bytes
@@ -203,7 +204,8 @@ contains
       end if
       outcome%table = outcome%table//get_defaults_line(case)
       if (.not. case%has_compression) return
-      call add_file(files, compression_file, get_compression_csv(results%compression))
+      call add_file(files, compression_file, get_history_csv('deflection_m,force_N', &
+         results%compression%deflection, reshape(results%compression%force, [size(results%compression%force), 1])))
       outcome%table = outcome%table//newline//get_compression_table(results%compression)
    end subroutine describe
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from thud.level.estimate import Estimate
 from thud.recordings.contact import Contact, even_edges
-from thud.recordings.estimates import Drop
+from thud.recordings.measured_drop import Drop
 from thud.recordings.noise import Background, Noise
 
 # Exponents of the power spectra of noise.

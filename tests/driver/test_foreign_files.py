@@ -82,7 +82,7 @@ WRITERS = {
     "fit": _study("fit", "target.levels = [39, 31, 23, 17, 12]\nparameters.mass = {}"),
     "figures": Writer(["figures"], {}),
     "thud": Writer(["thud", "case.nml"], {"case.nml": MINIMAL}),
-    "sets": Writer(["thud", "case.nml", "--sets", "table.csv"],
+    "sets": Writer(["thud", "case.nml", "--samples", "table.csv"],
                    {"case.nml": MINIMAL, "table.csv": "height\n1\n0.5\n"}),
 }  # fmt: skip
 # They write no results; `examples` makes a directory of its own.

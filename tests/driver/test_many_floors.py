@@ -95,10 +95,10 @@ def test_table_of_floors_has_the_same_numbers(
     case_file: Callable[[str], Path],
     tmp_path: Path,
 ) -> None:
-    (tmp_path / "sets.txt").write_text("thickness; plate.loss_factor\n0.1; 0.01\n-1; 0.01\n")
-    done = run(case_file(TEXT), "--sets", "sets.txt", "-o", "out")
+    (tmp_path / "samples.txt").write_text("thickness; plate.loss_factor\n0.1; 0.01\n-1; 0.01\n")
+    done = run(case_file(TEXT), "--samples", "samples.txt", "-o", "out")
     assert done.returncode in {0, 2}, done.stderr
-    with (tmp_path / "out" / "sets.csv").open(encoding="utf-8") as file:
+    with (tmp_path / "out" / "samples.csv").open(encoding="utf-8") as file:
         first, second = csv.DictReader(file)
     case = thud.Case(floor=thud.Plate(), room=thud.Room())
     found = thud.solve_many({"thickness": [0.1], "plate.loss_factor": [0.01]}, case)

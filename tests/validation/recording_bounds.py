@@ -33,7 +33,7 @@ from thud.recordings.signal import Signal
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from thud.recordings.estimates import Drop
+    from thud.recordings.measured_drop import Drop
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "driver"))
 from synthetic import HARMONICS, coloured_noise, noise_density

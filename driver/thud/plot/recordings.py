@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
-    from thud.recordings.estimates import Drop
+    from thud.recordings.measured_drop import Drop
     from thud.recordings.recording import Recording
 
 

@@ -16,6 +16,7 @@ from thud.recordings.channel import MIB, shown_path, shown_text
 from thud.recordings.excursion import POLARITIES
 from thud.recordings.force_units import read_chain, require_unit
 from thud.recordings.plate import Plate, check_plate
+from thud.recordings.restitution import DropConditions
 from thud.recordings.signal_files import regular_file
 
 if TYPE_CHECKING:
@@ -121,6 +122,16 @@ class Config:
             return None
         return Plate(plate.f0, plate.Q, frequency_uncertainty=plate.f0_uncertainty or 0.0)
 
+    def conditions(self, calibration: float | None) -> DropConditions:
+        """Return the conditions of the drops; an unknown uncertainty counts as zero."""
+        return DropConditions(
+            self.height,
+            self.mass,
+            calibration or 0.0,
+            self.mass_uncertainty or 0.0,
+            self.height_uncertainty or 0.0,
+        )
+
     @property
     def plate_checks(self) -> tuple[PlateCheck, ...]:
         """The standard's demands on the plate; none where there is no ``[plate]``."""
@@ -129,10 +140,9 @@ class Config:
             return ()
         return check_plate(
             self.resonance,
-            corrected=True,
             time_constant=plate.time_constant,
             full_scale=plate.full_scale,
-            calibration=plate.linearity or None,
+            linearity=plate.linearity or None,
         )
 
 

@@ -3,11 +3,12 @@ module thud_floor_report
    use thud_band, only: get_band_name
    use thud_case, only: case_type
    use thud_compute, only: impact_type
+   use thud_csv, only: get_table_csv
    use thud_floor_result, only: floor_result_type
    use thud_force_history, only: force_history_type, force_names
    use thud_kinds, only: wp
    use thud_quantities, only: get_quantities, quantities, sample_quantity_count
-   use thud_report, only: get_fact_group, get_force_csv, get_scalar_lines, line
+   use thud_report, only: get_fact_group, get_force_csv, get_quantity_lines, line
    use thud_text, only: fixed, newline, to_text
    implicit none (type, external)
    private
@@ -52,25 +53,13 @@ contains
       type(floor_result_type), intent(in) :: found
       !> Text of `floor_levels.csv`.
       character(len=:), allocatable, intent(out) :: text
-      real(wp), allocatable :: blocked_level(:)
-      integer :: i, j
 
-      blocked_level = get_blocked_levels(impact)
-      text = 'bandwidth,nominal_Hz,lower_edge_Hz,upper_edge_Hz,blocked_level_dB,contact_level_dB,difference_dB,' &
-         //'energy_by_motion_J,energy_by_mobility_J,conductance_m_per_Ns'//newline
-      do i = 1, size(found%bands)
-         associate (band => found%bands(i))
-            text = text//trim(band%set)
-            associate (numbers => [band%nominal, band%lower, band%upper, blocked_level(i), found%contact_level(i), &
-               found%contact_level(i) - blocked_level(i), found%energy_by_motion(i), found%energy_by_mobility(i), &
-               found%conductance(i)])
-               do j = 1, size(numbers)
-                  text = text//','//to_text(numbers(j))
-               end do
-            end associate
-         end associate
-         text = text//newline
-      end do
+      associate (bands => found%bands, blocked => get_blocked_levels(impact), contact => found%contact_level)
+         text = get_table_csv('bandwidth,nominal_Hz,lower_edge_Hz,upper_edge_Hz,blocked_level_dB,contact_level_dB,' &
+            //'difference_dB,energy_by_motion_J,energy_by_mobility_J,conductance_m_per_Ns', reshape([bands%nominal, &
+            bands%lower, bands%upper, blocked, contact, contact - blocked, found%energy_by_motion, &
+            found%energy_by_mobility, found%conductance], [size(bands), 9]), bands%set)
+      end associate
    end subroutine get_floor_levels_csv
 
    !> Levels of the force on a rigid floor in the bands that the case asks for, dB: [n_band].
@@ -87,8 +76,8 @@ contains
       !> Groups of `summary.nml`.
       character(len=:), allocatable, intent(out) :: text
 
-      text = newline//'&floor_summary'//newline//get_scalar_lines(contact)//line('floor_work', to_text(contact%floor_work), &
-         'J')//'/'//newline
+      text = newline//'&floor_summary'//newline//get_quantity_lines(contact)//line('floor_work', &
+         to_text(contact%floor_work), 'J')//'/'//newline
       if (size(contact%fact) > 0) text = text//newline//get_fact_group('floor_facts', contact)
    end subroutine get_floor_summary
 

@@ -9,10 +9,11 @@ module thud_hollow_sphere
    use thud_field, only: field_type, name_length
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_lumped, only: at_deflection, at_impulse, at_loss, at_velocity, lumped_type, solve_lumped
+   use thud_lumped, only: solve_lumped
    use thud_new_field, only: choice_field
    use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
+   use thud_single_mass, only: at_deflection, at_impulse, at_loss, at_velocity, single_mass_type
    use thud_source_model, only: source_model_type
    use thud_text, only: fixed, join_quoted, quoted, to_text
    use thud_theory_limit, only: get_gravity_limit, get_wall_limits, theory_limit_type
@@ -44,7 +45,7 @@ module thud_hollow_sphere
    real(wp), parameter :: restitution_weights(4) = [1.0_wp, 0.0_wp, 0.5_wp, 0.0_wp]
 
    !> Equation of motion of the shell (paper eq. 3) for one phase of the impact.
-   type, extends(lumped_type) :: shell_type
+   type, extends(single_mass_type) :: shell_type
       !> Outer radius R, m.
       real(wp) :: radius = 0.0_wp
       !> Deflection at which the flat cap meets the opposite wall and the cavity is closed, m.
@@ -61,7 +62,7 @@ module thud_hollow_sphere
       real(wp) :: compression_weight = 0.0_wp, restitution_weight = 0.0_wp
    contains
       procedure :: get_derivative
-      procedure :: get_parts
+      procedure :: get_components
       procedure :: get_failure
    end type shell_type
 
@@ -238,20 +239,19 @@ contains
    end subroutine get_derivative
 
    !> Shell, gas and flux force of one instant.
-   pure subroutine get_parts(self, state, parts, elastic_force)
-      !> The shell in its present phase.
+   pure subroutine get_components(self, state, components, elastic_force)
       class(shell_type), intent(in) :: self
-      !> State, see `thud_lumped`: [4].
+      !> State, see `thud_single_mass`: [4].
       real(wp), intent(in) :: state(:)
       !> F_B, F_G and the flux of momentum into the floor, N: [3].
-      real(wp), intent(out) :: parts(:)
+      real(wp), intent(out) :: components(:)
       !> F_B + F_G (paper eq. 1), N.
       real(wp), intent(out) :: elastic_force
 
-      parts = [self%stiffness*state(at_deflection), get_gas_force(self, state(at_deflection)), &
+      components = [self%stiffness*state(at_deflection), get_gas_force(self, state(at_deflection)), &
          (1 - get_flux_weight(self))*self%mass/(2*self%radius)*state(at_velocity)**2]
-      elastic_force = parts(1) + parts(2)
-   end subroutine get_parts
+      elastic_force = components(1) + components(2)
+   end subroutine get_components
 
    !> Factor s of the flux term in the present phase.
    pure function get_flux_weight(shell) result(weight)

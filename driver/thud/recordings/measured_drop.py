@@ -16,10 +16,10 @@ from thud.base.immutable import Immutable
 from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND, record_force
 from thud.recordings.contact import Contact, find_contact, find_edges
-from thud.recordings.faults import least_quiet, repair
+from thud.recordings.faults import min_background, repair
 from thud.recordings.noise import Noise
 from thud.recordings.recorded_levels import measure_levels
-from thud.recordings.restitution import GRAVITY, DropConditions
+from thud.recordings.restitution import BOUNCES, GRAVITY, DropConditions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,27 +27,27 @@ if TYPE_CHECKING:
     from thud.base._schema import BandSet
     from thud.recordings.drops import Window
 
-# Draws of noise that show what it adds to the maximum.
+# Draws of noise for its effect on the maximum.
 PEAK_DRAWS = 32
-# Quiet below which it is told, s.
-SHORT_QUIET = 0.005
-# Edges of the octave of 500 Hz, Hz; the part of the rate above which content folds back, and the
-# error that is told, dB.
+# Length of the background that raises a warning, s.
+SHORT_BACKGROUND = 0.005
+# Edges of the octave of 500 Hz, Hz; the fraction of the rate above which content folds back, and
+# the error that raises a warning, dB.
 OCTAVE_500 = (354.8, 707.9)
 TOP = 0.4
 NOTABLE_ERROR = 0.1
-# Least contact time over its uncertainty.
-MOST_DOUBT = 4.0
-# A pulse whose flight and whose peak, over those of the drop, differ by this factor is no bounce:
-# the force follows the velocity.
-UNLIKE = 3.0
-# Standard deviations that make a difference worth telling.
+# Minimum contact time over its uncertainty.
+MIN_CONTACT_RATIO = 4.0
+# Ratio of flight and peak, each over that of the drop, beyond which a pulse is no bounce: the force
+# follows the velocity.
+MAX_BOUNCE_RATIO = 3.0
+# Standard deviations of a difference that is noted.
 NOTABLE = 3.0
 
 
 @dataclass(frozen=True, eq=False)
 class Drop(Immutable):
-    """One drop, corrected, and what it tells.
+    """One measured drop.
 
     Attributes
     ----------
@@ -62,24 +62,25 @@ class Drop(Immutable):
     onset : float
         Time of first touch in the file, s.
     gate : tuple of int
-        First sample of the contact with its margins, and the one behind it: levels are those of
-        ``force[gate[0]:gate[1]]``.
+        First and stop index of the contact with its margins, over which levels are measured.
     contact_time, restitution, peak_force, impulse, effective_mass : Estimate
-        In s (`thud.impact.contact_time`), 1, N (below 1.25 kHz), N s and kg; NaN where not known.
+        In s (`thud.impact.contact_time`), 1, N (below 1.25 kHz), N s and kg; NaN if unknown.
     restitution_shared : dict of str to float
-        Standard uncertainties that calibration, mass and drop height make of the restitution of
-        all drops alike, beside that stated; signed.
+        Signed effects of calibration, mass and drop height on the restitution of all drops, which
+        its uncertainty excludes.
     restitution_method : str
         ``"impulse"``, ``"bounces"``, ``"impulse and bounces"`` or ``""``.
     restitutions : dict of str to Estimate
-        The restitution by each way.
+        Restitution by each method.
     noise : Noise
-        Noise of the quiet parts.
+        Noise of the background.
     bounces : tuple of float
-        Times at which the later bounces that were measured begin, since the onset, s: of one
-        where the drop height is known, else of up to two.
+        Times since the onset at which the measured bounces begin, s: one if the drop height is
+        known, else up to two.
     steps, warnings : tuple of str
-        What was done to the signal, and what is doubtful; a sentence each.
+        Processing of the signal, and what may be wrong, a sentence each.
+    contact : Contact
+        Times, background and gate of the contact.
     """
 
     name: str
@@ -119,27 +120,8 @@ class Drop(Immutable):
         return measure_levels([self], bands, method, low_pass=low_pass)[0].level.copy()
 
 
-def measure_drop(  # noqa: PLR0913 - what a laboratory knows
-    window: Window,
-    *,
-    height: float | None = None,
-    mass: float | None = None,
-    calibration_uncertainty: float = 0.0,
-    mass_uncertainty: float = 0.0,
-    height_uncertainty: float = 0.0,
-) -> Drop:
-    """Return what one drop tells.
-
-    Parameters
-    ----------
-    window
-        The part of the signal around the drop.
-    height
-        Drop height of the lowest point, m.
-    mass
-        Mass of the source, kg.
-    calibration_uncertainty, mass_uncertainty, height_uncertainty
-        Standard uncertainties, relative, kg and m; they weight the ways to the restitution.
+def measure_drop(window: Window, conditions: DropConditions) -> Drop:
+    """Measure one drop in the window around it.
 
     Raises
     ------
@@ -150,63 +132,56 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
     try:
         contact = find_contact(window, force)
     except np.linalg.LinAlgError as error:
-        refuse(f"{window.name}: the quiet parts are no noise", "noise, drift and hum", error)
-    steps += _told_background(contact)
-    for side, quiet in zip(("before", "after"), contact.quiet, strict=True):
-        if quiet < SHORT_QUIET:
-            warnings += (f"there are {1e3 * quiet:.1f} ms of quiet {side} the contact",)
-    rate = window.sample_rate
-    # The flight behind the drop gives the restitution; without the height two flights are compared.
-    landings = _landings(window, contact, 1 if height else 2)
+        refuse(f"{window.name}: the background is not noise", "noise, drift and hum", error)
+    for side, length in zip(("before", "after"), contact.background_lengths, strict=True):
+        if length < SHORT_BACKGROUND:
+            warnings += (f"there are {1e3 * length:.1f} ms of background {side} the contact",)
     contact_time = _between(contact.begin, contact.end)
-    if not contact_time.value > MOST_DOUBT * contact_time.uncertainty:
+    if not contact_time.value > MIN_CONTACT_RATIO * contact_time.uncertainty:
         refuse(
-            f"{window.name}: the contact cannot be told from the noise: "
+            f"{window.name}: the contact cannot be distinguished from the noise: "
             f"{1e3 * contact_time.value:.3g} ms with a standard uncertainty of "
             f"{1e3 * contact_time.uncertainty:.2g} ms",
-            f"an uncertainty up to 1/{MOST_DOUBT:g} of it",
+            f"an uncertainty up to 1/{MIN_CONTACT_RATIO:g} of it",
         )
     impulse = _impulse(contact)
-    fall = DropConditions(
-        height, mass, calibration_uncertainty, mass_uncertainty, height_uncertainty
-    )
-    if height and landings:
+    # The flight after the drop gives the restitution; without the height two flights are compared.
+    landings = _landings(window, contact, 1 if conditions.height else 2)
+    if conditions.height and landings:
         flight = _between(contact.end, landings[0][0]).value
-        peak = _peak_of(window.bounces[0]) / contact.peak
-        if not peak / UNLIKE < GRAVITY * flight / (2 * fall.speed) < peak * UNLIKE:
+        peak = _peak_above_background(window.bounces[0]) / contact.peak
+        expected = GRAVITY * flight / (2 * conditions.speed)
+        if not peak / MAX_BOUNCE_RATIO < expected < peak * MAX_BOUNCE_RATIO:
             landings = []
-            unlike = (
-                f"the pulse {1e3 * flight:.0f} ms behind the contact has {peak:.2g} of its peak: "
-                f"it is no bounce from {height:g} m"
+            no_bounce = (
+                f"the pulse {1e3 * flight:.0f} ms after the contact has {peak:.2g} of its peak: "
+                f"it is no bounce from {conditions.height:g} m"
             )
-            warnings += (unlike,)
-    flights = []
-    leaving = contact.end
-    for landing, again in landings:
-        flights.append(_between(leaving, landing))
-        leaving = again
-    ways, told = fall.restitutions(impulse, contact_time, flights)
-    restitution, shared = fall.mean(ways, impulse)
-    first, stop = (place - contact.span[0] for place in contact.gate)
+            warnings += (no_bounce,)
+    ends = [contact.end, *(end for _, end in landings)]
+    flights = [_between(end, begin) for end, (begin, _) in zip(ends, landings, strict=False)]
+    methods, unknown = conditions.restitutions(impulse, contact_time, flights)
+    restitution, shared = conditions.mean(methods, impulse)
+    rate, first = window.sample_rate, contact.span[0]
     return Drop(
         name=window.name,
-        begin=contact.span[0] / rate - contact.touch.value,
+        begin=first / rate - contact.touch.value,
         force=contact.force,
         sample_rate=rate,
         onset=window.start / rate + contact.touch.value,
-        gate=(first, stop),
+        gate=(contact.gate[0] - first, contact.gate[1] - first),
         contact_time=contact_time,
         restitution=restitution,
         restitution_shared=shared,
-        restitution_method=" and ".join(ways),
-        restitutions=ways,
+        restitution_method=" and ".join(methods),
+        restitutions=methods,
         peak_force=_peak(contact),
         impulse=impulse,
-        effective_mass=fall.effective_mass(impulse, contact_time, ways.get("bounces")),
+        effective_mass=conditions.effective_mass(impulse, contact_time, methods.get(BOUNCES)),
         noise=_noise(contact),
-        bounces=tuple(landing.value - contact.touch.value for landing, _ in landings),
-        steps=steps,
-        warnings=(*window.warnings, *warnings, *_told_aliased(contact), *told),
+        bounces=tuple(begin.value - contact.touch.value for begin, _ in landings),
+        steps=(*steps, *_removed(contact)),
+        warnings=(*window.warnings, *warnings, *_check_aliasing(contact), *unknown),
         contact=contact,
     )
 
@@ -218,27 +193,27 @@ def _between(first: Estimate, last: Estimate) -> Estimate:
 
 def _landings(window: Window, drop: Contact, count: int) -> list[tuple[Estimate, Estimate]]:
     """Return begin and end of the first bounces, s from the start of the window."""
-    found = []
+    landings = []
     for bounce in window.bounces[:count]:
         first, stop = bounce.contact
-        least = least_quiet(bounce.sample_rate)
-        if first < least or len(bounce.force) - stop < least:
+        minimum = min_background(bounce.sample_rate)
+        if first < minimum or len(bounce.force) - stop < minimum:
             break
-        late = (bounce.start - window.start) / window.sample_rate
+        delay = (bounce.start - window.start) / window.sample_rate
         begin, end = (
-            Estimate(late + edge.value, edge.uncertainty)
+            Estimate(delay + edge.value, edge.uncertainty)
             for edge in find_edges(bounce, drop.background)
         )
-        found.append((begin, end))
-    return found
+        landings.append((begin, end))
+    return landings
 
 
-def _peak_of(window: Window) -> float:
-    """Return the maximum of a pulse above its quiet, N."""
+def _peak_above_background(window: Window) -> float:
+    """Return the maximum of a pulse above its background, N."""
     first, stop = window.contact
     force = window.force
-    quiet = np.concatenate([force[:first], force[stop:]])
-    return float(force[first:stop].max() - np.median(quiet))
+    background = np.concatenate([force[:first], force[stop:]])
+    return float(force[first:stop].max() - np.median(background))
 
 
 def _impulse(contact: Contact) -> Estimate:
@@ -249,37 +224,37 @@ def _impulse(contact: Contact) -> Estimate:
 
 
 def _peak(contact: Contact) -> Estimate:
-    """Return the maximum of the force below 1.25 kHz, N, less what noise adds to a maximum.
+    """Return the maximum of the force below 1.25 kHz without the bias due to noise, N.
 
-    That is what further noise of the same density adds (bootstrap), a part of it where there is
-    much noise; as much again counts as uncertain.
+    The bias is what further noise of the same density adds (bootstrap), which underestimates it for
+    strong noise; it also counts as standard uncertainty.
     """
     force = np.pad(contact.gated, 2)
     low = record_force(force, contact.sample_rate)
-    place = int(np.argmax(low)) * len(contact.covariance) // len(low)
+    cell = int(np.argmax(low)) * len(contact.covariance) // len(low)
     density, _ = contact.background.density(RECORDED_BAND)
     deviation = math.sqrt(density * contact.sample_rate / 2)
     draws = np.random.default_rng(0).normal(scale=deviation, size=(PEAK_DRAWS, len(force)))
-    higher = [record_force(force + noise, contact.sample_rate).max() for noise in draws]
-    excess = max(float(np.mean(higher) - low.max()), 0.0)
-    variance = density * min(RECORDED_BAND, contact.sample_rate / 2) + excess**2
-    variance += contact.covariance[place, place]
-    return Estimate(float(low.max()) - excess, math.sqrt(variance))
+    maxima = [record_force(force + noise, contact.sample_rate).max() for noise in draws]
+    bias = max(float(np.mean(maxima) - low.max()), 0.0)
+    variance = density * min(RECORDED_BAND, contact.sample_rate / 2) + bias**2
+    variance += contact.covariance[cell, cell]
+    return Estimate(float(low.max()) - bias, math.sqrt(variance))
 
 
 def _noise(contact: Contact) -> Noise:
-    """Return the noise of the quiet parts."""
-    first, stop = (place - contact.span[0] for place in contact.gate)
-    quiet = np.concatenate([contact.force[:first], contact.force[stop:]])
-    deviation = 1.4826 * float(np.median(np.abs(quiet - np.median(quiet))))
+    """Return the noise of the background."""
+    first, stop = (index - contact.span[0] for index in contact.gate)
+    force = np.concatenate([contact.force[:first], contact.force[stop:]])
+    deviation = 1.4826 * float(np.median(np.abs(force - np.median(force))))
     white, pink, brown = map(float, contact.background.variances[:3])
     return Noise(deviation, "before and after", white, pink, brown)
 
 
-def _told_background(contact: Contact) -> tuple[str, ...]:
-    """Return what was removed, a sentence each."""
-    first, stop = (place - contact.span[0] for place in contact.gate)
-    offset = float(contact.under[first:stop].mean())
+def _removed(contact: Contact) -> tuple[str, ...]:
+    """Return which background was removed, a sentence each."""
+    first, stop = (index - contact.span[0] for index in contact.gate)
+    offset = float(contact.removed[first:stop].mean())
     steps = [f"an offset of {offset:.3g} N was removed"]
     drift, deviation = contact.background.drift
     if abs(drift) > NOTABLE * deviation:
@@ -290,8 +265,8 @@ def _told_background(contact: Contact) -> tuple[str, ...]:
     return tuple(steps)
 
 
-def _told_aliased(contact: Contact) -> tuple[str, ...]:
-    """Return a sentence where content at half the rate folds back into the octave of 500 Hz.
+def _check_aliasing(contact: Contact) -> tuple[str, ...]:
+    """Return a warning if content at half the rate folds back into the octave of 500 Hz.
 
     Beyond half the rate the amplitude of a pulse with kinks falls as 1/f2.
     """
@@ -308,8 +283,8 @@ def _told_aliased(contact: Contact) -> tuple[str, ...]:
     error = 20 * math.log10(1 + math.sqrt(folded / own))
     if error < NOTABLE_ERROR:
         return ()
-    told = (
+    warning = (
         f"the force has content up to half the rate, {rate / 2:g} Hz: without a filter before "
         f"sampling, the octave of 500 Hz may be off by {error:.1f} dB"
     )
-    return (told,)
+    return (warning,)

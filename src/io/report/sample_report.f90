@@ -1,28 +1,28 @@
-!> Results of many drops as rows of a table.
-module thud_set_report
+!> Results of many samples as rows of a table.
+module thud_sample_report
    use thud_band, only: get_band_name
    use thud_force_history, only: force_count, force_names
    use thud_kinds, only: wp
    use thud_quantities, only: quantities, sample_quantity_count
    use thud_sweep, only: sweep_type
-   use thud_set_table, only: set_table_type
+   use thud_sample_table, only: sample_table_type
    use thud_text, only: newline, replaced, to_text
    implicit none (type, external)
    private
 
-   public :: get_set_header, get_set_rows
+   public :: get_sample_header, get_sample_rows
 
 contains
 
    !> First line of the results.
-   subroutine get_set_header(table, sweep, text)
-      type(set_table_type), intent(in) :: table
+   subroutine get_sample_header(table, sweep, text)
+      type(sample_table_type), intent(in) :: table
       !> The results, whose bands are known.
       type(sweep_type), intent(in) :: sweep
       character(len=:), allocatable, intent(out) :: text
       integer :: i, j
 
-      text = 'set'
+      text = 'sample'
       do i = 1, size(table%names)
          text = text//','//trim(table%names(i))
       end do
@@ -43,14 +43,14 @@ contains
          text = text//','//trim(sweep%floor_column(i))
       end do
       text = text//',margin_dB,conforms,status,reason'//newline
-   end subroutine get_set_header
+   end subroutine get_sample_header
 
    !> Lines of the results, 17 digits; what could not be computed is left out.
-   subroutine get_set_rows(table, before, values, first, last, sweep, text)
-      type(set_table_type), intent(in) :: table
-      !> Number of drops before the first of `values`.
+   subroutine get_sample_rows(table, before, values, first, last, sweep, text)
+      type(sample_table_type), intent(in) :: table
+      !> Number of samples before the first of `values`.
       integer, intent(in) :: before
-      !> The drops: [n_column, n_drop].
+      !> The samples: [n_column, n_sample].
       real(wp), intent(in) :: values(:, :)
       !> The first and the last of them to be written.
       integer, intent(in) :: first, last
@@ -97,7 +97,7 @@ contains
          end_of_text = end_of_text + at
       end do
       text = text(:end_of_text)
-   end subroutine get_set_rows
+   end subroutine get_sample_rows
 
    !> Width of all that is no number: names, verdicts, and the longest reason with its quotes doubled.
    pure function get_rest_width(sweep) result(width)
@@ -131,4 +131,4 @@ contains
       cell(at + 1:) = '"'
    end function in_quotes
 
-end module thud_set_report
+end module thud_sample_report

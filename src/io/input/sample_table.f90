@@ -1,8 +1,8 @@
-!> Tables of drops: text with the keys in its first line and one drop in each of the others. Tabs, semicolons,
+!> Tables of samples: text with the keys in its first line and one sample in each of the others. Tabs, semicolons,
 !> commas or blanks separate the values, as in the first line; they may stand in quotes. Decimal commas are allowed
 !> where commas do not separate, or in quotes; the first number with a decimal mark decides for the table. Empty lines
 !> and what follows a `#` are skipped.
-module thud_set_table
+module thud_sample_table
    use thud_case, only: case_type, get_active_fields
    use thud_column, only: column_type, find_columns
    use thud_error, only: error_type, input_error
@@ -15,7 +15,7 @@ module thud_set_table
    implicit none (type, external)
    private
 
-   public :: open_set_table, read_sets, set_table_type
+   public :: open_sample_table, read_samples, sample_table_type
 
    !> Maximum number of columns.
    integer, parameter :: max_columns = 256
@@ -24,7 +24,7 @@ module thud_set_table
    integer, parameter :: cell_length = 64
 
    !> An open table.
-   type :: set_table_type
+   type :: sample_table_type
       character(len=path_length) :: path = ''
       !> Its lines.
       type(line_reader_type) :: reader
@@ -38,16 +38,16 @@ module thud_set_table
       character(len=cell_length), allocatable :: names(:)
       !> What they are; pointers into the case: [n_column].
       type(field_type), allocatable :: fields(:)
-   end type set_table_type
+   end type sample_table_type
 
 contains
 
    !> Opens a table and reads its first line.
-   subroutine open_set_table(path, case, table, error)
+   subroutine open_sample_table(path, case, table, error)
       character(len=*), intent(in) :: path
       !> The case, which has the keys.
       type(case_type), intent(in), target :: case
-      type(set_table_type), intent(out) :: table
+      type(sample_table_type), intent(out) :: table
       !> The file cannot be read, or a key is not known or given twice.
       type(error_type), allocatable, intent(out) :: error
       character(len=line_length) :: line
@@ -56,17 +56,17 @@ contains
 
       table%path = path
       if (directory_exists(path)) then
-         error = input_error(path//': this is a directory; allowed: a table of sets')
+         error = input_error(path//': this is a directory; allowed: a table of samples')
          return
       end if
       call open_lines(path, table%reader, done)
       if (.not. done) then
-         error = input_error(path//': the file cannot be read; allowed: a table of sets')
+         error = input_error(path//': the file cannot be read; allowed: a table of samples')
          return
       end if
       call next_line(table, line, there, error)
       if (.not. (there .or. allocated(error))) error = input_error(path//': the table is empty; allowed: keys in the ' &
-         //'first line and one set in each of the others')
+         //'first line and one sample in each of the others')
       if (.not. allocated(error)) then
          table%separator = get_separator(line)
          call split_line(table, line, table%names, error)
@@ -81,15 +81,15 @@ contains
       else
          call close_lines(table%reader)
       end if
-   end subroutine open_set_table
+   end subroutine open_sample_table
 
-   !> The next drops.
-   subroutine read_sets(table, values, n_set, error)
-      type(set_table_type), intent(inout) :: table
+   !> The next samples.
+   subroutine read_samples(table, values, n_sample, error)
+      type(sample_table_type), intent(inout) :: table
       !> Their values: [n_column, n_max].
       real(wp), intent(out) :: values(:, :)
-      !> Number of drops that were read; fewer than fit at the end of the table.
-      integer, intent(out) :: n_set
+      !> Number of samples that were read; fewer than fit at the end of the table.
+      integer, intent(out) :: n_sample
       !> A line has the wrong number of values, or a value is not a number.
       type(error_type), allocatable, intent(out) :: error
       character(len=line_length) :: line
@@ -97,8 +97,8 @@ contains
       integer :: i
       logical :: there
 
-      n_set = 0
-      do while (n_set < size(values, 2))
+      n_sample = 0
+      do while (n_sample < size(values, 2))
          call next_line(table, line, there, error)
          if (allocated(error) .or. .not. there) return
          call split_line(table, line, cells, error)
@@ -111,18 +111,18 @@ contains
          end if
          call find_decimal(table, cells, error)
          if (allocated(error)) return
-         n_set = n_set + 1
+         n_sample = n_sample + 1
          do i = 1, size(cells)
-            call read_value(table, i, trim(replaced(cells(i), ',', '.')), values(i, n_set), error)
+            call read_value(table, i, trim(replaced(cells(i), ',', '.')), values(i, n_sample), error)
             if (allocated(error)) return
          end do
       end do
-   end subroutine read_sets
+   end subroutine read_samples
 
    !> The next line with something in it.
    subroutine next_line(table, line, there, error)
       !> The table; closed at its end.
-      type(set_table_type), intent(inout) :: table
+      type(sample_table_type), intent(inout) :: table
       !> The line, without comment.
       character(len=line_length), intent(out) :: line
       !> There was one.
@@ -135,7 +135,7 @@ contains
       do while (.not. there)
          call read_line(table%reader, line, length)
          if (length == -1) exit
-         if (length < 0) error = input_error(trim(table%path)//': the file cannot be read; allowed: a table of sets')
+         if (length < 0) error = input_error(trim(table%path)//': the file cannot be read; allowed: a table of samples')
          mark = index(line, '#')
          if (mark > 0) line(mark:) = ''
          if (length > line_length .and. mark == 0) error = line_error(table, 'it is too long; allowed: up to ' &
@@ -165,7 +165,7 @@ contains
 
    !> Cells of a line.
    subroutine split_line(table, line, cells, error)
-      type(set_table_type), intent(in) :: table
+      type(sample_table_type), intent(in) :: table
       character(len=*), intent(in) :: line
       !> The cells, without blanks and quotes around them: [n_cell].
       character(len=cell_length), allocatable, intent(out) :: cells(:)
@@ -205,7 +205,7 @@ contains
 
    !> Finds the decimal mark of a table in the numbers of a line.
    subroutine find_decimal(table, cells, error)
-      type(set_table_type), intent(inout) :: table
+      type(sample_table_type), intent(inout) :: table
       !> The cells of the line: [n_cell].
       character(len=cell_length), intent(in) :: cells(:)
       !> A number has the other mark than those before it, or may have a decimal comma or 1000 times the value.
@@ -245,7 +245,7 @@ contains
 
    !> Removes the quotes around a cell, and the blanks inside them.
    subroutine unquote(table, cell, error)
-      type(set_table_type), intent(in) :: table
+      type(sample_table_type), intent(in) :: table
       character(len=cell_length), intent(inout) :: cell
       !> The quote is not closed.
       type(error_type), allocatable, intent(out) :: error
@@ -280,9 +280,9 @@ contains
       end do
    end function get_structure
 
-   !> One value of a drop.
+   !> One value of a sample.
    subroutine read_value(table, column, word, value, error)
-      type(set_table_type), intent(in) :: table
+      type(sample_table_type), intent(in) :: table
       integer, intent(in) :: column
       !> The value as written in the table.
       character(len=*), intent(in) :: word
@@ -325,7 +325,7 @@ contains
 
    !> Error of a line.
    function line_error(table, message) result(error)
-      type(set_table_type), intent(in) :: table
+      type(sample_table_type), intent(in) :: table
       !> What is wrong with the line.
       character(len=*), intent(in) :: message
       !> The error, with file and line.
@@ -334,4 +334,4 @@ contains
       error = input_error(trim(table%path)//', line '//to_text(table%reader%line)//': '//message)
    end function line_error
 
-end module thud_set_table
+end module thud_sample_table
