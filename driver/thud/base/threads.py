@@ -1,4 +1,4 @@
-"""Matrix products by one thread."""
+"""Matrix products in one thread."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _LOCK = Lock()
-# The limit that is in force, once for each that needs it.
+# The active limit, once for each caller.
 _LIMITS: list[threadpool_limits] = []
 
 
 def limit_threads() -> threadpool_limits:
-    """Limit matrix products of this process to one thread: of all libraries that are loaded."""
+    """Limit matrix products of this process, by all loaded libraries, to one thread."""
     limit = threadpool_limits(1, "blas")
-    # Else no other thread may restore what was before.
+    # Otherwise no other thread may restore the previous limit.
     OpenBLASController.clear_controlling_thread()
     return limit
 
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Limit matrix products to one thread until the last that needs it has ended.
+    """Limit matrix products to one thread until the last caller has ended.
 
-    The limit is that of the process: restored by each, it would be what another one had set.
+    The limit applies to the process, so that only the last caller may restore it.
     """
     with _LOCK:
         _LIMITS.append(_LIMITS[0] if _LIMITS else limit_threads())
