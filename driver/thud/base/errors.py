@@ -29,10 +29,6 @@ class LockWarning(RuntimeWarning):
     """A file system has no locks: concurrent runs may write to one directory."""
 
 
-class WorkerWarning(RuntimeWarning):
-    """A worker of a study is unresponsive; others do its work."""
-
-
 class InputError(ThudError, ValueError):
     """The input is invalid; the message names group, key, value and allowed range."""
 

@@ -66,7 +66,7 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
         "run", path=os.fsencode(path), output=os.fsencode(output), replace=options.replace,
         channels=options.all,        progress=not options.quiet,
     )  # fmt: skip
-    for warning in found.get("run_remarks", {}).values():
+    for warning in found.get("messages", {}).values():
         tqdm.write(f"thud-driver: {text(warning)}", file=sys.stderr)
     folder = Path(output or os.fsdecode(found["directory"]))
     figures = _figures(found, options)

@@ -109,8 +109,7 @@ class ForceTarget(Immutable):
         last = (force[time > time[-1] - END].mean() - low) / (force.max() - low)
         if last > OPEN_END:
             refuse(
-                f"target: the force ends with {last:.0%} of its peak",
-                "a record of a whole impact",
+                f"target: the force ends with {last:.0%} of its peak", "a record of a whole impact"
             )
         return ForceMisfit(self, Record(time, force, rate), self._pulse(time, force, rate))
 
