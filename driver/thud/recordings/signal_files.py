@@ -232,7 +232,7 @@ def _unit(one: Channel, stated: _Stated, name: str) -> tuple[str, tuple[str, ...
     if known:
         return known, ()
     if not one.unit and stated.calibration is None:
-        return ASSUMED, ("The file names no unit; the values were taken to be in N.",)
+        return ASSUMED, ("The file states no unit; the values are assumed to be in N.",)
     if one.unit or isinstance(stated.calibration, str | Calibration):
         own = f"in {shown_text(one.unit)!r}" if one.unit else "without a unit"
         refuse(f"{name}: the values are {own}", f"unit = one of {ALLOWED}")
