@@ -118,7 +118,7 @@ def design(
     study
         Path of a TOML file, or what would stand in it; it has two numeric parameters.
     output, **how
-        See `sweep`.
+        As of `sweep`.
 
     Returns
     -------

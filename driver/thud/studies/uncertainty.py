@@ -171,7 +171,7 @@ def uncertainty(
     study
         Path of a TOML file, or what would stand in it; its parameters are independent.
     output, **how
-        See `sweep`.
+        As of `sweep`.
 
     Returns
     -------
