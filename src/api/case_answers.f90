@@ -49,8 +49,9 @@ contains
       call bundle%add_text('case', text)
    end subroutine answer_effective_case
 
-   !> The run of the namelist file `path`, as by the executable, to the directory `output`; with the numbers `replace` and
-   !> `progress` not 0 it replaces files of others, and shows progress on a terminal.
+   !> The run of the namelist file `path`, as by the executable, to the directory `output`; with the numbers `replace`,
+   !> `channels` and `progress` not 0 it replaces files of others, writes the channels of the histories, and shows progress
+   !> on a terminal.
    subroutine answer_run(request, bundle, error)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
@@ -65,15 +66,16 @@ contains
       call request%get_text('path', path)
       call request%get_text('output', output)
       if (request%get_number('progress') > 0.0_wp) call begin_progress()
-      call run_case(path, output, request%get_number('replace') > 0.0_wp, case, results, outcome, error)
+      call run_case(path, output, request%get_number('replace') > 0.0_wp, request%get_number('channels') > 0.0_wp, case, &
+         results, outcome, error)
       call end_progress()
       if (allocated(error)) return
       call get_case_text(case, text)
       call bundle%add_text('case', text)
       call bundle%add_text('directory', outcome%directory)
       call bundle%add_text('table', outcome%table)
-      do i = 1, outcome%n_remark
-         call bundle%add_text('run_remarks.'//to_text(i), outcome%remarks(i)%text)
+      do i = 1, outcome%n_message
+         call bundle%add_text('messages.'//to_text(i), outcome%messages(i)%text)
       end do
       call bundle%add_number('conforms', merge(1.0_wp, 0.0_wp, outcome%conforms))
       call add_results(bundle, case, results)

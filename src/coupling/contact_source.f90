@@ -1,4 +1,4 @@
-!> A source of a few masses of which the first touches the floor: what the march on a floor that moves needs of it.
+!> A source of a few masses of which the first touches the floor: what the marches on rigid and mobile floors need of it.
 !>
 !> Its equations of motion are laid out in pairs, displacement towards the floor (m) and velocity (m/s) of each mass, then
 !> impulse given to the floor (N s) and energy lost (J); further places are its own. On a floor that moves they hold for
@@ -28,8 +28,13 @@ module thud_contact_source
    contains
       procedure(record_sample_interface), deferred :: record_sample
       procedure(record_peaks_interface), deferred :: record_peaks
+      procedure :: get_event
+      procedure :: pass_event
+      procedure :: has_left
+      procedure :: get_center
+      procedure :: get_inner_energy
       procedure :: get_failure
-      procedure :: get_reach
+      procedure :: get_amplitude
    end type contact_source_type
 
    abstract interface
@@ -60,6 +65,64 @@ module thud_contact_source
 
 contains
 
+   !> Component of the state that falls to zero where the phase ends on a rigid floor: velocity, then deflection.
+   pure function get_event(self) result(component)
+      class(contact_source_type), intent(in) :: self
+      integer :: component
+
+      component = merge(2, 1, self%compressing)
+   end function get_event
+
+   !> Begins the next phase on a rigid floor.
+   pure subroutine pass_event(self, time, state, history)
+      class(contact_source_type), intent(inout) :: self
+      !> Time since first touch, s.
+      real(wp), intent(in) :: time
+      !> State at the event: [n_state].
+      real(wp), intent(inout) :: state(:)
+      !> Gets maxima at the turning point, and the contact time at release.
+      type(force_history_type), intent(inout) :: history
+
+      state(self%get_event()) = 0.0_wp
+      if (self%compressing) then
+         self%compressing = .false.
+         call self%record_peaks(state, history)
+      else
+         self%touching = .false.
+         history%contact_time = time
+      end if
+   end subroutine pass_event
+
+   !> Whether the source has left a rigid floor for good; a single mass does at release.
+   pure function has_left(self, state) result(left)
+      class(contact_source_type), intent(in) :: self
+      !> State: [n_state].
+      real(wp), intent(in) :: state(:)
+      logical :: left
+
+      left = .not. self%touching
+   end function has_left
+
+   !> Displacement, m, and velocity, m/s, of the center of mass: [2].
+   pure function get_center(self, state) result(center)
+      class(contact_source_type), intent(in) :: self
+      !> State: [n_state].
+      real(wp), intent(in) :: state(:)
+      real(wp) :: center(2)
+
+      center = state(1:2)
+   end function get_center
+
+   !> Energy of the motion of the masses against each other and of the springs between them, J.
+   pure function get_inner_energy(self, state) result(energy)
+      class(contact_source_type), intent(in) :: self
+      !> State: [n_state].
+      real(wp), intent(in) :: state(:)
+      real(wp) :: energy
+
+      energy = 0.0_wp
+   end function get_inner_energy
+
    !> Error of a state outside the domain of the equations; sources that have such states override it.
    function get_failure(self, drop, time, state) result(error)
       class(contact_source_type), intent(in) :: self
@@ -75,17 +138,15 @@ contains
          //to_text(state(1))//' m; allowed: lower drops')
    end function get_failure
 
-   !> Line that the source in flight does not cross: no part of it sinks below.
-   pure subroutine get_reach(self, state, displacement, velocity)
+   !> How far motion between the masses can bring the first one below the center of mass in flight, m.
+   pure function get_amplitude(self, state) result(amplitude)
       class(contact_source_type), intent(in) :: self
       !> State: [n_state].
       real(wp), intent(in) :: state(:)
-      !> Displacement of the line towards the floor, m, and its constant velocity, m/s.
-      real(wp), intent(out) :: displacement, velocity
+      real(wp) :: amplitude
 
-      displacement = state(1)
-      velocity = state(2)
-   end subroutine get_reach
+      amplitude = 0.0_wp
+   end function get_amplitude
 
    !> Error of steps that are too long for the source.
    pure function coarse_error(finding) result(error)

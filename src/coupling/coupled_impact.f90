@@ -6,7 +6,7 @@ module thud_coupled_impact
    use thud_coupled_step, only: coupled_state_type, get_relative_state, take_coupled_step
    use thud_drop, only: drop_type
    use thud_error, only: error_type, input_error
-   use thud_force_history, only: force_history_type
+   use thud_force_history, only: clear_flight, force_history_type
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_receiver, only: can_strike, new_receiver_motion, receiver_type
@@ -189,7 +189,7 @@ contains
       type(impact_type), intent(in) :: impact
       !> The source touches the floor, or the floor can strike it again.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: displacement, velocity
+      real(wp) :: lowest(2)
 
       if (impact%caught) return
       if (source%touching) then
@@ -198,8 +198,10 @@ contains
          return
       end if
       associate (motion => impact%motion)
-         call source%get_reach(get_relative_state(source, motion), displacement, velocity)
-         if (can_strike(impact%receiver, motion%motion, -displacement, -velocity - motion%floor_velocity)) then
+         associate (state => get_relative_state(source, motion))
+            lowest = source%get_center(state) + [source%get_amplitude(state), 0.0_wp]
+         end associate
+         if (can_strike(impact%receiver, motion%motion, -lowest(1), -lowest(2) - motion%floor_velocity)) then
             error = input_error('&sampling: duration = '//to_text(sampling%duration) &
                //' s ends while the floor may strike the source again; allowed: longer')
          end if
@@ -211,12 +213,9 @@ contains
       class(contact_source_type), intent(in) :: source
       type(impact_type), intent(in) :: impact
       type(force_history_type), intent(inout) :: history
-      integer :: last, n
+      integer :: n
 
-      last = floor(history%contact_time*history%sample_rate) + 1
-      history%deflection(last + 1:) = 0.0_wp
-      history%velocity(last + 1:) = 0.0_wp
-      if (allocated(history%channel)) history%channel(last + 1:, :) = 0.0_wp
+      call clear_flight(history)
       history%floor_work = impact%motion%work
       history%peak_force = impact%peak_force
       history%fact_name = [character(len=len(history%fact_name)) :: history%fact_name, 'contacts']

@@ -8,7 +8,7 @@ module thud_force_history
    implicit none (type, external)
    private
 
-   public :: check_samples, continue_to_zero, force_count, force_history_type, force_names, holds_impulse
+   public :: check_samples, clear_flight, continue_to_zero, force_count, force_history_type, force_names, holds_impulse
    public :: max_residual, new_force_history
 
    !> Residual of the balances of impulse and energy above which models that integrate or sum one
@@ -108,6 +108,18 @@ contains
          //'hold an impulse of '//to_text(sampled)//' N s of '//to_text(history%impulse)//' N s; allowed: a higher one')
    end subroutine check_samples
 
+   !> Sets the samples of the motion after the last contact to zero.
+   pure subroutine clear_flight(history)
+      !> The history, with its contact time.
+      type(force_history_type), intent(inout) :: history
+      integer :: last
+
+      last = floor(history%contact_time*history%sample_rate) + 1
+      history%deflection(last + 1:) = 0.0_wp
+      history%velocity(last + 1:) = 0.0_wp
+      if (allocated(history%channel)) history%channel(last + 1:, :) = 0.0_wp
+   end subroutine clear_flight
+
    !> Finds the contact time between samples: the force is continued to zero in a straight line from the last two
    !> samples of the first contact.
    pure subroutine continue_to_zero(history)
@@ -127,12 +139,14 @@ contains
    end subroutine continue_to_zero
 
    !> A history of zero force.
-   pure function new_force_history(sample_rate, n_sample, part_name) result(history)
+   pure function new_force_history(sample_rate, n_sample, part_name, channel_name) result(history)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
       integer, intent(in) :: n_sample
       !> Names of the parts of the force: [n_part].
       character(len=*), intent(in) :: part_name(:)
+      !> Names of the channels (default: there are none): [n_channel].
+      character(len=*), intent(in), optional :: channel_name(:)
       !> The history, all arrays allocated and zero.
       type(force_history_type) :: history
 
@@ -143,6 +157,10 @@ contains
          history%floor_force(n_sample), source=0.0_wp)
       allocate (history%part(n_sample, size(part_name)), source=0.0_wp)
       allocate (history%fact_name(0), history%fact_unit(0), history%fact(0))
+      if (.not. present(channel_name)) return
+      allocate (history%channel_name(size(channel_name)))
+      history%channel_name = channel_name
+      allocate (history%channel(n_sample, size(channel_name)), source=0.0_wp)
    end function new_force_history
 
 end module thud_force_history

@@ -46,9 +46,12 @@ contains
 
    !> Whether a receiver does not move.
    pure function is_rigid(receiver) result(rigid)
-      type(receiver_type), intent(in) :: receiver
+      !> The receiver; a rigid one where it is absent.
+      type(receiver_type), intent(in), optional :: receiver
       logical :: rigid
 
+      rigid = .true.
+      if (.not. present(receiver)) return
       rigid = .not. receiver%direct > 0.0_wp
       if (allocated(receiver%residue)) rigid = rigid .and. .not. any(abs(receiver%residue) > 0.0_wp)
    end function is_rigid

@@ -2,16 +2,18 @@
 !> 1975; paper, reference [6]): a baseline, also of the tyre.
 module thud_hunt_crossley
    use thud_ball, only: ball_type
+   use thud_contact_law, only: contact_law_type, get_contact_force
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_lumped, only: at_deflection, at_impulse, at_loss, at_velocity, lumped_type, solve_lumped
+   use thud_lumped, only: solve_lumped
    use thud_new_field, only: real_field
    use thud_receiver, only: receiver_type
    use thud_rk4, only: locate_zero, rk4_step
    use thud_sampling, only: sampling_type
+   use thud_single_mass, only: at_deflection, at_impulse, at_loss, at_velocity, single_mass_type
    use thud_source_model, only: source_model_type
    use thud_text, only: to_text
    implicit none (type, external)
@@ -40,25 +42,18 @@ module thud_hunt_crossley
    end type hunt_crossley_type
 
    !> Equation of motion M z'' = -F with F = k d^n (1 + 3/2 alpha d').
-   type, extends(lumped_type) :: spring_type
-      !> Stiffness, N/m^exponent.
-      real(wp) :: stiffness = 1.0_wp
-      !> Exponent of the deflection.
-      real(wp) :: exponent = 1.5_wp
-      !> Damping, s/m.
-      real(wp) :: damping = 0.0_wp
+   type, extends(single_mass_type) :: spring_type
+      type(contact_law_type) :: law
    contains
       procedure :: get_derivative
-      procedure :: get_parts
+      procedure :: get_components
    end type spring_type
 
 contains
 
    !> Keys and allowed ranges.
    function get_fields(options) result(fields)
-      !> The options that the fields read and set.
       class(hunt_crossley_type), intent(in), target :: options
-      !> One field per component: [5].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
@@ -74,9 +69,7 @@ contains
 
    !> Refuses values that are missing or contradict each other.
    subroutine check(ball, options, sampling, error)
-      !> The source.
       type(ball_type), intent(in) :: ball
-      !> The options, each inside its own range.
       class(hunt_crossley_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(error_type), allocatable, intent(out) :: error
@@ -96,39 +89,35 @@ contains
    !> Right-hand side of the equation of motion.
    pure subroutine get_derivative(self, time, state, rate, valid)
       class(spring_type), intent(in) :: self
-      !> Time since first touch, s; the equation does not depend on it.
       real(wp), intent(in) :: time
-      !> State, see `thud_lumped`: [4].
       real(wp), intent(in) :: state(:)
-      !> Derivative of the state: [4].
       real(wp), intent(out) :: rate(:)
-      !> Always true.
       logical, intent(out) :: valid
-      real(wp) :: parts(2)
+      real(wp) :: components(2)
       real(wp) :: force
 
       valid = time >= 0.0_wp
-      call self%get_parts(state, parts, force)
+      call self%get_components(state, components, force)
       rate(at_deflection) = state(at_velocity)
       rate(at_velocity) = -force/self%mass
       rate(at_impulse) = force
-      rate(at_loss) = parts(2)*state(at_velocity)
+      rate(at_loss) = components(2)*state(at_velocity)
    end subroutine get_derivative
 
    !> Spring and damping force of one instant.
-   pure subroutine get_parts(self, state, parts, elastic_force)
+   pure subroutine get_components(self, state, components, elastic_force)
       class(spring_type), intent(in) :: self
-      !> State, see `thud_lumped`: [4].
       real(wp), intent(in) :: state(:)
       !> k d^n and k d^n * 3/2 alpha d', N: [2].
-      real(wp), intent(out) :: parts(:)
+      real(wp), intent(out) :: components(:)
       !> Their sum: without flux of momentum it is the whole force, N.
       real(wp), intent(out) :: elastic_force
+      real(wp) :: force(3)
 
-      parts(1) = self%stiffness*max(state(at_deflection), 0.0_wp)**self%exponent
-      parts(2) = 1.5_wp*self%damping*state(at_velocity)*parts(1)
-      elastic_force = sum(parts)
-   end subroutine get_parts
+      force = get_contact_force(self%law, max(state(at_deflection), 0.0_wp), state(at_velocity))
+      components = force(2:3)
+      elastic_force = sum(components)
+   end subroutine get_components
 
    !> Damping alpha that gives a coefficient of restitution, s/m.
    !>
@@ -188,8 +177,8 @@ contains
 
    !> Stiffness that gives a contact time, N/m^exponent.
    !>
-   !> In units of v0 and of the length D = (M v0^2/k)^(1/(n + 1)) the equation holds no k: one
-   !> contact in these units gives the ratio of contact time to D/v0.
+   !> In units of v0 and of the length D = (M v0^2/k)^(1/(n + 1)) the equation does not contain k:
+   !> one contact in these units gives the ratio of contact time to D/v0.
    pure function get_stiffness(contact_time, exponent, damping, mass, impact_velocity) result(stiffness)
       !> Wanted contact time, s; exponent n of the deflection; damping alpha, s/m; mass, kg.
       real(wp), intent(in) :: contact_time, exponent, damping, mass
@@ -206,7 +195,7 @@ contains
       integer :: i
       logical :: valid
 
-      spring = spring_type(mass=1.0_wp, exponent=exponent, damping=damping*impact_velocity)
+      spring = new_spring(1.0_wp, 1.0_wp, exponent, damping*impact_velocity)
       state = [0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]
       time = 0.0_wp
       do i = 1, max_steps
@@ -223,16 +212,21 @@ contains
       stiffness = mass*impact_velocity**2/length**(exponent + 1)
    end function get_stiffness
 
-   !> Force on each of two plates that press the source slowly: k (deflection/2)^n.
+   !> Equation of motion of a source.
+   pure function new_spring(mass, stiffness, exponent, damping) result(spring)
+      !> Mass, kg; k, N/m^exponent; n; alpha, s/m.
+      real(wp), intent(in) :: mass, stiffness, exponent, damping
+      type(spring_type) :: spring
+
+      spring = spring_type(mass=mass, law=contact_law_type(factor=stiffness, exponent=exponent, damping=1.5_wp*damping))
+   end function new_spring
+
+   !> Quasi-static force between two plates: k (deflection/2)^n.
    subroutine compress(ball, options, deflection, force, error)
-      !> The source, of which nothing counts.
       type(ball_type), intent(in) :: ball
       class(hunt_crossley_type), intent(in) :: options
-      !> Approach of the plates, m: [n].
       real(wp), intent(in) :: deflection(:)
-      !> The force, N: [n].
       real(wp), intent(out) :: force(:)
-      !> The stiffness hangs on a drop.
       type(error_type), allocatable, intent(out) :: error
 
       force = options%stiffness*(deflection/2)**options%exponent
@@ -242,32 +236,28 @@ contains
 
    !> Force history of one drop.
    subroutine solve(ball, drop, options, sampling, history, error, receiver)
-      !> The source, of which only the mass counts.
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
       class(hunt_crossley_type), intent(in) :: options
-      !> Sampling rate, length of the record, substeps.
       type(sampling_type), intent(in) :: sampling
-      !> Force and motion from first touch on.
       type(force_history_type), intent(out) :: history
-      !> The contact outlasts the record, or the steps are too coarse.
       type(error_type), allocatable, intent(out) :: error
-      !> What the source drops on (default: a rigid floor).
       type(receiver_type), intent(in), optional :: receiver
       type(spring_type) :: spring
-      real(wp) :: v0
+      real(wp) :: v0, damping, stiffness
 
       v0 = get_impact_velocity(drop)
-      spring = spring_type(mass=ball%mass, stiffness=options%stiffness, exponent=options%exponent, damping=options%damping)
-      if (options%restitution > 0.0_wp) spring%damping = get_damping(options%restitution, v0)
-      if (options%contact_time > 0.0_wp) then
-         spring%stiffness = get_stiffness(options%contact_time, spring%exponent, spring%damping, spring%mass, v0)
-         if (.not. spring%stiffness > 0.0_wp) then
-            error = input_error('&hunt_crossley: damping = '//to_text(spring%damping)//' s/m at '//to_text(v0) &
-               //' m/s gives no contact time; allowed: lower damping')
-            return
-         end if
+      damping = options%damping
+      if (options%restitution > 0.0_wp) damping = get_damping(options%restitution, v0)
+      stiffness = options%stiffness
+      if (options%contact_time > 0.0_wp) stiffness = get_stiffness(options%contact_time, options%exponent, damping, &
+         ball%mass, v0)
+      if (.not. stiffness > 0.0_wp) then
+         error = input_error('&hunt_crossley: damping = '//to_text(damping)//' s/m at '//to_text(v0) &
+            //' m/s gives no contact time; allowed: lower damping')
+         return
       end if
+      spring = new_spring(ball%mass, stiffness, options%exponent, damping)
       call solve_lumped(spring, drop, sampling, [character(len=13) :: 'spring_force', 'damping_force'], history, error, &
          receiver)
    end subroutine solve

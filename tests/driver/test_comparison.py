@@ -52,7 +52,6 @@ def test_paper_s_argument_from_end_to_end() -> None:
 def test_page_is_complete_in_one_file(tmp_path: Path) -> None:
     paths = thud.compare({"shell <1>": thud.Case(), "again": thud.solve()}).save(tmp_path)
     assert [path.name for path in paths] == [
-        "comparison.png",
         "comparison.svg",
         "comparison.html",
     ]

@@ -12,8 +12,7 @@ from test_figure_look import assert_clean
 
 import thud
 from thud.comparison.comparison import _cell
-from thud.plot.comparison_html import comparison_html
-from thud.plot.comparison_page import comparison_page
+from thud.plot.pages import comparison_html, comparison_page
 
 SHELL, SOFT = thud.solve(), thud.solve(thud.Ball(youngs_modulus=1.2e6), duration=0.5)
 IMPACTS: dict[str, thud.Impact | thud.Recording] = {"shell <1>": SHELL, "soft $x^{$": SOFT}
@@ -46,7 +45,7 @@ def test_page_has_the_curves_of_the_picture() -> None:
         for line, curve in zip(lines, curves, strict=True):
             np.testing.assert_allclose(curve["y"], line.get_ydata(), rtol=1e-5)
     assert page[0]["layout"]["yaxis"]["title"]["text"] == (
-        "Force on the floor<br>below 1.25 kHz, kN"
+        "Force on the floor,<br>low-passed at 1.25 kHz, kN"
     )
     low, high = figure.axes[0].get_xlim()
     assert low == 0

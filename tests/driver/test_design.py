@@ -193,7 +193,6 @@ def test_command_writes_figure_and_table(
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         ".thud",
         "design.nc",
-        "design.png",
         "design.svg",
         "design.toml",
     ]

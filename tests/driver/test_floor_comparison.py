@@ -215,7 +215,7 @@ def test_command_compares_cases(tmp_path: Path, capsys: pytest.CaptureFixture[st
         thud.write_case(case, path)
     output = tmp_path / "page"
     assert main(["floor", *map(str, paths), "--output", str(output)]) == 0
-    names = {".thud", "floors.png", "floors.svg", "floors.html"}
+    names = {".thud", "floors.svg", "floors.html"}
     assert {path.name for path in output.iterdir()} == names
     assert "thick" in capsys.readouterr().out
     assert main(["floor", str(paths[0]), str(paths[0]), "-o", str(output)]) == 1

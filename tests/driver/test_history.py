@@ -240,11 +240,11 @@ def test_command_writes_the_chart(folder: Path, capsys: pytest.CaptureFixture[st
         quiet=False,
     )
     assert run_history(options) == 0
-    assert sorted(path.name for path in chart.glob("*.*g")) == ["history.png", "history.svg"]
+    assert sorted(path.name for path in chart.glob("*.*g")) == ["history.svg"]
     printed = capsys.readouterr().out
     assert printed.startswith("ball 7\n")
     assert re.search(r"63 Hz, dB: .*\+0\.3", printed)
-    assert f"Chart: {chart / 'history.png'}" in printed
+    assert f"Chart: {chart / 'history.svg'}" in printed
 
 
 @pytest.mark.parametrize(

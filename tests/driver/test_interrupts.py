@@ -254,10 +254,10 @@ def test_executable_ends_sets_and_leaves_nothing(
     executable: str, number: int, copies: int, tmp_path: Path
 ) -> None:
     (tmp_path / "long.nml").write_text(LONG)
-    (tmp_path / "sets.csv").write_text("height\n" + "1.0\n" * 8)
-    command = [executable, "long.nml", "--sets", "sets.csv", "--threads", "2"]
+    (tmp_path / "samples.csv").write_text("height\n" + "1.0\n" * 8)
+    command = [executable, "long.nml", "--samples", "samples.csv", "--threads", "2"]
     with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
-        while not (tmp_path / "outputs/.long_sets.part/sets.csv").exists():
+        while not (tmp_path / "outputs/.long_sets.part/samples.csv").exists():
             time.sleep(0.01)
         # Some callers send a signal to the process and to its group.
         for _ in range(copies - 1):

@@ -27,7 +27,7 @@ import thud
 from thud import cli
 from thud.base.errors import ReportWarning
 from thud.recordings import checkpoint, measure_drops
-from thud.recordings.averages import average_estimates
+from thud.recordings.budgets import average_estimates
 from thud.recordings.config import Config, checked_config, read_config
 from thud.recordings.measure_drops import measure_window
 from thud.recordings.recorded_levels import measure_levels
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from thud.recordings.drops import Window
-    from thud.recordings.estimates import Drop
+    from thud.recordings.measured_drop import Drop
 
 FOLDER = REPOSITORY / "inputs/recordings"
 TRUTH = tomllib.loads((FOLDER / "truth.toml").read_text())

@@ -228,9 +228,9 @@ def test_walls_ceiling_octaves_and_history_are_written(
 def test_run_draws_the_chain(tmp_path: Path) -> None:
     case = tmp_path / "case.nml"
     case.write_text(ROOM_CASE, encoding="utf-8")
-    assert main(["run", str(case), "--output", str(tmp_path / "out"), "--quiet"]) == 0
+    assert main(["run", str(case), "--output", str(tmp_path / "out"), "--quiet", "--all"]) == 0
     for name in ("room", "room_decay", "room_positions", "floor_modes"):
-        assert (tmp_path / "out" / f"{name}.png").exists()
+        assert (tmp_path / "out" / f"{name}.svg").exists()
 
 
 def test_figures_of_a_case_predict_its_level_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -21,8 +21,8 @@ from thud.recordings.budgets import average_mass, average_restitution, drop_esti
 from thud.recordings.config import Config
 from thud.recordings.contact import Contact, find_contact
 from thud.recordings.drops import find_windows
-from thud.recordings.estimates import Drop, measure_drop
 from thud.recordings.faults import repair
+from thud.recordings.measured_drop import Drop, measure_drop
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.restitution import GRAVITY, DropConditions
 from thud.recordings.signal import Signal
@@ -50,9 +50,12 @@ def pulse(impact: thud.Impact) -> np.ndarray:
     return impact.floor_force[: int(impact.exact_contact_time * impact.sample_rate) + 2]
 
 
-def drops(force: np.ndarray, rate: float, **knowledge: float) -> list[Drop]:
+def drops(force: np.ndarray, rate: float, **known: float) -> list[Drop]:
     windows = find_windows(Signal.from_array(force, rate, "file.wav"))
-    return [measure_drop(window, **{"height": 1.0, "mass": 2.5, **knowledge}) for window in windows]
+    return [
+        measure_drop(window, DropConditions(**{"height": 1.0, "mass": 2.5, **known}))
+        for window in windows
+    ]
 
 
 def levels(drop: Drop) -> np.ndarray:
@@ -225,10 +228,10 @@ def test_uncertainties_of_mass_and_height_follow_the_formulas() -> None:
     )
     (signal,) = [Signal.from_array(force, 24e3)]
     (window,) = find_windows(signal)
-    impulse, step = measure_drop(window, height=1.0, mass=2.5).impulse, 1e-5
+    impulse, step = measure_drop(window, DropConditions(1.0, 2.5)).impulse, 1e-5
 
     def at(**known: float) -> Drop:
-        return measure_drop(window, **{"height": 1.0, "mass": 2.5, **known})
+        return measure_drop(window, DropConditions(**{"height": 1.0, "mass": 2.5, **known}))
 
     for key, unit, name in (("mass", 2.5, "mass"), ("height", 1.0, "drop height")):
         fall = DropConditions(1.0, 2.5, **{f"{key}_uncertainty": step * unit})
@@ -610,7 +613,7 @@ def test_contact_is_refused_from_a_quarter_of_uncertainty_on(
         }
         return replace(found, **ends)
 
-    monkeypatch.setattr("thud.recordings.estimates.find_contact", find)
+    monkeypatch.setattr("thud.recordings.measured_drop.find_contact", find)
     force, _ = make_recording(HALF_SINE, FINE, rate=24e3, noise_db=50)
     if ratio > 4:
         (drop,) = drops(force, 24e3)
@@ -729,4 +732,4 @@ def test_noise_that_rises_with_frequency_leaves_the_background_alone() -> None:
     white = np.random.default_rng(0).normal(scale=10, size=int(0.22 * 24e3) + 2)
     for noise in (np.diff(white)[1:], np.diff(white, 2)):
         (drop,) = drops(half_sine(24e3, 0.1, len(noise)) + noise + 12, 24e3)
-        np.testing.assert_allclose(drop.contact.under, 12, rtol=0, atol=0.01 * noise.std())
+        np.testing.assert_allclose(drop.contact.removed, 12, rtol=0, atol=0.01 * noise.std())

@@ -537,17 +537,6 @@ def test_damaged_results_print_nothing_and_leave_the_screen_to_others(
     assert not capsys.readouterr().out
 
 
-def test_snapshots_outside_the_directory_are_not_read(
-    run: Run, case_file: CaseFile, tmp_path: Path
-) -> None:
-    run(case_file(MINIMAL))
-    out = tmp_path / "outputs/case"
-    (out / ".thud").unlink()
-    (out / "motion.pvd").write_text('timestep="0.0" file="../secret.vtu"')
-    with pytest.raises(thud.InputError, match=naming("'../secret.vtu'")):
-        thud.read_results(out)
-
-
 def test_reader_waits_for_a_writer(run: Run, case_file: CaseFile, tmp_path: Path) -> None:
     run(case_file(MINIMAL))
     out = tmp_path / "outputs/case"

@@ -131,7 +131,7 @@ def test_command_writes_indices(tmp_path: Path, capsys: pytest.CaptureFixture[st
     lines = (tmp_path / "lumped_indices.csv").read_text().splitlines()
     assert lines[0] == "output,parameter,first_order,first_order_interval,total,total_interval"
     assert len(lines) == 1 + 7 * 2
-    assert (tmp_path / "lumped.png").exists()
+    assert (tmp_path / "lumped.svg").exists()
     assert "total index of" in capsys.readouterr().out
 
 

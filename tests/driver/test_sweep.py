@@ -625,7 +625,7 @@ def test_command_writes_figure_and_table(
     monkeypatch.chdir(tmp_path)
     assert cli.main(["sweep", str(REPOSITORY / "inputs/studies/sweep.toml")]) == 0
     folder = tmp_path / "outputs/sweep"
-    names = [".thud", "sweep.nc", "sweep.png", "sweep.svg"]
+    names = [".thud", "sweep.nc", "sweep.svg"]
     assert sorted(path.name for path in folder.iterdir()) == names
     printed = capsys.readouterr()
     assert re.search(naming(80, "hollow_sphere", "0.085 MB"), printed.err)

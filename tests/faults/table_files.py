@@ -116,7 +116,7 @@ def _read_recording(path: Path) -> np.ndarray:
 def _read_sets(path: Path, _: random.Random) -> str:
     Path("case.nml").write_text(CASE)
     done = subprocess.run(
-        [executable(), "case.nml", "--sets", str(path), "-q", "-o", "o", "--threads", "1"],
+        [executable(), "case.nml", "--samples", str(path), "-q", "-o", "o", "--threads", "1"],
         capture_output=True, timeout=PATIENCE, check=False,
     )  # fmt: skip
     found = [one.read_bytes() for one in Path("o").iterdir()] if Path("o").exists() else []

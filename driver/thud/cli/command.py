@@ -84,9 +84,15 @@ def results_of(
 
 
 # Endings of the files of a page.
-PAGE = (".png", ".svg", ".html")
+PAGE = (".svg", ".html")
 QUIET = argument("-q", "--quiet", action="store_true", help="show only errors and warnings")
 NO_FIGURES = argument("--no-figures", action="store_true", help="results only")
+FORMAT = argument(
+    "--format",
+    choices=("svg", "png", "pdf"),
+    default="svg",
+    help="format of the figures (default: svg)",
+)
 
 
 def print_notes(warnings: Iterable[object]) -> None:
@@ -130,9 +136,9 @@ def save_result(  # noqa: PLR0913, PLR0917 - each of them differs
     contents = dict([file])
     if not options.no_figures:
         with left_out(figure):
-            from thud.plot.style import picture_files
+            from thud.plot.files import figure_files
 
-            contents |= picture_files(draw_all({figure: found.plot}))
+            contents |= figure_files(draw_all({figure: found.plot}))
     results.write(contents)
     if not options.quiet:
         print(shown)

@@ -84,9 +84,9 @@ def run_study(options: argparse.Namespace) -> int:
         contents = kind.files(result, study)
         if drawn:
             with left_out("the figure of the study"):
-                from thud.plot import picture_files
+                from thud.plot import figure_files
 
-                contents |= picture_files(result.figures(study.name))
+                contents |= figure_files(result.figures(study.name))
         results.write(contents)
     if not options.quiet:
         tqdm.write(f"Results: {folder}")

@@ -23,10 +23,9 @@ from thud.case.case import Case, read_case
 from thud.impact.compute import compute
 from thud.level.impact_result import ImpactResult
 from thud.level.levels import FORCES, SOURCES, get_bands
-from thud.plot.comparison_html import comparison_html
-from thud.plot.comparison_page import comparison_page
-from thud.plot.levels_figure import common_source
-from thud.plot.style import page_files
+from thud.plot.files import page_files
+from thud.plot.impacts import common_source
+from thud.plot.pages import comparison_html, comparison_page
 from thud.recordings.read_recording import read_recording
 
 if TYPE_CHECKING:
@@ -120,7 +119,7 @@ class Comparison(Displayed):
         return comparison_html(self.impacts, self.force, self.source, self.table())
 
     def files(self) -> dict[str, bytes]:
-        """Return ``comparison.png``, ``.svg`` and ``.html`` by name."""
+        """Return ``comparison.svg`` and ``comparison.html`` by name."""
         return page_files("comparison", self.figure, self.html())
 
     def save(self, directory: str | os.PathLike[str], *, replace: bool = False) -> list[Path]:

@@ -14,7 +14,7 @@ from thud.case.keys import find_key, known_keys, users
 from thud.comparison.comparison import compare
 from thud.explorer.answer import new_case
 from thud.impact.compute import compute
-from thud.plot.comparison_html import comparison_html
+from thud.plot.pages import comparison_html
 
 if TYPE_CHECKING:
     from collections.abc import Callable

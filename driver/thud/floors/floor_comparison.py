@@ -68,19 +68,19 @@ class FloorComparison(Displayed):
 
     def figure(self) -> Figure:
         """Return the page as a matplotlib figure."""
-        from thud.plot.floors_page import draw_floors
+        from thud.plot.pages import draw_floors
 
         return draw_floors(self)
 
     def html(self) -> str:
         """Return the page as self-contained HTML with interactive plots."""
-        from thud.plot.floors_page import floors_html
+        from thud.plot.pages import floors_html
 
         return floors_html(self)
 
     def files(self) -> dict[str, bytes]:
-        """Return ``floors.png``, ``.svg`` and ``.html`` by name."""
-        from thud.plot.style import page_files
+        """Return ``floors.svg`` and ``floors.html`` by name."""
+        from thud.plot.files import page_files
 
         return page_files("floors", self.figure, self.html())
 

@@ -159,7 +159,7 @@ class BallImpedance(Displayed):
         floors
             Floors by their names in the legend.
         """
-        from thud.plot.impedance_figure import ball_impedances
+        from thud.plot.floors import ball_impedances
 
         return ball_impedances({"": self}, floors or {})
 

@@ -159,7 +159,7 @@ class MobilityFit(Displayed):
 
     def plot(self) -> Figure:
         """Draw the measured mobility and the fit."""
-        from thud.plot.mobility_fit_figure import mobility_fit
+        from thud.plot.floors import mobility_fit
 
         return mobility_fit(self)
 

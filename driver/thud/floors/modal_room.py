@@ -30,7 +30,7 @@ from thud.base.errors import InputError
 from thud.case.case import Case, case_text
 from thud.floors.prediction import RoomPrediction, predict_level
 from thud.level.levels import get_bands
-from thud.recordings.bank import band_filters
+from thud.recordings.filters import band_filters
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -133,7 +133,7 @@ class ModalRoom(Displayed):
 
     def plot(self) -> Figure:
         """Draw the levels of all positions against the statistical answer."""
-        from thud.plot.modal_room_figure import draw_modal_room
+        from thud.plot.rooms import draw_modal_room
 
         return draw_modal_room(self)
 

@@ -187,7 +187,7 @@ class RoomPrediction(Displayed):
 
     def plot(self, measured: RoomLevels | None = None) -> Figure:
         """Draw the chain: force, energy, floor and room, with measured levels if given."""
-        from thud.plot.prediction_figure import draw_prediction
+        from thud.plot.rooms import draw_prediction
 
         return draw_prediction(self, measured)
 
@@ -247,7 +247,7 @@ def predict_level(
         source=moved or source,
         force="contact" if moved else "blocked",
         force_change=change,
-        floor_warnings=tuple(map(text, found.get("remarks", {}).values())),
+        floor_warnings=tuple(map(text, found.get("warnings", {}).values())),
         time_of_maximum=bands.pop("time"),
         few_modes=found["room"]["few_modes"],
         mass_per_area=found["room"]["surface_mass"],

@@ -234,7 +234,7 @@ class Impact(ImpactQuantities, Displayed):
 
     def plot(self) -> Figure:
         """Return a figure of the force that the case assesses, and of its octave levels."""
-        from thud.plot.overview_figure import overview
+        from thud.plot.impacts import overview
 
         return overview(self)
 

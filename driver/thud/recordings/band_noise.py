@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.level.levels import Bands
-    from thud.recordings.estimates import Drop
+    from thud.recordings.measured_drop import Drop
 
 # Functionals whose energy is less than this part of the largest one add nothing.
 NEGLIGIBLE = 1e-14

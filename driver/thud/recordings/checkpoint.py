@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Self
 from thud.base.bridge import version
 from thud.base.errors import InputError, ReportWarning
 from thud.base.files import is_regular, replace_file, uninterrupted
-from thud.recordings.estimates import Drop
+from thud.recordings.measured_drop import Drop
 
 if TYPE_CHECKING:
     import os

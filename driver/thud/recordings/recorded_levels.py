@@ -12,8 +12,7 @@ from thud.base.checks import refuse, require_choice
 from thud.base.immutable import Immutable
 from thud.level.levels import force_exposure_levels, get_bands
 from thud.recordings.band_noise import band_noise
-from thud.recordings.bank import filter_levels
-from thud.recordings.low_pass import attenuation, low_pass_force
+from thud.recordings.filters import filter_levels, low_pass_attenuation, low_pass_force
 from thud.recordings.outliers import SIGNIFICANCE, Outlier, find_outliers
 
 if TYPE_CHECKING:
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
-    from thud.recordings.estimates import Drop
+    from thud.recordings.measured_drop import Drop
 
 METHODS = ("exact", "fft", "filter")
 # Level above the background, dB, below which a level is only an upper bound, and below which the
@@ -165,7 +164,7 @@ def _drop_levels(
     contributions = {
         "noise": ENERGY_DECIBEL * deviation / 10 ** (level / 10),
         "method": np.abs(measured - exact) / math.sqrt(3),
-        "filter": attenuation(edges.upper, rate) / math.sqrt(3) * low_pass,
+        "filter": low_pass_attenuation(edges.upper, rate) / math.sqrt(3) * low_pass,
     }
     steps = (*steps, f"levels: {_DESCRIPTIONS[method]}", *_background_steps(edges.nominal, flag))
     return LevelEstimate(

@@ -16,14 +16,17 @@ from thud.base.extras import require_extra
 from thud.case.case import Case
 from thud.level.assessment import assess
 from thud.level.impact_result import DropForce
-from thud.recordings.averages import level_estimates
-from thud.recordings.budgets import drop_estimates, find_deviant, told_restitution
+from thud.recordings.budgets import (
+    check_restitution,
+    drop_estimates,
+    find_deviant,
+    level_estimates,
+)
 from thud.recordings.config import Config, checked_config
-from thud.recordings.excursion import check_peak, scan
-from thud.recordings.low_pass import describe_low_pass
+from thud.recordings.filters import describe_low_pass
 from thud.recordings.measure_drops import measure_signals
+from thud.recordings.polarity import check_peak, scan
 from thud.recordings.recorded_levels import average_levels, compare_methods, measure_levels
-from thud.recordings.restitution import DropConditions
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
@@ -39,8 +42,8 @@ if TYPE_CHECKING:
     from thud.level.assessment import Verdict
     from thud.level.estimate import Estimate
     from thud.recordings.checkpoint import Checkpoint
-    from thud.recordings.estimates import Drop
     from thud.recordings.measure_drops import Origin
+    from thud.recordings.measured_drop import Drop
     from thud.recordings.outliers import Outlier
     from thud.recordings.recorded_levels import AverageLevels
 
@@ -193,7 +196,7 @@ class Recording(Displayed):
     @property
     def impact_velocity(self) -> float:
         """Velocity at first touch by the stated drop height, m/s; NaN without it."""
-        return DropConditions(self.config.height).speed
+        return self.config.conditions(None).speed
 
     @property
     def velocity_tolerance(self) -> float:
@@ -237,7 +240,7 @@ class Recording(Displayed):
         known = sum(math.isfinite(drop.restitution.value) for drop in self.drops)
         if 0 < known < len(self.drops):
             found.append(f"the restitution is known of {known} of {len(self.drops)} drops")
-        found += told_restitution(self.drops, config, self.calibration_uncertainty)
+        found += check_restitution(self.drops, config.conditions(self.calibration_uncertainty))
         if config.mass is None and math.isfinite(self.estimates["mass"].value):
             found.append("the mass is not given: the effective mass is judged")
         found += [f"force plate: {one.sentence}" for one in config.plate_checks if one.met is False]
@@ -360,7 +363,7 @@ class Recording(Displayed):
 
     def plot(self, what: Literal["levels", "force"] = "levels") -> Figure:
         """Draw the levels of the drops over the tolerance band, or their forces."""
-        from thud.plot.recording_figure import recording_figure
+        from thud.plot.recordings import recording_figure
 
         return recording_figure(self, what)
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from thud.base._schema import BandSet, LimitsSource
     from thud.level.assessment import Criterion
     from thud.level.estimate import Estimate
-    from thud.recordings.estimates import Drop
+    from thud.recordings.measured_drop import Drop
     from thud.recordings.recording import Recording
 
 FORMAT = "thud calibration report 1"

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _HIDDEN = ("Spread", "Background")
 _PLURALS = {RESULTS[0]: "conform", RESULTS[1]: "do not conform"}
 DATASET = "recording.nc"
-_PAGE = (HTML, PDF, "force.png", "force.svg", "levels.png", "levels.svg")
+_PAGE = (HTML, PDF, "force.svg", "levels.svg")
 
 
 def drop_table(recording: Recording) -> list[tuple[str, ...]]:
@@ -186,11 +186,11 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
     }
     if figures and _has_matplotlib():
         # It takes its time.
-        from thud.plot.style import picture_files
+        from thud.plot.files import figure_files
 
         drawn = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
         contents |= page_contents(data, list(drawn.values()), results.folder)
-        contents |= picture_files(drawn)
+        contents |= figure_files(drawn)
     write_files(results, data, contents, file_names())
 
 

@@ -39,7 +39,7 @@ class Design(SampleResult):
     dataset : Dataset
         Every sample, on a grid of the two parameters in ascending order; ``margin`` is the minimum
         distance of an octave level to its limits, dB, and ``conforms`` the whole verdict; of a case
-        with a room ``standardised_rating`` is drawn, dB.
+        with a room ``standardized_rating`` is drawn, dB.
     axes : tuple of str
         The two parameters.
     mark : tuple of float or None

@@ -123,7 +123,7 @@ function _shtab_thud_driver_using
 end
 
 set -g _shtab_thud_driver_commands run compare explore measure calibrate export history rate floor mobility sweep sensitivity design uncertainty surrogate fit examples figures
-set -g _shtab_thud_driver_opts_with_value --backend --calibration --calibration-uncertainty --channel --config --drop --force --height --height-uncertainty --host --mass --mass-uncertainty --order --output --polarity --port --quantity --rate --sample-rate --scheduler --source --uncertainty --unit --volume --workers -o
+set -g _shtab_thud_driver_opts_with_value --backend --calibration --calibration-uncertainty --channel --config --drop --force --format --height --height-uncertainty --host --mass --mass-uncertainty --order --output --polarity --port --quantity --rate --sample-rate --scheduler --source --uncertainty --unit --volume --workers -o
 
 complete -c thud-driver -e
 complete -c thud-driver -f
@@ -136,6 +136,8 @@ complete -c thud-driver -n '_shtab_thud_driver_using run' -s o -l output -xka "(
 complete -c thud-driver -n '_shtab_thud_driver_using run' -l replace -d 'replace also files that thud has not written'
 complete -c thud-driver -n '_shtab_thud_driver_using run' -l check -d 'exit with 3 unless all sources conform'
 complete -c thud-driver -n '_shtab_thud_driver_using run' -l no-figures -d 'results only'
+complete -c thud-driver -n '_shtab_thud_driver_using run' -l format -xka "svg png pdf" -d 'format of the figures (default: svg)'
+complete -c thud-driver -n '_shtab_thud_driver_using run' -l all -d 'write also the quantities of the model against time (channels.csv), and every figure'
 complete -c thud-driver -n '_shtab_thud_driver_using run' -l animation -d 'also motion.gif, of cases with snapshots'
 complete -c thud-driver -n '_shtab_thud_driver_using run' -s q -l quiet -d 'show only errors and warnings'
 complete -c thud-driver -n '_shtab_thud_driver_using run; and test $_shtab_thud_driver_npos -ge 0' -ka "(_shtab_glob_compgen_8a67cfc2)" -d 'namelist files'
@@ -233,8 +235,8 @@ complete -c thud-driver -n '_shtab_thud_driver_using; and test $_shtab_thud_driv
 complete -c thud-driver -n '_shtab_thud_driver_using sweep' -s h -l help -d 'show this help message and exit'
 complete -c thud-driver -n '_shtab_thud_driver_using sweep' -s o -l output -xka "(__fish_complete_directories)" -d 'directory for the results; an interrupted study resumes there (default: outputs/<study name>)'
 complete -c thud-driver -n '_shtab_thud_driver_using sweep' -l replace -d 'replace also files that thud has not written'
-complete -c thud-driver -n '_shtab_thud_driver_using sweep' -l yes -d 'start without limit to the number of sets'
-complete -c thud-driver -n '_shtab_thud_driver_using sweep' -l backend -xka "threads processes dask" -d 'how sets are computed; the results are the same (default: threads)'
+complete -c thud-driver -n '_shtab_thud_driver_using sweep' -l yes -d 'start without limit to the number of samples'
+complete -c thud-driver -n '_shtab_thud_driver_using sweep' -l backend -xka "threads processes dask" -d 'how samples are computed; the results are the same (default: threads)'
 complete -c thud-driver -n '_shtab_thud_driver_using sweep' -l workers -x -d 'threads or processes'
 complete -c thud-driver -n '_shtab_thud_driver_using sweep' -l scheduler -x -d 'of Dask, tcp://host:8786'
 complete -c thud-driver -n '_shtab_thud_driver_using sweep' -l no-figures -d 'results only'
@@ -244,8 +246,8 @@ complete -c thud-driver -n '_shtab_thud_driver_using; and test $_shtab_thud_driv
 complete -c thud-driver -n '_shtab_thud_driver_using sensitivity' -s h -l help -d 'show this help message and exit'
 complete -c thud-driver -n '_shtab_thud_driver_using sensitivity' -s o -l output -xka "(__fish_complete_directories)" -d 'directory for the results; an interrupted study resumes there (default: outputs/<study name>)'
 complete -c thud-driver -n '_shtab_thud_driver_using sensitivity' -l replace -d 'replace also files that thud has not written'
-complete -c thud-driver -n '_shtab_thud_driver_using sensitivity' -l yes -d 'start without limit to the number of sets'
-complete -c thud-driver -n '_shtab_thud_driver_using sensitivity' -l backend -xka "threads processes dask" -d 'how sets are computed; the results are the same (default: threads)'
+complete -c thud-driver -n '_shtab_thud_driver_using sensitivity' -l yes -d 'start without limit to the number of samples'
+complete -c thud-driver -n '_shtab_thud_driver_using sensitivity' -l backend -xka "threads processes dask" -d 'how samples are computed; the results are the same (default: threads)'
 complete -c thud-driver -n '_shtab_thud_driver_using sensitivity' -l workers -x -d 'threads or processes'
 complete -c thud-driver -n '_shtab_thud_driver_using sensitivity' -l scheduler -x -d 'of Dask, tcp://host:8786'
 complete -c thud-driver -n '_shtab_thud_driver_using sensitivity' -l no-figures -d 'results only'
@@ -255,8 +257,8 @@ complete -c thud-driver -n '_shtab_thud_driver_using; and test $_shtab_thud_driv
 complete -c thud-driver -n '_shtab_thud_driver_using design' -s h -l help -d 'show this help message and exit'
 complete -c thud-driver -n '_shtab_thud_driver_using design' -s o -l output -xka "(__fish_complete_directories)" -d 'directory for the results; an interrupted study resumes there (default: outputs/<study name>)'
 complete -c thud-driver -n '_shtab_thud_driver_using design' -l replace -d 'replace also files that thud has not written'
-complete -c thud-driver -n '_shtab_thud_driver_using design' -l yes -d 'start without limit to the number of sets'
-complete -c thud-driver -n '_shtab_thud_driver_using design' -l backend -xka "threads processes dask" -d 'how sets are computed; the results are the same (default: threads)'
+complete -c thud-driver -n '_shtab_thud_driver_using design' -l yes -d 'start without limit to the number of samples'
+complete -c thud-driver -n '_shtab_thud_driver_using design' -l backend -xka "threads processes dask" -d 'how samples are computed; the results are the same (default: threads)'
 complete -c thud-driver -n '_shtab_thud_driver_using design' -l workers -x -d 'threads or processes'
 complete -c thud-driver -n '_shtab_thud_driver_using design' -l scheduler -x -d 'of Dask, tcp://host:8786'
 complete -c thud-driver -n '_shtab_thud_driver_using design' -l no-figures -d 'results only'
@@ -266,8 +268,8 @@ complete -c thud-driver -n '_shtab_thud_driver_using; and test $_shtab_thud_driv
 complete -c thud-driver -n '_shtab_thud_driver_using uncertainty' -s h -l help -d 'show this help message and exit'
 complete -c thud-driver -n '_shtab_thud_driver_using uncertainty' -s o -l output -xka "(__fish_complete_directories)" -d 'directory for the results; an interrupted study resumes there (default: outputs/<study name>)'
 complete -c thud-driver -n '_shtab_thud_driver_using uncertainty' -l replace -d 'replace also files that thud has not written'
-complete -c thud-driver -n '_shtab_thud_driver_using uncertainty' -l yes -d 'start without limit to the number of sets'
-complete -c thud-driver -n '_shtab_thud_driver_using uncertainty' -l backend -xka "threads processes dask" -d 'how sets are computed; the results are the same (default: threads)'
+complete -c thud-driver -n '_shtab_thud_driver_using uncertainty' -l yes -d 'start without limit to the number of samples'
+complete -c thud-driver -n '_shtab_thud_driver_using uncertainty' -l backend -xka "threads processes dask" -d 'how samples are computed; the results are the same (default: threads)'
 complete -c thud-driver -n '_shtab_thud_driver_using uncertainty' -l workers -x -d 'threads or processes'
 complete -c thud-driver -n '_shtab_thud_driver_using uncertainty' -l scheduler -x -d 'of Dask, tcp://host:8786'
 complete -c thud-driver -n '_shtab_thud_driver_using uncertainty' -l no-figures -d 'results only'
@@ -277,8 +279,8 @@ complete -c thud-driver -n '_shtab_thud_driver_using; and test $_shtab_thud_driv
 complete -c thud-driver -n '_shtab_thud_driver_using surrogate' -s h -l help -d 'show this help message and exit'
 complete -c thud-driver -n '_shtab_thud_driver_using surrogate' -s o -l output -xka "(__fish_complete_directories)" -d 'directory for the results; an interrupted study resumes there (default: outputs/<study name>)'
 complete -c thud-driver -n '_shtab_thud_driver_using surrogate' -l replace -d 'replace also files that thud has not written'
-complete -c thud-driver -n '_shtab_thud_driver_using surrogate' -l yes -d 'start without limit to the number of sets'
-complete -c thud-driver -n '_shtab_thud_driver_using surrogate' -l backend -xka "threads processes dask" -d 'how sets are computed; the results are the same (default: threads)'
+complete -c thud-driver -n '_shtab_thud_driver_using surrogate' -l yes -d 'start without limit to the number of samples'
+complete -c thud-driver -n '_shtab_thud_driver_using surrogate' -l backend -xka "threads processes dask" -d 'how samples are computed; the results are the same (default: threads)'
 complete -c thud-driver -n '_shtab_thud_driver_using surrogate' -l workers -x -d 'threads or processes'
 complete -c thud-driver -n '_shtab_thud_driver_using surrogate' -l scheduler -x -d 'of Dask, tcp://host:8786'
 complete -c thud-driver -n '_shtab_thud_driver_using surrogate' -l no-figures -d 'results only'
@@ -299,4 +301,5 @@ complete -c thud-driver -n '_shtab_thud_driver_using; and test $_shtab_thud_driv
 complete -c thud-driver -n '_shtab_thud_driver_using figures' -s h -l help -d 'show this help message and exit'
 complete -c thud-driver -n '_shtab_thud_driver_using figures' -s o -l output -xka "(__fish_complete_directories)" -d 'directory for the figures (default: outputs/figures)'
 complete -c thud-driver -n '_shtab_thud_driver_using figures' -l replace -d 'replace also files that thud has not written'
+complete -c thud-driver -n '_shtab_thud_driver_using figures' -l format -xka "svg png pdf" -d 'format of the figures (default: svg)'
 complete -c thud-driver -n '_shtab_thud_driver_using figures' -s q -l quiet -d 'show only errors and warnings'

@@ -9,10 +9,11 @@ module thud_hollow_sphere
    use thud_field, only: field_type, name_length
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_lumped, only: at_deflection, at_impulse, at_loss, at_velocity, lumped_type, solve_lumped
+   use thud_lumped, only: solve_lumped
    use thud_new_field, only: choice_field
    use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
+   use thud_single_mass, only: at_deflection, at_impulse, at_loss, at_velocity, single_mass_type
    use thud_source_model, only: source_model_type
    use thud_text, only: fixed, join_quoted, quoted, to_text
    use thud_theory_limit, only: get_gravity_limit, get_wall_limits, theory_limit_type
@@ -44,7 +45,7 @@ module thud_hollow_sphere
    real(wp), parameter :: restitution_weights(4) = [1.0_wp, 0.0_wp, 0.5_wp, 0.0_wp]
 
    !> Equation of motion of the shell (paper eq. 3) for one phase of the impact.
-   type, extends(lumped_type) :: shell_type
+   type, extends(single_mass_type) :: shell_type
       !> Outer radius R, m.
       real(wp) :: radius = 0.0_wp
       !> Deflection at which the flat cap meets the opposite wall and the cavity is closed, m.
@@ -61,7 +62,7 @@ module thud_hollow_sphere
       real(wp) :: compression_weight = 0.0_wp, restitution_weight = 0.0_wp
    contains
       procedure :: get_derivative
-      procedure :: get_parts
+      procedure :: get_components
       procedure :: get_failure
    end type shell_type
 
@@ -69,9 +70,7 @@ contains
 
    !> The one key.
    function get_fields(options) result(fields)
-      !> The options that the fields read and set.
       class(hollow_sphere_type), intent(in), target :: options
-      !> One field per component: [1].
       type(field_type), allocatable :: fields(:)
 
       fields = [choice_field('momentum_flux', options%momentum_flux, &
@@ -81,7 +80,6 @@ contains
    !> Modulus of elasticity of the paper's ball, Pa (section 2.3).
    function get_paper_modulus(options) result(modulus)
       class(hollow_sphere_type), intent(in) :: options
-      !> The modulus, Pa.
       real(wp) :: modulus
 
       modulus = 1.6e6_wp
@@ -93,9 +91,7 @@ contains
       type(drop_type), intent(in) :: drop
       class(hollow_sphere_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> The answer.
       type(force_history_type), intent(in) :: history
-      !> The limits: [n_limit].
       type(theory_limit_type), allocatable :: limits(:)
 
       limits = [theory_limit_type('ball', 'wall_thickness over outer_radius', ball%wall_thickness/ball%outer_radius, &
@@ -105,15 +101,10 @@ contains
 
    !> Force on each of two plates that press the shell slowly: each flattens a cap of half their approach.
    subroutine compress(ball, options, deflection, force, error)
-      !> The ball, with the gas that it has in the press.
       type(ball_type), intent(in) :: ball
-      !> The options, none of which counts.
       class(hollow_sphere_type), intent(in) :: options
-      !> Approach of the plates, ascending, m: [n].
       real(wp), intent(in) :: deflection(:)
-      !> The force, N: [n].
       real(wp), intent(out) :: force(:)
-      !> The caps meet.
       type(error_type), allocatable, intent(out) :: error
       type(shell_type) :: shell
       integer :: i
@@ -210,13 +201,9 @@ contains
    !> m = M (1 - deflection/2R).
    pure subroutine get_derivative(self, time, state, rate, valid)
       class(shell_type), intent(in) :: self
-      !> Time since first touch, s; the equation does not depend on it.
       real(wp), intent(in) :: time
-      !> Deflection (m), velocity (m/s), impulse (N s), energy loss (J): [4].
       real(wp), intent(in) :: state(:)
-      !> Derivative of the state: [4].
       real(wp), intent(out) :: rate(:)
-      !> False where the shell is closed.
       logical, intent(out) :: valid
       real(wp) :: elastic_force, flux, moving_mass, weight
 
@@ -238,20 +225,18 @@ contains
    end subroutine get_derivative
 
    !> Shell, gas and flux force of one instant.
-   pure subroutine get_parts(self, state, parts, elastic_force)
-      !> The shell in its present phase.
+   pure subroutine get_components(self, state, components, elastic_force)
       class(shell_type), intent(in) :: self
-      !> State, see `thud_lumped`: [4].
       real(wp), intent(in) :: state(:)
       !> F_B, F_G and the flux of momentum into the floor, N: [3].
-      real(wp), intent(out) :: parts(:)
+      real(wp), intent(out) :: components(:)
       !> F_B + F_G (paper eq. 1), N.
       real(wp), intent(out) :: elastic_force
 
-      parts = [self%stiffness*state(at_deflection), get_gas_force(self, state(at_deflection)), &
+      components = [self%stiffness*state(at_deflection), get_gas_force(self, state(at_deflection)), &
          (1 - get_flux_weight(self))*self%mass/(2*self%radius)*state(at_velocity)**2]
-      elastic_force = parts(1) + parts(2)
-   end subroutine get_parts
+      elastic_force = components(1) + components(2)
+   end subroutine get_components
 
    !> Factor s of the flux term in the present phase.
    pure function get_flux_weight(shell) result(weight)
@@ -276,9 +261,7 @@ contains
    function get_failure(self, drop, time, state) result(error)
       class(shell_type), intent(in) :: self
       type(drop_type), intent(in) :: drop
-      !> Time since first touch, s.
       real(wp), intent(in) :: time
-      !> Last valid state: [4].
       real(wp), intent(in) :: state(:)
       type(error_type) :: error
 
@@ -295,15 +278,10 @@ contains
    subroutine solve_hollow_sphere(ball, drop, options, sampling, history, error, receiver)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
-      !> The choice of momentum flux.
       class(hollow_sphere_type), intent(in) :: options
-      !> Sampling rate, length of the record, substeps.
       type(sampling_type), intent(in) :: sampling
-      !> Force and motion from first touch on.
       type(force_history_type), intent(out) :: history
-      !> The shell closes, the contact outlasts the record, or the steps are too coarse.
       type(error_type), allocatable, intent(out) :: error
-      !> What the source drops on (default: a rigid floor).
       type(receiver_type), intent(in), optional :: receiver
       type(shell_type) :: shell
       integer :: choice

@@ -4,10 +4,10 @@ module thud_impact_batch
    use thud_constants, only: pi
    use thud_hollow_sphere, only: shell_type
    use thud_kinds, only: wp
-   use thud_lumped, only: at_deflection, at_velocity
    use thud_rk4, only: rk4_step
    use thud_shell_batch, only: batch_size, shell_batch_type, state_batch_type
    use thud_shell_series, only: get_flows, place_series, series_batch_type, take_step
+   use thud_single_mass, only: at_deflection, at_velocity
    implicit none (type, external)
    private
 

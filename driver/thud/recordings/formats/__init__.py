@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from thud.base.checks import refuse
 from thud.recordings.channel import Channel, guarded, shown_path
-from thud.recordings.probe import look
+from thud.recordings.probe import probe_in_subprocess
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,16 +30,16 @@ class Format(NamedTuple):
         Suffixes that promise it.
     begins : callable
         Whether the first bytes of a file are its own.
-    looks : bool
-        Whether its library hangs, dies or fills memory on damaged files, and looks first in a
-        process of its own.
+    is_probed : bool
+        Whether its library may hang, crash or fill memory on damaged files, so that it is probed in
+        a subprocess first.
     """
 
     name: str
     module: str
     suffixes: tuple[str, ...]
     begins: Callable[[bytes], bool]
-    looks: bool = False
+    is_probed: bool = False
 
 
 def _is_uff(head: bytes) -> bool:
@@ -60,8 +60,9 @@ FORMATS = (
     Format("TDMS", "tdms", (".tdms",), lambda head: head[:4] == b"TDSm"),
     Format("HDF5", "hdf5", (".h5", ".hdf5", ".hdf", ".nc", ".nc4"),
            lambda head: any(head[at : at + 8] == HDF5 for at in (0, 512, 1024, 2048)),
-           looks=True),
-    Format("MATLAB", "matlab", (".mat",), lambda head: head[124:128] in {b"\0\1IM", b"\1\0MI"}),
+           is_probed=True),
+    Format("MATLAB", "matlab", (".mat",),
+           lambda head: head[124:128] in {b"\0\1IM", b"\1\0MI"}, is_probed=True),
     Format("universal", "universal", (".uff", ".unv", ".uf"), _is_uff),
     Format("text", "text", (".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm", ".prn"), _is_text),
 )  # fmt: skip
@@ -97,8 +98,8 @@ def read_channels(path: Path) -> list[Channel]:
         what = f"is no {promised.name} file" if promised else "is of no known format"
         refuse(f"{name}: {what} by its first bytes", f"{kinds} files")
     module = importlib.import_module(f"{__name__}.{found.module}")
-    if found.looks:
-        look(lambda file: _touch(module.read_channels(file)), path, found.name)
+    if found.is_probed:
+        probe_in_subprocess(lambda file: _touch(module.read_channels(file)), path, found.name)
     with guarded(path, found.name):
         channels: list[Channel] = module.read_channels(path)
         return channels

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from thud.base.immutable import freeze
-from thud.recordings.contact import QUIET, cells_between
+from thud.recordings.contact import MAX_BACKGROUND, cells_between
 from thud.recordings.drops import CELL, FOOT, MARGIN
 from thud.recordings.noise import (
     DRIFT,
@@ -113,7 +113,7 @@ class Quiet:
     def seconds(self) -> float:
         """Length of the quiet that counts, s."""
         sides = (self.pulse[0] / self.rate, (len(self.force) - self.pulse[1]) / self.rate)
-        return sum(min(side, QUIET) for side in sides)
+        return sum(min(side, MAX_BACKGROUND) for side in sides)
 
     @property
     def freedom(self) -> int:
@@ -144,7 +144,7 @@ class Quiet:
         """
         width = max(1, int(self.rate / (2 * self.below)))
         first, stop = self.pulse
-        most = int(QUIET * self.rate)
+        most = int(MAX_BACKGROUND * self.rate)
         counts = [min(length, most) // width for length in (first, len(self.force) - stop)]
         edges = (
             first - width * np.arange(1 + counts[0])[::-1],
@@ -265,9 +265,9 @@ def _trendless(cells: Cells) -> Array:
 
 def _covariance(background: Background) -> Array:
     """Return the covariance of quiet cells, offset and drift with it, N2."""
-    middle = (background.quiet[0] + background.quiet[1]) / 2
+    middle = (background.cells[0] + background.cells[1]) / 2
     trend = OFFSET**2 + DRIFT**2 * np.multiply.outer(middle, middle)
-    parts = np.tensordot(background.variances, covariances(background.quiet), 1)
+    parts = np.tensordot(background.variances, covariances(background.cells), 1)
     return np.asarray(parts + background.peak**2 * trend, dtype=np.float64)
 
 
@@ -288,7 +288,7 @@ def _log_likelihood(background: Background) -> float:
 def trimmed(force: Array, rate: float) -> slice:
     """Return the part of a record that holds the pulse and the quiet which counts."""
     first, stop = find_pulse(force, rate)
-    room = int(QUIET * rate)
+    room = int(MAX_BACKGROUND * rate)
     return slice(max(first - room, 0), min(stop + room, len(force)))
 
 

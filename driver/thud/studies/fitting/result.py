@@ -303,9 +303,9 @@ class Fit(Estimates):
         contents = self.files()
         if figures:
             with left_out("the figure of the fit"):
-                from thud.plot import picture_files
+                from thud.plot import figure_files
 
-                contents |= picture_files(self.figures())
+                contents |= figure_files(self.figures())
         return Results(Path(directory), "fit", replace=replace).write(contents)
 
 

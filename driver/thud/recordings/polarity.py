@@ -1,0 +1,118 @@
+"""Extremes of a channel: its polarity, and whether they are plausible forces of a source."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.base.checks import refuse
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+# Peak forces of heavy/soft sources, N: from drops of some centimetres to the tyre on stiff floors.
+PEAKS = (300.0, 15000.0)
+# Factor outside of these that no drop height explains.
+MAX_FACTOR = 20.0
+THOUSAND = 1000.0
+POLARITIES = {"positive": 1.0, "negative": -1.0}
+# Minimum ratio of the two peaks that shows the sign.
+CLEAR = 1.5
+# Samples that are read at once, and that show the background level.
+BLOCK = 2**18
+SAMPLED = 2**16
+# Fraction of a file at each end that shows the background level.
+EDGE = 0.01
+
+
+@dataclass(frozen=True)
+class Extremes:
+    """Minimum, maximum and background level of a channel, in its own unit."""
+
+    low: float
+    high: float
+    background: float
+
+    def peak(self, scale: float) -> float:
+        """Return the positive peak above the background, N."""
+        # Never -0.
+        return (
+            max((self.high - self.background) * scale, (self.low - self.background) * scale) + 0.0
+        )
+
+
+def scan(samples: Callable[[int, int], NDArray[np.float64]], count: int, name: str) -> Extremes:
+    """Read a channel once; raise InputError where a value is not finite or all are equal."""
+    low, high = np.inf, -np.inf
+    stride = max(1, count // SAMPLED)
+    thinned = []
+    for start in range(0, count, BLOCK):
+        stop = min(count, start + BLOCK)
+        block = samples(start, stop)
+        if block.shape != (stop - start,):
+            refuse(f"{name}: is cut off at sample {start + block.size + 1}", "a complete file")
+        minimum, maximum = float(block.min()), float(block.max())
+        if not (np.isfinite(minimum) and np.isfinite(maximum)):
+            index = start + int(np.flatnonzero(~np.isfinite(block))[0])
+            refuse(f"{name}: sample {index + 1} is not finite", "real numbers")
+        low, high = min(low, minimum), max(high, maximum)
+        thinned.append(block[-start % stride :: stride].copy())
+    if low == high:
+        refuse(f"{name}: all samples are {low:g}", "a recording of drops")
+    thin = np.concatenate(thinned)
+    edge = max(1, int(EDGE * thin.size))
+    # A record filled by the pulse shows the background at one end only, one of many drops overall.
+    levels = [float(np.median(section)) for section in (thin[:edge], thin[-edge:], thin)]
+    middle = low + (high - low) / 2
+    return Extremes(low, high, max(levels, key=lambda level: abs(level - middle)))
+
+
+def find_sign(
+    seen: Extremes, scale: float, polarity: str | None, name: str
+) -> tuple[float, tuple[str, ...]]:
+    """Return the sign that makes a compression positive, and notes."""
+    # The polarity is that of the recorded values, before the calibration.
+    if polarity is not None:
+        sign = POLARITIES[polarity] * float(np.sign(scale))
+        changed = f"The sign was changed: polarity = {polarity!r}."
+        return sign, (changed,) if sign * scale < 0 else ()
+    up, down = seen.peak(scale), seen.peak(-scale)
+    if max(up, down) < CLEAR * min(up, down):
+        refuse(
+            f"{name}: the sign is not clear, the force goes {up:.4g} N up and {down:.4g} N down",
+            "polarity = 'positive' or 'negative', the sign of a compression",
+        )
+    if up > down:
+        return 1.0, ()
+    return -1.0, (f"The sign was changed: the largest peak, {-down:.4g} N, is negative.",)
+
+
+def check_peak(seen: Extremes, scale: float, name: str, *, assumed: bool) -> tuple[str, ...]:
+    """Return warnings about a peak force; `scale` is N per value, with its sign.
+
+    Raise InputError where the unit must be wrong, also where it is only assumed.
+    """
+    low, high = PEAKS
+    peak, other = seen.peak(scale), seen.peak(-scale)
+    allowed = f"{low:g} to {high:g} N for heavy/soft sources"
+    if assumed and not low <= peak <= high:
+        refuse(f"{name}: the values are without a unit and reach {peak:.4g}", f"{allowed}, or unit")
+    for ratio, likely in ((THOUSAND, "kN instead of N"), (1 / THOUSAND, "mN instead of N")):
+        if low <= peak * ratio <= high:
+            refuse(
+                f"{name}: the peak is {peak:.4g} N; the unit is probably wrong, {likely}", allowed
+            )
+    if not low / MAX_FACTOR <= peak <= high * MAX_FACTOR:
+        refuse(f"{name}: the peak is {peak:.4g} N; unit or calibration are wrong", allowed)
+    warnings: tuple[str, ...] = ()
+    if not low <= peak <= high:
+        warnings += (f"The peak is {peak:.4g} N; usual are {allowed}.",)
+    if other > CLEAR * peak:
+        warnings += (
+            f"The force goes {other:.4g} N down and {peak:.4g} N up; the polarity may be wrong.",
+        )
+    return warnings
