@@ -1,4 +1,4 @@
-"""Single numbers of the levels in the room below, and their standardisation."""
+"""Single numbers of the levels in the room below, and their standardization."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Rating(Displayed):
     korean_class : int or None
         Class 1 to 4 of KS F 2863-2 by A-weighted level (at most 37, 41, 45 and 49 dB), 0 for none;
         None for thirds, which that standard does not use. It is meant for levels that are not
-        standardised.
+        standardized.
     curve : int or None
         Rating of octaves by the inverse A-weighted curve that KS F 2863-2 used before, dB.
     """
@@ -87,7 +87,7 @@ def rating(levels: ArrayLike, bands: BandSet = "octave") -> Rating:
     ----------
     levels : array_like, shape (4,) or (12,)
         Maximum Fast levels of the octaves 63 to 500 Hz, or of the thirds 50 to 630 Hz, dB re
-        20 uPa: measured ones, or standardised ones.
+        20 uPa: measured ones, or standardized ones.
     bands
         ``"octave"`` or ``"third"``. Thirds are weighted one by one: maxima of thirds do not add up
         to those of octaves.
@@ -124,7 +124,7 @@ def rating(levels: ArrayLike, bands: BandSet = "octave") -> Rating:
     )
 
 
-def standardised_level(
+def standardized_level(
     level: ArrayLike, reverberation_time: ArrayLike, volume: float
 ) -> NDArray[np.float64]:
     """Return levels in a room of 50 m3 with a reverberation time of 0.5 s (ISO 16283-2).
@@ -144,7 +144,7 @@ def standardised_level(
     Returns
     -------
     ndarray, shape (n,)
-        Standardised levels, dB.
+        Standardized levels, dB.
 
     Raises
     ------
@@ -162,11 +162,11 @@ def standardised_level(
         )
     if (times <= 0).any():
         refuse_value("reverberation_time", float(times.min()), "reverberation_time > 0, s")
-    standardised: NDArray[np.float64]
-    standardised = ask(
+    standardized: NDArray[np.float64]
+    standardized = ask(
         "standardization", levels=values, reverberation_time=times, volume=require_volume(volume)
     )["levels"]
-    return standardised
+    return standardized
 
 
 def require_volume(volume: Any) -> float:  # noqa: ANN401 - of a user
