@@ -272,6 +272,10 @@ class Recording(Displayed):
         rates = dict.fromkeys(drop.sample_rate for drop in self.drops)
         return tuple(dict.fromkeys(f"levels: {describe_low_pass(rate)}" for rate in rates))
 
+    def quantity(self, name: str) -> float:
+        """Return a quantity of the table by its name, SI units; NaN if unknown."""
+        return float(getattr(self, name, math.nan))
+
     def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - there is one
         """Return the force of the first drop, corrected, N, shape (n_sample,), for any `kind`."""
         return self.drops[0].force
