@@ -50,8 +50,8 @@ contains
    end subroutine answer_effective_case
 
    !> The run of the namelist file `path`, as by the executable, to the directory `output`; with the numbers `replace`,
-   !> `channels` and `progress` not 0 it replaces files of others, writes the channels of the histories, and shows progress on a
-   !> terminal.
+   !> `channels` and `progress` not 0 it replaces files of others, writes the channels of the histories, and shows progress
+   !> on a terminal.
    subroutine answer_run(request, bundle, error)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
@@ -74,8 +74,8 @@ contains
       call bundle%add_text('case', text)
       call bundle%add_text('directory', outcome%directory)
       call bundle%add_text('table', outcome%table)
-      do i = 1, outcome%n_remark
-         call bundle%add_text('run_remarks.'//to_text(i), outcome%remarks(i)%text)
+      do i = 1, outcome%n_message
+         call bundle%add_text('messages.'//to_text(i), outcome%messages(i)%text)
       end do
       call bundle%add_number('conforms', merge(1.0_wp, 0.0_wp, outcome%conforms))
       call add_results(bundle, case, results)

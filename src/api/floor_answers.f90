@@ -13,9 +13,9 @@ module thud_floor_answers
    use thud_mobility_fit, only: fit_mobility
    use thud_plate, only: get_critical_frequency, get_plate_radiation, get_surface_mass, get_total_loss, plate_type
    use thud_receiver, only: get_mobility, receiver_type
-   use thud_remarks, only: add_floor_remark, remark_length
+   use thud_warnings, only: add_floor_warning, warning_length
    use thud_request, only: request_type
-   use thud_result_bundle, only: add_history, add_remarks, add_room_level
+   use thud_result_bundle, only: add_history, add_warnings, add_room_level
    use thud_room, only: get_room_bands, room_level_type
    implicit none (type, external)
    private
@@ -116,15 +116,15 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(room_level_type) :: prediction
       type(band_type), allocatable :: bands(:)
-      character(len=remark_length), allocatable :: remarks(:)
+      character(len=warning_length), allocatable :: warnings(:)
 
       call get_room_bands(bands, error)
       if (.not. allocated(error)) call predict_room_level(case, bands, request%get_array('levels'), prediction, error)
       if (allocated(error)) return
       call add_room_level(bundle, prediction)
-      allocate (remarks(0))
-      call add_floor_remark(case, remarks)
-      call add_remarks(bundle, remarks)
+      allocate (warnings(0))
+      call add_floor_warning(case, warnings)
+      call add_warnings(bundle, warnings)
    end subroutine answer_room_level
 
    !> The plate of a floor that radiates into the room below, at `frequency`, Hz.

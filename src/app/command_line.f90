@@ -94,8 +94,8 @@ contains
             exit_code = error%code
             return
          end if
-         do i = 1, outcome%n_remark
-            call write_line(standard_error, 'thud: '//outcome%remarks(i)%text, exit_code)
+         do i = 1, outcome%n_message
+            call write_line(standard_error, 'thud: '//outcome%messages(i)%text, exit_code)
          end do
          if (.not. request%quiet) call write_line(standard_output, outcome%table//'  Results: ' &
             //outcome%directory, exit_code)

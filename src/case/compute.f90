@@ -13,7 +13,7 @@ module thud_compute
    use thud_memory, only: require_memory
    use thud_plate, only: plate_type
    use thud_receiver, only: is_rigid, receiver_type
-   use thud_remarks, only: get_remarks, remark_length
+   use thud_warnings, only: get_warnings, warning_length
    use thud_room, only: check_below, get_room_bands, get_room_level, room_level_type
    use thud_sampling, only: get_sample_count
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
@@ -69,8 +69,8 @@ module thud_compute
       type(room_level_type) :: room
       !> Quasi-static compression, where it is asked for.
       type(compression_type) :: compression
-      !> What is possible but not plausible: [n_remark].
-      character(len=remark_length), allocatable :: remark(:)
+      !> What is possible but not plausible: [n_warning].
+      character(len=warning_length), allocatable :: warning(:)
    end type results_type
 
 contains
@@ -92,7 +92,7 @@ contains
       if (case%has_impact .and. .not. allocated(error)) call compute_impact(case, scope, results%impact, error)
       if (case%has_impact .and. .not. allocated(error)) call compute_floor(case, scope, results%impact, &
          results%on_floor, results%floor, results%room, error)
-      if (.not. allocated(error)) call get_remarks(case, results%impact%history, results%remark, results%on_floor)
+      if (.not. allocated(error)) call get_warnings(case, results%impact%history, results%warning, results%on_floor)
    end subroutine compute
 
    !> The drop of a case on a rigid floor, and its assessment.

@@ -6,8 +6,8 @@ module thud_double_plate
    use thud_kinds, only: wp
    use thud_modal_receiver, only: new_modal_receiver
    use thud_plate, only: air_type, get_bending_stiffness, get_surface_mass, get_total_loss, plate_type
-   use thud_plate_modes, only: check_losses, check_mode_count, far, get_far_compliance, get_half_waves, &
-      get_modal_stiffness, get_shape, mode_limit, rest_corner
+   use thud_plate_modes, only: far, get_far_compliance, get_half_waves, get_modal_stiffness, get_shape, mode_limit, &
+      residual_corner
    use thud_receiver, only: receiver_type
    implicit none (type, external)
    private
@@ -37,48 +37,39 @@ contains
    !>
    !> Both plates have the same shapes, and each shape two modes: those of two masses on three springs. A mode takes the mean
    !> of the loss factors of plates and layer, by their shares of its elastic energy; with equal shapes this is off by the
-   !> square of what the loss factors differ. The rest is as that of one plate.
+   !> square of what the loss factors differ. Residual modes are as those of one plate.
    subroutine new_double_receiver(floor, source, point, receiver, error)
       type(double_plate_type), intent(in) :: floor
-      !> Places of source and point, over length and width.
+      !> Positions of source and point, over length and width.
       real(wp), intent(in) :: source(2), point(2)
       type(receiver_type), intent(out) :: receiver
-      !> There are too many modes, or the losses are too high.
+      !> The losses are too high.
       type(error_type), allocatable, intent(out) :: error
       integer, allocatable :: m(:), n(:)
-      real(wp), allocatable :: shape(:), omega(:, :), share(:, :), loss_factor(:, :), gain(:, :)
+      real(wp), allocatable :: omega(:, :), share(:, :), loss_factor(:, :), gain(:, :)
       logical, allocatable :: single(:, :)
-      real(wp) :: rest
+      real(wp) :: compliance
 
-      call get_all_half_waves(floor, m, n, error)
-      if (allocated(error)) return
+      call get_all_half_waves(floor, m, n)
       allocate (omega(size(m), 2), share(size(m), 2), loss_factor(size(m), 2))
-      call get_mode_pairs(floor, get_modal_stiffness(floor%upper, m, n), get_modal_stiffness(floor%lower, m, n), omega, &
-         share, loss_factor)
+      call get_pair(floor, get_modal_stiffness(floor%upper, m, n), get_modal_stiffness(floor%lower, m, n), omega(:, 1), &
+         omega(:, 2), share(:, 1), share(:, 2), loss_factor(:, 1), loss_factor(:, 2))
       single = omega < 2*pi*mode_limit
-      call check_losses('floating_floor', pack(omega, single), pack(loss_factor, single), error)
-      if (allocated(error)) return
-      shape = get_shape(m, n, source)*get_shape(m, n, point)
-      gain = 4/(floor%upper%length*floor%upper%width)*share*spread(shape, 2, 2)
-      rest = sum(gain/omega**2, mask=.not. single)
-      if (all(abs(source - point) < epsilon(1.0_wp))) rest = rest + get_far_compliance(floor%upper)
-      call new_modal_receiver(pack(gain, single), pack(omega, single), pack(loss_factor, single), rest, rest_corner, &
-         receiver)
+      gain = 4/(floor%upper%length*floor%upper%width)*share*spread(get_shape(m, n, source)*get_shape(m, n, point), 2, 2)
+      compliance = sum(gain/omega**2, mask=.not. single)
+      if (all(abs(source - point) < epsilon(1.0_wp))) compliance = compliance + get_far_compliance(floor%upper)
+      call new_modal_receiver('floating_floor', pack(gain, single), pack(omega, single), pack(loss_factor, single), &
+         [compliance, residual_corner], receiver, error)
    end subroutine new_double_receiver
 
    !> Half waves of the upper plate's modes up to far above the limit, and those that only the lower one has below it.
-   subroutine get_all_half_waves(floor, m, n, error)
+   pure subroutine get_all_half_waves(floor, m, n)
       type(double_plate_type), intent(in) :: floor
       !> Half waves along length and width: [n_shape].
       integer, allocatable, intent(out) :: m(:), n(:)
-      !> There are too many.
-      type(error_type), allocatable, intent(out) :: error
       integer, allocatable :: m_lower(:), n_lower(:)
       logical, allocatable :: new(:)
 
-      call check_mode_count('floating_floor', floor%upper, error)
-      if (.not. allocated(error)) call check_mode_count('floating_floor', floor%lower, error)
-      if (allocated(error)) return
       call get_half_waves(floor%upper, far*mode_limit, m, n)
       call get_half_waves(floor%lower, mode_limit, m_lower, n_lower)
       new = get_modal_stiffness(floor%upper, m_lower, n_lower) &
@@ -118,18 +109,6 @@ contains
          loss_1 = get_loss(floor, omega_1, upper*top**2, lower*bottom**2, s*(top - bottom)**2)
       end associate
    end subroutine get_pair
-
-   !> The two modes of many shapes.
-   pure subroutine get_mode_pairs(floor, upper, lower, omega, share, loss_factor)
-      type(double_plate_type), intent(in) :: floor
-      !> As in `get_pair`: [n_shape].
-      real(wp), intent(in) :: upper(:), lower(:)
-      !> As in `get_pair`: [n_shape, 2].
-      real(wp), intent(out) :: omega(:, :), share(:, :), loss_factor(:, :)
-
-      call get_pair(floor, upper, lower, omega(:, 1), omega(:, 2), share(:, 1), share(:, 2), loss_factor(:, 1), &
-         loss_factor(:, 2))
-   end subroutine get_mode_pairs
 
    !> Mean of the loss factors by elastic energy.
    elemental function get_loss(floor, omega, upper, lower, layer) result(loss_factor)

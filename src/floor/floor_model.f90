@@ -3,7 +3,7 @@
 !>
 !> A floor `<name>` is a module `thud_<name>_floor` with a type `<name>_floor_type` that extends this one (a name that
 !> ends with `_floor` gets no second one); the list `floor_models` in src/CMakeLists.txt makes it known. Its options belong
-!> to the group of its name.
+!> to the group of its name. What is said here of the arguments of a procedure holds for those of every floor.
 module thud_floor_model
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type

@@ -25,7 +25,6 @@ contains
    !> Keys and allowed ranges of the group `&infinite_plate`.
    function get_fields(options) result(fields)
       class(infinite_plate_floor_type), intent(in), target :: options
-      !> One field: [1].
       type(field_type), allocatable :: fields(:)
 
       fields = [real_field('resistance', options%resistance, 'N s/m', &
@@ -36,7 +35,6 @@ contains
    subroutine get_receiver(options, receiver, error)
       class(infinite_plate_floor_type), intent(in) :: options
       type(receiver_type), intent(out) :: receiver
-      !> Never.
       type(error_type), allocatable, intent(out) :: error
 
       receiver%direct = 1/options%resistance

@@ -3,15 +3,14 @@
 module thud_joist_floor
    use thud_constants, only: pi
    use thud_error, only: error_type
-   use thud_field, only: field_type, name_length
-   use thud_floor_model, only: floor_model_type, reason_length
+   use thud_field, only: field_type, key_length, name_length
+   use thud_floor_model, only: reason_length
    use thud_kinds, only: wp
-   use thud_modal_receiver, only: new_modal_receiver
    use thud_new_field, only: choice_field, real_field
-   use thud_plate, only: air_type, get_resistance, get_surface_mass, get_total_loss, plate_type
-   use thud_plate_modes, only: check_inside, check_losses, check_mode_count, far, get_half_waves, get_modal_stiffness, &
-      get_shape, mode_limit, rest_corner
+   use thud_plate, only: get_resistance, plate_type
+   use thud_plate_modes, only: new_plate_receiver
    use thud_receiver, only: receiver_type
+   use thud_rectangular_floor, only: rectangular_floor_type
    implicit none (type, external)
    private
 
@@ -25,7 +24,7 @@ module thud_joist_floor
    real(wp), parameter :: shear_ratio = 1.0_wp/16
 
    !> The floor; the defaults are chipboard screwed to softwood joists.
-   type, extends(floor_model_type) :: joist_floor_type
+   type, extends(rectangular_floor_type) :: joist_floor_type
       !> Span of the joists and width across them, m.
       real(wp) :: length = 4.0_wp, width = 5.0_wp
       !> Thickness of the sheathing, m; its density, kg/m3; its modulus of elasticity in bending, Pa.
@@ -38,14 +37,12 @@ module thud_joist_floor
       real(wp) :: connection = 0.1_wp
       !> Loss factor with that of the edges, without radiation.
       real(wp) :: loss_factor = 0.05_wp
-      !> Place of the source, over length and width; `sheathing` between two joists, or a `joist`.
-      real(wp) :: source_x = 0.5_wp, source_y = 0.5_wp
+      !> What the source drops on: `sheathing` between two joists, or a `joist`.
       character(len=name_length) :: source_on = 'sheathing'
    contains
       procedure, pass(options) :: get_fields
-      procedure, pass(options) :: check
-      procedure, pass(options) :: get_receiver
-      procedure, pass(options) :: get_transfer
+      procedure, pass(options) :: get_plates
+      procedure, pass(options) :: get_mobility_at
       procedure, pass(options) :: get_radiator
       procedure, pass(options) :: get_validity
    end type joist_floor_type
@@ -54,9 +51,7 @@ contains
 
    !> Keys and allowed ranges of the group `&joist_floor`.
    function get_fields(options) result(fields)
-      !> The options that the fields read and set.
       class(joist_floor_type), intent(in), target :: options
-      !> One field per component, and the points: [17].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
@@ -75,21 +70,21 @@ contains
          'composite action of sheathing and joists, from 0, loose, to 1, glued (EN 1995-1-1 annex B)', '[0, 1]'), &
          real_field('loss_factor', options%loss_factor, '', &
          'loss factor of the floor and its edges, without radiation', '(0, 1]'), &
-         real_field('source_x', options%source_x, '', 'relative source position along the joists', '(0, 1)'), &
-         real_field('source_y', options%source_y, '', 'relative source position across the joists', '(0, 1)'), &
+         options%get_source_fields(), &
          choice_field('source_on', options%source_on, &
          'impact location: sheathing between joists, or a joist', [character(len=9) :: 'sheathing', 'joist']), &
          options%get_point_fields()]
    end function get_fields
 
-   !> Refuses floors with too many modes.
-   subroutine check(options, error)
+   !> The smeared plate.
+   pure subroutine get_plates(options, group, plates)
       class(joist_floor_type), intent(in) :: options
-      !> Names the size.
-      type(error_type), allocatable, intent(out) :: error
+      character(len=key_length), intent(out) :: group
+      type(plate_type), allocatable, intent(out) :: plates(:)
 
-      call check_mode_count('joist_floor', get_smeared(options), error)
-   end subroutine check
+      group = 'joist_floor'
+      plates = [get_smeared(options)]
+   end subroutine get_plates
 
    !> The orthotropic plate with smeared joists, as thick as the sheathing.
    !>
@@ -141,9 +136,7 @@ contains
    !> Band in which joists can be smeared.
    subroutine get_validity(options, lowest, highest, reason)
       class(joist_floor_type), intent(in) :: options
-      !> Ends of the band, Hz.
       real(wp), intent(out) :: lowest, highest
-      !> What ends it.
       character(len=reason_length), intent(out) :: reason
 
       lowest = 0.0_wp
@@ -161,69 +154,25 @@ contains
          *sqrt(get_sheathing_stiffness(options)/(options%sheathing_density*options%sheathing_thickness))
    end function get_smeared_limit
 
-   !> What a source feels.
-   subroutine get_receiver(options, receiver, error)
+   !> Velocity of a point over the force of the source: modes of the smeared plate, across the joists at most as many half
+   !> waves as there are bays. Under a source on the sheathing the residual modes are those of the sheathing between two
+   !> joists: its static compliance, and the conductance of the infinite sheathing at high frequencies. Elsewhere they are
+   !> those of the smeared plate.
+   subroutine get_mobility_at(options, source, point, receiver, error)
       class(joist_floor_type), intent(in) :: options
+      real(wp), intent(in) :: source(2), point(2)
       type(receiver_type), intent(out) :: receiver
-      !> The losses are too high.
       type(error_type), allocatable, intent(out) :: error
 
-      call get_point_receiver(options, [options%source_x, options%source_y], .true., receiver, error)
-   end subroutine get_receiver
-
-   !> Velocity of another point: on or near a joist, as the smeared plate moves.
-   subroutine get_transfer(options, x, y, transfer, error)
-      class(joist_floor_type), intent(in) :: options
-      !> Place of the point, m.
-      real(wp), intent(in) :: x, y
-      type(receiver_type), intent(out) :: transfer
-      !> The point lies outside, or the losses are too high.
-      type(error_type), allocatable, intent(out) :: error
-
-      call check_inside('joist_floor', options%length, options%width, x, y, error)
-      if (.not. allocated(error)) call get_point_receiver(options, [x/options%length, y/options%width], .false., transfer, &
-         error)
-   end subroutine get_transfer
-
-   !> Modes of the smeared plate, across the joists at most as many half waves as there are bays. Under a source on the
-   !> sheathing the rest is that of the sheathing between two joists: its static compliance, and the conductance of the
-   !> infinite sheathing at high frequencies. Under one on a joist it is that of the smeared plate.
-   subroutine get_point_receiver(options, point, under_source, receiver, error)
-      class(joist_floor_type), intent(in) :: options
-      !> Place of the point, over length and width.
-      real(wp), intent(in) :: point(2)
-      !> The point is that of the source.
-      logical, intent(in) :: under_source
-      type(receiver_type), intent(out) :: receiver
-      !> There are too many modes, or the losses are too high.
-      type(error_type), allocatable, intent(out) :: error
-      type(plate_type) :: plate
-      integer, allocatable :: m(:), n(:)
-      real(wp), allocatable :: omega(:), gain(:), loss_factor(:)
-      logical, allocatable :: smeared(:), single(:)
-      real(wp) :: rest, corner
-
-      plate = get_smeared(options)
-      call check_mode_count('joist_floor', plate, error)
-      if (allocated(error)) return
-      call get_half_waves(plate, far*mode_limit, m, n)
-      omega = sqrt(get_modal_stiffness(plate, m, n)/get_surface_mass(plate))
-      smeared = n <= int(options%width/options%spacing)
-      single = smeared .and. omega < 2*pi*mode_limit
-      gain = 4/(get_surface_mass(plate)*plate%length*plate%width) &
-         *get_shape(m, n, [options%source_x, options%source_y])*get_shape(m, n, point)
-      loss_factor = get_total_loss(plate, air_type(), pack(omega, single)/(2*pi))
-      call check_losses('joist_floor', pack(omega, single), loss_factor, error)
-      if (allocated(error)) return
-      corner = rest_corner
-      if (under_source .and. options%source_on == 'sheathing') then
-         rest = get_local_compliance(options)
-         corner = get_local_corner(options)
-      else
-         rest = sum(gain/omega**2, mask=smeared .and. .not. single)
-      end if
-      call new_modal_receiver(pack(gain, single), pack(omega, single), loss_factor, rest, corner, receiver)
-   end subroutine get_point_receiver
+      associate (plate => get_smeared(options), n_bay => int(options%width/options%spacing))
+         if (options%source_on == 'sheathing' .and. all(abs(source - point) < epsilon(1.0_wp))) then
+            call new_plate_receiver('joist_floor', plate, source, point, receiver, error, n_bay, &
+               [get_local_compliance(options), get_local_corner(options)])
+         else
+            call new_plate_receiver('joist_floor', plate, source, point, receiver, error, n_bay)
+         end if
+      end associate
+   end subroutine get_mobility_at
 
    !> Resistance of the infinite sheathing without joists.
    pure function get_sheathing_resistance(options) result(resistance)
@@ -255,12 +204,9 @@ contains
    !> The smeared plate, which gets what it gets as an infinite one and what the sheathing gets between joists.
    subroutine get_radiator(options, frequency, plate, conductance, error)
       class(joist_floor_type), intent(in) :: options
-      !> Frequencies, Hz: [n].
       real(wp), intent(in) :: frequency(:)
       type(plate_type), intent(out) :: plate
-      !> The power over the mean square of the force, m/(N s): [n].
       real(wp), intent(out) :: conductance(:)
-      !> Never.
       type(error_type), allocatable, intent(out) :: error
 
       plate = get_smeared(options)

@@ -35,9 +35,7 @@ contains
 
    !> Keys and allowed ranges of the group `&measured_mobility`.
    function get_fields(options) result(fields)
-      !> The options that the fields read and set.
       class(measured_mobility_floor_type), intent(in), target :: options
-      !> One field per component: [7].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
@@ -57,7 +55,6 @@ contains
    !> Refuses lists that do not fit each other, and a mobility that is not passive.
    subroutine check(options, error)
       class(measured_mobility_floor_type), intent(in) :: options
-      !> Names the lists, or the frequency with the least real part.
       type(error_type), allocatable, intent(out) :: error
       type(receiver_type) :: receiver
 
@@ -78,7 +75,6 @@ contains
    subroutine get_receiver(options, receiver, error)
       class(measured_mobility_floor_type), intent(in) :: options
       type(receiver_type), intent(out) :: receiver
-      !> Names the frequency with the least real part.
       type(error_type), allocatable, intent(out) :: error
       real(wp), parameter :: rounding = 1.0e-12_wp
       real(wp), allocatable :: omega(:), conductance(:)
@@ -111,9 +107,7 @@ contains
    !> Band of the measurement.
    subroutine get_validity(options, lowest, highest, reason)
       class(measured_mobility_floor_type), intent(in) :: options
-      !> Ends of the band, Hz.
       real(wp), intent(out) :: lowest, highest
-      !> What ends it.
       character(len=reason_length), intent(out) :: reason
 
       lowest = options%lowest_frequency

@@ -1,7 +1,10 @@
-!> Receivers made of modes, and of what the modes in a list leave out.
+!> Receivers made of modes, and of residual modes.
 module thud_modal_receiver
+   use thud_constants, only: pi
+   use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
    use thud_receiver, only: receiver_type
+   use thud_text, only: fixed, to_text
    implicit none (type, external)
    private
 
@@ -9,23 +12,35 @@ module thud_modal_receiver
 
 contains
 
-   !> Sum of modes, gain s/(s**2 + eta omega s + omega**2), and of their rest.
+   !> Sum of modes, gain s/(s**2 + eta omega s + omega**2), and of residual modes.
    !>
-   !> The loss factor of a mode is that of a dashpot at its frequency. The rest has a compliance C at low frequencies and
-   !> the conductance G = sqrt(2) C w at those above a corner w: G (s**2 + w s/sqrt(2))/(s**2 + sqrt(2) w s + w**2). It is
-   !> passive and takes hardly any power below the corner: with x = omega/w its real part is G x**4/(1 + x**4), its imaginary
-   !> part omega C (1 + x**2)/(1 + x**4).
-   pure subroutine new_modal_receiver(gain, omega, loss_factor, compliance, corner, receiver)
+   !> The loss factor of a mode is that of a dashpot at its frequency. Residual modes have a compliance C at low frequencies
+   !> and the conductance G = sqrt(2) C w at those above a corner w: G (s**2 + w s/sqrt(2))/(s**2 + sqrt(2) w s + w**2).
+   !> This is passive and takes hardly any power below the corner: with x = omega/w its real part is G x**4/(1 + x**4), its
+   !> imaginary part omega C (1 + x**2)/(1 + x**4).
+   subroutine new_modal_receiver(group, gain, omega, loss_factor, residual, receiver, error)
+      !> Group of the keys, for messages.
+      character(len=*), intent(in) :: group
       !> Products of the mode's shape at source and point over its modal mass, 1/kg: [n].
       real(wp), intent(in) :: gain(:)
-      !> Angular frequencies, rad/s, and loss factors, below 2: [n].
+      !> Angular frequencies, rad/s, and loss factors: [n].
       real(wp), intent(in) :: omega(:), loss_factor(:)
-      !> Compliance of the rest, m/N; its corner, rad/s.
-      real(wp), intent(in) :: compliance, corner
+      !> Compliance, m/N, and corner, rad/s, of the residual modes: [2].
+      real(wp), intent(in) :: residual(2)
       type(receiver_type), intent(out) :: receiver
+      !> A mode is overdamped: its loss factor is 2 or more.
+      type(error_type), allocatable, intent(out) :: error
       complex(wp) :: pole
       integer :: i, n
 
+      i = maxloc(loss_factor, dim=1)
+      if (i > 0) then
+         if (.not. loss_factor(i) < 2.0_wp) then
+            error = input_error('&'//group//': the total loss factor is '//to_text(loss_factor(i))//' at ' &
+               //fixed(omega(i)/(2*pi), 1)//' Hz; allowed: below 2')
+            return
+         end if
+      end if
       n = size(gain)
       allocate (receiver%pole(n + 1), receiver%residue(n + 1))
       do i = 1, n
@@ -35,9 +50,11 @@ contains
       end do
       ! Without G the quotient is -G (w s/sqrt(2) + w**2)/(s**2 + ...): at its pole w (i - 1)/sqrt(2), doubled, -G w (1 - i)/
       ! sqrt(2).
-      receiver%direct = sqrt(2.0_wp)*compliance*corner
-      receiver%pole(n + 1) = corner*cmplx(-1.0_wp, 1.0_wp, wp)/sqrt(2.0_wp)
-      receiver%residue(n + 1) = -receiver%direct*corner*cmplx(1.0_wp, -1.0_wp, wp)/sqrt(2.0_wp)
+      associate (compliance => residual(1), corner => residual(2))
+         receiver%direct = sqrt(2.0_wp)*compliance*corner
+         receiver%pole(n + 1) = corner*cmplx(-1.0_wp, 1.0_wp, wp)/sqrt(2.0_wp)
+         receiver%residue(n + 1) = -receiver%direct*corner*cmplx(1.0_wp, -1.0_wp, wp)/sqrt(2.0_wp)
+      end associate
    end subroutine new_modal_receiver
 
 end module thud_modal_receiver

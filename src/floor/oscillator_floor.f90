@@ -33,7 +33,6 @@ contains
    !> Keys and allowed ranges of the group `&oscillator`.
    function get_fields(options) result(fields)
       class(oscillator_floor_type), intent(in), target :: options
-      !> One field per component: [3].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
@@ -46,7 +45,6 @@ contains
    subroutine get_receiver(options, receiver, error)
       class(oscillator_floor_type), intent(in) :: options
       type(receiver_type), intent(out) :: receiver
-      !> Never.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: decay, square, fast, slow
       complex(wp) :: pole

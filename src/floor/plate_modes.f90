@@ -11,8 +11,7 @@ module thud_plate_modes
    implicit none (type, external)
    private
 
-   public :: check_inside, check_losses, check_mode_count, get_far_compliance, get_half_waves, get_modal_stiffness, get_shape
-   public :: new_plate_receiver
+   public :: check_mode_count, get_far_compliance, get_half_waves, get_modal_stiffness, get_shape, new_plate_receiver
 
    !> Modes up to this frequency count one by one, Hz. Those above act by their static compliance. In the mean, at a
    !> frequency f that misses 0.3 (f/limit)**3 of the mobility of the infinite plate: 0.4 % at 707 Hz.
@@ -21,9 +20,9 @@ module thud_plate_modes
    !> Modes up to this many times the limit make the static compliance; that of the others is their mean.
    real(wp), parameter, public :: far = 16.0_wp
 
-   !> Corner of the rest of modes, rad/s: in the mean over positions a rest of n(omega) modes with 1/(m'' S omega**2) each
-   !> has the compliance 2/(pi Z 2 pi limit); with this corner its conductance is 1/Z.
-   real(wp), parameter, public :: rest_corner = pi/(2*sqrt(2.0_wp))*2*pi*mode_limit
+   !> Corner of the residual modes, rad/s: in the mean over positions residual n(omega) modes with 1/(m'' S omega**2) each
+   !> have the compliance 2/(pi Z 2 pi limit); with this corner its conductance is 1/Z.
+   real(wp), parameter, public :: residual_corner = pi/(2*sqrt(2.0_wp))*2*pi*mode_limit
 
    !> Maximum number of modes below the limit: a drop takes time in proportion.
    real(wp), parameter :: max_modes = 20000.0_wp
@@ -44,36 +43,6 @@ contains
          //to_text(plate%width)//' m have '//fixed(count, 0)//' modes below '//fixed(mode_limit, 0) &
          //' Hz; allowed: up to '//fixed(max_modes, 0))
    end subroutine check_mode_count
-
-   !> Refuses a point that does not lie on a plate.
-   subroutine check_inside(group, length, width, x, y, error)
-      !> Group of the keys.
-      character(len=*), intent(in) :: group
-      !> Sides of the plate, and the point, m.
-      real(wp), intent(in) :: length, width, x, y
-      !> Names the point.
-      type(error_type), allocatable, intent(out) :: error
-
-      if (.not. (x >= 0.0_wp .and. x <= length .and. y >= 0.0_wp .and. y <= width)) error = input_error('&'//group &
-         //': the point ('//to_text(x)//', '//to_text(y)//') m lies outside; allowed: 0 to '//to_text(length) &
-         //' m and 0 to '//to_text(width)//' m')
-   end subroutine check_inside
-
-   !> Refuses loss factors of modes that would not swing.
-   subroutine check_losses(group, omega, loss_factor, error)
-      !> Group of the keys.
-      character(len=*), intent(in) :: group
-      !> Angular frequencies, rad/s, and loss factors there: [n].
-      real(wp), intent(in) :: omega(:), loss_factor(:)
-      !> Names the largest.
-      type(error_type), allocatable, intent(out) :: error
-      integer :: i
-
-      i = maxloc(loss_factor, dim=1)
-      if (i == 0) return
-      if (.not. loss_factor(i) < 2.0_wp) error = input_error('&'//group//': the total loss factor is ' &
-         //to_text(loss_factor(i))//' at '//fixed(omega(i)/(2*pi), 1)//' Hz; allowed: below 2')
-   end subroutine check_losses
 
    !> Half waves along length and width of the modes below a frequency.
    pure subroutine get_half_waves(plate, frequency, m, n)
@@ -163,34 +132,42 @@ contains
       shape = along(m)*across(n)
    end function get_shape
 
-   !> Velocity of a point of a plate over the force at another. The rest is that of the modes above the limit.
-   subroutine new_plate_receiver(group, plate, source, point, receiver, error)
+   !> Velocity of a point of a plate over the force at another. Modes above the limit are residual modes.
+   subroutine new_plate_receiver(group, plate, source, point, receiver, error, max_across, residual)
       !> Group of the plate's keys, for messages.
       character(len=*), intent(in) :: group
       type(plate_type), intent(in) :: plate
-      !> Places of source and point, over length and width.
+      !> Positions of source and point, over length and width: [2].
       real(wp), intent(in) :: source(2), point(2)
       type(receiver_type), intent(out) :: receiver
-      !> There are too many modes, or the losses are too high.
+      !> The losses are too high.
       type(error_type), allocatable, intent(out) :: error
+      !> Maximum number of half waves along the width (default: any).
+      integer, intent(in), optional :: max_across
+      !> Compliance, m/N, and corner, rad/s, of the residual modes (default: those of the plate): [2].
+      real(wp), intent(in), optional :: residual(2)
       integer, allocatable :: m(:), n(:)
-      real(wp), allocatable :: omega(:), loss_factor(:), gain(:)
+      real(wp), allocatable :: omega(:), gain(:)
       logical, allocatable :: single(:)
-      real(wp) :: rest
+      real(wp) :: rest(2)
 
-      call check_mode_count(group, plate, error)
-      if (allocated(error)) return
       call get_half_waves(plate, far*mode_limit, m, n)
+      if (present(max_across)) then
+         m = pack(m, n <= max_across)
+         n = pack(n, n <= max_across)
+      end if
       omega = sqrt(get_modal_stiffness(plate, m, n)/get_surface_mass(plate))
       single = omega < 2*pi*mode_limit
-      loss_factor = get_total_loss(plate, air_type(), pack(omega, single)/(2*pi))
-      call check_losses(group, pack(omega, single), loss_factor, error)
-      if (allocated(error)) return
       gain = 4/(get_surface_mass(plate)*plate%length*plate%width)*get_shape(m, n, source)*get_shape(m, n, point)
-      rest = sum(gain/omega**2, mask=.not. single)
+      rest = [sum(gain/omega**2, mask=.not. single), residual_corner]
       ! Modes farther off cancel but under the source.
-      if (all(abs(source - point) < epsilon(1.0_wp))) rest = rest + get_far_compliance(plate)
-      call new_modal_receiver(pack(gain, single), pack(omega, single), loss_factor, rest, rest_corner, receiver)
+      if (.not. present(max_across) .and. all(abs(source - point) < epsilon(1.0_wp))) rest(1) = rest(1) &
+         + get_far_compliance(plate)
+      if (present(residual)) rest = residual
+      associate (omega => pack(omega, single))
+         call new_modal_receiver(group, pack(gain, single), omega, get_total_loss(plate, air_type(), omega/(2*pi)), rest, &
+            receiver, error)
+      end associate
    end subroutine new_plate_receiver
 
    !> Static compliance of the modes that are too far off to be summed, the mean over positions.

@@ -21,7 +21,6 @@ contains
    !> No keys.
    function get_fields(options) result(fields)
       class(rigid_floor_type), intent(in), target :: options
-      !> None: [0].
       type(field_type), allocatable :: fields(:)
 
       allocate (fields(0))
@@ -31,7 +30,6 @@ contains
    subroutine get_receiver(options, receiver, error)
       class(rigid_floor_type), intent(in) :: options
       type(receiver_type), intent(out) :: receiver
-      !> Never.
       type(error_type), allocatable, intent(out) :: error
 
    end subroutine get_receiver

@@ -1,7 +1,8 @@
 !> The abstract source model: options from namelist groups, and the force of one drop.
 !>
 !> A model is a module `thud_<name>` with a type `<name>_type` that extends this one; the list of names in
-!> src/CMakeLists.txt makes it known. Its options belong to the group of its name unless stated otherwise.
+!> src/CMakeLists.txt makes it known. Its options belong to the group of its name unless stated otherwise. What is said
+!> here of the arguments of a procedure holds for those of every model.
 module thud_source_model
    use thud_ball, only: ball_type
    use thud_drop, only: drop_type

@@ -38,14 +38,14 @@ module thud_run
    !> The full input, which says whose results a directory holds.
    character(len=*), parameter :: input_file = 'effective.nml'
 
-   !> Remark on a directory, which follows.
+   !> Note on a directory, which follows.
    character(len=*), parameter :: replaces = 'replaces the results of another input of the same name in '
 
-   !> A remark.
-   type :: remark_type
+   !> A warning or a note.
+   type :: message_type
       !> A sentence, with the file that it is about.
       character(len=:), allocatable :: text
-   end type remark_type
+   end type message_type
 
    !> What a run leaves for its caller.
    type :: outcome_type
@@ -53,33 +53,33 @@ module thud_run
       character(len=:), allocatable :: directory
       !> Table for the screen.
       character(len=:), allocatable :: table
-      integer :: n_remark = 0
-      !> Remarks for the user: [n_remark].
-      type(remark_type), allocatable :: remarks(:)
+      integer :: n_message = 0
+      !> Warnings and notes for the user: [n_message].
+      type(message_type), allocatable :: messages(:)
       !> The source conforms to the limits, or there is no impact to judge.
       logical :: conforms = .true.
    contains
-      procedure :: add_remark
+      procedure :: add_message
    end type outcome_type
 
 contains
 
-   !> Adds a remark.
-   subroutine add_remark(self, path, remark)
+   !> Adds a warning or a note.
+   subroutine add_message(self, path, text)
       class(outcome_type), intent(inout) :: self
       !> The file that it is about; a sentence.
-      character(len=*), intent(in) :: path, remark
-      type(remark_type), allocatable :: remarks(:)
+      character(len=*), intent(in) :: path, text
+      type(message_type), allocatable :: messages(:)
       integer :: i
 
-      allocate (remarks(self%n_remark + 1))
-      do i = 1, self%n_remark
-         call move_alloc(self%remarks(i)%text, remarks(i)%text)
+      allocate (messages(self%n_message + 1))
+      do i = 1, self%n_message
+         call move_alloc(self%messages(i)%text, messages(i)%text)
       end do
-      self%n_remark = self%n_remark + 1
-      remarks(self%n_remark)%text = path//': '//remark
-      call move_alloc(remarks, self%remarks)
-   end subroutine add_remark
+      self%n_message = self%n_message + 1
+      messages(self%n_message)%text = path//': '//text
+      call move_alloc(messages, self%messages)
+   end subroutine add_message
 
    !> Runs a namelist file and writes its results.
    subroutine run_case(path, output, replace, channels, case, results, outcome, error)
@@ -131,9 +131,9 @@ contains
       call describe(case, results, channels, files, outcome)
       call write_results(outcome%directory, input, files, [path], replace, differs, error)
       if (allocated(error)) return
-      if (differs) call outcome%add_remark(path, replaces//outcome%directory)
-      do i = 1, size(results%remark)
-         call outcome%add_remark(path, trim(results%remark(i)))
+      if (differs) call outcome%add_message(path, replaces//outcome%directory)
+      do i = 1, size(results%warning)
+         call outcome%add_message(path, trim(results%warning(i)))
       end do
    end subroutine store_case
 
@@ -182,7 +182,7 @@ contains
       outcome%table = outcome%table//newline//get_table(case, results%impact%history, results%impact%assessment)
       call add_file(files, file_names(1), get_force_csv(results%impact%history))
       call add_file(files, file_names(2), get_levels_csv(case, results%impact%assessment))
-      summary = get_summary(case, results%impact%history, results%impact%assessment, results%remark)
+      summary = get_summary(case, results%impact%history, results%impact%assessment, results%warning)
       call add_history_files(results%impact%history, '', channels, files)
       if (allocated(results%on_floor)) then
          call get_floor_table(case, results%impact, results%on_floor, results%floor, text)

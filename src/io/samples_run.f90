@@ -82,8 +82,8 @@ contains
       call write_samples(case, table, threads, results, tally, error)
       call close_results(results, differs, error)
       if (allocated(error)) return
-      if (differs) call outcome%add_remark(path, replaces//outcome%directory)
-      if (tally%computed < tally%samples) call outcome%add_remark(path, to_text(tally%samples - tally%computed)//' of ' &
+      if (differs) call outcome%add_message(path, replaces//outcome%directory)
+      if (tally%computed < tally%samples) call outcome%add_message(path, to_text(tally%samples - tally%computed)//' of ' &
          //to_text(tally%samples)//' samples have no results, such as: '//trim(tally%failure))
       outcome%conforms = tally%conforming == tally%samples
       call describe(case, table, tally, outcome%table)

@@ -53,9 +53,7 @@ contains
 
    !> Keys and allowed ranges.
    function get_fields(options) result(fields)
-      !> The options that the fields read and set.
       class(hunt_crossley_type), intent(in), target :: options
-      !> One field per component: [5].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
@@ -71,9 +69,7 @@ contains
 
    !> Refuses values that are missing or contradict each other.
    subroutine check(ball, options, sampling, error)
-      !> The source.
       type(ball_type), intent(in) :: ball
-      !> The options, each inside its own range.
       class(hunt_crossley_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(error_type), allocatable, intent(out) :: error
@@ -93,13 +89,9 @@ contains
    !> Right-hand side of the equation of motion.
    pure subroutine get_derivative(self, time, state, rate, valid)
       class(spring_type), intent(in) :: self
-      !> Time since first touch, s; the equation does not depend on it.
       real(wp), intent(in) :: time
-      !> State, see `thud_single_mass`: [4].
       real(wp), intent(in) :: state(:)
-      !> Derivative of the state: [4].
       real(wp), intent(out) :: rate(:)
-      !> Always true.
       logical, intent(out) :: valid
       real(wp) :: components(2)
       real(wp) :: force
@@ -115,7 +107,6 @@ contains
    !> Spring and damping force of one instant.
    pure subroutine get_components(self, state, components, elastic_force)
       class(spring_type), intent(in) :: self
-      !> State, see `thud_single_mass`: [4].
       real(wp), intent(in) :: state(:)
       !> k d^n and k d^n * 3/2 alpha d', N: [2].
       real(wp), intent(out) :: components(:)
@@ -232,14 +223,10 @@ contains
 
    !> Quasi-static force between two plates: k (deflection/2)^n.
    subroutine compress(ball, options, deflection, force, error)
-      !> Not used.
       type(ball_type), intent(in) :: ball
       class(hunt_crossley_type), intent(in) :: options
-      !> Approach of the plates, m: [n].
       real(wp), intent(in) :: deflection(:)
-      !> The force, N: [n].
       real(wp), intent(out) :: force(:)
-      !> The stiffness depends on the drop.
       type(error_type), allocatable, intent(out) :: error
 
       force = options%stiffness*(deflection/2)**options%exponent
@@ -249,17 +236,12 @@ contains
 
    !> Force history of one drop.
    subroutine solve(ball, drop, options, sampling, history, error, receiver)
-      !> The source, of which only the mass counts.
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
       class(hunt_crossley_type), intent(in) :: options
-      !> Sampling rate, length of the record, substeps.
       type(sampling_type), intent(in) :: sampling
-      !> Force and motion from first touch on.
       type(force_history_type), intent(out) :: history
-      !> The contact outlasts the record, or the steps are too coarse.
       type(error_type), allocatable, intent(out) :: error
-      !> What the source drops on (default: a rigid floor).
       type(receiver_type), intent(in), optional :: receiver
       type(spring_type) :: spring
       real(wp) :: v0, damping, stiffness

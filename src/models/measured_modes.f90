@@ -59,9 +59,7 @@ contains
 
    !> Keys and allowed ranges.
    function get_fields(options) result(fields)
-      !> The options that the fields read and set.
       class(measured_modes_type), intent(in), target :: options
-      !> One field per component: [4].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
@@ -78,7 +76,6 @@ contains
    !> Refuses lists that do not fit each other or the ball.
    subroutine check(ball, options, sampling, error)
       type(ball_type), intent(in) :: ball
-      !> The options, each inside its own range.
       class(measured_modes_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(error_type), allocatable, intent(out) :: error
@@ -103,17 +100,12 @@ contains
 
    !> Force history of one drop.
    subroutine solve(ball, drop, options, sampling, history, error, receiver)
-      !> The ball, whose mass the effective masses add up to.
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
       class(measured_modes_type), intent(in) :: options
-      !> Sampling rate and length of the record.
       type(sampling_type), intent(in) :: sampling
-      !> Force and motion from first touch on.
       type(force_history_type), intent(out) :: history
-      !> The contact outlasts the record.
       type(error_type), allocatable, intent(out) :: error
-      !> What the source drops on (default: a rigid floor).
       type(receiver_type), intent(in), optional :: receiver
       type(mode_type) :: modes(options%frequency%count)
       real(wp) :: step, time, force, deflection, velocity, v0
@@ -184,9 +176,7 @@ contains
       type(ball_type), intent(in) :: ball
       class(measured_modes_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> Not used: the model leaves floors alone.
       type(receiver_type), intent(in), optional :: receiver
-      !> The time, s.
       real(wp) :: cost
       real(wp) :: rate
 

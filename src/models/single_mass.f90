@@ -40,9 +40,7 @@ contains
    !> Writes motion and forces of one instant into the history.
    pure subroutine record_sample(self, state, i, history)
       class(single_mass_type), intent(in) :: self
-      !> State at the sample: [4].
       real(wp), intent(in) :: state(:)
-      !> Index of the sample.
       integer, intent(in) :: i
       type(force_history_type), intent(inout) :: history
 
@@ -60,7 +58,6 @@ contains
    !> Raises the maxima of deflection and elastic force.
    pure subroutine record_peaks(self, state, history)
       class(single_mass_type), intent(in) :: self
-      !> State: [4].
       real(wp), intent(in) :: state(:)
       type(force_history_type), intent(inout) :: history
       real(wp) :: components(size(history%part, 2))

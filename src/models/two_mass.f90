@@ -85,9 +85,7 @@ contains
 
    !> Keys and allowed ranges.
    function get_fields(options) result(fields)
-      !> The options that the fields read and set.
       class(two_mass_type), intent(in), target :: options
-      !> One field per component: [8].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
@@ -108,9 +106,7 @@ contains
 
    !> Refuses a belt that leaves nothing for the rim, and a patch without stiffness.
    subroutine check(ball, options, sampling, error)
-      !> The source.
       type(ball_type), intent(in) :: ball
-      !> The options, each inside its own range.
       class(two_mass_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(error_type), allocatable, intent(out) :: error
@@ -127,17 +123,12 @@ contains
 
    !> Force history of one drop.
    subroutine solve(ball, drop, options, sampling, history, error, receiver)
-      !> The source, of which only the mass counts.
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
       class(two_mass_type), intent(in) :: options
-      !> Sampling rate, length of the record, substeps.
       type(sampling_type), intent(in) :: sampling
-      !> Force and motion from first touch on.
       type(force_history_type), intent(out) :: history
-      !> The contact outlasts the record, or the steps are too coarse or too many.
       type(error_type), allocatable, intent(out) :: error
-      !> What the source drops on (default: a rigid floor).
       type(receiver_type), intent(in), optional :: receiver
       type(tyre_type) :: tyre
       integer :: n_step
@@ -217,13 +208,9 @@ contains
    !> Right-hand side of the equations of motion.
    pure subroutine get_derivative(self, time, state, rate, valid)
       class(tyre_type), intent(in) :: self
-      !> Time since first touch, s; the equations do not depend on it.
       real(wp), intent(in) :: time
-      !> State: [7].
       real(wp), intent(in) :: state(:)
-      !> Derivative of the state: [7].
       real(wp), intent(out) :: rate(:)
-      !> Always true.
       logical, intent(out) :: valid
       real(wp) :: components(3)
       real(wp) :: force, sidewall
@@ -246,7 +233,6 @@ contains
    !> Components of the force on the floor: pressure times area, carcass, damping, N.
    pure function get_components(tyre, state) result(components)
       class(tyre_type), intent(in) :: tyre
-      !> State: [7].
       real(wp), intent(in) :: state(:)
       real(wp) :: components(3)
 
@@ -257,7 +243,6 @@ contains
    !> Raises the maxima of force and deflection.
    pure subroutine record_peaks(self, state, history)
       class(tyre_type), intent(in) :: self
-      !> State: [7].
       real(wp), intent(in) :: state(:)
       type(force_history_type), intent(inout) :: history
       real(wp) :: center(2)
@@ -278,11 +263,8 @@ contains
    !> Changes between contact and flight.
    pure subroutine pass_event(self, time, state, history)
       class(tyre_type), intent(inout) :: self
-      !> Time since first touch, s.
       real(wp), intent(in) :: time
-      !> State at the event: [7].
       real(wp), intent(inout) :: state(:)
-      !> Gets the time of release.
       type(force_history_type), intent(inout) :: history
 
       state([at_belt, at_gap]) = 0.0_wp
@@ -293,7 +275,6 @@ contains
    !> Displacement, m, and velocity, m/s, of the center of mass: [2].
    pure function get_center(self, state) result(center)
       class(tyre_type), intent(in) :: self
-      !> State: [7].
       real(wp), intent(in) :: state(:)
       real(wp) :: center(2)
 
@@ -304,7 +285,6 @@ contains
    !> Energy of the motion of belt and rim against each other, and of the sidewall, J.
    pure function get_inner_energy(self, state) result(energy)
       class(tyre_type), intent(in) :: self
-      !> State: [7].
       real(wp), intent(in) :: state(:)
       real(wp) :: energy
 
@@ -316,7 +296,6 @@ contains
    !> How far the belt sinks below the center of mass in flight if it gets all of the inner energy, m.
    pure function get_amplitude(self, state) result(amplitude)
       class(tyre_type), intent(in) :: self
-      !> State: [7].
       real(wp), intent(in) :: state(:)
       real(wp) :: amplitude
 
@@ -326,7 +305,6 @@ contains
    !> Whether no motion of the belt brings it back to a rigid floor.
    pure function has_left(self, state) result(left)
       class(tyre_type), intent(in) :: self
-      !> State: [7].
       real(wp), intent(in) :: state(:)
       logical :: left
 
@@ -336,9 +314,7 @@ contains
    !> Writes motion and forces of one instant into the history.
    pure subroutine record_sample(self, state, i, history)
       class(tyre_type), intent(in) :: self
-      !> State at the sample: [7].
       real(wp), intent(in) :: state(:)
-      !> Index of the sample.
       integer, intent(in) :: i
       type(force_history_type), intent(inout) :: history
       real(wp) :: center(2)

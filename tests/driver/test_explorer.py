@@ -412,7 +412,7 @@ def test_study_of_what_was_moved_runs(client: TestClient, tmp_path: Path) -> Non
     content = tomllib.loads(path.read_text())
     assert content["case"] == SHELL | {"ball": {"mass": 2.4}}
     assert content["parameters"] == {"height": {"low": 0.5, "high": 1.0, "count": 11}}
-    found = thud.sweep(path)
+    found = thud.sweep(path).dataset
     assert found.sizes == {**found.sizes, "height": 11}
     assert client.post("/download/study.toml", json=SHELL).status_code == 400
 

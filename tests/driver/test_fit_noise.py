@@ -201,12 +201,12 @@ def test_pulse_is_found_in_means_of_a_millisecond() -> None:
 def test_likelihood_of_quiet_is_that_of_normal_cells() -> None:
     background = quiet_of(2).background()
     other = replace(background, draws=2 * background.draws)
-    time = (background.quiet[0] + background.quiet[1]) / 2
+    time = (background.cells[0] + background.cells[1]) / 2
     trend = background.peak**2 * (1 + 0.01 * np.outer(time, time))
     values = [
         record_noise._log_likelihood(one)  # noqa: SLF001
         - stats.multivariate_normal.logpdf(
-            one.mean, cov=np.tensordot(one.variances, covariances(one.quiet), 1) + trend
+            one.mean, cov=np.tensordot(one.variances, covariances(one.cells), 1) + trend
         )
         for one in (background, other)
     ]

@@ -78,15 +78,15 @@ def run_study(options: argparse.Namespace) -> int:
             message = f"{options.study}: {error}"
             raise type(error)(message) from error
         if not options.quiet:
-            tqdm.write(kind.table(result, study))
-        print_notes(f"{options.study}: {warning}" for warning in kind.warnings(result))
+            tqdm.write(result.table())
+        print_notes(f"{options.study}: {text}" for text in (*result.warnings, *result.notes))
         contents = kind.files(result, study)
         if drawn:
             with left_out("the figure of the study"):
                 from thud.plot import figure_files
 
-                contents |= figure_files(kind.figures(result, study))
+                contents |= figure_files(result.figures(study.name))
         results.write(contents)
     if not options.quiet:
         tqdm.write(f"Results: {folder}")
-    return 0 if kind.succeeded(result) else NumericalError.exit_code
+    return 0 if result.succeeded else NumericalError.exit_code

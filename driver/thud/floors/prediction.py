@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
     from thud.base._schema import FloorOptions, Room
 
+    Array = NDArray[np.float64]
+
 THIRDS = BANDWIDTHS[1]
 # Change of the force by a floor that gives way, dB, that raises a warning.
 NOTICED = 0.1
@@ -81,23 +83,23 @@ class RoomPrediction(Displayed):
 
     floor: FloorOptions
     room: Room
-    frequency: NDArray[np.float64]
-    level: NDArray[np.float64]
-    time_of_maximum: NDArray[np.float64]
-    energy: NDArray[np.float64]
-    radiation_factor: NDArray[np.float64]
-    loss_factor: NDArray[np.float64]
-    reverberation_time: NDArray[np.float64]
-    floor_modes: NDArray[np.float64]
-    room_modes: NDArray[np.float64]
-    conductance: NDArray[np.float64]
+    frequency: Array
+    level: Array
+    time_of_maximum: Array
+    energy: Array
+    radiation_factor: Array
+    loss_factor: Array
+    reverberation_time: Array
+    floor_modes: Array
+    room_modes: Array
+    conductance: Array
     few_modes: float
     mass_per_area: float
-    spread: NDArray[np.float64]
-    octave_level: NDArray[np.float64]
-    octave_time: NDArray[np.float64]
-    history_time: NDArray[np.float64]
-    history: NDArray[np.float64]
+    spread: Array
+    octave_level: Array
+    octave_time: Array
+    history_time: Array
+    history: Array
     source: ImpactResult
     force: Literal["contact", "blocked"]
     force_change: float
@@ -109,7 +111,7 @@ class RoomPrediction(Displayed):
         return rating(self.level, THIRDS)
 
     @property
-    def radiated_share(self) -> NDArray[np.float64]:
+    def radiated_share(self) -> Array:
         """Share of the floor's losses that it radiates into the room, shape (12,)."""
         air = self.room.air_density * self.room.sound_speed
         omega = 2 * np.pi * self.frequency
@@ -124,7 +126,7 @@ class RoomPrediction(Displayed):
         return rating(self.octave_level, BANDWIDTHS[0])
 
     @property
-    def standardised(self) -> NDArray[np.float64]:
+    def standardised(self) -> Array:
         """L'_i,Fmax,V,T, dB, shape (12,): in a room of 50 m3 and 0.5 s (ISO 16283-2)."""
         return standardised_level(self.level, self.reverberation_time, self.room.volume)
 
@@ -158,7 +160,7 @@ class RoomPrediction(Displayed):
             )
         return tuple(found)
 
-    def difference(self, measured: RoomLevels) -> NDArray[np.float64]:
+    def difference(self, measured: RoomLevels) -> Array:
         """Return measured less predicted level, dB, shape (12,), in the room as it is.
 
         Raise InputError where the measured levels are not thirds.
@@ -245,7 +247,7 @@ def predict_level(
         source=moved or source,
         force="contact" if moved else "blocked",
         force_change=change,
-        floor_warnings=tuple(map(text, found.get("remarks", {}).values())),
+        floor_warnings=tuple(map(text, found.get("warnings", {}).values())),
         time_of_maximum=bands.pop("time"),
         few_modes=found["room"]["few_modes"],
         mass_per_area=found["room"]["surface_mass"],

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
     from thud.base._schema import BandSet
 
+    Array = NDArray[np.float64]
+
 # Rounded mid frequencies in a decade (ISO 3, R10), and how far a title may be from one.
 R10 = np.array([1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0])
 NEAR = 0.03
@@ -84,20 +86,20 @@ class RoomLevels(Displayed):
 
     name: str
     bands: BandSet
-    frequency: NDArray[np.float64]
-    positions: NDArray[np.float64]
-    background: NDArray[np.float64] | None = None
-    reverberation_time: NDArray[np.float64] | None = None
+    frequency: Array
+    positions: Array
+    background: Array | None = None
+    reverberation_time: Array | None = None
     volume: float | None = None
 
     @property
-    def measured(self) -> NDArray[np.float64]:
+    def measured(self) -> Array:
         """Energy mean of the positions, with the background, dB, shape (n_band,)."""
-        mean: NDArray[np.float64] = 10 * np.log10((10 ** (self.positions / 10)).mean(axis=0))
+        mean: Array = 10 * np.log10((10 ** (self.positions / 10)).mean(axis=0))
         return mean
 
     @property
-    def level(self) -> NDArray[np.float64]:
+    def level(self) -> Array:
         """Energy mean L_i,Fmax without the background, dB, shape (n_band,)."""
         return self._corrected()[0]
 
@@ -107,14 +109,14 @@ class RoomLevels(Displayed):
         return self._corrected()[1]
 
     @property
-    def standardised(self) -> NDArray[np.float64] | None:
+    def standardised(self) -> Array | None:
         """L'_i,Fmax,V,T, dB, shape (n_band,); None without reverberation time or volume."""
         if self.reverberation_time is None or self.volume is None:
             return None
         return standardised_level(self.level, self.reverberation_time, self.volume)
 
     @property
-    def spread(self) -> NDArray[np.float64] | None:
+    def spread(self) -> Array | None:
         """Standard deviation of the positions' levels, dB, shape (n_band,); None of one."""
         return self.positions.std(axis=0, ddof=1) if len(self.positions) > 1 else None
 
@@ -225,7 +227,7 @@ class RoomLevels(Displayed):
         wanted = rated_bands(self.bands)
         return np.isin(self.frequency, wanted)
 
-    def _corrected(self) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    def _corrected(self) -> tuple[Array, NDArray[np.bool_]]:
         if self.background is None:
             return self.measured, np.zeros(len(self.frequency), dtype=bool)
         found = ask("background", levels=self.measured, background=self.background)
@@ -257,7 +259,7 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     _require_positions(
         [title for title, kind in zip(titles, kinds, strict=True) if kind == "level"], path
     )
-    columns: dict[str, NDArray[np.float64]] = {}
+    columns: dict[str, Array] = {}
     for kind in ("frequency", "background", "time"):
         if kinds.count(kind) > 1:
             refuse(f"{path}: more than one column of {kind}", ALLOWED)
@@ -361,7 +363,7 @@ def _nominal(frequency: float, path: object) -> float:
     )
 
 
-def _bands_of(frequency: NDArray[np.float64], path: object) -> BandSet:
+def _bands_of(frequency: Array, path: object) -> BandSet:
     """Return the set of bands; raise InputError where rated ones are missing or double."""
     double = frequency[1:][np.diff(frequency) <= 0]
     if double.size:

@@ -29,6 +29,6 @@ def compute(case: Case) -> Impact:
 
 def new_impact(case: Case, found: Bundle) -> Impact:
     """Return the impact in a bundle of the library."""
-    warnings = tuple(map(text, found.get("remarks", {}).values()))
+    warnings = tuple(map(text, found.get("warnings", {}).values()))
     common = history(case, found, warnings)
     return Impact(**common, on_floor=new_floor_impact(case, found, common["floor_force"]))

@@ -128,7 +128,7 @@ def new_modes(ball: Ball, found: Bundle) -> FreeModes:
         modes["rigid_frequency"],
         np.stack((modes["r"], modes["z"]), axis=-1),
         np.moveaxis(modes["shape"], (-1, 0), (0, -1)),
-        tuple(map(text, found.get("remarks", {}).values())),
+        tuple(map(text, found.get("warnings", {}).values())),
     )
 
 

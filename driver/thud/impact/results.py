@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 import f90nml
 import numpy as np
 
-from thud.base._schema import QUANTITIES
+from thud.base._schema import IMPACT_QUANTITIES
 from thud.base.checks import refuse, shown
 from thud.base.errors import PlausibilityWarning, ThudError
 from thud.base.files import MANIFEST, checksum, locked, read_input, read_manifest
@@ -107,7 +107,7 @@ def _new_impact(files: _Files) -> Impact:
     case = Case.from_text(files.read("effective.nml"))
     numbers = f90nml.reads(files.read("summary.nml"))
     history, _ = _read_history(files, "", numbers["summary"], numbers.get("facts", {}))
-    found = _texts(numbers.get("remarks", {}).get("remark", []))
+    found = _texts(numbers.get("warnings", {}).get("warning", []))
     if not files.listed:
         warning = f"{MANIFEST} is missing: nothing shows that the files belong together"
         warnings.warn(f"{files.folder}: {warning}", PlausibilityWarning, stacklevel=3)
@@ -145,7 +145,7 @@ def _read_history(
         "channels": {name: values for name, values in found.items() if name != "time_s"},
         "facts": dict(facts),
         "motion": _read_motion(files, prefix) if f"{prefix}snapshots.xmf" in files else None,
-        **{name: scalars[name] for name in QUANTITIES},
+        **{name: scalars[name] for name in IMPACT_QUANTITIES},
     }
     return history, {name: force[name] for name in columns[last + 1 :]}
 

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 
     from thud.studies.design import Design
     from thud.studies.sensitivity import Sensitivity
+    from thud.studies.sweep import Sweep
     from thud.studies.trained_surrogate import Surrogate
     from thud.studies.uncertainty import Uncertainty
 
@@ -118,13 +119,14 @@ class _Excess(NamedTuple):
 
 
 @own_style()
-def draw_sweep(dataset: xr.Dataset) -> Figure:
+def draw_sweep(result: Sweep) -> Figure:
     """Draw octave levels against the first numeric parameter that has several values.
 
     Levels are those of the assessed force relative to the nominal ones, dB. Each value of the first
     text parameter, up to six of them, has its panel. Lines are medians over the other parameters,
     shades extend from the minimum to the maximum.
     """
+    dataset = result.dataset
     columns = _columns(dataset)
     varied = [name for name, values in columns.items() if len(np.unique(values)) > 1]
     numeric = [name for name in varied if columns[name].dtype.kind in "iuf"]

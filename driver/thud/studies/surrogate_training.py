@@ -22,11 +22,7 @@ from thud.studies.directory import require_version
 from thud.studies.parameter import Parameter
 from thud.studies.samples import SampleStudy
 from thud.studies.sampling import unit_samples
-from thud.studies.trained_surrogate import (
-    SMOOTHNESS,
-    Surrogate,
-    read_surrogate,
-)
+from thud.studies.trained_surrogate import SMOOTHNESS, Surrogate, read_surrogate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,7 +31,7 @@ if TYPE_CHECKING:
     from thud.base.files import Results
     from thud.studies.kind import RunOptions
     from thud.studies.samples import Columns
-    from thud.studies.surrogate_plan import Plan
+    from thud.studies.trained_surrogate import Plan
 
     Values = NDArray[np.float64]
 
@@ -198,11 +194,7 @@ def regress(points: Values, values: Values, judged: NDArray[np.bool_]) -> dict[s
     with require_extra("surrogate"):
         from sklearn.exceptions import ConvergenceWarning
         from sklearn.gaussian_process import GaussianProcessRegressor
-        from sklearn.gaussian_process.kernels import (
-            ConstantKernel,
-            Matern,
-            WhiteKernel,
-        )
+        from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
     mean, scale = values.mean(axis=0), values.std(axis=0)
     # Such as a contact time that was asked for.
     scale[scale <= _ROUNDING * np.maximum(np.abs(mean), 1.0)] = 0.0

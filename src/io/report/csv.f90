@@ -47,13 +47,13 @@ contains
    end function get_history_csv
 
    !> A table, as many digits as its numbers have.
-   function get_table_csv(header, columns, labels, remarks) result(text)
+   function get_table_csv(header, columns, labels, notes) result(text)
       !> Names of all columns, with commas between.
       character(len=*), intent(in) :: header
       !> The numbers: [n_row, n_column].
       real(wp), intent(in) :: columns(:, :)
       !> The first and the last column, where they are texts: [n_row].
-      character(len=*), intent(in), optional :: labels(:), remarks(:)
+      character(len=*), intent(in), optional :: labels(:), notes(:)
       character(len=:), allocatable :: text
       type(text_buffer_type) :: buffer
       integer :: i, j
@@ -65,7 +65,7 @@ contains
             if (j > 1) call buffer%append(',')
             call buffer%append(to_text(columns(i, j)))
          end do
-         if (present(remarks)) call buffer%append(','//trim(remarks(i)))
+         if (present(notes)) call buffer%append(','//trim(notes(i)))
          call buffer%append(newline)
       end do
       text = buffer%get_text()

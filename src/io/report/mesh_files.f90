@@ -83,7 +83,8 @@ contains
          scalar(:n_polar + 1, 3) = motion%cavity_pressure(i)
          scalar(:, 4) = motion%floor_displacement(i)
          call add_snapshot(buffer, motion%time(i), get_points(motion%position(:, :, 1, i), motion%position(:, :, 2, i)), &
-            get_cells(n_polar, n_radial, 1), [character(len=12) :: 'displacement', 'velocity'], vector, motion_scalars, scalar)
+            get_cells(n_polar, n_radial, 1), [character(len=12) :: 'displacement', 'velocity'], vector, motion_scalars, &
+            scalar)
       end do
       call end_snapshots(buffer)
       files%name = prefix//motion_names

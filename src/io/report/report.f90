@@ -7,7 +7,7 @@ module thud_report
    use thud_csv, only: get_history_csv, get_table_csv
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_kinds, only: wp
-   use thud_quantities, only: get_quantities, quantities
+   use thud_quantities, only: get_quantities, history_quantity_count, quantities
    use thud_source_limits, only: conforms, criterion_type
    use thud_text, only: join_quoted, newline, quoted, to_text
    implicit none (type, external)
@@ -109,18 +109,18 @@ contains
    end function get_levels_csv
 
    !> The quantities of a run as a namelist file.
-   function get_summary(case, history, assessment, remark) result(text)
+   function get_summary(case, history, assessment, warning) result(text)
       type(case_type), intent(in) :: case
       type(force_history_type), intent(in) :: history
       type(assessment_type), intent(in) :: assessment
-      !> Remarks on the case: [n].
-      character(len=*), intent(in) :: remark(:)
+      !> Warnings on the case: [n].
+      character(len=*), intent(in) :: warning(:)
       !> Text of `summary.nml`.
       character(len=:), allocatable :: text
 
       text = '! thud '//version//': results of case '//trim(case%name)//', SI units, levels in dB re 1 N'//newline &
          //newline//'&summary'//newline//line('case', quoted(case%name), '')//line('model', quoted(case%model), '') &
-         //get_quantity_lines(history)//'/'//newline//newline//get_fact_group('facts', history)//remark_group(remark) &
+         //get_quantity_lines(history)//'/'//newline//newline//get_fact_group('facts', history)//warning_group(warning) &
          //'&verdict'//newline &
          //line('source', quoted(case%source), '') &
          //line('level_method', quoted(case%level_method), '') &
@@ -140,12 +140,12 @@ contains
    function get_quantity_lines(history) result(text)
       type(force_history_type), intent(in) :: history
       character(len=:), allocatable :: text
-      real(wp) :: values(size(quantities))
+      real(wp) :: values(history_quantity_count)
       integer :: i
 
       values = get_quantities(history)
       text = ''
-      do i = 1, size(quantities)
+      do i = 1, history_quantity_count
          text = text//line(trim(quantities(i)%name), to_text(values(i)), trim(quantities(i)%unit))
       end do
    end function get_quantity_lines
@@ -168,17 +168,17 @@ contains
       text = text//'/'//newline//newline
    end function get_fact_group
 
-   !> Remarks as a namelist group.
-   function remark_group(remark) result(text)
-      !> The remarks: [n].
-      character(len=*), intent(in) :: remark(:)
+   !> Warnings as a namelist group.
+   function warning_group(warning) result(text)
+      !> The warnings: [n].
+      character(len=*), intent(in) :: warning(:)
       !> The group; empty where there are none.
       character(len=:), allocatable :: text
 
       text = ''
-      if (size(remark) > 0) text = '&remarks'//newline//line('remark', join_quoted(remark), '') &
+      if (size(warning) > 0) text = '&warnings'//newline//line('warning', join_quoted(warning), '') &
          //'/'//newline//newline
-   end function remark_group
+   end function warning_group
 
    !> Where a value lies: `conforms`, `too low` or `too high`.
    function get_word(criterion) result(word)
@@ -195,7 +195,7 @@ contains
    !> One line of a namelist group.
    pure function line(key, value, note) result(text)
       character(len=*), intent(in) :: key
-      !> Its value as text; unit or remark, may be empty.
+      !> Its value as text; unit or warning, may be empty.
       character(len=*), intent(in) :: value, note
       !> The line with its end.
       character(len=:), allocatable :: text

@@ -7,13 +7,13 @@ module thud_result_bundle
    use thud_force_history, only: force_history_type
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
-   use thud_quantities, only: get_quantities, quantities
+   use thud_quantities, only: get_quantities, history_quantity_count, quantities
    use thud_room, only: few_modes, room_level_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: add_compression, add_history, add_remarks, add_results, add_room_level
+   public :: add_compression, add_history, add_warnings, add_results, add_room_level
 
 contains
 
@@ -28,20 +28,20 @@ contains
       if (allocated(results%room%bands)) call add_room_level(bundle, results%room)
       if (case%has_modes) call add_modes(bundle, results%modes)
       if (case%has_compression) call add_compression(bundle, results%compression)
-      call add_remarks(bundle, results%remark)
+      call add_warnings(bundle, results%warning)
    end subroutine add_results
 
-   !> Adds remarks to a bundle.
-   subroutine add_remarks(bundle, remarks)
+   !> Adds warnings to a bundle.
+   subroutine add_warnings(bundle, warnings)
       type(bundle_type), intent(inout) :: bundle
-      !> Sentences: [n].
-      character(len=*), intent(in) :: remarks(:)
+      !> Messages: [n].
+      character(len=*), intent(in) :: warnings(:)
       integer :: i
 
-      do i = 1, size(remarks)
-         call bundle%add_text('remarks.'//to_text(i), trim(remarks(i)))
+      do i = 1, size(warnings)
+         call bundle%add_text('warnings.'//to_text(i), trim(warnings(i)))
       end do
-   end subroutine add_remarks
+   end subroutine add_warnings
 
    !> Adds a force history to a bundle.
    subroutine add_history(bundle, prefix, history)
@@ -49,13 +49,13 @@ contains
       !> What the names of its items begin with.
       character(len=*), intent(in) :: prefix
       type(force_history_type), intent(in) :: history
-      real(wp) :: values(size(quantities))
+      real(wp) :: values(history_quantity_count)
       integer :: n(1)
       integer :: i
 
       n = size(history%deflection)
       values = get_quantities(history)
-      do i = 1, size(quantities)
+      do i = 1, history_quantity_count
          call bundle%add_number(prefix//'quantities.'//quantities(i)%name, values(i))
       end do
       do i = 1, size(history%fact)

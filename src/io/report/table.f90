@@ -7,14 +7,16 @@ module thud_table
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
-   use thud_quantities, only: get_quantities, quantities, sample_quantity_count
+   use thud_quantities, only: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
+      sample_quantity_count
    use thud_report, only: get_word
    use thud_source_limits, only: conforms, criterion_type
-   use thud_text, only: fixed, newline, replaced, to_text
+   use thud_text, only: fixed, flush_right, newline, padded, replaced, to_text
    implicit none (type, external)
    private
 
    public :: get_defaults_line, get_compression_table, get_force_title, get_modes_table, get_span_row, get_table
+   public :: is_peak_of_other
 
 contains
 
@@ -24,7 +26,7 @@ contains
       type(force_history_type), intent(in) :: history
       type(assessment_type), intent(in) :: assessment
       character(len=:), allocatable :: text
-      real(wp) :: values(size(quantities))
+      real(wp) :: values(history_quantity_count)
       integer :: i, assessed, other
 
       assessed = get_assessed_force(case)
@@ -38,11 +40,10 @@ contains
          do i = 1, octave_count
             text = text//level_row(i, criteria(i))
          end do
-         text = text//row('contact time', history%contact_time*1000, 3, 'ms', criteria(octave_count + 1), 1000.0_wp) &
-            //row('restitution', history%restitution, 4, '', criteria(octave_count + 2), 1.0_wp) &
-            //row('peaks of the force', criteria(octave_count + 3)%value, 0, '', criteria(octave_count + 3), 1.0_wp) &
-            //row('mass', case%ball%mass, 3, 'kg', criteria(octave_count + 4), 1.0_wp) &
-            //row('drop height', case%drop%height, 3, 'm', criteria(octave_count + 5), 1.0_wp)//newline
+         do i = octave_count + 1, size(criteria)
+            text = text//quantity_row(get_quantity(criteria(i)%name), criteria(i)%value, criteria(i))
+         end do
+         text = text//newline
          do i = octave_count + 1, size(assessment%bands)
             text = text//level_row(i)
          end do
@@ -51,9 +52,8 @@ contains
          do i = 1, sample_quantity_count
             ! Those with limits stand above.
             if (any(criteria%name == quantities(i)%name)) cycle
-            if (quantities(i)%name == merge('peak_elastic_force', 'peak_force        ', case%level_force == 'floor')) cycle
-            text = text//row(trim(quantities(i)%title), quantities(i)%display_scale*values(i), quantities(i)%decimals, &
-               trim(quantities(i)%display_unit))
+            if (is_peak_of_other(quantities(i), case)) cycle
+            text = text//quantity_row(quantities(i), values(i))
          end do
          text = text//facts(history)//newline
          text = text//'  The source '//trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
@@ -75,10 +75,19 @@ contains
          line = row('level, '//get_band_name(assessment%bands(band))//' Hz '//trim(assessment%bands(band)%set), &
             assessment%level(band, assessed), 2, 'dB', criterion, 1.0_wp)
          if (other == 0) return
-         line = line(:len(line) - 1)//right(fixed(assessment%level(band, other), 2), 79 - len(line))//' dB'//newline
+         line = line(:len(line) - 1)//flush_right(fixed(assessment%level(band, other), 2), 79 - len(line))//' dB'//newline
       end function level_row
 
    end function get_table
+
+   !> Whether a quantity is the peak of the force that is not assessed.
+   pure function is_peak_of_other(quantity, case) result(yes)
+      type(quantity_type), intent(in) :: quantity
+      type(case_type), intent(in) :: case
+      logical :: yes
+
+      yes = quantity%name == merge('peak_elastic_force', 'peak_force        ', case%level_force == 'floor')
+   end function is_peak_of_other
 
    !> Which groups a file has left out.
    function get_defaults_line(case) result(line)
@@ -107,10 +116,11 @@ contains
 
       text = '  free modes     frequency   harmonic   participation'//newline &
          //'                       Hz                of the pole'//newline &
-         //'   rigid        '//right(fixed(modes%rigid_frequency, 3), 9)//right('1', 11)//right('1.000', 16)//newline
+         //'   rigid        '//flush_right(fixed(modes%rigid_frequency, 3), 9)//flush_right('1', 11) &
+         //flush_right('1.000', 16)//newline
       do i = 1, size(modes%frequency)
-         text = text//right(to_text(i), 6)//right(fixed(modes%frequency(i), 3), 19) &
-            //right(to_text(modes%harmonic(i)), 11)//right(fixed(modes%participation(i), 3), 16)//newline
+         text = text//flush_right(to_text(i), 6)//flush_right(fixed(modes%frequency(i), 3), 19) &
+            //flush_right(to_text(modes%harmonic(i)), 11)//flush_right(fixed(modes%participation(i), 3), 16)//newline
       end do
    end function get_modes_table
 
@@ -128,6 +138,18 @@ contains
       end associate
    end function get_compression_table
 
+   !> A quantity, with its limits where there are any.
+   function quantity_row(quantity, value, criterion) result(text)
+      type(quantity_type), intent(in) :: quantity
+      !> Its value and its limits, in SI units.
+      real(wp), intent(in) :: value
+      type(criterion_type), intent(in), optional :: criterion
+      character(len=:), allocatable :: text
+
+      text = row(quantity%title, quantity%display_scale*value, quantity%decimals, quantity%display_unit, criterion, &
+         quantity%display_scale)
+   end function quantity_row
+
    !> One number of the table, with its limits where there are any.
    function row(name, value, decimals, unit, criterion, scale) result(text)
       character(len=*), intent(in) :: name
@@ -142,7 +164,7 @@ contains
       real(wp), intent(in), optional :: scale
       character(len=:), allocatable :: text
 
-      text = '  '//padded(name, 22)//right(fixed(value, decimals), 10)//' '//padded(unit, 5)
+      text = '  '//padded(name, 22)//flush_right(fixed(value, decimals), 10)//' '//padded(unit, 5)
       if (present(criterion) .and. present(scale)) text = text//get_limits(criterion, scale)//get_word(criterion)
       text = trim(text)//newline
    end function row
@@ -154,7 +176,7 @@ contains
       real(wp), intent(in) :: scale
       character(len=:), allocatable :: text
 
-      text = right(short(criterion%lower*scale), 7)
+      text = flush_right(short(criterion%lower*scale), 7)
       if (criterion%upper > criterion%lower) text = text//' to '//short(criterion%upper*scale)
       text = padded(text, 18)
    end function get_limits
@@ -169,8 +191,8 @@ contains
       character(len=*), intent(in) :: unit
       character(len=:), allocatable :: text
 
-      text = '  '//padded(name, 22)//right(fixed(span(1), decimals), 10)//' to '//right(fixed(span(2), decimals), 8)//' ' &
-         //unit//newline
+      text = '  '//padded(name, 22)//flush_right(fixed(span(1), decimals), 10)//' to ' &
+         //flush_right(fixed(span(2), decimals), 8)//' '//unit//newline
    end function get_span_row
 
    !> Numbers that the model chose or found, as rows.
@@ -201,25 +223,5 @@ contains
       text = text(:verify(text, '0', back=.true.))
       if (text(len(text):) == '.') text = text(:len(text) - 1)
    end function short
-
-   !> Left-justified text.
-   pure function padded(text, width) result(cell)
-      character(len=*), intent(in) :: text
-      !> Width of the cell; longer text keeps its length.
-      integer, intent(in) :: width
-      character(len=:), allocatable :: cell
-
-      cell = trim(text)//repeat(' ', max(width - len_trim(text), 0))
-   end function padded
-
-   !> Right-justified text.
-   pure function right(text, width) result(cell)
-      character(len=*), intent(in) :: text
-      !> Width of the cell; longer text keeps its length.
-      integer, intent(in) :: width
-      character(len=:), allocatable :: cell
-
-      cell = repeat(' ', max(width - len(text), 0))//text
-   end function right
 
 end module thud_table

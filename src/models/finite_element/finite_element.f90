@@ -75,9 +75,7 @@ contains
       type(ball_type), intent(in) :: ball
       class(finite_element_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> What the source drops on (default: a rigid floor).
       type(receiver_type), intent(in), optional :: receiver
-      !> The time, s.
       real(wp) :: cost
       real(wp) :: speed, interval, time, n_step, element_cost, damping
 
@@ -111,7 +109,6 @@ contains
    !> Modulus of elasticity of the paper's ball, Pa (that of its published free modes, section 4.1).
    function get_paper_modulus(options) result(modulus)
       class(finite_element_type), intent(in) :: options
-      !> The modulus, Pa.
       real(wp) :: modulus
 
       modulus = 2.08e6_wp
@@ -123,9 +120,7 @@ contains
       type(drop_type), intent(in) :: drop
       class(finite_element_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> The answer.
       type(force_history_type), intent(in) :: history
-      !> The limits: [n_limit].
       type(theory_limit_type), allocatable :: limits(:)
       real(wp) :: length
 
@@ -142,11 +137,8 @@ contains
    subroutine get_loss_factors(ball, options, frequency, loss_factor, error)
       type(ball_type), intent(in) :: ball
       class(finite_element_type), intent(in) :: options
-      !> Frequencies, Hz: [n].
       real(wp), intent(in) :: frequency(:)
-      !> Loss factors: [n].
       real(wp), intent(out) :: loss_factor(:)
-      !> No Prony series fits the loss factor.
       type(error_type), allocatable, intent(out) :: error
       type(material_type) :: material
       integer :: i
@@ -159,15 +151,10 @@ contains
 
    !> Force on each of two plates that press the ball slowly, at its long-term modulus.
    subroutine compress(ball, options, deflection, force, error)
-      !> The ball, with the gas that it has in the press.
       type(ball_type), intent(in) :: ball
-      !> Mesh and material.
       class(finite_element_type), intent(in) :: options
-      !> Approach of the plates, ascending from 0, m: [n].
       real(wp), intent(in) :: deflection(:)
-      !> The force, N: [n].
       real(wp), intent(out) :: force(:)
-      !> No Prony series fits the loss factor, or no state of rest was found.
       type(error_type), allocatable, intent(out) :: error
       type(material_type) :: material
       type(pressed_ball_type) :: pressed
@@ -188,15 +175,10 @@ contains
    subroutine solve(ball, drop, options, sampling, history, error, receiver)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
-      !> Mesh, material, contact.
       class(finite_element_type), intent(in) :: options
-      !> Sampling rate, length of the record, minimum number of steps in a sampling interval.
       type(sampling_type), intent(in) :: sampling
-      !> Force and motion, with the energies in the channels, and snapshots of the deformed ball.
       type(force_history_type), intent(out) :: history
-      !> The ball cannot be computed, or the balances do not close.
       type(error_type), allocatable, intent(out) :: error
-      !> What the source drops on (default: a rigid floor).
       type(receiver_type), intent(in), optional :: receiver
       type(impact_run_type) :: run
       type(material_type) :: material

@@ -50,9 +50,7 @@ contains
 
    !> Keys and allowed ranges; some belong to groups of their own.
    function get_fields(options) result(fields)
-      !> The options that the fields read and set.
       class(finite_element_options_type), intent(in), target :: options
-      !> One field per component: [17].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
@@ -72,7 +70,6 @@ contains
    !> Refuses options that do not fit each other, the ball or the memory.
    subroutine check(ball, options, sampling, error)
       type(ball_type), intent(in) :: ball
-      !> The options, each inside its own range.
       class(finite_element_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(error_type), allocatable, intent(out) :: error
@@ -101,7 +98,6 @@ contains
    function get_snapshot_shape(options, sampling) result(extents)
       class(finite_element_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> Nodes from pole to pole, nodes through the wall, snapshots.
       integer :: extents(3)
 
       extents = [options%mesh%polar_elements + 1, options%mesh%radial_elements + 1, get_frame_count(options, sampling)]

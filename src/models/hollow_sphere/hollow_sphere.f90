@@ -70,9 +70,7 @@ contains
 
    !> The one key.
    function get_fields(options) result(fields)
-      !> The options that the fields read and set.
       class(hollow_sphere_type), intent(in), target :: options
-      !> One field per component: [1].
       type(field_type), allocatable :: fields(:)
 
       fields = [choice_field('momentum_flux', options%momentum_flux, &
@@ -82,7 +80,6 @@ contains
    !> Modulus of elasticity of the paper's ball, Pa (section 2.3).
    function get_paper_modulus(options) result(modulus)
       class(hollow_sphere_type), intent(in) :: options
-      !> The modulus, Pa.
       real(wp) :: modulus
 
       modulus = 1.6e6_wp
@@ -94,9 +91,7 @@ contains
       type(drop_type), intent(in) :: drop
       class(hollow_sphere_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> The answer.
       type(force_history_type), intent(in) :: history
-      !> The limits: [n_limit].
       type(theory_limit_type), allocatable :: limits(:)
 
       limits = [theory_limit_type('ball', 'wall_thickness over outer_radius', ball%wall_thickness/ball%outer_radius, &
@@ -106,15 +101,10 @@ contains
 
    !> Force on each of two plates that press the shell slowly: each flattens a cap of half their approach.
    subroutine compress(ball, options, deflection, force, error)
-      !> The ball, with the gas that it has in the press.
       type(ball_type), intent(in) :: ball
-      !> The options, none of which counts.
       class(hollow_sphere_type), intent(in) :: options
-      !> Approach of the plates, ascending, m: [n].
       real(wp), intent(in) :: deflection(:)
-      !> The force, N: [n].
       real(wp), intent(out) :: force(:)
-      !> The caps meet.
       type(error_type), allocatable, intent(out) :: error
       type(shell_type) :: shell
       integer :: i
@@ -211,13 +201,9 @@ contains
    !> m = M (1 - deflection/2R).
    pure subroutine get_derivative(self, time, state, rate, valid)
       class(shell_type), intent(in) :: self
-      !> Time since first touch, s; the equation does not depend on it.
       real(wp), intent(in) :: time
-      !> Deflection (m), velocity (m/s), impulse (N s), energy loss (J): [4].
       real(wp), intent(in) :: state(:)
-      !> Derivative of the state: [4].
       real(wp), intent(out) :: rate(:)
-      !> False where the shell is closed.
       logical, intent(out) :: valid
       real(wp) :: elastic_force, flux, moving_mass, weight
 
@@ -241,7 +227,6 @@ contains
    !> Shell, gas and flux force of one instant.
    pure subroutine get_components(self, state, components, elastic_force)
       class(shell_type), intent(in) :: self
-      !> State, see `thud_single_mass`: [4].
       real(wp), intent(in) :: state(:)
       !> F_B, F_G and the flux of momentum into the floor, N: [3].
       real(wp), intent(out) :: components(:)
@@ -276,9 +261,7 @@ contains
    function get_failure(self, drop, time, state) result(error)
       class(shell_type), intent(in) :: self
       type(drop_type), intent(in) :: drop
-      !> Time since first touch, s.
       real(wp), intent(in) :: time
-      !> Last valid state: [4].
       real(wp), intent(in) :: state(:)
       type(error_type) :: error
 
@@ -295,15 +278,10 @@ contains
    subroutine solve_hollow_sphere(ball, drop, options, sampling, history, error, receiver)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
-      !> The choice of momentum flux.
       class(hollow_sphere_type), intent(in) :: options
-      !> Sampling rate, length of the record, substeps.
       type(sampling_type), intent(in) :: sampling
-      !> Force and motion from first touch on.
       type(force_history_type), intent(out) :: history
-      !> The shell closes, the contact outlasts the record, or the steps are too coarse.
       type(error_type), allocatable, intent(out) :: error
-      !> What the source drops on (default: a rigid floor).
       type(receiver_type), intent(in), optional :: receiver
       type(shell_type) :: shell
       integer :: choice

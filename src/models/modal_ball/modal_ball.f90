@@ -59,9 +59,7 @@ contains
       type(ball_type), intent(in) :: ball
       class(modal_ball_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> What the source drops on (default: a rigid floor).
       type(receiver_type), intent(in), optional :: receiver
-      !> The time, s.
       real(wp) :: cost
       real(wp) :: n_mode, n_gap, step_cost
 
@@ -81,7 +79,6 @@ contains
    !> Modulus of elasticity of the paper's ball, Pa (section 2.3; of linear modes an effective modulus).
    function get_paper_modulus(options) result(modulus)
       class(modal_ball_type), intent(in) :: options
-      !> The modulus, Pa.
       real(wp) :: modulus
 
       modulus = 1.6e6_wp
@@ -94,9 +91,7 @@ contains
       type(drop_type), intent(in) :: drop
       class(modal_ball_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> The answer.
       type(force_history_type), intent(in) :: history
-      !> The limits: [n_limit].
       type(theory_limit_type), allocatable :: limits(:)
       real(wp) :: angle
 
@@ -119,15 +114,10 @@ contains
 
    !> Force on each of two plates that press the ball slowly.
    subroutine compress(ball, options, deflection, force, error)
-      !> The ball, with the gas that it has in the press.
       type(ball_type), intent(in) :: ball
-      !> Harmonics and rings.
       class(modal_ball_type), intent(in) :: options
-      !> Approach of the plates, ascending, m: [n].
       real(wp), intent(in) :: deflection(:)
-      !> The force, N: [n].
       real(wp), intent(out) :: force(:)
-      !> The rings cannot be distinguished, or the ball lies on the outermost one.
       type(error_type), allocatable, intent(out) :: error
 
       call compress_modal_ball(ball, options, deflection, force, error)
@@ -137,15 +127,10 @@ contains
    subroutine solve(ball, drop, options, sampling, history, error, receiver)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
-      !> Modes, rings and damping.
       class(modal_ball_type), intent(in) :: options
-      !> Sampling rate, length of the record, substeps.
       type(sampling_type), intent(in) :: sampling
-      !> Force and motion from first touch on; the force is the mean of each sampling interval.
       type(force_history_type), intent(out) :: history
-      !> The modes cannot be computed, the contact outlasts the record, or the steps are too coarse.
       type(error_type), allocatable, intent(out) :: error
-      !> What the source drops on (default: a rigid floor).
       type(receiver_type), intent(in), optional :: receiver
       type(mode_step_type) :: step
       type(ring_contact_type) :: contact

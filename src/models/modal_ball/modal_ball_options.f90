@@ -49,9 +49,7 @@ contains
 
    !> Keys and allowed ranges.
    function get_fields(options) result(fields)
-      !> The options that the fields read and set.
       class(modal_ball_options_type), intent(in), target :: options
-      !> One field per component: [12].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
@@ -80,7 +78,6 @@ contains
    !> Refuses rings that are too few for the harmonics, and losses that no fractional law has.
    subroutine check(ball, options, sampling, error)
       type(ball_type), intent(in) :: ball
-      !> The options, each inside its own range.
       class(modal_ball_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(error_type), allocatable, intent(out) :: error

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    Array = NDArray[np.float64]
+
 # Columns of the Jacobian with a smaller norm over that of the target, or a larger relative error,
 # are zero.
 NO_EFFECT = 1e-9
@@ -48,12 +50,12 @@ class Inference:
         Changes that leave the residuals as they are, of the fewest parameters.
     """
 
-    covariance: NDArray[np.float64]
-    singular_values: NDArray[np.float64]
-    null: NDArray[np.float64]
+    covariance: Array
+    singular_values: Array
+    null: Array
 
 
-def infer(jacobian: NDArray[np.float64], finer: NDArray[np.float64], size: float) -> Inference:
+def infer(jacobian: Array, finer: Array, size: float) -> Inference:
     """Return covariance, singular values and null directions.
 
     `jacobian`, shape (m, n), holds derivatives of weighted residuals by scaled parameters, `finer`
@@ -76,20 +78,18 @@ def infer(jacobian: NDArray[np.float64], finer: NDArray[np.float64], size: float
     return Inference(covariance, values, _sparse(turned[lost] / length))
 
 
-def _sparse(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def _sparse(rows: Array) -> Array:
     """Return another basis of the same space: in each of its pivot columns one entry is not 0."""
     if not len(rows):
         return rows
     # The parameters that vary most represent the directions.
     _, _, order = qr(rows, pivoting=True)
     basis = np.linalg.solve(rows[:, order[: len(rows)]], rows)
-    result: NDArray[np.float64] = basis / np.abs(basis).max(axis=1, keepdims=True)
+    result: Array = basis / np.abs(basis).max(axis=1, keepdims=True)
     return result
 
 
-def worst_directions(
-    covariance: NDArray[np.float64], maximum: float
-) -> list[tuple[float, NDArray[np.float64]]]:
+def worst_directions(covariance: Array, maximum: float) -> list[tuple[float, Array]]:
     """Return directions whose standard deviation exceeds a maximum, with that deviation."""
     finite = np.flatnonzero(np.isfinite(np.diag(covariance)))
     variances, vectors = np.linalg.eigh(covariance[np.ix_(finite, finite)])
@@ -102,7 +102,7 @@ def worst_directions(
     return found
 
 
-def null_sentence(names: Sequence[str], direction: NDArray[np.float64]) -> str:
+def null_sentence(names: Sequence[str], direction: Array) -> str:
     """Return the meaning of a direction that is not identifiable."""
     part = _parts(names, direction)
     if len(part) == 1:
@@ -111,9 +111,7 @@ def null_sentence(names: Sequence[str], direction: NDArray[np.float64]) -> str:
     return f"{change} leave what is compared as it is{_product(part)}"
 
 
-def weak_sentence(
-    names: Sequence[str], direction: NDArray[np.float64], width: float, confidence: float
-) -> str:
+def weak_sentence(names: Sequence[str], direction: Array, width: float, confidence: float) -> str:
     """Return the meaning of a direction with a relative half interval `width` that is wide."""
     part = _parts(names, direction)
     share = f"{100 * width * max(abs(value) for _, value in part):.0f} %"
@@ -128,9 +126,7 @@ def weak_sentence(
     )
 
 
-def pair_sentences(
-    names: Sequence[str], correlation: NDArray[np.float64], least: float
-) -> list[str]:
+def pair_sentences(names: Sequence[str], correlation: Array, least: float) -> list[str]:
     """Return the pairs of parameters whose correlation reaches a size, the strongest first."""
     strong = np.triu(np.nan_to_num(np.abs(correlation)), 1)
     pairs = sorted(np.argwhere(strong >= least).tolist(), key=lambda pair: -strong[*pair])
@@ -145,12 +141,7 @@ def pair_sentences(
     return found
 
 
-def statement(
-    names: Sequence[str],
-    covariance: NDArray[np.float64],
-    correlation: NDArray[np.float64],
-    count: int,
-) -> list[str]:
+def statement(names: Sequence[str], covariance: Array, correlation: Array, count: int) -> list[str]:
     """Return how well parameters can be told apart, from the covariance of their relative values.
 
     The first `count` parameters are those of the model.
@@ -169,7 +160,7 @@ def statement(
     return found + pair_sentences(names, correlation, STRONG)
 
 
-def _parts(names: Sequence[str], direction: NDArray[np.float64]) -> list[tuple[str, float]]:
+def _parts(names: Sequence[str], direction: Array) -> list[tuple[str, float]]:
     """Return names and entries of a direction without negligible ones; the maximum is 1."""
     largest = np.abs(direction).max()
     found = [

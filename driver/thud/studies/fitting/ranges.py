@@ -11,6 +11,7 @@ import numpy as np
 from thud.base._schema import KEYS
 from thud.base.checks import refuse, require_kind, suggestion
 from thud.base.errors import InputError
+from thud.base.units import scaled
 from thud.case.keys import limits, put, users
 from thud.studies.parameter import fitted
 
@@ -32,7 +33,7 @@ class Range:
     """Start and limits of a parameter of a fit, SI units.
 
     `scale` divides it in the search: its start, or a tenth of the range where that is 0. Further
-    starts lie within `spread`.
+    starts lie within `spread`. `given_unit` and its size in SI units are those of the study.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Range:
     high: float
     scale: float
     spread: tuple[float, float]
+    given_unit: tuple[str, float] | None = None
 
 
 def known_parameters(case: Case) -> dict[str, tuple[Key, float]]:
@@ -133,4 +135,6 @@ def _get_range(case: Case, given: Parameter) -> Range:
         low = -np.inf
     margin = min(INSIDE * scale, (high - low) / 4)
     start = min(max(start, low + margin), high - margin)
-    return Range(name, key.unit, start, low, high, scale, spread)
+    unit, power = given.shown_unit
+    given_unit = (unit, scaled(1.0, power)) if given.unit else None
+    return Range(name, key.unit, start, low, high, scale, spread, given_unit)

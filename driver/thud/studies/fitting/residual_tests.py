@@ -10,13 +10,15 @@ from scipy import stats
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    Array = NDArray[np.float64]
+
 # Probability of a false warning by one test.
 UNLIKELY = 1e-3
 # Fewer residuals are not tested.
 MIN_TESTED = 20
 
 
-def residual_doubts(residual: NDArray[np.float64], time: NDArray[np.float64]) -> list[str]:
+def residual_doubts(residual: Array, time: Array) -> list[str]:
     """Return what the residuals of equally spaced times, s, show beside independent noise."""
     if len(residual) < MIN_TESTED:
         return []
@@ -25,7 +27,7 @@ def residual_doubts(residual: NDArray[np.float64], time: NDArray[np.float64]) ->
     ]
 
 
-def _colour(residual: NDArray[np.float64]) -> str:
+def _colour(residual: Array) -> str:
     """Test the cumulative periodogram (Bartlett): of white noise it is that of uniform numbers."""
     power = np.abs(np.fft.rfft(residual)[1:]) ** 2
     share = np.cumsum(power) / power.sum()
@@ -41,7 +43,7 @@ def _colour(residual: NDArray[np.float64]) -> str:
     )
 
 
-def _largest(residual: NDArray[np.float64], time: NDArray[np.float64]) -> str:
+def _largest(residual: Array, time: Array) -> str:
     """Test the largest of n normal residuals: n times its probability (Bonferroni)."""
     place = int(np.argmax(np.abs(residual)))
     size = abs(float(residual[place]))
@@ -53,7 +55,7 @@ def _largest(residual: NDArray[np.float64], time: NDArray[np.float64]) -> str:
     )
 
 
-def runs_doubt(residual: NDArray[np.float64]) -> str:
+def runs_doubt(residual: Array) -> str:
     """Return that residuals have too few or many runs of one sign (Wald and Wolfowitz), or ""."""
     positive = residual > 0
     n, m = int(positive.sum()), int((~positive).sum())

@@ -1,5 +1,5 @@
-!> Remarks on what is possible but not plausible: input of no rubber, moduli of another model, forces of no source.
-module thud_remarks
+!> Warnings on what is possible but not plausible: input of no rubber, moduli of another model, forces of no source.
+module thud_warnings
    use thud_ball, only: get_density
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
    use thud_case, only: case_type, get_floor_number, get_model_number
@@ -15,10 +15,10 @@ module thud_remarks
    implicit none (type, external)
    private
 
-   public :: add_floor_remark, get_remarks, remark_length
+   public :: add_floor_warning, get_warnings, warning_length
 
-   !> Length of a remark.
-   integer, parameter :: remark_length = 240
+   !> Length of a warning.
+   integer, parameter :: warning_length = 240
 
    !> Densities of rubbers, from unfilled natural rubber with pores to highly filled, kg/m3: [2].
    real(wp), parameter :: rubber_density(2) = [800.0_wp, 2200.0_wp]
@@ -53,39 +53,39 @@ module thud_remarks
 
 contains
 
-   !> Remarks on a case and its force.
-   subroutine get_remarks(case, history, remarks, on_floor)
+   !> Warnings on a case and its force.
+   subroutine get_warnings(case, history, warnings, on_floor)
       !> The case, checked.
       type(case_type), intent(in) :: case
       !> Its force, of no samples without an impact.
       type(force_history_type), intent(in) :: history
-      !> Sentences: [n].
-      character(len=remark_length), allocatable, intent(out) :: remarks(:)
+      !> Messages: [n].
+      character(len=warning_length), allocatable, intent(out) :: warnings(:)
       !> The force on a floor that has moved under the source.
       type(force_history_type), intent(in), optional :: on_floor
 
-      allocate (remarks(0))
+      allocate (warnings(0))
       if (case%has_impact) then
-         call add_ball_remarks(case, case%model, remarks)
+         call add_ball_warnings(case, case%model, warnings)
       else
-         call add_ball_remarks(case, modes_model, remarks)
+         call add_ball_warnings(case, modes_model, warnings)
       end if
       if (.not. case%has_impact) return
-      if (case%has_floor .and. case%floor /= floor_names(1) .and. .not. present(on_floor)) call add(remarks, &
+      if (case%has_floor .and. case%floor /= floor_names(1) .and. .not. present(on_floor)) call add(warnings, &
          '&floor: name = '//quoted(case%floor)//' does not move under the model '//quoted(case%model) &
          //': its force is that on a rigid floor')
-      if (case%has_floor) call add_floor_remark(case, remarks)
-      call add_limit_remarks(case, history, remarks)
-      call add_level_remarks(history, remarks)
-      if (present(on_floor)) call add_limit_remarks(case, on_floor, remarks)
-   end subroutine get_remarks
+      if (case%has_floor) call add_floor_warning(case, warnings)
+      call add_limit_warnings(case, history, warnings)
+      call add_level_warnings(history, warnings)
+      if (present(on_floor)) call add_limit_warnings(case, on_floor, warnings)
+   end subroutine get_warnings
 
-   !> Adds remarks on an answer that lies outside the theory.
-   subroutine add_limit_remarks(case, history, remarks)
+   !> Adds warnings on an answer that lies outside the theory.
+   subroutine add_limit_warnings(case, history, warnings)
       type(case_type), intent(in) :: case
       type(force_history_type), intent(in) :: history
-      !> Sentences: [n].
-      character(len=remark_length), allocatable, intent(inout) :: remarks(:)
+      !> Messages: [n].
+      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
       type(theory_limit_type), allocatable :: limits(:)
       integer :: i
 
@@ -99,16 +99,16 @@ contains
       do i = 1, size(limits)
          if (.not. is_outside(limits(i))) cycle
          ! One sentence on a drop, on whichever floor.
-         if (any(index(remarks, trim(limits(i)%quantity)//' is ') > 0)) cycle
-         call add(remarks, get_limit_sentence(limits(i)))
+         if (any(index(warnings, trim(limits(i)%quantity)//' is ') > 0)) cycle
+         call add(warnings, get_limit_sentence(limits(i)))
       end do
-   end subroutine add_limit_remarks
+   end subroutine add_limit_warnings
 
-   !> Adds remarks on levels of a force in other units, and on levels that are rounding.
-   subroutine add_level_remarks(history, remarks)
+   !> Adds warnings on levels of a force in other units, and on levels that are rounding.
+   subroutine add_level_warnings(history, warnings)
       type(force_history_type), intent(in) :: history
-      !> Sentences: [n].
-      character(len=remark_length), allocatable, intent(inout) :: remarks(:)
+      !> Messages: [n].
+      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
       type(band_type) :: bands(octave_count)
       type(error_type), allocatable :: error
       real(wp) :: levels(octave_count)
@@ -116,42 +116,42 @@ contains
       integer :: first
 
       total = 10*log10(max(sum(history%floor_force**2)/history%sample_rate, tiny(1.0_wp)))
-      if (total < source_level(1) - max_distance .or. total > source_level(2) + max_distance) call add(remarks, &
+      if (total < source_level(1) - max_distance .or. total > source_level(2) + max_distance) call add(warnings, &
          'the force exposure level over all frequencies is '//fixed(total, 1)//' dB, sources that conform have ' &
          //fixed(source_level(1), 0)//' to '//fixed(source_level(2), 0)//' dB; check the units of the input')
       bands = get_octaves()
       call get_force_exposure_levels(history%floor_force, history%sample_rate, bands, 'exact', levels, error)
       if (allocated(error)) return
       first = findloc(levels < total - max_decline, .true., dim=1)
-      if (first > 0) call add(remarks, 'octaves from '//trim(get_band_name(bands(first))) &
+      if (first > 0) call add(warnings, 'octaves from '//trim(get_band_name(bands(first))) &
          //' Hz on hold less than 1e-12 of the energy of the force: rounding counts in their levels')
-   end subroutine add_level_remarks
+   end subroutine add_level_warnings
 
-   !> Adds a remark on octaves of the standard in which the floor is not what it claims to be.
-   subroutine add_floor_remark(case, remarks)
+   !> Adds a warning on octaves of the standard in which the floor is not what it claims to be.
+   subroutine add_floor_warning(case, warnings)
       !> A case with a floor.
       type(case_type), intent(in) :: case
-      !> Sentences: [n].
-      character(len=remark_length), allocatable, intent(inout) :: remarks(:)
+      !> Messages: [n].
+      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
       character(len=reason_length) :: reason
       real(wp) :: lowest, highest
 
       associate (floor => case%floors(get_floor_number(case))%model)
          call floor%get_validity(lowest, highest, reason)
       end associate
-      if (lowest > standard_band(1)) call add(remarks, '&'//trim(case%floor)//': below '//fixed(lowest, 0)//' Hz ' &
+      if (lowest > standard_band(1)) call add(warnings, '&'//trim(case%floor)//': below '//fixed(lowest, 0)//' Hz ' &
          //trim(reason))
-      if (highest < standard_band(2)) call add(remarks, '&'//trim(case%floor)//': above '//fixed(highest, 0)//' Hz ' &
+      if (highest < standard_band(2)) call add(warnings, '&'//trim(case%floor)//': above '//fixed(highest, 0)//' Hz ' &
          //trim(reason))
-   end subroutine add_floor_remark
+   end subroutine add_floor_warning
 
-   !> Adds remarks on wall and modulus of the ball, for models that use them.
-   subroutine add_ball_remarks(case, model, remarks)
+   !> Adds warnings on wall and modulus of the ball, for models that use them.
+   subroutine add_ball_warnings(case, model, warnings)
       type(case_type), intent(in) :: case
       !> The model that uses the ball, one of `model_names`.
       character(len=*), intent(in) :: model
-      !> Sentences: [n].
-      character(len=remark_length), allocatable, intent(inout) :: remarks(:)
+      !> Messages: [n].
+      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
       real(wp) :: own, other, density
       integer :: i
 
@@ -160,34 +160,34 @@ contains
       if (.not. own > 0.0_wp) return
       density = get_density(case%ball)
       associate (modulus => case%ball%youngs_modulus)
-         if (density < rubber_density(1) .or. density > rubber_density(2)) call add(remarks, &
+         if (density < rubber_density(1) .or. density > rubber_density(2)) call add(warnings, &
             '&ball: the wall has a density of '//fixed(density, 0)//' kg/m3, rubbers have '//fixed(rubber_density(1), 0) &
             //' to '//fixed(rubber_density(2), 0)//'; check mass, outer_radius and wall_thickness')
-         if (modulus < rubber_modulus(1) .or. modulus > rubber_modulus(2)) call add(remarks, &
+         if (modulus < rubber_modulus(1) .or. modulus > rubber_modulus(2)) call add(warnings, &
             '&ball: youngs_modulus = '//to_text(modulus)//' Pa, rubbers have '//to_text(rubber_modulus(1))//' to ' &
             //to_text(rubber_modulus(2))//'; check the unit')
-         if (case%ball%poisson_ratio < rubber_ratio(1)) call add(remarks, '&ball: poisson_ratio = ' &
+         if (case%ball%poisson_ratio < rubber_ratio(1)) call add(warnings, '&ball: poisson_ratio = ' &
             //to_text(case%ball%poisson_ratio)//', rubbers have '//fixed(rubber_ratio(1), 2)//' to ' &
             //fixed(rubber_ratio(2), 2))
          do i = 1, size(model_names)
             other = case%models(i)%model%get_paper_modulus()
             if (.not. (other > 0.0_wp .and. abs(other - own) > same_modulus*own)) cycle
             if (abs(modulus - other) > same_modulus*other) cycle
-            call add(remarks, '&ball: youngs_modulus = '//fixed(modulus/1.0e6_wp, 2)//" MPa is the modulus of the paper's " &
-               //'ball in the model '//quoted(model_names(i))//'; '//quoted(model)//' needs '//fixed(own/1.0e6_wp, 2) &
-               //' MPa')
+            call add(warnings, '&ball: youngs_modulus = '//fixed(modulus/1.0e6_wp, 2)//' MPa is the modulus of the ' &
+               //"paper's ball in the model "//quoted(model_names(i))//'; '//quoted(model)//' needs ' &
+               //fixed(own/1.0e6_wp, 2)//' MPa')
             exit
          end do
       end associate
-   end subroutine add_ball_remarks
+   end subroutine add_ball_warnings
 
    !> Adds a sentence.
-   pure subroutine add(remarks, sentence)
-      !> Sentences: [n].
-      character(len=remark_length), allocatable, intent(inout) :: remarks(:)
+   pure subroutine add(warnings, sentence)
+      !> Messages: [n].
+      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
       character(len=*), intent(in) :: sentence
 
-      remarks = [character(len=remark_length) :: remarks, sentence]
+      warnings = [character(len=warning_length) :: warnings, sentence]
    end subroutine add
 
-end module thud_remarks
+end module thud_warnings
