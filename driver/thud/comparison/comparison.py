@@ -26,7 +26,6 @@ from thud.level.levels import FORCES, SOURCES, get_bands
 from thud.plot.files import page_files
 from thud.plot.impacts import common_source
 from thud.plot.pages import comparison_html, comparison_page
-from thud.recordings.read_recording import read_recording
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -286,7 +285,13 @@ def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Impact
     found: dict[str, Case | ImpactResult] = {}
     for path in map(Path, paths):
         given: Case | ImpactResult
-        given = read_case(path) if path.suffix.lower() in NAMELISTS else read_recording(path)
+        if path.suffix.lower() in NAMELISTS:
+            given = read_case(path)
+        else:
+            # SciPy takes its time.
+            from thud.recordings.read_recording import read_recording
+
+            given = read_recording(path)
         name = given.name
         if name in found:
             message = f"{path}: {name!r} also names another input; allowed: different names"

@@ -1,4 +1,4 @@
-"""The page of a calibration report: one sheet of A4 in one file, from its data and its figures."""
+"""The page of a calibration report: A4 in one file, from its data and its figures."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from thud.base.display import left_out
 from thud.level.assessment import RESULTS
 from thud.plot.style import own_style
 from thud.recordings.recorded_levels import BACKGROUND, MARGIN
-from thud.report.fonts import FAMILY, clip, count_lines, font_faces, text_width
-from thud.report.notes import fit_lines, group_places
+from thud.report.fonts import FAMILY, font_faces
+from thud.report.notes import group_places, shorten
 from thud.report.rows import HEAD, NOT_KNOWN, criterion_row, limits_of, number, style_of
 from thud.report.template import BODY, PAGE
 
@@ -22,21 +22,15 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-# Sizes of text, pt; width of the page within its margins, of a column, of labels and of
-# the verdict, mm.
-SIZE = 7.3
-WIDTH, COLUMN, LABEL, REASON = 186.0, 91.0, 23.0, 112.0
-# Lines of a value, of the instruments, of files, of the blocks of notes and of a note.
-VALUE_LINES, INSTRUMENT_LINES, FILES = 2, 6, 5
-RESULT_LINES, STEP_LINES, WARNING_LINES = 13, 8, 7
-SENTENCE_LINES = 3
+# Maximum number of instruments, of files, and of notes in a list.
+INSTRUMENTS, FILES, NOTES = 6, 5, 7
 # Of two drops, none is an outlier.
 MIN_DROPS = 2
 STANDARDS = {
     "rubber_ball": "JIS A 1418-2, ISO 10140-5 and ISO 16283-2",
     "tyre": "JIS A 1418-2",
 }
-# Part of a range that lies within the limits, and its ends.
+# Ends of the limits in the picture of a criterion, of 100.
 LOW, HIGH = 25.0, 75.0
 
 
@@ -63,9 +57,9 @@ def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) 
         rows="\n".join(map(_row, data["criteria"])),
         rule=_text(_rule(data)),
         figures="\n".join(_cells(figures)),
-        results=_notes("Drops and methods", _results(data), RESULT_LINES),
-        done=_notes("Signal processing", _told(data, "steps") or ["nothing"], STEP_LINES),
-        warnings=_notes("Warnings", _told(data, "warnings") or ["none"], WARNING_LINES),
+        results=_notes("Drops and methods", _results(data)),
+        done=_notes("Signal processing", _told(data, "steps") or ["nothing"]),
+        warnings=_notes("Warnings", _told(data, "warnings") or ["none"]),
         files=_files(data["files"]),
         footer=_text(f"thud {data['thud']} · report.json: SHA-256 {checksum}"),
     )
@@ -75,7 +69,6 @@ def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) 
         title=_text(title),
         fonts=font_faces(used),
         family=FAMILY,
-        size=SIZE,
         body=body,
     )
 
@@ -105,7 +98,7 @@ def _reason(criteria: Sequence[dict[str, Any]]) -> str:
         names = [style_of(one).title.split(",")[0] for one in criteria if one["verdict"] == verdict]
         if names:
             parts.append(f"{verdict}: {', '.join(names).lower().replace(' hz', ' Hz')}")
-    return clip("; ".join(parts), 0.93 * SIZE, REASON, 2) if parts else "all criteria are met"
+    return "; ".join(parts) or "all criteria are met"
 
 
 def _about(data: dict[str, Any]) -> list[tuple[str, str]]:
@@ -128,14 +121,12 @@ def _measured(data: dict[str, Any]) -> list[tuple[str, str]]:
     amount = f"{_count(drops, 'drop')} in {_count(len(files), 'file')}, {listed} kHz"
     ways = list(dict.fromkeys(one["calibration"] for one in files if one["calibration"]))
     share = data["calibration_uncertainty"]
-    given = f"u = {100 * share:.2g} %" if share is not None else "uncertainty not given"
+    given = f"u = {100 * share:.2g} %" if share is not None else "uncertainty not stated"
     way = f"{ways[0]}{f' and {len(ways) - 1} more' if len(ways) > 1 else ''}" if ways else NOT_KNOWN
-    instruments = [clip(_plain(one), SIZE, COLUMN - LABEL) for one in data["instruments"]]
-    fitted = fit_lines(instruments, INSTRUMENT_LINES, lambda _: 1)
     return [
         ("Recordings", amount),
         ("Calibration", f"{way}; {given}"),
-        ("Instruments", "\n".join(fitted)),
+        ("Instruments", "\n".join(shorten(data["instruments"], INSTRUMENTS))),
     ]
 
 
@@ -143,14 +134,9 @@ def _pairs(pairs: Iterable[tuple[str, str]]) -> str:
     """Return labels and values as rows."""
     rows = []
     for label, value in pairs:
-        lines = value.split("\n") if "\n" in value else [_clipped(value, VALUE_LINES)]
-        shown = "<br>".join(map(_text, lines)) if any(lines) else NOT_KNOWN
+        shown = "<br>".join(map(_text, value.split("\n"))) if value else NOT_KNOWN
         rows.append(f'<tr><th>{_text(label)}</th><td dir="auto">{shown}</td></tr>')
     return "\n".join(rows)
-
-
-def _clipped(value: str, lines: int) -> str:
-    return clip(_plain(value), SIZE, COLUMN - LABEL, lines)
 
 
 def _columns(row: Sequence[str], picture: str) -> list[str]:
@@ -195,14 +181,17 @@ def _rule(data: dict[str, Any]) -> str:
     limits += ", those marked * of the laboratory. " if own else ". "
     return limits + (
         "U: expanded uncertainty for 95 % (JCGM 100, Student's t). A criterion conforms where "
-        "value ± U lies within its limits, does not conform where it lies outside, and cannot be "
-        "decided otherwise (JCGM 106). Spread: standard deviation of single drops."
+        "value ± U lies within its limits, does not conform where it lies outside, and is "
+        "inconclusive otherwise (JCGM 106). Spread: standard deviation of single drops."
     )
 
 
 def _means(drops: Sequence[dict[str, Any]]) -> list[str]:
     """Return sentences on means of the drops that are no criteria."""
-    names = {"peak_force": ("peak force below 1.25 kHz", "N", 0), "impulse": ("impulse", "N s", 2)}
+    names = {
+        "peak_force": ("peak force, low-passed at 1.25 kHz", "N", 0),
+        "impulse": ("impulse", "N s", 2),
+    }
     names["effective_mass"] = ("effective mass", "kg", 3)
     means = []
     for key, (title, unit, decimals) in names.items():
@@ -261,28 +250,20 @@ def _told(data: dict[str, Any], kind: str) -> list[str]:
     return [*data[kind], *group_places(places)]
 
 
-def _notes(title: str, sentences: Sequence[str], lines: int) -> str:
-    """Return sentences as a list that takes a limited number of lines."""
-    width = COLUMN - 5.0
-    clipped = [clip(_plain(one), SIZE, width, SENTENCE_LINES) for one in sentences]
-    fitted = fit_lines(clipped, lines, lambda one: count_lines(one, SIZE, width))
-    items = "".join(f"<li>{_text(one)}</li>" for one in fitted)
+def _notes(title: str, messages: Sequence[str]) -> str:
+    """Return messages as a list with a title."""
+    items = "".join(f"<li>{_text(one)}</li>" for one in shorten(messages, NOTES))
     return f"<h2>{_text(title)}</h2><ul>{items}</ul>"
 
 
 def _files(files: Sequence[dict[str, Any]]) -> str:
-    """Return the names and checksums of the files, those that fit."""
-    shown = files if len(files) <= FILES else files[: FILES - 1]
-    room = WIDTH - text_width("0" * 66, SIZE)
-    rows = [
-        f"<tr><td>{_text(clip(_plain(one['name']), SIZE, room))}</td>"
-        f"<td>{_text(one['sha256'])}</td></tr>"
-        for one in shown
-    ]
-    if len(shown) < len(files):
-        rest = f"and {_count(len(files) - len(shown), 'file')} more, in report.json"
-        rows.append(f"<tr><td>{_text(rest)}</td><td></td></tr>")
-    return "\n".join(rows)
+    """Return the names and checksums of the first files."""
+    names = shorten([_plain(one["name"]) for one in files], FILES)
+    checksums = [*(one["sha256"] for one in files[: len(names) - (len(files) > FILES)]), ""]
+    return "\n".join(
+        f"<tr><td>{_text(name)}</td><td>{checksum}</td></tr>"
+        for name, checksum in zip(names, checksums, strict=False)
+    )
 
 
 def _count(number_of: int, what: str) -> str:
