@@ -220,7 +220,7 @@ def _room(impact: Impact) -> Answer:
         "frequency": _plain(found.frequency),
         "level": _plain(found.level),
         "rating": found.rating.rounded,
-        "standardised": found.standardised_rating.rounded,
+        "standardized": found.standardized_rating.rounded,
         "warnings": list(found.warnings),
     }
 

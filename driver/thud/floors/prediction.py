@@ -16,7 +16,7 @@ from thud.floors.survey import RoomLevels
 from thud.impact.floor_impact import FloorImpact, new_floor_impact
 from thud.level.impact_result import ImpactResult
 from thud.level.levels import BANDWIDTHS, get_bands
-from thud.level.rating import Rating, rated_bands, rating, standardised_level
+from thud.level.rating import Rating, rated_bands, rating, standardized_level
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -126,14 +126,14 @@ class RoomPrediction(Displayed):
         return rating(self.octave_level, BANDWIDTHS[0])
 
     @property
-    def standardised(self) -> Array:
+    def standardized(self) -> Array:
         """L'_i,Fmax,V,T, dB, shape (12,): in a room of 50 m3 and 0.5 s (ISO 16283-2)."""
-        return standardised_level(self.level, self.reverberation_time, self.room.volume)
+        return standardized_level(self.level, self.reverberation_time, self.room.volume)
 
     @property
-    def standardised_rating(self) -> Rating:
-        """Single numbers of the standardised levels."""
-        return rating(self.standardised, THIRDS)
+    def standardized_rating(self) -> Rating:
+        """Single numbers of the standardized levels."""
+        return rating(self.standardized, THIRDS)
 
     @property
     def has_few_modes(self) -> NDArray[np.bool_]:
@@ -174,10 +174,10 @@ class RoomPrediction(Displayed):
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, a third each."""
         head = (
-            "third, Hz", "L_i,Fmax, dB", "standardised, dB", "spread, dB", "energy, mJ",
+            "third, Hz", "L_i,Fmax, dB", "standardized, dB", "spread, dB", "energy, mJ",
             "floor modes",
         )  # fmt: skip
-        columns = (self.level, self.standardised, self.spread, 1e3 * self.energy, self.floor_modes)
+        columns = (self.level, self.standardized, self.spread, 1e3 * self.energy, self.floor_modes)
         forms = (".1f", ".1f", ".1f", ".3g", ".1f")
         cells = [
             [f"{value:{form}}" for value in column]
@@ -195,7 +195,7 @@ class RoomPrediction(Displayed):
         """Return the single numbers."""
         return (
             f"<RoomPrediction: L_iA,Fmax {self.rating.rounded} dB, "
-            f"standardised {self.standardised_rating.rounded} dB>"
+            f"standardized {self.standardized_rating.rounded} dB>"
         )
 
 

@@ -354,7 +354,7 @@ def _draw_classes(axes: Axes, found: FloorComparison) -> None:
     """Draw the single numbers beside the maximum levels of the Korean classes."""
     x = np.arange(len(found.predictions))
     room = [one.octave_rating.a_weighted for one in found.predictions.values()]
-    after = [one.standardised_rating.a_weighted for one in found.predictions.values()]
+    after = [one.standardized_rating.a_weighted for one in found.predictions.values()]
     axes.bar(
         x - 0.2, room, 0.36, color=COLORS[5], edgecolor="black", linewidth=0.5,
         label="in the room, of octaves",

@@ -44,11 +44,11 @@ def room_levels(found: RoomLevels) -> Figure:
         x, found.level, color=COLORS[0], marker="o", markersize=3.5,
         label=f"in the room: L_iA,Fmax {number} dB",
     )  # fmt: skip
-    after, standardised = found.standardised, found.standardised_rating
-    if after is not None and standardised is not None:
+    after, standardized = found.standardized, found.standardized_rating
+    if after is not None and standardized is not None:
         axes.plot(
             x, after, color=COLORS[1], marker="s", markersize=3.5,
-            linestyle="--", label=f"standardized: {standardised.rounded} dB",
+            linestyle="--", label=f"standardized: {standardized.rounded} dB",
         )  # fmt: skip
     if found.background is not None:
         axes.plot(
@@ -94,8 +94,8 @@ def draw_prediction(found: RoomPrediction, measured: RoomLevels | None = None) -
     label = f"in the room: L_iA,Fmax {found.rating.rounded} dB"
     below.plot([], [], color=COLORS[0], marker="o", markersize=4, label=label)
     below.plot(
-        x, found.standardised, color=COLORS[1], marker="s", markersize=3, linewidth=1,
-        linestyle="--", label=f"standardized: {found.standardised_rating.rounded} dB",
+        x, found.standardized, color=COLORS[1], marker="s", markersize=3, linewidth=1,
+        linestyle="--", label=f"standardized: {found.standardized_rating.rounded} dB",
     )  # fmt: skip
     if measured is not None:
         level = found.level + found.difference(measured)

@@ -258,7 +258,7 @@ def draw_design(result: Design) -> Figure:
     """Draw the margin of a design map, dB, its zero as a line, and the samples that conform.
 
     The margin is positive where all octave levels lie within their limits. Of a case with a room
-    draw the rating of the standardised levels there.
+    draw the rating of the standardized levels there.
     """
     dataset = result.dataset
     figure, axes = empty_axes(2.9)

@@ -11,14 +11,13 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import least_squares
 
 from thud.base._schema import Ball, Compression
-from thud.base.checks import require_array, require_real
-from thud.base.errors import FitWarning, InputError, NumericalError
+from thud.base.checks import refuse, require_array, require_real
+from thud.base.errors import FitWarning, NumericalError
 from thud.base.extras import require_extra
 from thud.base.key import check_keywords
 from thud.impact.compression import CompressionCurve, compress
 from thud.studies.fitting.estimates import Estimates
-from thud.studies.fitting.inference import require_confidence
-from thud.studies.fitting.residual_tests import runs_doubt
+from thud.studies.fitting.inference import require_confidence, runs_warning
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,9 +30,8 @@ if TYPE_CHECKING:
 
 # Points of the curves of the model, between which it is interpolated.
 _POINTS = 81
-# Data that two parameters leave something of.
-_MIN_DATA = 5
 _PARAMETERS = 2
+_MIN_DATA = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,9 +142,9 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
             )  # fmt: skip
         return curves[modulus]
 
-    def residuals(place: Array) -> Array:
-        found = curve(float(np.exp(place[0])) * start.youngs_modulus)
-        depth = measured - measured[0] - place[1] * span
+    def residuals(x: Array) -> Array:
+        found = curve(float(np.exp(x[0])) * start.youngs_modulus)
+        depth = measured - measured[0] - x[1] * span
         model_force = PchipInterpolator(found.deflection, found.force)(np.maximum(depth, 0))
         return np.asarray(model_force - wanted)
 
@@ -155,7 +153,9 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
     first = np.array([np.log(_ratio(curve(start.youngs_modulus), measured, wanted)), 0.0])
     best = least_squares(residuals, first, bounds=bounds, x_scale=(1.0, 0.1), xtol=1e-10)
     if np.linalg.matrix_rank(best.jac) < _PARAMETERS:
-        message = "the force of this model does not tell youngs_modulus; allowed: one that has it"
+        message = (
+            "youngs_modulus has no effect on the force of this model; allowed: one that has it"
+        )
         raise NumericalError(message)
     modulus = float(np.exp(best.x[0])) * start.youngs_modulus
     touch = float(measured[0] + best.x[1] * span)
@@ -188,21 +188,17 @@ def _data(deflection: ArrayLike, force: ArrayLike) -> tuple[Array, Array]:
         for name, values in (("deflection", deflection), ("force", force))
     )
     if measured.shape != wanted.shape or len(measured) < _MIN_DATA:
-        message = (
-            f"deflection has {len(measured)} entries and force {len(wanted)}; "
-            f"allowed: the same number, at least {_MIN_DATA}"
+        refuse(
+            f"deflection has {len(measured)} entries and force {len(wanted)}",
+            f"the same number, at least {_MIN_DATA}",
         )
-        raise InputError(message)
     if not (np.isfinite(measured).all() and np.isfinite(wanted).all()):
-        message = "deflection or force holds what is no finite number; allowed: finite numbers"
-        raise InputError(message)
-    if not (np.diff(measured) > 0).all():
-        at = int(np.argmin(np.diff(measured) > 0)) + 1
-        message = f"deflection does not rise at point {at + 1}; allowed: the branch of loading"
-        raise InputError(message)
+        refuse("deflection or force is not finite", "finite numbers")
+    falling = np.flatnonzero(np.diff(measured) <= 0)
+    if falling.size:
+        refuse(f"deflection does not rise at point {falling[0] + 2}", "the branch of loading")
     if not wanted[-1] > max(0.0, wanted[0]):
-        message = "force does not rise with the deflection; allowed: pressure is positive"
-        raise InputError(message)
+        refuse("force does not rise with the deflection", "pressure is positive")
     return measured, wanted
 
 
@@ -215,11 +211,10 @@ def _ratio(curve: CompressionCurve, measured: Array, wanted: Array) -> float:
     shown = np.interp(measured - measured[0], curve.deflection, curve.force)
     model_work = float(np.trapezoid(shown, measured))
     if not model_work > 0:
-        message = (
-            f"deflection spans {np.ptp(measured):g} m, where the model shows no force; "
-            "allowed: a ball that is pressed by millimetres"
+        refuse(
+            f"deflection spans {np.ptp(measured):g} m, where the model has no force",
+            "a ball that is pressed by millimeters",
         )
-        raise InputError(message)
     return max(work, 0.01 * float(wanted[-1] * np.ptp(measured))) / model_work
 
 
@@ -230,6 +225,6 @@ def _warnings(residuals: Array, place: float, bounds: tuple[list[float], list[fl
         found.append(
             "the first touch lies at the limit of the search: give data from first touch on"
         )
-    if runs := runs_doubt(residuals):
+    if runs := runs_warning(residuals):
         found.append(f"{runs}: the model does not explain the curve")
     return found

@@ -69,7 +69,7 @@ class Design(SampleResult):
             rows.append(("in doubt by the surrogate", f"{int(self.dataset['doubtful'].sum())}"))
         words, sign, quantity = "largest margin, dB", 1, margin
         if RATING in self.dataset:
-            words, sign, quantity = "lowest standardised rating, dB", -1, self.dataset[RATING]
+            words, sign, quantity = "lowest standardized rating, dB", -1, self.dataset[RATING]
         if quantity.notnull().any():
             best = quantity.isel((sign * quantity).argmax(...))
             rows.append((words, f"{float(best):z.2f}"))
@@ -118,7 +118,7 @@ def design(
     study
         Path of a TOML file, or what would stand in it; it has two numeric parameters.
     output, **how
-        See `sweep`.
+        As of `sweep`.
 
     Returns
     -------

@@ -14,7 +14,6 @@ from thud.studies.result import StudyResult
 from thud.studies.study import Study, named_files, read_common, read_tables
 
 if TYPE_CHECKING:
-    from contextlib import AbstractContextManager
     from pathlib import Path
 
     from thud.base.files import Results
@@ -96,21 +95,10 @@ class Kind(ABC, Generic[S, R]):
         if output is None:
             return self.compute(study, None, **how)
         replace = how.get("replace", False)
-        with self.take(study, output, replace=replace, figures=False) as results:
+        with take(output, self, study, replace=replace, figures=False) as results:
             result = self.compute(study, results, **how)
             results.write(self.files(result, study))
             return result
-
-    def take(
-        self,
-        study: S,
-        folder: str | os.PathLike[str],
-        *,
-        replace: bool = False,
-        figures: bool = True,
-    ) -> AbstractContextManager[Results]:
-        """Return the context of a results directory of a study; see `thud.studies.directory`."""
-        return take(folder, self, study, replace=replace, figures=figures)
 
     @abstractmethod
     def new_parameter(

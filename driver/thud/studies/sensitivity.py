@@ -124,7 +124,7 @@ def sensitivity(
         Path of a TOML file, or what would stand in it. ``[design] size`` is the number of base
         samples N, a power of 2 from 4; N (d + 2) samples are computed for d parameters.
     output, **how
-        See `sweep`.
+        As of `sweep`.
 
     Returns
     -------

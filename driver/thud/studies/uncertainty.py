@@ -105,7 +105,7 @@ class Uncertainty(SampleResult):
             rating = self.dataset[RATING].values[self.dataset["status"].values == 0]
             low, high = np.quantile(rating, [0.025, 0.975])
             spread = f"{rating.std(ddof=1):.2f}", f"{low:.2f} to {high:.2f}"
-            rows.append(("rating, standardised", f"{rating.mean():.2f}", *spread, ""))
+            rows.append(("rating, standardized", f"{rating.mean():.2f}", *spread, ""))
         low, high = self.interval
         probability = f"{100 * self.probability:.1f} %", f"± {100 * self.standard_error:.1f} %"
         interval = f"{100 * low:.1f} to {100 * high:.1f} %"
@@ -171,7 +171,7 @@ def uncertainty(
     study
         Path of a TOML file, or what would stand in it; its parameters are independent.
     output, **how
-        See `sweep`.
+        As of `sweep`.
 
     Returns
     -------

@@ -12,6 +12,7 @@ from scipy.signal import ZoomFFT
 from thud.base.checks import refuse
 from thud.base.immutable import freeze
 from thud.impact.impact import Impact
+from thud.studies.fitting.inference import UNLIKELY, residual_warnings
 from thud.studies.fitting.misfit import GAIN, SHIFT, Misfit
 from thud.studies.fitting.record_noise import (
     MIN_QUIET,
@@ -21,7 +22,6 @@ from thud.studies.fitting.record_noise import (
     new_weights,
     wave_size,
 )
-from thud.studies.fitting.residual_tests import UNLIKELY, residual_doubts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -185,7 +185,7 @@ class ForceMisfit(Misfit):
         """Return the record, N."""
         return self.force
 
-    def history_columns(self, impact: Impact, own: Array) -> dict[str, Array]:
+    def columns(self, impact: Impact, own: Array) -> dict[str, Array]:
         """Return target and model side by side, s and N: columns by their names."""
         model = self.model_spectrum(impact, own)
         under = self.weights.background(self._grid(self.spectrum - model))
@@ -199,11 +199,6 @@ class ForceMisfit(Misfit):
             "model_N": force,
             "residual_N": force + background - target,
         }
-
-    def columns(self, impact: Impact, own: Array) -> dict[str, list[object]]:
-        """Return target and model side by side, s and N: columns by their names."""
-        columns = self.history_columns(impact, own)
-        return {name: column.tolist() for name, column in columns.items()}
 
     def nuisances(self, impact: Impact, own: Array) -> dict[str, tuple[float, float]]:
         """Return offset and amplitude of hum where they are fitted, and their errors, N."""
@@ -239,7 +234,7 @@ class ForceMisfit(Misfit):
         unit = deviation * self.unit_deviation
         found = _contact_doubt(weighted, inside, count, unit)
         if not found:
-            found = residual_doubts(weighted, time)
+            found = residual_warnings(weighted, time)
             found += _change_doubt(weighted, time < begin, time > begin + impact.contact_time)
         if not (self.quiet.known or self.target.offset is not None or self.exact):
             found.append(

@@ -87,7 +87,7 @@ class Misfit(ABC):
         """Return the numbers of the target as they were given."""
 
     @abstractmethod
-    def columns(self, impact: Impact, own: Array) -> Mapping[str, Sequence[object]]:
+    def columns(self, impact: Impact, own: Array) -> Mapping[str, Sequence[object] | Array]:
         """Return target and model side by side, SI units, dB: columns by their names."""
 
     def own_derivatives(self, impact: Impact, own: Array) -> Array:  # noqa: ARG002

@@ -10,7 +10,6 @@ import numpy as np
 
 from thud.base._schema import KEYS
 from thud.base.checks import refuse, require_kind, suggestion
-from thud.base.errors import InputError
 from thud.base.units import scaled
 from thud.case.keys import limits, put, users
 from thud.studies.parameter import fitted
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     from thud.case.case import Case
     from thud.studies.parameter import Parameter
 
-# A start at a limit is moved away from it by this part of itself.
+# A start at a limit is moved away from it by this fraction of itself.
 INSIDE = 0.01
 # Limits of the library that exceed the start by this factor are ignored.
 FAR = 10.0
@@ -114,17 +113,15 @@ def _get_range(case: Case, given: Parameter) -> Range:
     low = lower if given.low is None else given.low
     high = upper if given.high is None else given.high
     if not lower <= low < high <= upper:
-        message = (
-            f"[parameters] {name}: low = {low:g} and high = {high:g} are not allowed; "
-            f"allowed: {lower:g} <= low < high <= {upper:g} {key.unit}".rstrip()
+        refuse(
+            f"[parameters] {name}: low = {low:g} and high = {high:g} are not allowed",
+            f"{lower:g} <= low < high <= {upper:g} {key.unit}".rstrip(),
         )
-        raise InputError(message)
     if not low <= start <= high:
-        message = (
-            f"[parameters] {name}: start = {start:g} is not allowed; "
-            f"allowed: {low:g} <= start <= {high:g} {key.unit}".rstrip()
+        refuse(
+            f"[parameters] {name}: start = {start:g} is not allowed",
+            f"{low:g} <= start <= {high:g} {key.unit}".rstrip(),
         )
-        raise InputError(message)
     spread = (
         max(low, start - scale / SPREAD) if given.low is None else low,
         min(high, start + scale * (SPREAD - 1)) if given.high is None else high,

@@ -25,7 +25,7 @@ from thud.recordings.noise import (
     fit_background,
     noise_covariances,
 )
-from thud.studies.fitting.residual_tests import UNLIKELY
+from thud.studies.fitting.inference import UNLIKELY
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

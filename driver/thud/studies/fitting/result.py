@@ -62,7 +62,7 @@ class FittedTarget(Immutable):
         """Offset and amplitude of hum, and their standard errors, N, by name."""
         return self.misfit.nuisances(self.impact, self.own)
 
-    def columns(self) -> Mapping[str, Sequence[object]]:
+    def columns(self) -> Mapping[str, Sequence[object] | NDArray[np.float64]]:
         """Return target and model side by side, SI units, dB: columns by their names."""
         return self.misfit.columns(self.impact, self.own)
 

@@ -10,10 +10,12 @@ from scipy import stats
 from scipy.optimize import OptimizeResult, least_squares
 from tqdm import tqdm
 
-from thud.base.errors import InputError, NumericalError, ThudError
+from thud.base.checks import refuse
+from thud.base.errors import NumericalError, ThudError
 from thud.base.units import display_unit
 from thud.studies.fitting.inference import (
     INSEPARABLE,
+    UNLIKELY,
     Inference,
     coverage_factor,
     infer,
@@ -24,7 +26,6 @@ from thud.studies.fitting.inference import (
     worst_directions,
 )
 from thud.studies.fitting.objective import Objective, new_parts
-from thud.studies.fitting.residual_tests import UNLIKELY
 from thud.studies.fitting.result import Fit, FittedTarget
 
 if TYPE_CHECKING:
@@ -72,20 +73,18 @@ def _require_data(parts: list[Part], count: int) -> None:
     known = all(misfit.known_noise for misfit in misfits)
     for number, misfit in enumerate(misfits, start=1):
         if len(parts) > 1 and not misfit.known_noise:
-            message = (
-                f"target {number}: the weight of its residuals is not known; "
-                f"allowed: {misfit.deviation_source} where there are several targets"
+            refuse(
+                f"target {number}: the weight of its residuals is not known",
+                f"{misfit.deviation_source} where there are several targets",
             )
-            raise InputError(message)
     count += sum(len(misfit.own) for misfit in misfits)
     size = sum(misfit.size - misfit.absorbed for misfit in misfits)
     minimum = count if known else count + 1
     if size < minimum:
-        message = (
-            f"target: {size} data for {count} parameters are too few; "
-            f"allowed: {minimum} or more" + ("" if known else " where no noise is given")
+        refuse(
+            f"target: {size} data for {count} parameters are too few",
+            f"{minimum} or more" + ("" if known else " where no noise is given"),
         )
-        raise InputError(message)
 
 
 def _spread(ranges: list[Range], count: int, seed: int) -> Iterator[Array]:
