@@ -7,7 +7,7 @@ module thud_level_answers
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_kinds, only: wp
    use thud_rating, only: correct_for_background, get_a_weighted_level, get_grade, get_legacy_rating, get_rounded, &
-      get_standardisation
+      get_standardization
    use thud_request, only: request_type
    use thud_source_limits, only: get_peak_count
    use thud_transform, only: get_low_pass
@@ -85,7 +85,7 @@ contains
       real(wp), allocatable :: levels(:)
 
       levels = request%get_array('levels')
-      levels = levels + get_standardisation(request%get_array('reverberation_time'), request%get_number('volume'))
+      levels = levels + get_standardization(request%get_array('reverberation_time'), request%get_number('volume'))
       call bundle%add_array('levels', shape(levels), levels)
    end subroutine answer_standardization
 

@@ -9,7 +9,7 @@ module thud_rating
    private
 
    public :: class_limits, correct_for_background, fast_reverberation, find_rated_bands, get_a_weighted_level, get_grade
-   public :: get_legacy_rating, get_rounded, get_standardisation, rated_set_names
+   public :: get_legacy_rating, get_rounded, get_standardization, rated_set_names
 
    !> Maximum number of bands of a rating.
    integer, parameter :: max_rated = 12
@@ -132,7 +132,7 @@ contains
    !>
    !> g(C) is the maximum of a decay of reverberation time T as the Fast detector shows it, over that of a decay
    !> without end: C**(-1/(C - 1)) with C = T/1.7275 s; the printed form is the same with more terms.
-   elemental function get_standardisation(reverberation_time, volume) result(difference)
+   elemental function get_standardization(reverberation_time, volume) result(difference)
       !> Reverberation time, s; volume, m3.
       real(wp), intent(in) :: reverberation_time, volume
       !> The difference, dB.
@@ -140,7 +140,7 @@ contains
 
       difference = 10*log10(volume/reference_volume) &
          - 10/log(10.0_wp)*(get_log_gain(reverberation_time) - get_log_gain(reference_time))
-   end function get_standardisation
+   end function get_standardization
 
    !> ln g = -ln C/(C - 1).
    elemental function get_log_gain(reverberation_time) result(log_gain)

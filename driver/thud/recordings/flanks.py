@@ -227,13 +227,13 @@ def find_touch(flank: Flank, low: float, high: float, searches: int) -> Posterio
             )
             if members.size
         ]
-        logarithm = np.concatenate([one for one, _ in evidence])
+        logarithm = np.concatenate([likelihood for likelihood, _ in evidence])
         logarithm += PRIOR[kinds, int(flank.release), None]
         weight = np.exp(logarithm - logarithm.max())
         weight /= weight.sum()
         likely = weight.sum(axis=1) > MIN_PROBABILITY
         kinds, weight = kinds[likely], weight[likely]
-        factors = np.concatenate([one for _, one in evidence])[likely]
+        factors = np.concatenate([factor for _, factor in evidence])[likely]
         posterior = Posterior(time, kinds, weight, factors, flank.release)
         mean, deviation = _moments(time, weight.sum(axis=0))
         reach = REACH * deviation

@@ -144,8 +144,8 @@ def measure_levels(
     require_choice("method", method, METHODS)
     noise = band_noise(drops, get_bands(bands))
     return [
-        _drop_levels(drop, bands, method, one, low_pass=low_pass)
-        for drop, one in zip(drops, noise, strict=True)
+        _drop_levels(drop, bands, method, energies, low_pass=low_pass)
+        for drop, energies in zip(drops, noise, strict=True)
     ]
 
 
@@ -268,7 +268,7 @@ def _corrected(
 
 def _root_sum(contributions: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
     """Return the combined standard uncertainty."""
-    return np.asarray(np.sqrt(np.sum([one**2 for one in contributions.values()], axis=0)))
+    return np.asarray(np.sqrt(np.sum([value**2 for value in contributions.values()], axis=0)))
 
 
 def _background_steps(nominal: NDArray[np.float64], flag: NDArray[np.str_]) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +19,7 @@ from thud.recordings.header_aliases import (
     split_title,
     text_of,
 )
-from thud.recordings.signal import ArraySamples
+from thud.recordings.signal import read_array
 from thud.recordings.uniform_grid import uniform_grid
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ def channels_of_variables(values: dict[str, NDArray[np.generic]], name: str) -> 
         group, word = _split(key)
         header = [
             (_split(other)[1], text_of(value))
-            for other, value in sorted(values.items(), key=lambda one: -one[0].count("/"))
+            for other, value in sorted(values.items(), key=lambda item: -item[0].count("/"))
             if np.size(value) == 1 and group.startswith(_split(other)[0])
         ]
         same = next(
@@ -67,7 +68,7 @@ def channels_of_variables(values: dict[str, NDArray[np.generic]], name: str) -> 
                 name=key + index,
                 number=number,
                 n_sample=len(column),
-                samples=ArraySamples(column),
+                samples=partial(read_array, column),
                 unit=split_title(word)[1] or find_word(header, UNIT),
                 sample_rate=own,
                 date=find_word(header, DATE),

@@ -57,7 +57,7 @@ FORMATS = (
     Format("WAV", "audio", (".wav", ".rf64", ".bwf"),
            lambda head: head[:4] in {b"RIFF", b"RF64", b"BW64"} and head[8:12] == b"WAVE"),
     Format("FLAC", "audio", (".flac",), lambda head: head[:4] == b"fLaC"),
-    Format("TDMS", "tdms", (".tdms",), lambda head: head[:4] == b"TDSm"),
+    Format("TDMS", "tdms", (".tdms",), lambda head: head[:4] == b"TDSm", is_probed=True),
     Format("HDF5", "hdf5", (".h5", ".hdf5", ".hdf", ".nc", ".nc4"),
            lambda head: any(head[at : at + 8] == HDF5 for at in (0, 512, 1024, 2048)),
            is_probed=True),
