@@ -26,7 +26,7 @@ REPOSITORY = Path(__file__).parents[1]
 DESCRIPTIONS = {
     "thud": "Drops the source of a case and leaves its force, its levels and the verdict, and the "
     "input with all defaults, as files in a directory; prints the verdict.",
-    "thud-driver": "Runs cases as thud(1) does and draws them; judges recordings, compares, fits "
+    "thud-driver": "Runs cases as thud(1) does and draws them; assesses recordings, compares, fits "
     "and varies. thud-driver COMMAND --help shows the arguments of one command.",
 }
 COMPLETIONS = {

@@ -21,9 +21,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal, Self
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 from thud.base.key import Group, Key
+from thud.base.quantity import Quantity
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 __all__ = [
 {names}]
@@ -197,7 +202,7 @@ def python_module(schema: Entry) -> str:
     keys, models, floors = schema["keys"], schema["models"], schema["floors"]
     groups, optional = shared_groups(schema), optional_groups(schema)
     choices = [literal(choice_name(key), key["choices"]) for key in keys if key["choices"]]
-    choices.append(literal("BandSet", schema["band_sets"]))
+    choices.append(literal("BandSet", [*schema["band_sets"]]))
     quoted_names = "".join(f"    {quoted(name)},\n" for name in public_names(schema))
     parts = [HEAD.format(names=quoted_names, choices="".join(choices))]
     for group in groups:
@@ -213,8 +218,8 @@ def python_module(schema: Entry) -> str:
     for floor in floors:
         members = [key for key in keys if key["owner"] == floor]
         parts.append(python_class(f"Floor ``{floor}``.", members, floor, "FloorName"))
-    scalars = [f"{quoted(s['name'])}: ({quoted(s['unit'])}, {quoted(s['meaning'])})"
-               for s in schema["scalars"]]  # fmt: skip
+    quantities = schema["quantities"]
+    of_samples = quantities[: schema["sample_quantities"]]
     parts += [
         union("ModelOptions", models),
         union("FloorOptions", floors),
@@ -224,9 +229,27 @@ def python_module(schema: Entry) -> str:
               [f"{name}.name: {name}" for name in map(class_name, floors)]),
         table("Groups that every model uses.", "GROUPS",
               [f"{quoted(group)}: {class_name(group)}" for group in groups]),
-        table("Unit and meaning of the numbers that describe an impact.", "SCALARS", scalars),
-        "\n# Those of them that describe each of many drops.\n",
-        f"OUTCOMES = tuple(SCALARS)[:{schema['outcomes']}]\n",
+        quantity_class("ImpactQuantities", "Numbers that describe an impact.", quantities, "float"),
+        quantity_class("SampleQuantities", "Numbers that describe each of many samples.",
+                       of_samples, "NDArray[np.float64]", ", shape (n_sample,)"),
+        table("The table of quantities.", "QUANTITIES",
+              [f"{quoted(entry['name'])}: {python_quantity(entry)}" for entry in quantities]),
+        "\n# Those of them that describe each of many samples.\n",
+        f"SAMPLE_QUANTITIES = tuple(QUANTITIES)[:{len(of_samples)}]\n",
+        table("Nominal and exact mid frequencies, and edges of the bands of each set, Hz.",
+              "BANDS: dict[BandSet, dict[str, tuple[float, ...]]]",
+              [f"{quoted(name)}: {bands_entry(bands)}"
+               for name, bands in schema["band_sets"].items()]),
+        table("Nominal frequencies of the bands of each set that a rating is made of, Hz.",
+              "RATED_BANDS: dict[BandSet, tuple[float, ...]]",
+              [f"{quoted(name)}: {tuple(bands)!r}"
+               for name, bands in schema["rated_bands"].items()]),
+        table("Name, unit, lower and upper limit of the criteria of each source.",
+              "LIMITS: dict[LimitsSource, tuple[tuple[str, str, float, float], ...]]",
+              [f"{quoted(source)}: ({', '.join(map(limits_entry, limits))})"
+               for source, limits in schema["limits"].items()]),
+        "\n# Maximum A-weighted levels of the classes 1, 2, ... of KS F 2863-2, dB.\n",
+        f"CLASS_LIMITS = {tuple(schema['class_limits'])!r}\n",
         "\n# Every key, in the order of an input file.\nKEYS = (\n",
         *(f"    {python_key(key)},\n" for key in keys),
         ")\n",
@@ -277,6 +300,37 @@ def table(comment: str, name: str, entries: list[str]) -> str:
     """Return a dictionary as Python writes it."""
     lines = "".join(f"    {entry},\n" for entry in entries)
     return f"\n# {comment}\n{name} = {{\n{lines}}}\n"
+
+
+def bands_entry(bands: dict[str, list[float]]) -> str:
+    """Return the frequencies of bands as Python writes them."""
+    return repr({name: tuple(values) for name, values in bands.items()}).replace("'", '"')
+
+
+def limits_entry(entry: Entry) -> str:
+    """Return a criterion as Python writes it."""
+    return repr(tuple(entry.values())).replace("'", '"')
+
+
+def python_quantity(entry: Entry) -> str:
+    """Return the `Quantity` of a quantity."""
+    values = (quoted(v) if isinstance(v, str) else repr(v) for v in entry.values())
+    return f"Quantity({', '.join(values)})"
+
+
+def quantity_class(
+    name: str, title: str, quantities: list[Entry], type_name: str, shape: str = ""
+) -> str:
+    """Return the dataclass of some quantities."""
+    text = f'\n\n@dataclass(frozen=True, eq=False, kw_only=True)\nclass {name}:\n    """{title}\n'
+    text += "\n    Attributes\n    ----------\n"
+    plain = "ndarray" if shape else type_name
+    for entry in quantities:
+        unit = f", {entry['unit']}" if entry["unit"] else ""
+        meaning = entry["meaning"][0].upper() + entry["meaning"][1:]
+        text += f"    {entry['name']} : {plain}{shape}\n        {meaning}{unit}.\n"
+    text += '    """\n\n'
+    return text + "".join(f"    {entry['name']}: {type_name}\n" for entry in quantities)
 
 
 def python_key(key: Entry) -> str:

@@ -5,7 +5,7 @@ module thud
    use thud_case, only: case_type, check_case, get_model_number, new_case
    use thud_case_text, only: get_case_text, read_case
    use thud_compression, only: compression_options_type, compression_type
-   use thud_compute, only: compute_case, is_conforming, judge_case, predict_room, results_type, verdict_type
+   use thud_compute, only: assessment_type, compute, impact_type, is_conforming, results_type, scope_type
    use thud_constants, only: version
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type

@@ -143,8 +143,8 @@ def main() -> None:
     figure, axes = plot.empty_axes(2.4)
     curves = {"scikit-fem": found, "modal sum": exact, "infinite plate, F/Z": infinite}
     plot.add_curves(axes, {name: (1e3 * time, 1e3 * v) for name, v in curves.items()})
-    axes.set_xlabel("Time since first touch, ms", fontsize=plot.SIZE)
-    axes.set_ylabel("Velocity of the plate, mm/s", fontsize=plot.SIZE)
+    axes.set_xlabel("Time since first touch, ms")
+    axes.set_ylabel("Velocity of the plate, mm/s")
     plot.legend_above(axes)
     plot.save(figure, "docs/figures/plate_velocity.png")
 

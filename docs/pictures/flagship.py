@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import thud
-from thud.plot.force_history_figure import draw_forces
-from thud.plot.levels_figure import draw_levels
-from thud.plot.style import LEVEL, SIZE, WIDTH, legend_above, new_figure, style_axes
+from thud.plot.impacts import draw_forces, draw_levels
+from thud.plot.style import LEVEL, WIDTH, legend_above, new_figure, own_style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,6 +20,7 @@ CASES = {
 }
 
 
+@own_style()
 def flagship() -> Figure:
     """Draw forces and octaves of the three cases of `./bootstrap run`."""
     impacts = {
@@ -28,8 +28,8 @@ def flagship() -> Figure:
     }
     figure = new_figure(2.4, 2 * WIDTH)
     history, octaves = figure.subplots(1, 2)
-    draw_forces(style_axes(history), impacts, None)
+    draw_forces(history, impacts, None)
     draw_levels({"octave": octaves}, impacts, None, "rubber_ball")
-    octaves.set_ylabel(LEVEL, fontsize=SIZE)
+    octaves.set_ylabel(LEVEL)
     legend_above(octaves)
     return figure

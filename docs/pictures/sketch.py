@@ -1,4 +1,4 @@
-"""What all sketches share: paper, colours, arrows, springs, dashpots, floors."""
+"""What all sketches share: paper, colors, arrows, springs, dashpots, floors."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch, Rectangle
 
-from thud.plot.style import COLOURS, WIDTH, new_figure
+from thud.plot.style import COLORS, WIDTH, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 INK = "0.15"
-BLUE, RED, GREEN = COLOURS[:3]
+BLUE, RED, GREEN = COLORS[:3]
 SOLID = "#d7e6f2"
 FLOOR = "0.82"
 SIZE = 8.5

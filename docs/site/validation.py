@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.ticker import NullLocator
 
-from thud.plot import COLOURS, SIZE, legend_above, save, style_axes
+from thud.plot import COLORS, legend_above, own_style, save
 from thud.plot.style import LEVEL, WIDTH, empty_axes, new_figure
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ KINDS = {
     "closed form": "answers that mathematics gives",
     "convergence": "observed orders, and finer meshes",
     "balance": "momentum and energy, relative",
-    "independent code": "programs of other make at equal assumptions",
+    "independent code": "independent programs at equal assumptions",
     "other model": "models of thud that share nothing but the physics",
     "published example": "worked examples of standards",
     "published measurement": "",
@@ -74,12 +74,13 @@ def table(oracles: list[dict[str, Any]]) -> str:
     return "\n\n".join(parts)
 
 
+@own_style()
 def draw_orders(curves: dict[str, Any]) -> Figure:
     """Draw errors against steps and element sizes, with the fourth power."""
     figure, axes = empty_axes(2.4)
     for i, (name, curve) in enumerate(curves.items()):
         x, y = np.array(curve["x"]), np.array(curve["y"])
-        axes.loglog(x, y, "os"[i], color=COLOURS[i], markersize=4, label=name)
+        axes.loglog(x, y, "os"[i], color=COLORS[i], markersize=4, label=name)
         fine = np.geomspace(x.min(), 1)
         axes.loglog(fine, y[0] * fine**4, color="0.5", linewidth=0.8, zorder=1)
     axes.lines[-1].set_label("fourth power")
@@ -87,12 +88,13 @@ def draw_orders(curves: dict[str, Any]) -> Figure:
     axes.set_xticks([1 / part for part in parts], ["1", *(f"1/{part}" for part in parts[1:])])
     axes.xaxis.set_minor_locator(NullLocator())
     axes.yaxis.set_minor_locator(NullLocator())
-    axes.set_xlabel("Step or element size over the first", fontsize=SIZE)
-    axes.set_ylabel("Relative error", fontsize=SIZE)
+    axes.set_xlabel("Step or element size over the first")
+    axes.set_ylabel("Relative error")
     legend_above(axes)
     return figure
 
 
+@own_style()
 def draw_codes(curves: dict[str, Any]) -> Figure:
     """Draw octaves of two impacts by thud and by other element codes, and the differences."""
     figure = new_figure(3.6)
@@ -105,44 +107,45 @@ def draw_codes(curves: dict[str, Any]) -> Figure:
     place = np.arange(len(octaves))
     for i, (case, by) in enumerate(cases.items()):
         (other,) = by.keys() - {"thud"}
-        style_axes(levels).plot(place, by["thud"], color=COLOURS[i], label=f"{case}: thud")
+        levels.plot(place, by["thud"], color=COLORS[i], label=f"{case}: thud")
         levels.plot(
             place,
             by[other],
             "os"[i],
-            color=COLOURS[i],
+            color=COLORS[i],
             markerfacecolor="none",
             label=f"{case}: {other}",
         )
         difference = by["thud"] - by[other]
-        style_axes(change).plot(place, difference, "os"[i], color=COLOURS[i], markersize=4)
+        change.plot(place, difference, "os"[i], color=COLORS[i], markersize=4)
     change.axhline(0, color="0.4", linewidth=0.8)
     change.set_xticks(place, [f"{octave:g}" for octave in octaves])
-    change.set_xlabel("Octave band, Hz", fontsize=SIZE)
-    change.set_ylabel("thud less\nthe other, dB", fontsize=SIZE)
-    levels.set_ylabel(LEVEL.replace(", ", ",\n"), fontsize=SIZE)
+    change.set_xlabel("Octave band, Hz")
+    change.set_ylabel("thud −\nother code, dB")
+    levels.set_ylabel(LEVEL.replace(", ", ",\n"))
     legend_above(levels)
     return figure
 
 
+@own_style()
 def draw_laws(curves: dict[str, Any]) -> Figure:
-    """Draw three octaves against the order of the law of the loss, by thud and another code."""
+    """Draw three octaves against the order of the damping law, by thud and another code."""
     figure = new_figure(2.2, 2 * WIDTH)
     octaves = list(dict.fromkeys(name.split(": ")[0] for name in curves))
     for axes, octave in zip(figure.subplots(1, len(octaves)), octaves, strict=True):
         for name, curve in curves.items():
             if name.startswith(octave):
                 thud = name.endswith("thud")
-                style_axes(axes).plot(
-                    curve["x"], curve["y"], "-" if thud else "o", color=COLOURS[0 if thud else 1],
+                axes.plot(
+                    curve["x"], curve["y"], "-" if thud else "o", color=COLORS[0 if thud else 1],
                     markerfacecolor="none", label=name.split(": ")[1],
                 )  # fmt: skip
         middle = np.mean(axes.get_ylim())
         axes.set_ylim(middle - 1.4, middle + 1.4)
-        axes.set_title(octave, fontsize=SIZE)
-        axes.set_xlabel("Order of the law", fontsize=SIZE)
+        axes.set_title(octave)
+        axes.set_xlabel("Order of the law")
     first = figure.axes[0]
-    first.set_ylabel(LEVEL.replace(", ", ",\n"), fontsize=SIZE)
+    first.set_ylabel(LEVEL.replace(", ", ",\n"))
     legend_above(first)
     return figure
 

@@ -66,15 +66,16 @@ from .impact.motion import Motion as Motion
 from .impact.outcomes import Ensemble as Ensemble
 from .impact.results import read_results as read_results
 from .impact.solve import solve as solve
-from .level.criteria import (
-    Conformity as Conformity,
+from .level.assessment import (
     Criterion as Criterion,
+    Verdict as Verdict,
+    assess as assess,
 )
+from .level.estimate import Estimate as Estimate
 from .level.levels import (
     Bands as Bands,
     force_exposure_levels as force_exposure_levels,
     get_bands as get_bands,
-    judge as judge,
 )
 from .level.rating import (
     Rating as Rating,
@@ -89,13 +90,9 @@ from .studies.compression_fit import (
     CompressionFit as CompressionFit,
     fit_compression as fit_compression,
 )
-from .studies.design_map import (
-    DesignMap as DesignMap,
-    design_map as design_map,
-)
-from .studies.emulation.emulator import (
-    Surrogate as Surrogate,
-    read_surrogate as read_surrogate,
+from .studies.design import (
+    Design as Design,
+    design as design,
 )
 from .studies.fit import fit as fit
 from .studies.fitting.force_target import ForceTarget as ForceTarget
@@ -110,6 +107,10 @@ from .studies.sensitivity import (
 from .studies.study import Study as Study
 from .studies.surrogate import surrogate as surrogate
 from .studies.sweep import sweep as sweep
+from .studies.trained_surrogate import (
+    Surrogate as Surrogate,
+    read_surrogate as read_surrogate,
+)
 from .studies.uncertainty import (
     Uncertainty as Uncertainty,
     uncertainty as uncertainty,

@@ -10,7 +10,7 @@ module thud_command_line
    use thud_progress_line, only: begin_progress, end_progress
    use thud_run, only: outcome_type, run_case
    use thud_schema, only: get_schema
-   use thud_sets_run, only: run_sets
+   use thud_samples_run, only: run_samples
    use thud_suggestion, only: get_suggestion
    use thud_system, only: get_system_message, is_closed, prepare_process, standard_error, standard_output, write_text
    use thud_text, only: newline, quoted
@@ -30,8 +30,8 @@ module thud_command_line
    real(wp), parameter :: blas_memory = 160.0e6_wp
 
    !> Options by their long names.
-   character(len=*), parameter :: known_options(*) = [character(len=9) :: '--output', '--replace', '--sets', '--threads', &
-      '--check', '--quiet', '--keys', '--schema', '--help', '--version']
+   character(len=*), parameter :: known_options(*) = [character(len=9) :: '--output', '--replace', '--all', &
+      '--samples', '--threads', '--check', '--quiet', '--keys', '--schema', '--help', '--version']
 
    !> What the command line asks for.
    type :: request_type
@@ -41,8 +41,10 @@ module thud_command_line
       character(len=:), allocatable :: output
       !> Replace also files that thud has not written.
       logical :: replace = .false.
-      !> Path of a table of sets, empty where not given.
-      character(len=:), allocatable :: sets
+      !> Write also the channels of the model.
+      logical :: all = .false.
+      !> Path of a table of samples, empty where not given.
+      character(len=:), allocatable :: samples
       !> Threads for them.
       integer :: threads = 1
       !> Exit with 3 where the source does not conform.
@@ -80,10 +82,11 @@ contains
             error, mostly_unused=.true.)
          if (allocated(error)) then
             continue
-         else if (request%sets == '') then
-            call run_case(request%case_file, request%output, request%replace, case, results, outcome, error)
+         else if (request%samples == '') then
+            call run_case(request%case_file, request%output, request%replace, request%all, case, results, outcome, error)
          else
-            call run_sets(request%case_file, request%sets, request%threads, request%output, request%replace, outcome, error)
+            call run_samples(request%case_file, request%samples, request%threads, request%output, request%replace, &
+               outcome, error)
          end if
          call end_progress()
          if (allocated(error)) then
@@ -91,8 +94,8 @@ contains
             exit_code = error%code
             return
          end if
-         do i = 1, outcome%n_remark
-            call write_line(standard_error, 'thud: '//outcome%remarks(i)%text, exit_code)
+         do i = 1, outcome%n_message
+            call write_line(standard_error, 'thud: '//outcome%messages(i)%text, exit_code)
          end do
          if (.not. request%quiet) call write_line(standard_output, outcome%table//'  Results: ' &
             //outcome%directory, exit_code)
@@ -125,33 +128,26 @@ contains
       integer :: i
 
       request%output = ''
-      request%sets = ''
+      request%samples = ''
       i = 1
       do while (i <= command_argument_count())
          argument = get_argument(i)
          select case (argument)
-         case ('-h', '--help')
-            request%information = help()
-            return
-         case ('--version')
-            request%information = 'thud '//version
-            return
-         case ('--keys')
-            call describe_keys(request%information)
-            return
-         case ('--schema')
-            call get_schema(request%information)
+         case ('-h', '--help', '--version', '--keys', '--schema')
+            call get_information(argument, request%information)
             return
          case ('--replace')
             request%replace = .true.
+         case ('--all')
+            request%all = .true.
          case ('--check')
             request%check = .true.
          case ('--quiet', '-q')
             request%quiet = .true.
          case ('--output', '-o')
             call take_value(i, '--output', 'a directory', request%output, error)
-         case ('--sets')
-            call take_value(i, '--sets', 'a table of sets', request%sets, error)
+         case ('--samples')
+            call take_value(i, '--samples', 'a table of samples', request%samples, error)
          case ('--threads')
             call take_value(i, '--threads', threads_allowed, number, error)
             if (.not. allocated(error)) call take_threads(number, request%threads, error)
@@ -159,7 +155,7 @@ contains
             if (index(argument, '-') == 1) then
                call get_suggestion(argument, known_options, suggestion)
                error = input_error(quoted(argument)//' is not a known option'//suggestion//'; allowed: --output DIR, ' &
-                  //'--replace, --sets TABLE, --threads N, --check, --quiet, --keys, --schema, --help, --version')
+                  //'--replace, --all, --samples TABLE, --threads N, --check, --quiet, --keys, --schema, --help, --version')
             else if (allocated(request%case_file)) then
                error = input_error(quoted(argument)//' is a second case; allowed: one')
             else
@@ -171,10 +167,30 @@ contains
       end do
       if (.not. allocated(request%case_file)) then
          error = input_error('no case is given')
-      else if (request%sets == '' .and. allocated(number)) then
-         error = input_error('--threads does nothing without --sets; allowed: both')
+      else if (request%samples == '' .and. allocated(number)) then
+         error = input_error('--threads does nothing without --samples; allowed: both')
+      else if (request%samples /= '' .and. request%all) then
+         error = input_error('--all does nothing with --samples; allowed: one of them')
       end if
    end subroutine parse_arguments
+
+   !> The text that an option shows instead of a run.
+   subroutine get_information(option, information)
+      !> One of -h, --help, --version, --keys and --schema.
+      character(len=*), intent(in) :: option
+      character(len=:), allocatable, intent(out) :: information
+
+      select case (option)
+      case ('--version')
+         information = 'thud '//version
+      case ('--keys')
+         call describe_keys(information)
+      case ('--schema')
+         call get_schema(information)
+      case default
+         information = help()
+      end select
+   end subroutine get_information
 
    !> The value of an option.
    subroutine take_value(i, option, allowed, value, error)
@@ -222,8 +238,8 @@ contains
    pure function usage() result(text)
       character(len=:), allocatable :: text
 
-      text = 'thud CASE.nml [--sets TABLE.csv [--threads N]] [--output DIR] [--replace] [--check] [--quiet] | ' &
-         //'--keys | --schema | --help | --version'
+      text = 'thud CASE.nml [--samples TABLE.csv [--threads N]] [--output DIR] [--replace] [--all] [--check] ' &
+         //'[--quiet] | --keys | --schema | --help | --version'
    end function usage
 
    !> The help text.
@@ -233,18 +249,21 @@ contains
 
       text = 'Force of a heavy/soft impact source on the floor, its levels and a verdict.'//newline &
          //newline//'Usage: '//usage()//newline//newline &
-         //'  CASE.nml           input, a namelist file; inputs/ holds examples'//newline &
-         //'  -o, --output DIR   directory for the results (default: outputs/<case>, of sets <case>_sets)'//newline &
-         //'  --replace          replace also files that thud has not written'//newline &
-         //'  --sets TABLE.csv   many drops: keys in the first line, one drop in each other; the rest is as in'//newline &
-         //'                     CASE.nml'//newline &
-         //'  --threads N        threads for them (default: 1)'//newline &
-         //'  --check            exit with 3 where the source does not conform to the limits'//newline &
-         //'  -q, --quiet        show nothing but errors and remarks'//newline &
-         //'  --keys             show every key with default, range and meaning'//newline &
-         //'  --schema           the same and more as JSON, for programs'//newline &
-         //'  -h, --help         show this text'//newline &
-         //'  --version          show the version'//newline//newline &
+         //'  CASE.nml             input, a namelist file; inputs/ holds examples'//newline &
+         //'  -o, --output DIR     directory for the results (default: outputs/<case>, with'//newline &
+         //'                       --samples outputs/<case>_samples)'//newline &
+         //'  --replace            replace also files that thud has not written'//newline &
+         //'  --all                write also channels.csv: energies and other quantities of'//newline &
+         //'                       the model against time'//newline &
+         //'  --samples TABLE.csv  a header row of keys and one drop, a sample, in each'//newline &
+         //'                       further row; all other keys are those of CASE.nml'//newline &
+         //'  --threads N          threads for the samples (default: 1)'//newline &
+         //'  --check              exit with 3 where the source does not conform to the limits'//newline &
+         //'  -q, --quiet          show only errors and warnings'//newline &
+         //'  --keys               show every key with default, range and meaning'//newline &
+         //'  --schema             the same and more as JSON, for programs'//newline &
+         //'  -h, --help           show this text'//newline &
+         //'  --version            show the version'//newline//newline &
          //'Exit codes: 0 done, 1 bad input or usage, 2 numerical failure, 3 not conforming (--check),'//newline &
          //'130 interrupted, 143 terminated.'
    end function help

@@ -8,7 +8,8 @@ module thud_text
    implicit none (type, external)
    private
 
-   public :: fixed, is_number, is_utf8, join_quoted, lower_case, newline, quoted, replaced, shortened, split, to_text
+   public :: fixed, flush_right, is_number, is_utf8, join_quoted, lower_case, newline, padded, quoted, replaced
+   public :: shortened, split, to_text
 
    !> Maximum length of a value in a message.
    integer, parameter :: longest_shown = 80
@@ -297,5 +298,25 @@ contains
          at = at + length + 1
       end do
    end function split
+
+   !> A text with blanks behind it.
+   pure function padded(text, width) result(cell)
+      character(len=*), intent(in) :: text
+      !> Width of the cell; longer text keeps its length.
+      integer, intent(in) :: width
+      character(len=max(width, len_trim(text))) :: cell
+
+      cell = text
+   end function padded
+
+   !> A text with blanks before it.
+   pure function flush_right(text, width) result(cell)
+      character(len=*), intent(in) :: text
+      !> Width of the cell; longer text keeps its length.
+      integer, intent(in) :: width
+      character(len=max(width, len(text))) :: cell
+
+      cell = repeat(' ', len(cell) - len(text))//text
+   end function flush_right
 
 end module thud_text

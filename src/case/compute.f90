@@ -1,10 +1,11 @@
-!> Computes a case: free modes, slow compression, the force history of its model, levels and verdict. It knows no files.
+!> Computes all that a case asks for: free modes, quasi-static compression, the impact and its assessment, the drop on the
+!> floor, the level in the room below, and warnings. It knows no files.
 module thud_compute
    use thud_band, only: band_type, get_level_bands, octave_count
    use thud_case, only: case_type, check_case, get_floor_number, get_model_number
    use thud_compression, only: compression_type, get_deflections, get_pressed_ball
    use thud_error, only: error_type
-   use thud_floor_result, only: floor_result_type
+   use thud_floor_result, only: floor_result_type, get_floor_result
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type, get_free_modes
@@ -12,7 +13,7 @@ module thud_compute
    use thud_memory, only: require_memory
    use thud_plate, only: plate_type
    use thud_receiver, only: is_rigid, receiver_type
-   use thud_remarks, only: get_remarks, remark_length
+   use thud_warnings, only: get_warnings, warning_length
    use thud_room, only: check_below, get_room_bands, get_room_level, room_level_type
    use thud_sampling, only: get_sample_count
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
@@ -20,50 +21,65 @@ module thud_compute
    implicit none (type, external)
    private
 
-   public :: compress_case, compute_case, drop_on_floor, get_cost, get_judged_force, is_conforming, judge_case, predict_room
-   public :: predict_room_level, results_type, verdict_type
+   public :: assessment_type, compress_case, compute, compute_floor, compute_impact, drop_on_floor, get_assessed_force
+   public :: get_cost, impact_type, is_conforming, predict_room_level, results_type, scope_type
 
    !> Memory that a sample of a record takes, its transforms and text included, bytes; measured.
    real(wp), parameter :: sample_memory = 600.0_wp
 
+   !> What is computed of that which a case asks for.
+   type :: scope_type
+      !> Levels and criteria.
+      logical :: levels = .true.
+      !> Energies that the force gives to a mobile floor, and velocities of its points.
+      logical :: energies = .true.
+      !> Level in the room below.
+      logical :: room = .true.
+   end type scope_type
+
    !> Levels and criteria of an impact.
-   type :: verdict_type
+   type :: assessment_type
       !> Bands of the levels, the octaves first: [n_band].
       type(band_type), allocatable :: bands(:)
-      !> Number of the first band that the case asks for.
+      !> Index of the first band that the case asks for.
       integer :: first_band = 1
       !> Levels, dB: [n_band, force_count].
       real(wp), allocatable :: level(:, :)
       !> Criteria, the octaves first: [criterion_count, force_count].
       type(criterion_type) :: criteria(criterion_count, force_count)
-   end type verdict_type
+   end type assessment_type
+
+   !> The drop on a rigid floor.
+   type :: impact_type
+      type(force_history_type) :: history
+      type(assessment_type) :: assessment
+   end type impact_type
 
    !> Results of a case.
    type :: results_type
-      !> The force, where an impact is asked for.
-      type(force_history_type) :: history
-      !> Its levels and verdict.
-      type(verdict_type) :: verdict
-      !> The force on a floor that moves, where one is asked for and the model couples with it.
+      !> The drop on a rigid floor, where an impact is asked for.
+      type(impact_type) :: impact
+      !> The drop on a mobile floor, where one is asked for and the model couples with it.
       type(force_history_type), allocatable :: on_floor
-      !> What it makes of the floor.
+      !> Its levels and energies.
       type(floor_result_type) :: floor
       !> Free modes, where they are asked for.
       type(free_modes_type) :: modes
       !> Level in the room below, where it is asked for.
       type(room_level_type) :: room
-      !> Slow compression, where it is asked for.
+      !> Quasi-static compression, where it is asked for.
       type(compression_type) :: compression
-      !> What is possible but not plausible: [n_remark].
-      character(len=remark_length), allocatable :: remark(:)
+      !> What is possible but not plausible: [n_warning].
+      character(len=warning_length), allocatable :: warning(:)
    end type results_type
 
 contains
 
-   !> Computes what a case asks for, without levels and verdict.
-   subroutine compute_case(case, results, error)
+   !> Computes all that a case asks for.
+   subroutine compute(case, scope, results, error)
       !> The case, checked.
       type(case_type), intent(in) :: case
+      type(scope_type), intent(in) :: scope
       type(results_type), intent(out) :: results
       !> A computation failed.
       type(error_type), allocatable, intent(out) :: error
@@ -73,16 +89,51 @@ contains
       if (case%has_modes .and. .not. allocated(error)) call get_free_modes(case%ball, case%modes%mesh, case%modes%count, &
          results%modes, error)
       if (case%has_compression .and. .not. allocated(error)) call compress_case(case, results%compression, error)
-      if (allocated(error)) return
-      if (case%has_impact) then
-         associate (model => case%models(get_model_number(case))%model)
-            call model%solve(case%ball, case%drop, case%sampling, results%history, error)
-         end associate
+      if (case%has_impact .and. .not. allocated(error)) call compute_impact(case, scope, results%impact, error)
+      if (case%has_impact .and. .not. allocated(error)) call compute_floor(case, scope, results%impact, &
+         results%on_floor, results%floor, results%room, error)
+      if (.not. allocated(error)) call get_warnings(case, results%impact%history, results%warning, results%on_floor)
+   end subroutine compute
+
+   !> The drop of a case on a rigid floor, and its assessment.
+   subroutine compute_impact(case, scope, impact, error)
+      !> The case, checked.
+      type(case_type), intent(in) :: case
+      type(scope_type), intent(in) :: scope
+      type(impact_type), intent(out) :: impact
+      !> A computation failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      associate (model => case%models(get_model_number(case))%model)
+         call model%solve(case%ball, case%drop, case%sampling, impact%history, error)
+      end associate
+      if (scope%levels .and. .not. allocated(error)) call assess(case, impact%history, impact%assessment, error)
+   end subroutine compute_impact
+
+   !> The drop of a case on its floor, where it asks for one, and the level in the room below.
+   subroutine compute_floor(case, scope, impact, on_floor, floor, room, error)
+      !> The case, checked.
+      type(case_type), intent(in) :: case
+      type(scope_type), intent(in) :: scope
+      !> The drop on a rigid floor.
+      type(impact_type), intent(in) :: impact
+      !> The drop on the floor; not allocated where the floor is rigid, or the model's force is the blocked one.
+      type(force_history_type), allocatable, intent(out) :: on_floor
+      type(floor_result_type), intent(out) :: floor
+      type(room_level_type), intent(out) :: room
+      !> A computation failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      if (case%has_floor) call drop_on_floor(case, on_floor, error)
+      if (allocated(on_floor) .and. scope%levels .and. .not. allocated(error)) call get_floor_result(case, on_floor, &
+         scope%energies, floor, error)
+      if (allocated(error) .or. .not. (case%has_room .and. scope%room)) return
+      if (allocated(on_floor)) then
+         call predict_room(case, on_floor%floor_force, on_floor%sample_rate, room, error)
+      else
+         call predict_room(case, impact%history%floor_force, impact%history%sample_rate, room, error)
       end if
-      if (allocated(error)) return
-      if (case%has_impact .and. case%has_floor) call drop_on_floor(case, results%on_floor, error)
-      if (.not. allocated(error)) call get_remarks(case, results%history, results%remark, results%on_floor)
-   end subroutine compute_case
+   end subroutine compute_floor
 
    !> The drop of a case on its floor.
    subroutine drop_on_floor(case, on_floor, error)
@@ -125,7 +176,7 @@ contains
       end associate
    end function get_cost
 
-   !> Slow compression of the ball of a case by its model.
+   !> Quasi-static compression of the ball of a case by its model.
    subroutine compress_case(case, compression, error)
       type(case_type), intent(in) :: case
       type(compression_type), intent(out) :: compression
@@ -140,31 +191,31 @@ contains
    end subroutine compress_case
 
    !> Levels and criteria of the force history of a case.
-   subroutine judge_case(case, history, verdict, error)
+   subroutine assess(case, history, assessment, error)
       type(case_type), intent(in) :: case
       type(force_history_type), intent(in) :: history
       !> Levels and criteria of both forces.
-      type(verdict_type), intent(out) :: verdict
+      type(assessment_type), intent(out) :: assessment
       !> A level cannot be computed.
       type(error_type), allocatable, intent(out) :: error
 
-      call get_level_bands(case%bands, verdict%bands, verdict%first_band)
-      allocate (verdict%level(size(verdict%bands), force_count))
-      call judge_force(case, history, history%elastic_force, verdict%bands, verdict%level(:, 1), verdict%criteria(:, 1), &
-         error)
+      call get_level_bands(case%bands, assessment%bands, assessment%first_band)
+      allocate (assessment%level(size(assessment%bands), force_count))
+      call assess_force(case, history, history%elastic_force, assessment%bands, assessment%level(:, 1), &
+         assessment%criteria(:, 1), error)
       if (allocated(error)) return
       ! Most models have the same force twice.
       if (any(abs(history%floor_force - history%elastic_force) > 0.0_wp)) then
-         call judge_force(case, history, history%floor_force, verdict%bands, verdict%level(:, 2), verdict%criteria(:, 2), &
-            error)
+         call assess_force(case, history, history%floor_force, assessment%bands, assessment%level(:, 2), &
+            assessment%criteria(:, 2), error)
       else
-         verdict%level(:, 2) = verdict%level(:, 1)
-         verdict%criteria(:, 2) = verdict%criteria(:, 1)
+         assessment%level(:, 2) = assessment%level(:, 1)
+         assessment%criteria(:, 2) = assessment%criteria(:, 1)
       end if
-   end subroutine judge_case
+   end subroutine assess
 
    !> Levels and criteria of one force.
-   subroutine judge_force(case, history, force, bands, level, criteria, error)
+   subroutine assess_force(case, history, force, bands, level, criteria, error)
       type(case_type), intent(in) :: case
       type(force_history_type), intent(in) :: history
       !> The force, N: [n_sample].
@@ -185,7 +236,7 @@ contains
       if (allocated(error)) return
       criteria = get_criteria(limits, level(:octave_count), history%contact_time, history%restitution, &
          get_peak_count(force, history%sample_rate), case%ball%mass, case%drop%height)
-   end subroutine judge_force
+   end subroutine assess_force
 
    !> Level that a force causes in the room below.
    subroutine predict_room(case, force, sample_rate, prediction, error)
@@ -212,7 +263,7 @@ contains
    subroutine predict_room_level(case, bands, level, prediction, error)
       !> The case, with floor and room.
       type(case_type), intent(in) :: case
-      !> Thirds of `get_room_bands`, and levels of the force on the floor in them, dB: [n_band].
+      !> One-third-octave bands of `get_room_bands`, and levels of the force on the floor in them, dB: [n_band].
       type(band_type), intent(in) :: bands(:)
       real(wp), intent(in) :: level(:)
       type(room_level_type), intent(out) :: prediction
@@ -228,23 +279,23 @@ contains
       if (.not. allocated(error)) call get_room_level(plate, conductance, case%room, bands, level, prediction)
    end subroutine predict_room_level
 
-   !> Number of the force that the verdict is on.
-   pure function get_judged_force(case) result(number)
+   !> Index of the force that the criteria count for.
+   pure function get_assessed_force(case) result(index)
       type(case_type), intent(in) :: case
-      !> Its place in `force_names`.
-      integer :: number
+      !> Its index in `force_names`.
+      integer :: index
 
-      number = findloc(force_names == case%level_force, .true., dim=1)
-   end function get_judged_force
+      index = findloc(force_names == case%level_force, .true., dim=1)
+   end function get_assessed_force
 
    !> Whether the source of a case conforms.
-   pure function is_conforming(case, verdict) result(yes)
+   pure function is_conforming(case, assessment) result(yes)
       type(case_type), intent(in) :: case
-      type(verdict_type), intent(in) :: verdict
-      !> All criteria of the judged force are met.
+      type(assessment_type), intent(in) :: assessment
+      !> All criteria of the assessed force are met.
       logical :: yes
 
-      yes = all(conforms(verdict%criteria(:, get_judged_force(case))))
+      yes = all(conforms(assessment%criteria(:, get_assessed_force(case))))
    end function is_conforming
 
 end module thud_compute

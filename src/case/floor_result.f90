@@ -1,5 +1,4 @@
-!> What a floor that moves makes of an impact: levels of the contact force against the blocked one, the energy that goes
-!> into the floor, and the motion of further points.
+!> Results on a mobile floor: levels of the contact force, the energy that goes into the floor, and the velocities of points.
 module thud_floor_result
    use thud_band, only: band_type, get_level_bands
    use thud_case, only: case_type, get_floor_number
@@ -20,8 +19,8 @@ module thud_floor_result
    type :: floor_result_type
       !> The bands that the case asks for: [n_band].
       type(band_type), allocatable :: bands(:)
-      !> Levels of the force on a rigid floor and on this one, dB: [n_band].
-      real(wp), allocatable :: blocked_level(:), contact_level(:)
+      !> Levels of the force on the floor, dB: [n_band].
+      real(wp), allocatable :: contact_level(:)
       !> Energy that the force gives to the floor, by its velocity and by its mobility, J: [n_band].
       real(wp), allocatable :: energy_by_motion(:), energy_by_mobility(:)
       !> Mean of the real part of the mobility, m/(N s): [n_band].
@@ -33,10 +32,12 @@ module thud_floor_result
 contains
 
    !> Results on the floor of a case.
-   subroutine get_floor_result(case, blocked, contact, found, error)
+   subroutine get_floor_result(case, contact, energies, found, error)
       type(case_type), intent(in) :: case
-      !> The drop on a rigid floor, and on the floor.
-      type(force_history_type), intent(in) :: blocked, contact
+      !> The drop on the floor.
+      type(force_history_type), intent(in) :: contact
+      !> Energies and velocities of points are wanted, too.
+      logical, intent(in) :: energies
       type(floor_result_type), intent(out) :: found
       !> A level cannot be computed, or the floor has no such point.
       type(error_type), allocatable, intent(out) :: error
@@ -46,12 +47,10 @@ contains
       call get_level_bands(case%bands, found%bands, first)
       found%bands = found%bands(first:)
       n = size(found%bands)
-      allocate (found%blocked_level(n), found%contact_level(n), found%energy_by_motion(n), found%energy_by_mobility(n))
-      call get_force_exposure_levels(blocked%floor_force, blocked%sample_rate, found%bands, trim(case%level_method), &
-         found%blocked_level, error)
-      if (.not. allocated(error)) call get_force_exposure_levels(contact%floor_force, contact%sample_rate, found%bands, &
-         trim(case%level_method), found%contact_level, error)
-      if (allocated(error)) return
+      allocate (found%contact_level(n), found%energy_by_motion(n), found%energy_by_mobility(n))
+      call get_force_exposure_levels(contact%floor_force, contact%sample_rate, found%bands, trim(case%level_method), &
+         found%contact_level, error)
+      if (allocated(error) .or. .not. energies) return
       associate (floor => case%floors(get_floor_number(case))%model)
          call floor%get_receiver(receiver, error)
          if (allocated(error)) return

@@ -8,8 +8,8 @@ module thud_force_history
    implicit none (type, external)
    private
 
-   public :: check_samples, clear_flight, continue_to_zero, force_count, force_history_type, force_names, get_scalars
-   public :: holds_impulse, max_residual, new_force_history, outcome_count, scalar_fields
+   public :: check_samples, clear_flight, continue_to_zero, force_count, force_history_type, force_names, holds_impulse
+   public :: max_residual, new_force_history
 
    !> Residual of the balances of impulse and energy above which models that integrate or sum one
    !> equation of motion refuse their result; at the default step they have less than 1e-9.
@@ -83,47 +83,7 @@ module thud_force_history
       real(wp) :: energy_residual = 0.0_wp
    end type force_history_type
 
-   !> One number that describes an impact.
-   type :: scalar_field_type
-      !> Its name.
-      character(len=part_name_length) :: name = ''
-      !> Its SI unit, blank for pure numbers.
-      character(len=8) :: unit = ''
-      !> What it is.
-      character(len=64) :: meaning = ''
-   end type scalar_field_type
-
-   !> Of these numbers the first are those that each of many drops is described by.
-   integer, parameter :: outcome_count = 6
-
-   !> The numbers that describe an impact, in the order of `get_scalars`.
-   type(scalar_field_type), parameter :: scalar_fields(*) = [ &
-      scalar_field_type('contact_time', 's', 'contact time'), &
-      scalar_field_type('peak_force', 'N', 'maximum force on the floor'), &
-      scalar_field_type('peak_elastic_force', 'N', 'maximum elastic force'), &
-      scalar_field_type('max_deflection', 'm', 'maximum deflection'), &
-      scalar_field_type('restitution', '', 'coefficient of restitution'), &
-      scalar_field_type('impulse', 'N s', 'time integral of the force on the floor'), &
-      scalar_field_type('impact_velocity', 'm/s', 'velocity at first touch'), &
-      scalar_field_type('exact_contact_time', 's', 'contact time between steps'), &
-      scalar_field_type('touch_time', 's', 'time of first touch in the record'), &
-      scalar_field_type('sample_rate', 'Hz', 'samples per second'), &
-      scalar_field_type('impulse_residual', '', 'what the balance of momentum misses, relative'), &
-      scalar_field_type('energy_residual', '', 'what the balance of energy misses, relative')]
-
 contains
-
-   !> The numbers that describe an impact.
-   pure function get_scalars(history) result(values)
-      type(force_history_type), intent(in) :: history
-      !> The numbers, SI units: [size(scalar_fields)].
-      real(wp) :: values(size(scalar_fields))
-
-      values = [history%contact_time, history%peak_force, history%peak_elastic_force, history%max_deflection, &
-         history%restitution, history%impulse, history%impact_velocity, &
-         merge(history%exact_contact_time, history%contact_time, history%exact_contact_time > 0.0_wp), &
-         history%touch_time, history%sample_rate, history%impulse_residual, history%energy_residual]
-   end function get_scalars
 
    !> Whether samples hold the impulse of a force.
    elemental function holds_impulse(sampled, impulse) result(yes)

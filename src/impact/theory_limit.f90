@@ -1,4 +1,4 @@
-!> Limits of a theory: a number of an answer, where the theory holds, and why. An answer outside is computed, and remarked.
+!> Limits of a theory: a number of an answer, where the theory holds, and why. An answer outside is computed, and warninged.
 module thud_theory_limit
    use thud_ball, only: ball_type, get_density
    use thud_drop, only: drop_type

@@ -2,17 +2,17 @@
 module thud_run
    use thud_case, only: case_type, get_model_number
    use thud_case_text, only: get_case_text, read_case
-   use thud_compute, only: compute_case, is_conforming, judge_case, predict_room, results_type
+   use thud_compute, only: compute, is_conforming, results_type, scope_type
    use thud_constants, only: version
+   use thud_csv, only: get_history_csv
    use thud_error, only: error_type, input_error
    use thud_file, only: get_file_stem, read_text_file, text_file_type
    use thud_floor_report, only: get_floor_force_csv, get_floor_levels_csv, get_floor_summary, get_floor_table
-   use thud_floor_result, only: get_floor_result
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_mesh_files, only: estimate_motion_bytes, get_modes_files, get_motion_files, modes_names, &
       motion_names
-   use thud_report, only: get_channels_csv, get_compression_csv, get_force_csv, get_levels_csv, get_summary
+   use thud_report, only: get_channels_csv, get_force_csv, get_levels_csv, get_summary
    use thud_result_directory, only: check_owner, write_results
    use thud_room_report, only: get_room_files, get_room_table, room_file_names
    use thud_system, only: get_free_bytes
@@ -38,14 +38,14 @@ module thud_run
    !> The full input, which says whose results a directory holds.
    character(len=*), parameter :: input_file = 'effective.nml'
 
-   !> Remark on a directory, which follows.
+   !> Note on a directory, which follows.
    character(len=*), parameter :: replaces = 'replaces the results of another input of the same name in '
 
-   !> A remark.
-   type :: remark_type
+   !> A warning or a note.
+   type :: message_type
       !> A sentence, with the file that it is about.
       character(len=:), allocatable :: text
-   end type remark_type
+   end type message_type
 
    !> What a run leaves for its caller.
    type :: outcome_type
@@ -53,41 +53,41 @@ module thud_run
       character(len=:), allocatable :: directory
       !> Table for the screen.
       character(len=:), allocatable :: table
-      integer :: n_remark = 0
-      !> Remarks for the user: [n_remark].
-      type(remark_type), allocatable :: remarks(:)
+      integer :: n_message = 0
+      !> Warnings and notes for the user: [n_message].
+      type(message_type), allocatable :: messages(:)
       !> The source conforms to the limits, or there is no impact to judge.
       logical :: conforms = .true.
    contains
-      procedure :: add_remark
+      procedure :: add_message
    end type outcome_type
 
 contains
 
-   !> Adds a remark.
-   subroutine add_remark(self, path, remark)
+   !> Adds a warning or a note.
+   subroutine add_message(self, path, text)
       class(outcome_type), intent(inout) :: self
       !> The file that it is about; a sentence.
-      character(len=*), intent(in) :: path, remark
-      type(remark_type), allocatable :: remarks(:)
+      character(len=*), intent(in) :: path, text
+      type(message_type), allocatable :: messages(:)
       integer :: i
 
-      allocate (remarks(self%n_remark + 1))
-      do i = 1, self%n_remark
-         call move_alloc(self%remarks(i)%text, remarks(i)%text)
+      allocate (messages(self%n_message + 1))
+      do i = 1, self%n_message
+         call move_alloc(self%messages(i)%text, messages(i)%text)
       end do
-      self%n_remark = self%n_remark + 1
-      remarks(self%n_remark)%text = path//': '//remark
-      call move_alloc(remarks, self%remarks)
-   end subroutine add_remark
+      self%n_message = self%n_message + 1
+      messages(self%n_message)%text = path//': '//text
+      call move_alloc(messages, self%messages)
+   end subroutine add_message
 
    !> Runs a namelist file and writes its results.
-   subroutine run_case(path, output, replace, case, results, outcome, error)
+   subroutine run_case(path, output, replace, channels, case, results, outcome, error)
       character(len=*), intent(in) :: path
       !> Directory for the results; empty for `outputs/<name of the case>`.
       character(len=*), intent(in) :: output
-      !> Files that thud has not written are replaced, too.
-      logical, intent(in) :: replace
+      !> Files that thud has not written are replaced, too; the channels of the histories are written, too.
+      logical, intent(in) :: replace, channels
       type(case_type), target, intent(out) :: case
       type(results_type), intent(out) :: results
       !> Table, verdict and place of the results.
@@ -97,19 +97,19 @@ contains
 
       call load_case(path, case, error)
       if (allocated(error)) return
-      call store_case(path, case, output, replace, results, outcome, error)
+      call store_case(path, case, output, replace, channels, results, outcome, error)
       if (allocated(error)) error%message = path//': '//error%message
    end subroutine run_case
 
    !> Computes a case and writes its results.
-   subroutine store_case(path, case, output, replace, results, outcome, error)
+   subroutine store_case(path, case, output, replace, channels, results, outcome, error)
       !> The file of the case.
       character(len=*), intent(in) :: path
       type(case_type), intent(in), target :: case
       !> Directory for the results; empty for `outputs/<name of the case>`.
       character(len=*), intent(in) :: output
-      !> Files that thud has not written are replaced, too.
-      logical, intent(in) :: replace
+      !> Files that thud has not written are replaced, too; the channels of the histories are written, too.
+      logical, intent(in) :: replace, channels
       type(results_type), intent(out) :: results
       !> Table, verdict and place of the results.
       type(outcome_type), intent(out) :: outcome
@@ -126,24 +126,14 @@ contains
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)
       call check_owner(outcome%directory, input, replace, differs, error)
       if (.not. allocated(error)) call check_space(case, outcome%directory, error)
-      if (.not. allocated(error)) call compute_case(case, results, error)
-      if (case%has_impact .and. .not. allocated(error)) call judge_case(case, results%history, results%verdict, error)
-      if (allocated(results%on_floor) .and. .not. allocated(error)) call get_floor_result(case, results%history, &
-         results%on_floor, results%floor, error)
-      if (case%has_room .and. .not. allocated(error)) then
-         if (allocated(results%on_floor)) then
-            call predict_room(case, results%on_floor%floor_force, results%on_floor%sample_rate, results%room, error)
-         else
-            call predict_room(case, results%history%floor_force, results%history%sample_rate, results%room, error)
-         end if
-      end if
+      if (.not. allocated(error)) call compute(case, scope_type(), results, error)
       if (allocated(error)) return
-      call describe(case, results, files, outcome)
+      call describe(case, results, channels, files, outcome)
       call write_results(outcome%directory, input, files, [path], replace, differs, error)
       if (allocated(error)) return
-      if (differs) call outcome%add_remark(path, replaces//outcome%directory)
-      do i = 1, size(results%remark)
-         call outcome%add_remark(path, trim(results%remark(i)))
+      if (differs) call outcome%add_message(path, replaces//outcome%directory)
+      do i = 1, size(results%warning)
+         call outcome%add_message(path, trim(results%warning(i)))
       end do
    end subroutine store_case
 
@@ -166,9 +156,11 @@ contains
    end subroutine check_space
 
    !> Table, verdict and files of results.
-   subroutine describe(case, results, files, outcome)
+   subroutine describe(case, results, channels, files, outcome)
       type(case_type), intent(in) :: case
       type(results_type), intent(in) :: results
+      !> Channels of the histories, too.
+      logical, intent(in) :: channels
       !> The files: [n_file].
       type(text_file_type), allocatable, intent(out) :: files(:)
       !> Gets table and verdict.
@@ -186,50 +178,51 @@ contains
       end if
       if (.not. case%has_impact) outcome%table = outcome%table//get_defaults_line(case)
       if (.not. case%has_impact) return
-      outcome%conforms = is_conforming(case, results%verdict)
-      outcome%table = outcome%table//newline//get_table(case, results%history, results%verdict)
-      call add_file(files, file_names(1), get_force_csv(results%history))
-      call add_file(files, file_names(2), get_levels_csv(case, results%verdict))
-      summary = get_summary(case, results%history, results%verdict, results%remark)
-      call add_history_files(results%history, '', files)
+      outcome%conforms = is_conforming(case, results%impact%assessment)
+      outcome%table = outcome%table//newline//get_table(case, results%impact%history, results%impact%assessment)
+      call add_file(files, file_names(1), get_force_csv(results%impact%history))
+      call add_file(files, file_names(2), get_levels_csv(case, results%impact%assessment))
+      summary = get_summary(case, results%impact%history, results%impact%assessment, results%warning)
+      call add_history_files(results%impact%history, '', channels, files)
       if (allocated(results%on_floor)) then
-         call get_floor_table(case, results%history, results%on_floor, results%floor, text)
+         call get_floor_table(case, results%impact, results%on_floor, results%floor, text)
          outcome%table = outcome%table//newline//text
-         call get_floor_force_csv(results%history, results%on_floor, results%floor, text)
+         call get_floor_force_csv(results%impact%history, results%on_floor, results%floor, text)
          call add_file(files, floor_names(1), text)
-         call get_floor_levels_csv(results%floor, text)
+         call get_floor_levels_csv(results%impact, results%floor, text)
          call add_file(files, floor_names(2), text)
          call get_floor_summary(results%on_floor, text)
          summary = summary//text
-         call add_history_files(results%on_floor, 'floor_', files)
+         call add_history_files(results%on_floor, 'floor_', channels, files)
       end if
       call add_file(files, file_names(3), summary)
       if (case%has_room) then
-         call get_room_table(case, results%room, results%history%contact_time, allocated(results%on_floor), text)
+         call get_room_table(case, results%room, results%impact%history%contact_time, allocated(results%on_floor), text)
          outcome%table = outcome%table//newline//text
          call extend(files, size(room_file_names))
          call get_room_files(results%room, files(size(files) - size(room_file_names) + 1:))
       end if
       outcome%table = outcome%table//get_defaults_line(case)
       if (.not. case%has_compression) return
-      call add_file(files, compression_file, get_compression_csv(results%compression))
+      call add_file(files, compression_file, get_history_csv('deflection_m,force_N', &
+         results%compression%deflection, reshape(results%compression%force, [size(results%compression%force), 1])))
       outcome%table = outcome%table//newline//get_compression_table(results%compression)
    end subroutine describe
 
    !> Adds the files of a history of models that have channels or snapshots.
-   subroutine add_history_files(history, prefix, files)
+   subroutine add_history_files(history, prefix, channels, files)
       type(force_history_type), intent(in) :: history
-      !> What their names begin with.
+      !> Beginning of their names.
       character(len=*), intent(in) :: prefix
+      !> Channels, too.
+      logical, intent(in) :: channels
       !> The files: [n_file].
       type(text_file_type), allocatable, intent(inout) :: files(:)
-      integer :: n
 
-      if (allocated(history%channel)) call add_file(files, prefix//channel_file, get_channels_csv(history))
-      n = size(files)
+      if (channels .and. allocated(history%channel)) call add_file(files, prefix//channel_file, get_channels_csv(history))
       if (history%motion%n_frame == 0) return
-      call extend(files, history%motion%n_frame + size(motion_names))
-      call get_motion_files(history%motion, prefix, files(n + 1:))
+      call extend(files, size(motion_names))
+      call get_motion_files(history%motion, prefix, files(size(files) - size(motion_names) + 1:))
    end subroutine add_history_files
 
    !> Adds a file.

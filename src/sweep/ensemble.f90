@@ -17,6 +17,7 @@ module thud_ensemble
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
+   use thud_quantities, only: sample_quantity_count
    use thud_sampling, only: check_sampling, get_sample_count, sampling_type
    use thud_shell_sets, only: block_size, get_blocks, set_outcome_type, set_type, solve_block
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
@@ -85,8 +86,9 @@ contains
       alike = abs(one%sample_rate - other%sample_rate) <= 0.0_wp .and. all(one%bands%set == other%bands%set)
    end function are_alike
 
-   !> Outcomes, levels and verdicts of all sets.
-   subroutine solve_ensemble(sets, sampling, source, threads, judged, projections, outcomes, levels, met, forces, error)
+   !> Quantities, levels and verdicts of all sets.
+   subroutine solve_ensemble(sets, sampling, source, threads, judged, projections, computed, quantity, levels, met, forces, &
+      error)
       !> The sets: [n_set].
       type(set_type), intent(in) :: sets(:)
       type(sampling_type), intent(in) :: sampling
@@ -97,26 +99,29 @@ contains
       logical, intent(in) :: judged
       !> Matrices of the levels for this sampling rate.
       type(projections_type), intent(inout) :: projections
-      !> The outcomes: [n_set].
-      type(set_outcome_type), intent(out) :: outcomes(:)
-      !> Force exposure levels, dB, NaN without outcome: [n_band, force_count, n_set].
+      !> Whether the batch has computed a set: [n_set].
+      logical, intent(out) :: computed(:)
+      !> The first of the table of quantities, NaN where not computed: [sample_quantity_count, n_set].
+      real(wp), intent(out) :: quantity(:, :)
+      !> Force exposure levels, dB, NaN where not computed: [n_band, force_count, n_set].
       real(wp), intent(out) :: levels(:, :, :)
       !> The source conforms by each force: [force_count, n_set].
       logical, intent(out) :: met(:, :)
-      !> Forces, N, NaN without outcome; of no size where they are not wanted: [n_sample, force_count, n_set].
+      !> Forces, N, NaN where not computed; of no size where they are not wanted: [n_sample, force_count, n_set].
       real(wp), intent(out) :: forces(:, :, :)
       !> The sampling cannot be used, its records do not fit into memory, the source is not known, or an interrupt.
       type(error_type), allocatable, intent(out) :: error
       type(source_limits_type) :: limits
       integer, allocatable :: order(:), first(:)
 
+      quantity = not_a_number
       levels = not_a_number
       met = .false.
       forces = not_a_number
       call check_sampling(sampling, error)
       if (.not. allocated(error)) call get_source_limits(source, limits, error)
       if (allocated(error)) return
-      call get_blocks(sets, outcomes%computed, order, first)
+      call get_blocks(sets, computed, order, first)
       call use_one_blas_thread()
       !$omp parallel num_threads(threads)
       call run_blocks()
@@ -154,14 +159,26 @@ contains
 
          call solve_workspace(workspace, sets(members), sampling, judged, projections, found, found_levels, found_met)
          do i = 1, size(members)
-            outcomes(members(i)) = found(i)
+            computed(members(i)) = found(i)%computed
             levels(:, :, members(i)) = found_levels(:, :, i)
             met(:, members(i)) = found_met(:, i)
-            if (size(forces) > 0 .and. found(i)%computed) call copy_forces(workspace, i, forces(:, :, members(i)))
+            if (.not. found(i)%computed) cycle
+            quantity(:, members(i)) = get_set_quantities(found(i))
+            if (size(forces) > 0) call copy_forces(workspace, i, forces(:, :, members(i)))
          end do
       end subroutine run_block
 
    end subroutine solve_ensemble
+
+   !> The first of the table of quantities, of one set.
+   pure function get_set_quantities(outcome) result(values)
+      type(set_outcome_type), intent(in) :: outcome
+      !> Values, SI units: [sample_quantity_count].
+      real(wp) :: values(sample_quantity_count)
+
+      values = [outcome%contact_time, outcome%peak_force, outcome%peak_elastic_force, outcome%max_deflection, &
+         outcome%restitution, outcome%impulse]
+   end function get_set_quantities
 
    !> Arrays of a thread. Memory beyond the longest contact is never touched.
    subroutine set_workspace(workspace, sampling, limits, n_row)

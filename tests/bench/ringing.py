@@ -72,11 +72,11 @@ def told(force: np.ndarray, rate: float, rng: np.random.Generator) -> list[str]:
         after=float(np.exp(rng.uniform(np.log(0.005), 0))), seed=int(rng.integers(2**31)),
     )  # fmt: skip
     found = thud.Recording.from_array(record, rate, height=1.0, mass=2.5)
-    return [remark for remark in found.drops[0].remarks if "keeps ringing" in remark]
+    return [warning for warning in found.drops[0].warnings if "keeps ringing" in warning]
 
 
 def is_due(force: np.ndarray, plate: np.ndarray) -> bool:
-    """Whether a plate is worth a remark."""
+    """Whether a plate is worth a warning."""
     before, after = (thud.force_exposure_levels(one, FINE)[4] for one in (force, plate))
     peaks = peak_count(record_force(plate, FINE), FINE)
     return bool(abs(after - before) > 0.5 or peaks > peak_count(record_force(force, FINE), FINE))

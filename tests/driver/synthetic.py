@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from thud.recordings.contact import Contact, Estimate, even_edges
-from thud.recordings.estimates import Drop
+from thud.level.estimate import Estimate
+from thud.recordings.contact import Contact, even_edges
+from thud.recordings.measured_drop import Drop
 from thud.recordings.noise import Background, Noise
 
 # Exponents of the power spectra of noise.
@@ -160,7 +161,7 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
         noise=Noise(deviation, "before and after", float(draws[0, 0])),
         bounces=(),
         steps=(),
-        remarks=(),
+        warnings=(),
         contact=Contact(
             touch, release, touch, release, 1500.0, (0, len(time)), force, np.zeros(len(time)),
             gate, offset, (before, after),

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-# Some of these sets fail; by this method of the levels they make several blocks.
+# Some of these samples fail; by this method of the levels they make several blocks.
 STUDY: dict[str, Any] = {
     "name": "some",
     "fixed": {"method": "fft"},
@@ -65,7 +65,7 @@ def cluster() -> Iterator[LocalCluster]:
 def test_every_backend_gives_the_same(cluster: LocalCluster) -> None:
     one = thud.sweep(STUDY, workers=1)
     assert set(one["status"].values) == {0, 1, 2}
-    assert one.sizes["set"] > KIND.read_study(STUDY).block_size
+    assert one.sizes["sample"] > KIND.read_study(STUDY).block_size
     for how in (
         {"workers": 3},
         {"backend": "processes", "workers": 2},
@@ -191,7 +191,7 @@ def test_lost_scheduler_is_reported_and_its_study_goes_on_elsewhere(
     assert re.search(naming(study, "backend", "CancelledError"), errors)
     assert errors.count("\n") == 1
     finished = thud.read_sweep(tmp_path / "some.partial")
-    assert 0 < finished.sizes["set"] < 600
+    assert 0 < finished.sizes["sample"] < 600
     if "scheduler" in rest:
         rest = {"scheduler": cluster.scheduler_address}
     found = thud.sweep(study, tmp_path, **rest)

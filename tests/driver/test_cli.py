@@ -34,10 +34,8 @@ def test_run_writes_results_and_figures(
         ".thud",
         "effective.nml",
         "force.csv",
-        "force.png",
         "force.svg",
         "levels.csv",
-        "levels.png",
         "levels.svg",
         "summary.nml",
     ]
@@ -146,10 +144,10 @@ def test_figure_that_cannot_be_replaced_is_named(
 ) -> None:
     case = str(case_file(MINIMAL))
     assert cli.main(["run", "-q", case]) == 0
-    (tmp_path / "outputs/case/force.png").unlink()
-    (tmp_path / "outputs/case/force.png").mkdir()
+    (tmp_path / "outputs/case/force.svg").unlink()
+    (tmp_path / "outputs/case/force.svg").mkdir()
     assert cli.main(["run", "-q", case]) == 1
-    assert "outputs/case/force.png" in capsys.readouterr().err
+    assert "outputs/case/force.svg" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -269,10 +267,10 @@ def test_errors_that_nobody_can_read_change_no_exit_code(
 def test_interruption_is_not_a_traceback(
     case_file: CaseFile, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def interrupt(*_: object) -> None:
+    def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(sys.modules["thud.cli.run_command"], "call", interrupt)
+    monkeypatch.setattr(sys.modules["thud.cli.run_command"], "ask", interrupt)
     assert cli.main(["run", str(case_file(MINIMAL))]) == 130
     assert "interrupted" in capsys.readouterr().err
 

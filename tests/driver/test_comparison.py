@@ -15,7 +15,8 @@ import thud
 from thud import cli
 from thud.base.errors import PlausibilityWarning
 from thud.comparison.comparison import _cell, _digits, read_all
-from thud.level.criteria import Criterion
+from thud.level.assessment import Criterion
+from thud.level.impact_result import ImpactResult
 from thud.recordings.config import Config
 
 if TYPE_CHECKING:
@@ -51,7 +52,6 @@ def test_paper_s_argument_from_end_to_end() -> None:
 def test_page_is_complete_in_one_file(tmp_path: Path) -> None:
     paths = thud.compare({"shell <1>": thud.Case(), "again": thud.solve()}).save(tmp_path)
     assert [path.name for path in paths] == [
-        "comparison.png",
         "comparison.svg",
         "comparison.html",
     ]
@@ -126,7 +126,7 @@ def test_limits_are_those_of_the_cases() -> None:
 def test_limits_are_those_of_the_recordings_where_no_case_has_others() -> None:
     ball = recorded(thud.solve())
     tyre = replace(ball, config=Config(source="tyre"))
-    assert thud.compare([tyre]).source == tyre.conformity().source == "tyre"
+    assert thud.compare([tyre]).source == tyre.assess().source == "tyre"
     assert thud.compare({"tyre": tyre, "not stated": ball}).source == "tyre"
     assert thud.compare([ball]).source == "rubber_ball"
     case = thud.Case(limits=thud.Limits("tyre"))
@@ -137,12 +137,12 @@ def test_limits_are_those_of_the_recordings_where_no_case_has_others() -> None:
 
 def test_recordings_say_what_is_doubtful_and_have_their_names() -> None:
     ball = replace(recorded(thud.solve()), name="plate 7")
-    assert ball.remarks
+    assert ball.warnings
     with pytest.warns(PlausibilityWarning, match="plate 7: "):
         comparison = thud.compare([ball, ball])
     assert list(comparison.impacts) == ["plate 7", "plate 7 (2)"]
     for name in comparison.impacts:
-        assert {f"{name}: {remark}" for remark in ball.remarks} <= set(comparison.remarks)
+        assert {f"{name}: {warning}" for warning in ball.warnings} <= set(comparison.warnings)
 
 
 def test_heights_of_recordings_are_those_of_the_drop_within_their_limits() -> None:
@@ -175,11 +175,11 @@ def test_verdict_on_a_record_is_open_where_its_ball_is_not_known(tmp_path: Path)
     ball = thud.Ball(outer_radius=0.06105, wall_thickness=0.0244, mass=2.59, youngs_modulus=2.03e6,
                      gauge_pressure=17.8e3)  # fmt: skip
     impact = thud.solve(ball)
-    assert impact.conformity().verdict == "conforms"
+    assert impact.assess().result == "conforms"
     write_recording(tmp_path / "plate.csv", impact)
     recording = thud.read_recording(tmp_path / "plate.csv")
-    assert recording.conformity().verdict == "cannot be decided"
-    assert not recording.conformity()
+    assert recording.assess().result == "inconclusive"
+    assert not recording.assess()
 
 
 def test_nothing_and_different_drops_are_told(
@@ -225,18 +225,17 @@ def test_case_that_fails_is_named() -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "conforms", "unit", "decimals", "cell"),
+    ("value", "uncertainty", "unit", "decimals", "cell"),
     [
-        (0.021, True, 1e-3, 2, "21.00"), (37.9, False, 1.0, 1, "37.9 low"),
-        (40.1, False, 1.0, 1, "40.1 high"), (38.0, False, 1.0, 1, "38.0 open"),
-        (40.0, False, 1.0, 1, "40.0 open"), (np.nan, False, 1.0, 1, "not known"),
-        (-0.0001, True, 1.0, 2, "0.00"),
+        (38.1, 0, 0.1, 2, "381.00"), (37.9, 0, 1.0, 1, "37.9 low"), (40.1, 1, 1.0, 1, "40.1 high"),
+        (38.0, 0.1, 1.0, 1, "38.0 open"), (40.0, 0.1, 1.0, 1, "40.0 open"),
+        (np.nan, 0, 1.0, 1, "not known"),
     ],
 )  # fmt: skip
 def test_cell_tells_how_a_criterion_is_missed(
-    value: float, unit: float, decimals: int, cell: str, *, conforms: bool
+    value: float, uncertainty: float, unit: float, decimals: int, cell: str
 ) -> None:
-    criterion = Criterion("octave_31_5", "dB", value, 38.0, 40.0, conforms=conforms)
+    criterion = Criterion("octave_31_5", thud.Estimate(value, uncertainty), 38.0, 40.0)
     assert _cell(criterion, unit, decimals) == cell
 
 
@@ -263,3 +262,23 @@ def test_drops_of_different_speeds_are_refused_and_others_named() -> None:
     expected = f"{1e3 * found.run_times['heavy']:.1f}"
     assert rows["computed in, ms"][1] == expected
     assert rows["peak force, N"][0] == _digits(impact.peak())
+
+
+def test_impact_and_recording_answer_the_same_questions() -> None:
+    impact = thud.solve()
+    record = recorded(impact, height=1.0, mass=2.5)
+    for one in (impact, record):
+        assert isinstance(one, ImpactResult)
+        assert one.mass == 2.5
+        assert one.impact_velocity == pytest.approx(4.429, abs=1e-3)
+        assert one.peak("floor") == one.peak_force == pytest.approx(1574, rel=0.02)
+        assert one.impulse == pytest.approx(impact.impulse, rel=0.01)
+        assert one.limits_source in (None, "rubber_ball")
+        drop = one.drop_force()
+        assert drop.force.max() == pytest.approx(one.peak_force, rel=0.01)
+        assert drop.time[0] <= one.touch_time <= drop.time[-1]
+        assert one.to_dataframe().index.to_numpy() == pytest.approx(one.time)
+        dataset = one.to_xarray()
+        assert dataset["floor_level"].to_numpy() == pytest.approx(one.levels(force="floor"))
+        assert dataset["floor_third_level"].size == 15
+        assert one.plot().axes

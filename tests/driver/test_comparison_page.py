@@ -12,8 +12,7 @@ from test_figure_look import assert_clean
 
 import thud
 from thud.comparison.comparison import _cell
-from thud.plot.comparison_html import comparison_html
-from thud.plot.comparison_page import comparison_page
+from thud.plot.pages import comparison_html, comparison_page
 
 SHELL, SOFT = thud.solve(), thud.solve(thud.Ball(youngs_modulus=1.2e6), duration=0.5)
 IMPACTS: dict[str, thud.Impact | thud.Recording] = {"shell <1>": SHELL, "soft $x^{$": SOFT}
@@ -46,7 +45,7 @@ def test_page_has_the_curves_of_the_picture() -> None:
         for line, curve in zip(lines, curves, strict=True):
             np.testing.assert_allclose(curve["y"], line.get_ydata(), rtol=1e-5)
     assert page[0]["layout"]["yaxis"]["title"]["text"] == (
-        "Force on the floor<br>below 1.25 kHz, kN"
+        "Force on the floor,<br>low-passed at 1.25 kHz, kN"
     )
     low, high = figure.axes[0].get_xlim()
     assert low == 0
@@ -56,7 +55,7 @@ def test_page_has_the_curves_of_the_picture() -> None:
 def test_tolerance_is_that_of_the_octaves() -> None:
     _, octaves, thirds = plots(comparison_html(IMPACTS, None, "tyre", TABLE))
     (box,) = [curve for curve in octaves["data"] if curve.get("type") == "bar"]
-    criteria = SHELL.conformity("tyre").criteria[:5]
+    criteria = SHELL.assess("tyre").criteria[:5]
     assert box["base"] == [c.lower for c in criteria]
     assert np.add(box["base"], box["y"]) == pytest.approx([c.upper for c in criteria])
     assert "Tolerance, tyre" in box["name"]
@@ -111,5 +110,5 @@ def test_table_of_any_rows_fits_on_the_picture(count: int) -> None:
 
 
 def test_no_cell_is_minus_zero() -> None:
-    criterion = thud.Criterion("level", "dB", -0.001, -1.0, 1.0, conforms=True)
+    criterion = thud.Criterion("level", thud.Estimate(-0.001), -1.0, 1.0)
     assert _cell(criterion, 1.0, 2) == "0.00"

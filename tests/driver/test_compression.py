@@ -124,4 +124,4 @@ def test_driver_draws_the_compression_of_a_case(tmp_path: Path) -> None:
     case = tmp_path / "ball.nml"
     case.write_text(CASE + "&compression points = 5 /")
     assert cli.main(["run", "-q", "-o", str(tmp_path / "out"), str(case)]) == 0
-    assert {"compression.csv", "compression.png"} <= {p.name for p in (tmp_path / "out").iterdir()}
+    assert {"compression.csv", "compression.svg"} <= {p.name for p in (tmp_path / "out").iterdir()}

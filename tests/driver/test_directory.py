@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from thud.studies.sets import SetStudy
+    from thud.studies.samples import SampleStudy
 
 HEIGHTS = {"parameters": {"height": {"values": [50, 100], "unit": "cm"}}}
 # Several blocks of the modal ball, some seconds.
@@ -87,7 +87,7 @@ def test_command_writes_zarr(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     path = tmp_path / "six.toml"
     path.write_text('format = "zarr"\nparameters.height.values = [0.5, 0.6, 0.7, 0.8, 0.9, 1]')
     assert cli.main(["sweep", str(path), "-o", str(tmp_path)]) == 0
-    assert "conforming sets" in capsys.readouterr().out
+    assert "conforming samples" in capsys.readouterr().out
     assert (tmp_path / "six.zarr").is_dir()
 
 
@@ -116,7 +116,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
 
 
 def start(study: str, folder: Path, *more: str) -> subprocess.Popen[str]:
-    """Start a study in a process of its own, and return when it has finished some of its sets."""
+    """Start a study in a process of its own, and return when it has some samples."""
     (folder / "long.toml").write_text(study)
     command = [sys.executable, "-m", "thud", "sweep", "long.toml", "-q", "-o", "."]
     command += ["--workers", "1", *more]
@@ -144,7 +144,7 @@ def test_ended_study_goes_on_where_it_stopped(
         assert process.returncode == -signal.SIGKILL
     assert not (tmp_path / "long.nc").exists()
     finished = thud.read_sweep(tmp_path / "long.partial")
-    assert 0 < finished.sizes["set"] < 1000
+    assert 0 < finished.sizes["sample"] < 1000
     known = np.isin(whole["height"], finished["height"])
     assert values(finished).identical(values(whole.isel(set=known)))
 
@@ -160,12 +160,12 @@ def test_ended_study_goes_on_where_it_stopped(
     left = disk_space(thud.read_study(tmp_path / "long.toml")) - 1
     monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=left))
     resumed = thud.sweep(tmp_path / "long.toml", tmp_path)
-    assert sum(computed) == 1000 - finished.sizes["set"]
+    assert sum(computed) == 1000 - finished.sizes["sample"]
     assert values(resumed).identical(values(whole))
     assert not (tmp_path / "long.partial").exists()
     again = thud.sweep(tmp_path / "long.toml", tmp_path)
     assert again.identical(resumed)
-    assert sum(computed) == 1000 - finished.sizes["set"]
+    assert sum(computed) == 1000 - finished.sizes["sample"]
 
 
 @pytest.mark.slow
@@ -176,7 +176,7 @@ def test_full_disk_is_reported_and_loses_nothing(
     arguments = ["sweep", str(tmp_path / "long.toml"), "-q", "-o", str(tmp_path)]
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     size = KIND.read_study(tmp_path / "long.toml").block_size
-    blocks = -(-whole.sizes["set"] // size)
+    blocks = -(-whole.sizes["sample"] // size)
     assert blocks > 1
     block, end = (
         len(bytes(part.to_netcdf(engine="h5netcdf"))) + 44
@@ -223,10 +223,10 @@ def test_disk_that_is_full_for_zarr_is_reported_and_loses_nothing(
     assert "File too large" in errors
     assert errors.count("\n") == 1
     assert sorted(found.name for found in tmp_path.iterdir()) == ["long.partial", "long.toml"]
-    assert thud.read_sweep(tmp_path / "long.partial").sizes["set"] == 1000
+    assert thud.read_sweep(tmp_path / "long.partial").sizes["sample"] == 1000
 
     def compute_again(*_: object) -> None:
-        pytest.fail("all sets were kept")
+        pytest.fail("all samples were kept")
 
     monkeypatch.setattr("thud.studies.backends.evaluate", compute_again)
     assert values(thud.sweep(path, tmp_path)).identical(values(whole))
@@ -247,7 +247,7 @@ def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
     with pytest.raises(thud.InputError, match=naming("c.nc", "--replace")):
         thud.sweep({**other, "name": "c"}, tmp_path)
     (tmp_path / "d.partial").mkdir()
-    (tmp_path / "d.partial/study").write_text('{"thud": "0.0.1", "sets in a block": "9"}')
+    (tmp_path / "d.partial/study").write_text('{"thud": "0.0.1", "samples in a block": "9"}')
     (tmp_path / "d.partial/block_000000000000.nc").write_text("of another study")
     with pytest.raises(
         thud.InputError,
@@ -259,7 +259,7 @@ def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
     # Kills leave half a file.
     (tmp_path / "e.partial/.study.part").write_text("")
     (tmp_path / ".e.nc.part").write_text("")
-    with pytest.raises(thud.InputError, match=naming("e.partial", "sets")):
+    with pytest.raises(thud.InputError, match=naming("e.partial", "samples")):
         thud.read_sweep(tmp_path / "e.partial")
     assert thud.sweep({**other, "name": "e"}, tmp_path).sizes["height"] == 1
     assert not list(tmp_path.glob(".e.*"))
@@ -362,7 +362,7 @@ def test_other_studies_leave_no_mark_on_one_at_work(tmp_path: Path) -> None:
     assert thud.sweep(other, tmp_path, replace=True)["height"].values.tolist() == [0.7, 0.8]
 
 
-def keep_one_block(study: SetStudy, folder: Path) -> None:
+def keep_one_block(study: SampleStudy, folder: Path) -> None:
     """Begin a study and finish its first set only."""
     blocks = Blocks(folder, study, 1)
     blocks.open()
@@ -493,7 +493,7 @@ def test_results_that_cannot_be_read_for_now_stay(
     with monkeypatch.context() as patch:
         patch.setattr("xarray.open_zarr", fail)
         patch.setattr("thud.studies.blocks.read_input", fail)
-        patch.setattr("thud.studies.emulation.emulator.read_input", fail)
+        patch.setattr("thud.studies.trained_surrogate.read_input", fail)
         with pytest.raises(OSError, match=os.strerror(number)):
             run(study, tmp_path, replace=True)
     assert (tmp_path / name).stat().st_ino == inode

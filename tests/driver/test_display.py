@@ -31,12 +31,12 @@ def impact() -> thud.Impact:
 
 def results() -> list[Displayed]:
     many = thud.solve_many({"mass": [2.5, -1.0]})
-    judged = impact().conformity()
+    judged = impact().assess()
     record = recorded(impact())
     modes = thud.free_modes(count=2, radial_elements=2, polar_elements=16)
     grid = {"mass": {**MASS["mass"], "count": 2}, "height": {"values": [0.5, 1.0]}}
     studies = [
-        thud.design_map({"parameters": grid}),
+        thud.design({"parameters": grid}),
         thud.uncertainty({"parameters": MASS, "design": {"size": 4}}),
         thud.sensitivity({"parameters": MASS, "design": {"size": 4}}),
         thud.fit(thud.solve(), ["mass"]),
@@ -63,14 +63,14 @@ def test_results_have_a_line_and_a_table() -> None:
 
 
 def test_texts_name_verdicts_and_numbers() -> None:
-    assert repr(impact().conformity()) == "<Conformity, rubber_ball: conforms>"
-    shell = thud.solve().conformity()
+    assert repr(impact().assess()) == "<Verdict, rubber_ball: conforms>"
+    shell = thud.solve().assess()
     missed = "octave_125, octave_250, octave_500"
-    assert repr(shell) == f"<Conformity, rubber_ball: does not conform in {missed}>"
+    assert repr(shell) == f"<Verdict, rubber_ball: does not conform in {missed}>"
     assert repr(shell.criteria[2]) == (
-        "<Criterion, octave 125: 18.95 dB is too low, allowed 21.5 to 24.5>"
+        "<Criterion, octave 125: 18.95 dB too low, allowed 21.5 to 24.5>"
     )
-    assert shell.rows()[-1] == ("all criteria", "", "", "does not conform")
+    assert shell.rows()[-1] == ("all criteria", "", "", "", "does not conform")
     many = thud.solve_many({"mass": [2.5, -1.0]})
     assert repr(many) == "<Ensemble: 2 drops by mass; 0 conform, 1 failed>"
     many = thud.solve_many({"mass": [-1.0, -2.0]})
@@ -82,16 +82,16 @@ def test_texts_name_verdicts_and_numbers() -> None:
 
 def test_unknown_criteria_are_not_met() -> None:
     record = recorded(impact())
-    verdicts = {row[0]: row[-1] for row in record.conformity().rows()}
-    assert verdicts["restitution"] == "cannot be decided"
-    assert verdicts["all criteria"] == "cannot be decided"
+    verdicts = {row[0]: row[-1] for row in record.assess().rows()}
+    assert verdicts["restitution"] == "not known"
+    assert verdicts["all criteria"] == "inconclusive"
 
 
-def test_remarks_are_shown() -> None:
+def test_warnings_are_shown() -> None:
     with pytest.warns(thud.PlausibilityWarning):
         odd = thud.solve(thud.Ball(mass=0.5, youngs_modulus=1e5))
-    assert [row[1] for row in odd.rows() if row[0] == "remark"] == list(odd.remarks)
-    assert odd.remarks
+    assert [row[1] for row in odd.rows() if row[0] == "warning"] == list(odd.warnings)
+    assert odd.warnings
 
 
 def test_html_is_escaped() -> None:

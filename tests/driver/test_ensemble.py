@@ -88,8 +88,8 @@ def test_equals_the_single_solver() -> None:
         for name in ("contact_time", "peak_force", "peak_elastic_force", "max_deflection",
                      "restitution", "impulse"):  # fmt: skip
             assert getattr(ensemble, name)[i] == pytest.approx(getattr(impact, name), rel=1e-10)
-        assert ensemble.conforms[i] == bool(impact.conformity())
-        assert ensemble.elastic_conforms[i] == bool(impact.conformity(force="elastic"))
+        assert ensemble.conforms[i] == bool(impact.assess())
+        assert ensemble.elastic_conforms[i] == bool(impact.assess(force="elastic"))
 
 
 def test_fails_where_the_single_solver_fails() -> None:
@@ -119,8 +119,8 @@ def test_a_conforming_source_conforms() -> None:
     for i in range(count):
         ball = thud.Ball(**{key: float(values[i]) for key, values in parameters.items()})
         impact = thud.solve(ball)
-        assert ensemble.conforms[i] == bool(impact.conformity())
-        assert ensemble.elastic_conforms[i] == bool(impact.conformity(force="elastic"))
+        assert ensemble.conforms[i] == bool(impact.assess())
+        assert ensemble.elastic_conforms[i] == bool(impact.assess(force="elastic"))
 
 
 def test_forces_beyond_the_memory_are_refused() -> None:
@@ -428,7 +428,7 @@ def test_levels_and_forces_are_kept_by_their_names() -> None:
             kept = getattr(found, f"{force}_force")[i]
             assert kept == pytest.approx(impact.force(force), abs=1e-6)  # type: ignore[arg-type]
             met = getattr(found, f"{force}_conforms")[i]
-            assert met == impact.conformity(force=force).conforms  # type: ignore[arg-type]
+            assert met == impact.assess(force=force).conforms  # type: ignore[arg-type]
     assert list(thud.solve_many({"height": 1.0}).levels) == [
         ("elastic", "octave"),
         ("floor", "octave"),

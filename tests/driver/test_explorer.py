@@ -114,7 +114,7 @@ def test_answer_is_that_of_the_library(client: TestClient) -> None:
     answer = solved(client, SHELL | {"drop": {"height": 0.5}})
     impact = thud.solve(drop=thud.Drop(height=0.5))
     assert answer["levels"]["level"] == pytest.approx(impact.levels(), rel=1e-5)
-    assert answer["conforms"] is impact.conformity().conforms
+    assert answer["conforms"] is impact.assess().conforms
     numbers = {name: value for name, value, _ in answer["numbers"]}
     assert numbers["contact"] == pytest.approx(1e3 * impact.contact_time)
     assert max(answer["force"]["value"]) == pytest.approx(impact.floor_force.max(), rel=1e-2)
@@ -188,7 +188,7 @@ def test_recording_is_judged(client: TestClient) -> None:
     recording = thud.read_recording(path, height=1.0, mass=2.5, calibration=CALIBRATION)
     assert answer["levels"]["level"] == pytest.approx(recording.levels(), rel=1e-5)
     assert answer["criteria"][0]["uncertainty"] > 0
-    assert answer["verdict"] == recording.conformity().verdict
+    assert answer["verdict"] == recording.assess().result
     assert answer["drops"] == 1
 
 
@@ -196,9 +196,9 @@ def test_recording_of_a_ball_that_is_not_known_is_shown(client: TestClient) -> N
     content = (REPOSITORY / "inputs/recordings/drop_1.csv").read_bytes()
     report = last_report(client, "/measure", params={"name": "drop_1.csv"}, content=content)
     assert ["restitution", None, ""] in report["answer"]["numbers"]
-    remarks = report["answer"]["remarks"]
+    warnings = report["answer"]["warnings"]
     # The page puts the name before them.
-    assert any("ring" in remark for remark in remarks)
+    assert any("ring" in warning for warning in warnings)
 
 
 @pytest.mark.parametrize("name", ["../../etc/passwd.wav", "x.exe", "a\0b.wav", "", "x" * 5000])

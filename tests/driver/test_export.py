@@ -133,7 +133,7 @@ def test_spectrum_holds_the_energy_of_the_force(tmp_path: Path) -> None:
 def test_resampling_changes_levels_by_no_more_than_it_says(rate: float) -> None:
     found = blocked_force(IMPACT, rate=rate)
     assert found.sample_rate == rate
-    error = float(found.remarks[0].split()[-4])
+    error = float(found.notes[0].split()[-4])
     largest = np.abs(FORCE.spectrum()[1]).max()
     bands = thud.get_bands()
     before = IMPACT.levels()
@@ -167,7 +167,7 @@ def test_force_is_that_which_the_case_judges() -> None:
 
 
 def test_words_of_others_stay_in_their_lines(tmp_path: Path) -> None:
-    force = replace(FORCE, name="b\udcffll", origin="first\nsecond,3", remarks=("a\r\nb",))
+    force = replace(FORCE, name="b\udcffll", origin="first\nsecond,3", notes=("a\r\nb",))
     for kind, (ending, _) in EXPORTS.items():
         if ending == ".uff":
             pytest.importorskip("pyuff", reason="the extra recordings is not installed")
@@ -192,12 +192,13 @@ def recording(tmp_path: Path) -> Path:
 def test_recording_gives_the_force_of_a_drop(recording: Path) -> None:
     found = read_recording(recording)
     force = blocked_force(found, drop=2)
-    time, expected = found.to_force_history(2)
-    assert np.array_equal(force.force, expected)
-    assert force.time == pytest.approx(time, abs=1e-12)
+    drop = found.drops[1]
+    gate = slice(*drop.gate)
+    assert np.array_equal(force.force, drop.force[gate])
+    assert force.time == pytest.approx(drop.time[gate], abs=1e-12)
     assert force.checksum == hashlib.sha256(recording.read_bytes()).hexdigest()
     assert "drop 2" in force.origin
-    assert any("offset" in remark for remark in force.remarks)
+    assert any("offset" in note for note in force.notes)
 
 
 def test_command_writes_what_is_asked_for(

@@ -28,7 +28,8 @@ from PIL import Image
 
 import thud
 from thud import cli, plot, report
-from thud.plot.style import COLOURS, line_style, marker_style
+from thud.plot import documentation
+from thud.plot.style import COLORS, line_style, marker_style
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -79,10 +80,10 @@ def assert_clean(figure: Figure) -> None:
     assert not re.search(r"[-−]0\.?0*(?![.\d])", " ".join(texts(figure)))
 
 
-@pytest.mark.parametrize("name", sorted(plot.documentation_figures()))
+@pytest.mark.parametrize("name", sorted(documentation.FIGURES))
 @pytest.mark.slow
 def test_nothing_crosses_a_legend_of_the_documentation(name: str) -> None:
-    figure = plot.documentation_figures()[name]()
+    figure = documentation.FIGURES[name]()
     assert figure.get_figwidth() == pytest.approx(3.5)
     assert_clean(figure)
     words = " ".join(texts(figure))
@@ -108,9 +109,9 @@ def test_long_names_of_many_cases_stay_outside_of_the_axes(shell: thud.Impact, c
 def test_no_two_of_many_curves_look_the_same() -> None:
     looks = {
         (line_style(i)["color"], str(line_style(i)["linestyle"]), marker_style(i)["marker"])
-        for i in range(4 * len(COLOURS))
+        for i in range(4 * len(COLORS))
     }
-    assert len(looks) == 4 * len(COLOURS)
+    assert len(looks) == 4 * len(COLORS)
 
 
 def test_force_is_that_of_the_case_and_is_named(shell: thud.Impact) -> None:
@@ -141,7 +142,7 @@ def test_third_octaves_are_drawn_where_a_case_asks_for_them(
     labels = [axes.get_xlabel() for axes in figure.axes]
     assert labels == ["Octave band, Hz", "One-third-octave band, Hz"][:panels]
     # Tolerances are those of the octaves.
-    assert [len(axes.collections) for axes in figure.axes] == [5, 0][:panels]
+    assert [len(axes.collections) for axes in figure.axes] == [6, 0][:panels]
     if panels > 1:
         (line,) = figure.axes[1].lines
         np.testing.assert_array_equal(line.get_ydata(), shell.levels("third"))
@@ -185,7 +186,7 @@ def test_recording_is_drawn_from_first_touch_to_last_release(shell: thud.Impact)
 
 @pytest.mark.slow
 def test_arrows_have_a_key_and_end_above_the_floor() -> None:
-    impact = thud.solve(model="finite_element", flight_before=2e-3)
+    impact = thud.solve(model="finite_element", flight_before=2e-3, snapshot_interval=1e-3)
     figure = plot.motion(impact)
     arrows = [a for axes in figure.axes for a in axes.collections if isinstance(a, Quiver)]
     assert len(arrows) == 9
@@ -249,7 +250,7 @@ def test_run_beside_a_matplotlibrc_draws_the_same_figures(tmp_path: Path) -> Non
         )
         assert done.returncode == 0, done.stderr
         assert "Traceback" not in done.stderr
-        drawn.append((tmp_path / folder / "out/force.png").read_bytes())
+        drawn.append((tmp_path / folder / "out/force.svg").read_bytes())
     assert drawn[0] == drawn[1]
 
 
@@ -325,7 +326,7 @@ def test_figure_that_fails_is_a_warning(
         raise RuntimeError(message)
 
     few: dict[str, Callable[[], Figure]] = {"one": Figure}
-    monkeypatch.setattr(plot, "documentation_figures", lambda: few)
+    monkeypatch.setattr(documentation, "FIGURES", few)
     monkeypatch.setattr(Figure, "savefig", fail)
     monkeypatch.chdir(tmp_path)
     for name, text in (("sweep.toml", SWEEP), ("fit.toml", FIT), ("response.csv", RESPONSE)):
@@ -334,6 +335,6 @@ def test_figure_that_fails_is_a_warning(
     told = [line for line in capsys.readouterr().err.splitlines() if "not drawn" in line]
     assert told
     assert all("the font is damaged" in line for line in told)
-    assert not list(Path("out").glob("*.png"))
+    assert not list(Path("out").glob("*.svg"))
     assert all((Path("out") / name).exists() for name in results), list(Path("out").iterdir())
     assert list(Path("out").iterdir()) or arguments[0] == "figures"

@@ -205,7 +205,7 @@ def test_study_of_several_records(folder: Path, capsys: pytest.CaptureFixture[st
     assert cli.main(["fit", "-o", "found", "study.toml"]) == 0
     assert "gain(2)" in capsys.readouterr().out
     names = {path.name for path in (folder / "found").iterdir()}
-    assert {"fit_1.csv", "fit_2.csv", "fitted_2.nml", "fit_2.png", "fit.json"} < names
+    assert {"fit_1.csv", "fit_2.csv", "fitted_2.nml", "fit_2.svg", "fit.json"} < names
     assert names == {".thud", *KIND.listed_files(thud.read_study("study.toml", "fit"))}
     saved = json.loads((folder / "found/fit.json").read_text())
     for name, truth in TRUTH.items():

@@ -144,10 +144,13 @@ def test_too_little_quiet_leaves_the_noise_to_the_residuals() -> None:
 def _measured(force: np.ndarray, rate: float) -> Recording:
     """Return the recording of a force in memory."""
     from thud.recordings.drops import find_windows
-    from thud.recordings.estimates import measure_drop
+    from thud.recordings.measured_drop import measure_drop
+    from thud.recordings.restitution import DropConditions
 
     windows = find_windows(Signal.from_array(force, rate))
-    return Recording("memory", tuple(measure_drop(window) for window in windows), ())
+    return Recording(
+        "memory", tuple(measure_drop(window, DropConditions()) for window in windows), ()
+    )
 
 
 @pytest.fixture

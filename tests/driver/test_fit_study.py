@@ -48,11 +48,9 @@ def test_studies_of_the_repository(
     folder = tmp_path / "outputs" / name
     assert sorted(path.name for path in folder.iterdir()) == [
         ".thud",
-        "confidence.png",
         "confidence.svg",
         "fit.csv",
         "fit.json",
-        "fit.png",
         "fit.svg",
         "fitted.nml",
     ]
@@ -285,12 +283,12 @@ def test_replace_finds_the_fit_again_and_leaves_no_older_file(tmp_path: Path) ->
     (tmp_path / "study.toml").write_text(both)
     fit = ["fit", "-q", "study.toml", "-o", "found"]
     assert cli.main(fit) == 0
-    assert (tmp_path / "found/confidence.png").exists()
+    assert (tmp_path / "found/confidence.svg").exists()
     (tmp_path / "study.toml").write_text(STUDY.replace("[target]", "[target]\ntime_shift = false"))
     np.savetxt("record.csv", np.loadtxt("record.csv", delimiter=",") - [0.2, 0], delimiter=",")
     assert cli.main([*fit, "--replace"]) == 0
     assert sorted(path.name for path in (tmp_path / "found").iterdir()) == [
-        ".thud", "fit.csv", "fit.json", "fit.png", "fit.svg", "fitted.nml",
+        ".thud", "fit.csv", "fit.json", "fit.svg", "fitted.nml",
     ]  # fmt: skip
 
 

@@ -13,7 +13,7 @@ import pytest
 from conftest import REPOSITORY, naming
 
 import thud
-from thud.base.bridge import call, floor_api
+from thud.base.bridge import ask
 from thud.case.case import case_text
 from thud.cli import main
 from thud.floors.tapping import THIRDS
@@ -54,8 +54,8 @@ def test_tapping_levels_are_those_of_the_published_example() -> None:
 
 def test_page_tells_where_a_floor_is_not_what_it_claims_to_be() -> None:
     found = thud.predict_level(thud.solve(), thud.JoistFloor(), thud.Room())
-    remarks = thud.compare_floors({"joists": found}).remarks
-    assert any("joists" in one and "Hz" in one for one in remarks)
+    warnings = thud.compare_floors({"joists": found}).warnings
+    assert any("joists" in one and "Hz" in one for one in warnings)
 
 
 def test_rating_of_the_tapping_machine_is_the_shifted_curve() -> None:
@@ -103,7 +103,7 @@ def test_halves_of_a_tenth_are_rounded_up() -> None:
 
 def test_tapping_level_is_the_formula_of_iso_12354_2() -> None:
     floor, room = thud.Plate(thickness=0.16, density=2400.0), thud.Room(volume=30.0)
-    known = call(floor_api.get_radiator, case_text(thud.Case(floor=floor, room=room)), THIRDS)
+    known = ask("radiator", case=case_text(thud.Case(floor=floor, room=room)), frequency=THIRDS)
     found = thud.tapping_level(floor, room)
     for i, frequency in enumerate((50, 63, 80, 100, 125, 160, 200, 250, 315, 400, 500, 630)):
         time = 2.2 / (frequency * known["loss_factor"][i])
@@ -147,7 +147,7 @@ def test_comparison_has_the_numbers_of_its_predictions(found: thud.FloorComparis
         f"{thin.octave_level[0]:.1f}",
         f"{thick.octave_level[0]:.1f}",
     )
-    assert re.search(naming("thin", "modes", "Hz"), found.remarks[0])
+    assert re.search(naming("thin", "modes", "Hz"), found.warnings[0])
 
 
 def test_floors_without_a_tapping_level_leave_its_cell_empty(found: thud.FloorComparison) -> None:
@@ -215,7 +215,7 @@ def test_command_compares_cases(tmp_path: Path, capsys: pytest.CaptureFixture[st
         thud.write_case(case, path)
     output = tmp_path / "page"
     assert main(["floor", *map(str, paths), "--output", str(output)]) == 0
-    names = {".thud", "floors.png", "floors.svg", "floors.html"}
+    names = {".thud", "floors.svg", "floors.html"}
     assert {path.name for path in output.iterdir()} == names
     assert "thick" in capsys.readouterr().out
     assert main(["floor", str(paths[0]), str(paths[0]), "-o", str(output)]) == 1

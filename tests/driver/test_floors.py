@@ -42,7 +42,7 @@ def test_floor_leaves_the_blocked_impact_as_it_is(
     alone = thud.solve()
     assert alone.on_floor is None
     assert np.array_equal(impact.floor_force, alone.floor_force)
-    assert impact.conformity() == alone.conformity()
+    assert impact.assess() == alone.assess()
     assert np.array_equal(moved.blocked_force, alone.floor_force)
     assert thud.solve(floor=thud.Rigid()).on_floor is None
 
@@ -82,9 +82,9 @@ def test_results_on_a_floor_are_read_back(
     model: str,
 ) -> None:
     options = "radial_elements = 2\n polar_elements = 24" if model == "finite_element" else ""
-    mesh = f"&mesh\n {options}\n/\n" if options else ""
+    mesh = f"&mesh\n {options}\n/\n&output snapshot_interval = 1e-3 /\n" if options else ""
     text = f"&model name = '{model}' /\n{mesh}&floor name = 'oscillator' /\n"
-    done = run(case_file(text), "-o", "out")
+    done = run(case_file(text), "-o", "out", "--all")
     assert done.returncode == 0, done.stderr
     folder = case_file(text).parent / "out"
     found = thud.read_results(folder)
@@ -200,7 +200,7 @@ def test_result_on_a_floor_is_shown(moved: thud.FloorImpact, tmp_path: Path) -> 
         drawn = np.asarray(line.get_xdata())
         assert drawn[[0, -1]] == pytest.approx([bands.lower[0], bands.upper[-1]])
     assert [axes.get_ylabel().split("\n")[0] for axes in figure.axes] == [
-        "Force on the floor", "Velocity of", "Contact less", "Energy into", "Mobility Y,",
+        "Force, low-passed", "Velocity of", "Contact −", "Energy into", "Mobility Y,",
     ]  # fmt: skip
     thud.plot.save(figure, tmp_path / "floor.png")
     dataset = moved.to_xarray()

@@ -18,7 +18,6 @@ from conftest import MINIMAL, REPOSITORY, naming
 import thud
 from thud import cli
 from thud.base.files import MANIFEST, PART
-from thud.plot import style as look
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -83,7 +82,7 @@ WRITERS = {
     "fit": _study("fit", "target.levels = [39, 31, 23, 17, 12]\nparameters.mass = {}"),
     "figures": Writer(["figures"], {}),
     "thud": Writer(["thud", "case.nml"], {"case.nml": MINIMAL}),
-    "sets": Writer(["thud", "case.nml", "--sets", "table.csv"],
+    "sets": Writer(["thud", "case.nml", "--samples", "table.csv"],
                    {"case.nml": MINIMAL, "table.csv": "height\n1\n0.5\n"}),
 }  # fmt: skip
 # They write no results; `examples` makes a directory of its own.
@@ -114,8 +113,8 @@ def command(executable: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     """Run a command of the table."""
     monkeypatch.chdir(tmp_path)
     # To draw them takes long, and is tested elsewhere.
-    monkeypatch.setattr(look, "_picture", lambda *_: b"picture")
-    monkeypatch.setattr("thud.plot.documentation_figures", lambda: {"figure1": object})
+    monkeypatch.setattr("thud.plot.files._content", lambda *_: b"figure")
+    monkeypatch.setattr("thud.plot.documentation.FIGURES", {"figure1": object})
     monkeypatch.setattr("thud.report.write.page_contents", lambda *_: {"report.html": b"page"})
     monkeypatch.setattr(
         "thud.report.recording_files.page_contents", lambda *_: {"report.html": b"p"}

@@ -16,8 +16,9 @@ from scipy.stats import binom
 
 import thud
 from thud.cli.history_command import run_history
+from thud.level.assessment import RESULTS, assess
+from thud.level.estimate import Contribution, Estimate
 from thud.level.levels import get_bands
-from thud.recordings.verdict import VERDICTS, Contribution, Quantity, decide
 from thud.report.ball_history import YEAR, History, _trend, read_history
 from thud.report.ball_history_figure import draw_history
 from thud.report.contents import FORMAT
@@ -31,37 +32,37 @@ LIMITS = (29.5, 32.5)
 
 def report(day: str, levels: Any = LEVELS, deviation: float = 0.1, **keys: Any) -> dict[str, Any]:  # noqa: ANN401
     """Return what a report says that a chart needs, the verdicts by the library."""
-    part = (Contribution("repeatability", deviation),)
-    decisions = decide(
-        [Quantity(float(level), part) for level in levels],
-        contact_time=Quantity(0.02, (Contribution("repeatability", 1e-4),)),
+    part = Contribution("repeatability", deviation)
+    decisions = assess(
+        [Estimate.from_budget(float(level), part) for level in levels],
+        contact_time=Estimate.from_budget(0.02, Contribution("repeatability", 1e-4)),
         restitution=0.8,
         peaks=1.0,
         mass=2.5,
-    ).decisions
+    ).criteria
     rows = [
         {
             "name": one.name,
             "unit": one.unit,
             "band": float(get_bands().nominal[i]) if i < 5 else None,
             "value": None if np.isnan(one.value) else one.value,
-            "uncertainty": one.quantity.uncertainty,
-            "expanded_uncertainty": one.quantity.expanded,
+            "uncertainty": one.estimate.uncertainty,
+            "expanded_uncertainty": one.estimate.expanded,
             "upper_bound": False,
             "lower": one.lower,
             "upper": one.upper,
             "limits_of_standard": True,
             "margin": None if np.isnan(one.value) else one.margin,
-            "verdict": one.verdict,
+            "verdict": one.result,
             "spread": None,
             "background": None,
-            "contributions": [vars(c) for c in one.quantity.contributions],
+            "contributions": [vars(c) for c in one.estimate.contributions],
         }
         for i, one in enumerate(decisions)
     ]
     return {
         "format": FORMAT, "ball": "ball", "serial": "7", "source": "rubber_ball", "date": day,
-        "verdict": VERDICTS[0], "criteria": rows, **keys,
+        "verdict": RESULTS[0], "criteria": rows, **keys,
     }  # fmt: skip
 
 
@@ -116,9 +117,9 @@ def test_trend_without_noise_reaches_the_limit_on_its_day() -> None:
     # From 31 to 32.5 dB by 0.1 dB a year; the line is sure to 0.1 dB.
     assert trend.reached == pytest.approx(15, abs=1e-9)
     assert trend.earliest < 15 < trend.latest
-    (remark,) = found.remarks()
+    (warning,) = found.warnings()
     due = (date(2015, 1, 1) + 15 * YEAR).isoformat()
-    assert re.search(naming("63 Hz, dB", "+0.100", due, "95 %"), remark)
+    assert re.search(naming("63 Hz, dB", "+0.100", due, "95 %"), warning)
     assert [row[-1] for row in found.table()][1:4] == ["–", due, "–"]
 
 
@@ -239,11 +240,11 @@ def test_command_writes_the_chart(folder: Path, capsys: pytest.CaptureFixture[st
         quiet=False,
     )
     assert run_history(options) == 0
-    assert sorted(path.name for path in chart.glob("*.*g")) == ["history.png", "history.svg"]
+    assert sorted(path.name for path in chart.glob("*.*g")) == ["history.svg"]
     printed = capsys.readouterr().out
     assert printed.startswith("ball 7\n")
     assert re.search(r"63 Hz, dB: .*\+0\.3", printed)
-    assert f"Chart: {chart / 'history.png'}" in printed
+    assert f"Chart: {chart / 'history.svg'}" in printed
 
 
 @pytest.mark.parametrize(
@@ -303,7 +304,7 @@ def test_far_days_are_not_told() -> None:
     for one in far:
         one["criteria"][1]["upper"] = 300.0
     distant = History("ball", found.dates, tuple(far))
-    (remark,) = distant.remarks()
-    assert re.search(naming("63 Hz, dB", "+0.100 ± 0.019", "year"), remark)
-    assert "95 %" not in remark
+    (warning,) = distant.warnings()
+    assert re.search(naming("63 Hz, dB", "+0.100 ± 0.019", "year"), warning)
+    assert "95 %" not in warning
     assert distant.table()[2][-1] == "–"

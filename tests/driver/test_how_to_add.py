@@ -113,11 +113,11 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_executable_knows_what_was_added(copy: Path, tmp_path: Path) -> None:
     (tmp_path / "case.nml").write_text(CASE)
     (tmp_path / "table.csv").write_text("stiffness;height\n62000,0;1,0\n31000;1\n")
-    for arguments in ([], ["--sets", "table.csv"]):
+    for arguments in ([], ["--samples", "table.csv"]):
         command = [copy / "build/src/thud", "case.nml", *arguments]
         subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
     expected = math.pi * math.sqrt(2.5 / 62000)
-    with (tmp_path / "outputs/case_sets/sets.csv").open(newline="") as file:
+    with (tmp_path / "outputs/case_sets/samples.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert float(rows[0]["contact_time_s"]) == pytest.approx(expected, rel=1e-9)
     assert float(rows[1]["contact_time_s"]) == pytest.approx(expected * math.sqrt(2), rel=1e-9)

@@ -57,7 +57,7 @@ def test_impulse_changes_the_momentum() -> None:
 
 
 def test_paper_s_ball_does_not_conform() -> None:
-    verdict = thud.solve().conformity()
+    verdict = thud.solve().assess()
     assert not verdict
     met = {criterion.name: criterion.conforms for criterion in verdict.criteria}
     assert met == {
@@ -75,7 +75,7 @@ def test_paper_s_ball_does_not_conform() -> None:
 
 
 def test_low_drop_is_not_the_standard_s() -> None:
-    verdict = thud.solve(drop=thud.Drop(0.1)).conformity()
+    verdict = thud.solve(drop=thud.Drop(0.1)).assess()
     assert not next(c for c in verdict.criteria if c.name == "drop_height").conforms
 
 
@@ -142,18 +142,18 @@ def test_each_question_is_answered_for_the_force_that_is_asked() -> None:
     peaks = {"elastic": 1.0, "floor": 2.0}
     forces = {"elastic": impact.elastic_force, "floor": impact.floor_force}
     for asked, judged in ((None, "elastic"), ("elastic", "elastic"), ("floor", "floor")):
-        assert impact.judged(asked) == judged  # type: ignore[arg-type]
+        assert impact.assessed_force(asked) == judged  # type: ignore[arg-type]
         assert impact.force(asked) is forces[judged]  # type: ignore[arg-type]
         assert impact.peak(asked) == peaks[judged]  # type: ignore[arg-type]
         for method in (None, "exact", "fft"):
             levels = thud.force_exposure_levels(forces[judged], rate, "third", method or "fft")  # type: ignore[arg-type]
             assert (impact.levels("third", method, asked) == levels).all()  # type: ignore[arg-type]
         for source in (None, "rubber_ball", "tyre"):
-            expected = thud.judge(
+            expected = thud.assess(
                 impact.levels(force=asked), impact.contact_time, impact.restitution,  # type: ignore[arg-type]
                 peak_count(forces[judged], rate), 2.4, 0.9, source or "tyre",  # type: ignore[arg-type]
             )  # fmt: skip
-            assert impact.conformity(source, asked) == expected  # type: ignore[arg-type]
+            assert impact.assess(source, asked) == expected  # type: ignore[arg-type]
 
 
 def test_arguments_of_a_drop_are_keys_of_its_case() -> None:

@@ -191,7 +191,8 @@ def test_ignored_interrupt_is_ignored() -> None:
 def test_forked_process_does_not_wait_for_calls_of_its_parent() -> None:
     code = """
 import os, signal, threading, time, thud
-long = lambda: thud.solve(model="finite_element", radial_elements=16, polar_elements=512)
+solve = thud.solve
+long = lambda: solve(model="finite_element", radial_elements=16, polar_elements=512)
 threading.Thread(target=long, daemon=True).start()
 time.sleep(0.3)
 child = os.fork()
@@ -253,10 +254,10 @@ def test_executable_ends_sets_and_leaves_nothing(
     executable: str, number: int, copies: int, tmp_path: Path
 ) -> None:
     (tmp_path / "long.nml").write_text(LONG)
-    (tmp_path / "sets.csv").write_text("height\n" + "1.0\n" * 8)
-    command = [executable, "long.nml", "--sets", "sets.csv", "--threads", "2"]
+    (tmp_path / "samples.csv").write_text("height\n" + "1.0\n" * 8)
+    command = [executable, "long.nml", "--samples", "samples.csv", "--threads", "2"]
     with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
-        while not (tmp_path / "outputs/.long_sets.part/sets.csv").exists():
+        while not (tmp_path / "outputs/.long_sets.part/samples.csv").exists():
             time.sleep(0.01)
         # Some callers send a signal to the process and to its group.
         for _ in range(copies - 1):

@@ -52,4 +52,4 @@ def test_kind_is_added_by_one_file_and_one_line(tmp_path: Path) -> None:
         assert done.returncode == 0, done.stderr
         assert "peak force, N" in done.stdout
     names = sorted(path.name for path in (tmp_path / "outputs/mass").iterdir())
-    assert names == [".thud", "mass.nc", "mass.png", "mass.svg"]
+    assert names == [".thud", "mass.nc", "mass.svg"]

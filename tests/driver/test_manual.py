@@ -27,7 +27,7 @@ printf '%s\\n' "${COMPREPLY[@]}"
 LINES = {
     "thud --t": {"--threads"},
     "thud a": {"a case.nml"},
-    "thud b.nml --sets ": {"table.csv", "folder"},
+    "thud b.nml --samples ": {"table.csv", "folder"},
     "thud-driver sen": {"sensitivity"},
     "thud-driver compare --source ": {"rubber_ball", "tyre"},
     "thud-driver run b.nml a": {"a case.nml"},

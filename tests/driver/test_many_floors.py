@@ -95,10 +95,10 @@ def test_table_of_floors_has_the_same_numbers(
     case_file: Callable[[str], Path],
     tmp_path: Path,
 ) -> None:
-    (tmp_path / "sets.txt").write_text("thickness; plate.loss_factor\n0.1; 0.01\n-1; 0.01\n")
-    done = run(case_file(TEXT), "--sets", "sets.txt", "-o", "out")
+    (tmp_path / "samples.txt").write_text("thickness; plate.loss_factor\n0.1; 0.01\n-1; 0.01\n")
+    done = run(case_file(TEXT), "--samples", "samples.txt", "-o", "out")
     assert done.returncode in {0, 2}, done.stderr
-    with (tmp_path / "out" / "sets.csv").open(encoding="utf-8") as file:
+    with (tmp_path / "out" / "samples.csv").open(encoding="utf-8") as file:
         first, second = csv.DictReader(file)
     case = thud.Case(floor=thud.Plate(), room=thud.Room())
     found = thud.solve_many({"thickness": [0.1], "plate.loss_factor": [0.01]}, case)
@@ -116,14 +116,14 @@ def test_studies_vary_floors_and_rooms(tmp_path: Path, many: thud.Ensemble) -> N
     path.write_text(TEXT, encoding="utf-8")
     axes = {"thickness": {"values": THICKNESSES}, "volume": {"values": [40.0, 60.0]}}
     study = {"case": str(path), "parameters": axes}
-    found = thud.design_map(study)
+    found = thud.design(study)
     rating = found.dataset["standardised_rating"]
     assert many.standardised_rating is not None
     # The volume is standardised away but for what flows back into the floor.
     assert rating.values[:, 0] == pytest.approx(rating.values[:, 1], abs=0.1)
     assert rating.values[:, 0] == pytest.approx(many.standardised_rating[2:], abs=0.1)
     assert ("lowest standardised rating, dB", f"{float(rating.min()):.2f}") in found.rows()
-    thud.plot.save(thud.plot.draw_design_map(found), tmp_path / "map.png")
+    thud.plot.save(thud.plot.draw_design(found), tmp_path / "map.png")
     assert found.dataset["room_level"].dims[-1] == "room_third"
     draws = {"kind": "random", "size": 4}
     parameters = {"reverberation_time": {"low": 0.4, "high": 0.6}}

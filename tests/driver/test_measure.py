@@ -27,11 +27,11 @@ import thud
 from thud import cli
 from thud.base.errors import ReportWarning
 from thud.recordings import checkpoint, measure_drops
+from thud.recordings.budgets import average_estimates
 from thud.recordings.config import Config, checked_config, read_config
 from thud.recordings.measure_drops import measure_window
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.signal import Signal
-from thud.recordings.verdict import average_estimates
 from thud.report import recording_files
 from thud.report.contents import report_data
 
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from thud.recordings.drops import Window
-    from thud.recordings.estimates import Drop
+    from thud.recordings.measured_drop import Drop
 
 FOLDER = REPOSITORY / "inputs/recordings"
 TRUTH = tomllib.loads((FOLDER / "truth.toml").read_text())
@@ -83,7 +83,7 @@ def test_examples_are_measured_as_they_were_made(
         rows = [row for row in csv.DictReader(file) if row["bandwidth"] == "octave"]
     assert [float(row["level_dB"]) for row in rows] == recording.levels().tolist()
     report = json.loads((tmp_path / "out/report.json").read_text())
-    assert report["verdict"] == recording.conformity().verdict == "does not conform"
+    assert report["verdict"] == recording.assess().result == "does not conform"
     assert [one["name"] for one in report["criteria"] if one["verdict"] != "conforms"] == [
         "octave_500"
     ]
@@ -107,9 +107,9 @@ def test_record_of_an_unknown_ball_cannot_be_decided() -> None:
     impact = thud.solve(
         thud.Ball.standard(), model="finite_element", viscosity="kelvin_voigt", loss_factor=0.2
     )
-    assert recorded(impact).conformity().verdict == "cannot be decided"
-    verdict = recorded(impact, height=1.0, mass=2.5).conformity()
-    assert verdict.verdict == "conforms"
+    assert recorded(impact).assess().result == "inconclusive"
+    verdict = recorded(impact, height=1.0, mass=2.5).assess()
+    assert verdict.result == "conforms"
     assert verdict
 
 
@@ -173,8 +173,8 @@ def test_limits_given_from_python_are_those_of_the_verdict() -> None:
     signal = recorded(thud.solve())
     limits = {"mass": (2.0, 3.0), "octave_63": (0.0, 99.0)}
     config = Config(limits=limits, mass=2.5)
-    found = replace(signal, config=checked_config(config)).conformity()
-    spans = {one.name: (one.lower, one.upper) for one in found.decisions}
+    found = replace(signal, config=checked_config(config)).assess()
+    spans = {one.name: (one.lower, one.upper) for one in found.criteria}
     assert {name: spans[name] for name in limits} == limits
 
 
@@ -191,9 +191,9 @@ def example(name: Path | str, tmp_path: Path, *changes: tuple[str, str]) -> thud
 def test_limits_of_the_configuration_that_were_ignored(tmp_path: Path) -> None:
     limits = ("# [limits]", "[limits]\noctave_500 = [20.0, 30.0]\n#")
     recording = example("drop_1.wav", tmp_path, limits)
-    verdict = recording.conformity()
-    assert verdict.verdict == "does not conform"
-    assert [d.name for d in verdict.decisions if not d.conforms] == ["octave_500"]
+    verdict = recording.assess()
+    assert verdict.result == "does not conform"
+    assert [d.name for d in verdict.criteria if not d.conforms] == ["octave_500"]
     boxes = {box.get_label() for box in recording.plot().axes[0].get_children()}
     assert "Tolerance, rubber ball, own limits" in boxes
     (row,) = [one for one in report_data(recording)["criteria"] if one["name"] == "octave_500"]
@@ -208,8 +208,8 @@ def test_dropout_that_rang_in_the_correction_of_a_plate(tmp_path: Path) -> None:
     whole, filled = example("drop_1.wav", tmp_path), example(tmp_path / "lost.wav", tmp_path)
     np.testing.assert_allclose(filled.levels(), whole.levels(), atol=0.05)
     assert any(re.search(naming("dropout", "0.125 ms"), step) for step in filled.steps)
-    assert any("dropout" in remark for remark in filled.remarks)
-    assert not any("dropout" in remark for remark in whole.remarks)
+    assert any("dropout" in warning for warning in filled.warnings)
+    assert not any("dropout" in warning for warning in whole.warnings)
 
 
 @pytest.mark.parametrize("ending", ["wav", "csv", "flac"])
@@ -224,7 +224,7 @@ def test_contact_times_of_the_examples_lie_within_their_uncertainty(ending: str)
     files = {FOLDER / drop["file"].replace("wav", ending): drop for drop in made}
     truth = [drop["contact_time"] for drop in made]
     recording = thud.read_recording(files, config=config)
-    whole = recording.quantities["contact_time"]
+    whole = recording.estimates["contact_time"]
     assert abs(whole.value - np.mean(truth)) <= whole.expanded
     assert "edges of the pulse" in {part.name for part in whole.contributions}
     for drop, time in zip(recording.drops, truth, strict=True):
@@ -245,7 +245,7 @@ def test_contact_times_of_finite_elements_lie_within_their_uncertainty(name: str
             force, _ = make_recording(
                 pulse, impact.sample_rate, rate=rate, noise_db=level, seed=seed
             )
-            found = thud.Recording.from_array(force, rate).quantities["contact_time"]
+            found = thud.Recording.from_array(force, rate).estimates["contact_time"]
             assert abs(found.value - truth) <= found.expanded
 
 
@@ -254,7 +254,7 @@ NOT_COUNTED = "uncertainty not stated, and not included: "
 
 def parts(recording: thud.Recording, criterion: int) -> dict[str, float]:
     """Return the budget of a criterion."""
-    found = recording.conformity().decisions[criterion].quantity.contributions
+    found = recording.assess().criteria[criterion].estimate.contributions
     return {part.name: part.uncertainty for part in found}
 
 
@@ -262,7 +262,7 @@ def test_uncertainty_of_the_calibration_that_counted_as_zero_or_was_dropped() ->
     file, table = FOLDER / "drop_1.wav", FOLDER / "drop_1.csv"
     unknown = thud.read_recording(file, calibration="5000 N/FS")
     assert unknown.calibration_uncertainty is None
-    assert f"{NOT_COUNTED}calibration" in unknown.remarks
+    assert f"{NOT_COUNTED}calibration" in unknown.warnings
     assert "calibration" not in parts(unknown, 0)
     config = replace(read_config(FOLDER / "lab.toml"), polarity=None)
     number = Config(calibration=1.0, calibration_uncertainty=0.005)
@@ -273,7 +273,7 @@ def test_uncertainty_of_the_calibration_that_counted_as_zero_or_was_dropped() ->
         thud.read_recording(table, unit="V", config=number),
     ):
         assert known.calibration_uncertainty == 0.005
-        assert not any("calibration" in remark for remark in known.remarks)
+        assert not any("calibration" in warning for warning in known.warnings)
         assert parts(known, 0)["calibration"] == pytest.approx(0.0434, rel=1e-3)
     with pytest.raises(thud.InputError, match=naming("calibration_uncertainty", -1)):
         thud.read_recording(table, calibration_uncertainty=-1)
@@ -283,8 +283,8 @@ def test_uncertainty_of_the_resonance_is_part_of_the_levels(tmp_path: Path) -> N
     known = example("drop_1.wav", tmp_path)
     unknown = example("drop_1.wav", tmp_path, ("f0_uncertainty = 0.005", "# "))
     told = f"{NOT_COUNTED}resonance of the plate"
-    assert not any(told in remark for remark in known.remarks)
-    assert any(told in remark for remark in unknown.remarks)
+    assert not any(told in warning for warning in known.warnings)
+    assert any(told in warning for warning in unknown.warnings)
     assert parts(known, 4)["plate"] == pytest.approx(0.061, abs=2e-3)
 
 
@@ -296,11 +296,11 @@ def test_peaks_of_noise_that_were_counted_as_exact() -> None:
     for force, noise_db, expected in ((pulse, 60, 1), (double, 60, 2), (double, 20, np.nan)):
         record, _ = make_recording(force, 48_000, noise_db=noise_db, seed=1)
         found = thud.Recording.from_array(record, 48_000)
-        np.testing.assert_equal(found.quantities["peaks"].value, expected)
-        peaks = next(d for d in found.conformity().decisions if d.name == "peak_count")
+        np.testing.assert_equal(found.estimates["peaks"].value, expected)
+        peaks = next(d for d in found.assess().criteria if d.name == "peak_count")
         known = "conforms" if expected == 1 else "does not conform"
-        assert peaks.verdict == (known if np.isfinite(expected) else "cannot be decided")
-        assert any("noise" in remark for remark in found.remarks) == np.isnan(expected)
+        assert peaks.result == (known if np.isfinite(expected) else "inconclusive")
+        assert any("noise" in warning for warning in found.warnings) == np.isnan(expected)
 
 
 def test_weights_of_the_restitution_hold_the_calibration() -> None:
@@ -317,7 +317,7 @@ def test_weights_of_the_restitution_hold_the_calibration() -> None:
             assert drop.restitution.value == pytest.approx(expected, abs=1e-9)
             found = drop.restitution_shared.get("calibration", 0.0)
             assert found == pytest.approx(weight * scale, rel=1e-9)
-        budget = recording.quantities["restitution"].contributions
+        budget = recording.estimates["restitution"].contributions
         shares = {part.name: part.uncertainty for part in budget}
         mean = np.mean([d.restitution_shared.get("calibration", 0.0) for d in recording.drops])
         assert shares.get("calibration", 0.0) == pytest.approx(mean)
@@ -327,16 +327,16 @@ def test_restitution_of_a_slower_bounce_that_was_judged() -> None:
     config = replace(read_config(FOLDER / "lab.toml"), height=None)
     recording = thud.read_recording(FOLDER / "three_drops.flac", config=config)
     assert np.isnan(recording.restitution)
-    (decision,) = [d for d in recording.conformity().decisions if d.name == "restitution"]
-    assert decision.verdict == "cannot be decided"
-    assert sum(bool(re.search(r"bounce.* 0\.8", remark)) for remark in recording.remarks) == 3
+    (decision,) = [d for d in recording.assess().criteria if d.name == "restitution"]
+    assert decision.result == "inconclusive"
+    assert sum(bool(re.search(r"bounce.* 0\.8", warning)) for warning in recording.warnings) == 3
 
 
 def test_drops_without_a_restitution_are_told() -> None:
     config = replace(read_config(FOLDER / "lab.toml"), mass=None)
     files = [FOLDER / "drop_1.wav", FOLDER / "three_drops.flac"]
     recording = thud.read_recording(files, config=config)
-    assert any(re.search(naming("restitution", 3, 4), one) for one in recording.remarks)
+    assert any(re.search(naming("restitution", 3, 4), one) for one in recording.warnings)
 
 
 @pytest.mark.slow
@@ -519,7 +519,7 @@ def test_outliers_of_all_quantities_are_marked() -> None:
     assert {"contact time", "restitution"} <= marked
     assert {outlier.name for outlier in found.outliers} == {"recording, drop 4"}
     assert len(found.drops) == 7
-    assert any("contact time, ms, 2" in remark for remark in found.remarks)
+    assert any("contact time, ms, 2" in warning for warning in found.warnings)
 
 
 def test_low_pass_and_plate_are_those_of_the_configuration(tmp_path: Path) -> None:
@@ -534,7 +534,7 @@ def test_low_pass_and_plate_are_those_of_the_configuration(tmp_path: Path) -> No
     assert not np.array_equal(found.levels(), usual.levels())
     assert any(re.search(naming("low-pass", "1.25 kHz"), step) for step in found.steps)
     assert [one.met for one in found.config.plate_checks] == [False, True, False, True]
-    told = [remark for remark in found.remarks if "force plate" in remark]
+    told = [warning for warning in found.warnings if "force plate" in warning]
     assert len(told) == 2
     assert "0.2 Hz" in told[0]
     assert "4000 N" in told[1]

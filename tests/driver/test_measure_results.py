@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 FOLDER = REPOSITORY / "inputs/recordings"
 FILES = {"levels.csv", "criteria.csv", "recording.nc", "report.json"}
-PICTURES = {"report.html", "force.png", "force.svg", "levels.png", "levels.svg"}
+FIGURES = {"report.html", "force.svg", "levels.svg"}
 
 
 @pytest.fixture(scope="module")
@@ -112,16 +112,16 @@ def test_uncertainty_that_nobody_states_is_empty_and_not_zero(
     noisy: thud.Recording, tmp_path: Path
 ) -> None:
     recording_files.save(noisy, Results(tmp_path), figures=False)
-    decisions = noisy.conformity().decisions
+    decisions = noisy.assess().criteria
     for row, one in zip(rows_of(tmp_path / "criteria.csv"), decisions, strict=True):
-        assert bool(row["uncertainty"]) == bool(one.quantity.contributions), one.name
+        assert bool(row["uncertainty"]) == bool(one.estimate.contributions), one.name
 
 
 def test_criteria_are_counted_in_words() -> None:
-    verdicts = ["conforms"] * 7 + ["does not conform"] * 2 + ["cannot be decided"]
-    counts = "7 criteria conform, 2 do not conform, 1 cannot be decided"
+    verdicts = ["conforms"] * 7 + ["does not conform"] * 2 + ["inconclusive"]
+    counts = "7 criteria conform, 2 do not conform, 1 inconclusive"
     assert recording_files.count_verdicts(verdicts) == counts
-    assert recording_files.count_verdicts(["cannot be decided"]) == "1 criterion cannot be decided"
+    assert recording_files.count_verdicts(["inconclusive"]) == "1 criterion inconclusive"
 
 
 def test_report_of_another_recording_lay_beside_new_numbers(
@@ -132,7 +132,7 @@ def test_report_of_another_recording_lay_beside_new_numbers(
         (tmp_path / name).mkdir()
         content = (FOLDER / f"drop_{drop}.csv").read_bytes()
         (tmp_path / name / "drop.csv").write_bytes(content)
-    remark = "outputs/drop"
+    warning = "outputs/drop"
     out = tmp_path / "outputs/drop"
     # thud has not written this page.
     out.mkdir(parents=True)
@@ -144,11 +144,11 @@ def test_report_of_another_recording_lay_beside_new_numbers(
     (out / "report.html").unlink()
     for _ in range(2):
         assert cli.main(["measure", "a/drop.csv", "-q"]) == 0
-        assert names(out) == FILES | PICTURES
-        assert remark not in capsys.readouterr().err
+        assert names(out) == FILES | FIGURES
+        assert warning not in capsys.readouterr().err
     (out / PDF).write_bytes(b"signed by hand")
     assert cli.main(["measure", "b/drop.csv", "-q", "--no-figures"]) == 0
-    assert remark in capsys.readouterr().err
+    assert warning in capsys.readouterr().err
     assert names(out) == FILES
     assert (out / PDF).read_bytes() == b"signed by hand"
     (origin,) = thud.read_recording("b/drop.csv").origins
@@ -173,7 +173,7 @@ def test_page_that_failed_left_half_of_the_results(
 def test_netcdf_holds_drops_levels_and_provenance(tmp_path: Path) -> None:
     files = [FOLDER / f"drop_{i}.csv" for i in (1, 2, 3)]
     recording = thud.read_recording(files, height=1.0, mass=2.5)
-    drops = tuple(replace(drop, remarks=("long " * 20000,)) for drop in recording.drops)
+    drops = tuple(replace(drop, warnings=("long " * 20000,)) for drop in recording.drops)
     config = replace(recording.config, laboratory="Ωmega\udcff\0")
     recording = replace(recording, drops=drops, config=config)
     recording_files.save(recording, Results(tmp_path), figures=False)
@@ -186,19 +186,19 @@ def test_netcdf_holds_drops_levels_and_provenance(tmp_path: Path) -> None:
             doubts = [one.uncertainty for one in estimates]
             np.testing.assert_array_equal(found[f"{name}_uncertainty"], doubts)
             assert found[name].attrs["units"] == unit
-        quantities = [one.quantity for one in recording.conformity().decisions[:5]]
+        quantities = [one.estimate for one in recording.assess().criteria[:5]]
         expanded = [one.expanded for one in quantities]
         np.testing.assert_array_equal(found["octave_level_expanded"], expanded)
         np.testing.assert_array_equal(found["third_level"], recording.levels("third"))
         np.testing.assert_array_equal(found["octave_drop_level"], recording.average().drops)
         assert list(found["file_sha256"].values) == [one.checksum for one in recording.origins]
-        assert found.attrs["verdict"] == recording.conformity().verdict
+        assert found.attrs["verdict"] == recording.assess().result
         assert found.attrs["thud"] == thud.__version__
         assert found.attrs["laboratory"].startswith("Ωmega")
-        assert len(found.attrs["remarks"]) > 300_000
+        assert len(found.attrs["warnings"]) > 300_000
 
 
-def test_without_xarray_a_remark_tells_what_is_left_out(
+def test_without_xarray_a_warning_tells_what_is_left_out(
     noisy: thud.Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recording_files.save(noisy, Results(tmp_path), figures=False)

@@ -61,7 +61,7 @@ def test_modes_and_their_number_are_found(exact: thud.MobilityFit) -> None:
     )
     assert exact.floor.direct == pytest.approx(2e-6, rel=1e-6)
     assert exact.error < 1e-10
-    assert not exact.remarks
+    assert not exact.warnings
     assert max(abs(level) for _, level in exact.band_errors().values()) < 1e-9
 
 
@@ -193,10 +193,10 @@ def test_titles_are_needed(tmp_path: Path) -> None:
         thud.fit_mobility(table)
 
 
-def test_negative_lines_are_remarked_and_left_out() -> None:
+def test_negative_lines_raise_a_warning_and_left_out() -> None:
     values = MOBILITY - 2 * MOBILITY.real * (np.arange(300) % 10 == 0)
     found = thud.fit_mobility((FREQUENCY, values), order=8)
-    assert re.search(naming("negative", "10 %"), found.remarks[0])
+    assert re.search(naming("negative", "10 %"), found.warnings[0])
     assert found.mobility(np.geomspace(0.1, 1e6, 5000)).real.min() >= 0
 
 
@@ -353,11 +353,11 @@ def test_real_parts_that_are_not_positive_have_no_level(exact: thud.MobilityFit)
         (1.0 + 2e-8, 0.0, 1),
     ],
 )
-def test_fits_that_miss_are_remarked(
+def test_fits_that_miss_raise_a_warning(
     exact: thud.MobilityFit, factor: float, free_error: float, count: int
 ) -> None:
     found = replace(scaled_fit(exact, np.full(300, factor)), free_error=free_error)
-    assert len(found.remarks) == count
+    assert len(found.warnings) == count
 
 
 def test_number_of_poles_has_the_least_information_criterion(

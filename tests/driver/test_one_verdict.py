@@ -33,7 +33,7 @@ def test_every_command_has_the_same_peak_levels_and_verdict(
     monkeypatch.chdir(tmp_path)
     case = thud.read_case(path)
     impact = thud.solve(case)
-    levels, conformity = impact.levels(), impact.conformity()
+    levels, conformity = impact.levels(), impact.assess()
 
     assert cli.main(["run", "-q", "--no-figures", str(path)]) == 0
     summary = f90nml.read(f"outputs/{case.name}/summary.nml")
@@ -49,7 +49,7 @@ def test_every_command_has_the_same_peak_levels_and_verdict(
     assert [shown[f"{f:g} Hz, dB"].split()[0] for f in thud.get_bands().nominal] == [
         f"{level:.2f}" for level in levels
     ]
-    assert shown["verdict"] == conformity.verdict
+    assert shown["verdict"] == conformity.result
 
     swept = thud.sweep(
         {"case": str(path), "parameters": {"height": {"values": [case.drop.height]}}}
@@ -68,7 +68,7 @@ def test_every_command_has_the_same_peak_levels_and_verdict(
     )
     read = thud.read_results(f"outputs/{case.name}")
     assert (read.peak(), read.levels().tolist()) == (impact.peak(), levels.tolist())
-    assert read.conformity() == conformity
+    assert read.assess() == conformity
 
 
 @pytest.mark.parametrize("force", ["elastic", "floor"])

@@ -38,7 +38,7 @@ WRONG = {
     'thud.FiniteElement(law="hooke")': "arg-type",
     'thud.Levels(force="elastik")': "arg-type",
     'thud.solve().levels("fifth")': "arg-type",
-    'thud.solve().conformity(source="football")': "arg-type",
+    'thud.solve().assess(source="football")': "arg-type",
     'thud.solve_many({}, model="cube")': "arg-type",
     'thud.get_bands("fifth")': "arg-type",
     "thud.slove()": "attr-defined",
@@ -93,7 +93,7 @@ def test_users_script_touches_every_name_and_runs(tmp_path: Path) -> None:
     command = [sys.executable, SCRIPT]
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     assert done.returncode == 0, done.stderr
-    assert "<Uncertainty, rubber_ball: 0 of 8 sets conform>" in done.stdout
+    assert "<Uncertainty, rubber_ball: 0 of 8 samples conform>" in done.stdout
 
 
 @pytest.fixture(scope="module")
@@ -195,7 +195,7 @@ def test_names_whose_packages_are_missing_say_so() -> None:
         (lambda: thud.solve(model="Hollow_Sphere"), naming("'Hollow_Sphere'", "'modal_ball'")),
         (lambda: thud.solve_many({"heigth": 1}), naming("'heigth'", "'height'")),
         (lambda: thud.get_bands("octav"), naming("'octav'", "'octave'", "'third'")),
-        (lambda: thud.solve().conformity("rubberball"), naming("'rubberball'", "'rubber_ball'")),
+        (lambda: thud.solve().assess("rubberball"), naming("'rubberball'", "'rubber_ball'")),
         (lambda: thud.fit(thud.solve(), ["mas"]), naming("mas", "'mass'")),
         (lambda: thud.read_study({}, "swep"), naming("'swep'", "'sweep'")),
         (
@@ -236,8 +236,8 @@ def test_standard_ball_conforms() -> None:
         loss_factor=0.2,
         loss_frequency=74.0,
     )
-    assert impact.conformity()
-    assert impact.remarks == ()
+    assert impact.assess()
+    assert impact.warnings == ()
 
 
 @pytest.mark.parametrize(

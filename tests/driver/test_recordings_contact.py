@@ -12,7 +12,7 @@ from scipy.ndimage import uniform_filter1d
 from synthetic import half_sine, make_drop
 
 from thud.level.levels import record_force
-from thud.recordings import calibration, contact, drops, estimates, flanks
+from thud.recordings import calibration, contact, drops, flanks, measured_drop
 from thud.recordings.contact import Contact, cells_between, even_edges
 from thud.recordings.plate import Plate, correct_plate
 from thud.recordings.signal import Signal
@@ -103,7 +103,7 @@ def test_covariance_of_functionals_is_that_of_samples() -> None:
 
 def test_impulse_is_the_sum_of_samples_with_their_covariance() -> None:
     one = with_covariance(3)
-    found = estimates._impulse(one)  # noqa: SLF001
+    found = measured_drop._impulse(one)  # noqa: SLF001
     # 2 P T / pi of a half sine; the noise of n samples of 3 N.
     noise = 3 * np.sqrt(len(one.gated)) / RATE
     assert found.value == pytest.approx(1500 * 0.02 * 2 / np.pi, abs=4 * noise)
@@ -116,7 +116,7 @@ def test_peak_has_the_uncertainty_of_its_place() -> None:
     n_cell = len(quiet.covariance)
     # That of the background grows from cell to cell; the peak lies in the middle one.
     slope = replace(quiet, covariance=np.diag(np.arange(1.0, n_cell + 1)))
-    found = estimates._peak(slope)  # noqa: SLF001
+    found = measured_drop._peak(slope)  # noqa: SLF001
     low = record_force(np.pad(quiet.gated, 2), RATE)
     assert found.value == pytest.approx(low.max())
     cell = np.argmax(low) / len(low) * n_cell
@@ -125,7 +125,7 @@ def test_peak_has_the_uncertainty_of_its_place() -> None:
 
 def test_peak_is_less_what_noise_adds_and_as_uncertain() -> None:
     """Maxima of many noisy records: their mean error is part of their uncertainty."""
-    found = [estimates._peak(make_drop(20.0, RATE, seed=seed).contact) for seed in range(40)]  # noqa: SLF001
+    found = [measured_drop._peak(make_drop(20.0, RATE, seed=seed).contact) for seed in range(40)]  # noqa: SLF001
     clean = record_force(np.pad(make_drop(0.0, RATE).contact.gated, 2), RATE).max()
     error = np.array([one.value for one in found]) - clean
     stated = np.array([one.uncertainty for one in found])
@@ -139,7 +139,7 @@ def test_peak_is_less_what_noise_adds_and_as_uncertain() -> None:
 
 def test_noise_of_the_quiet_is_that_outside_the_gate() -> None:
     one = make_drop(7.0, RATE).contact
-    found = estimates._noise(one)  # noqa: SLF001
+    found = measured_drop._noise(one)  # noqa: SLF001
     # The median of absolute values has a relative error of 1.17/sqrt(n).
     assert found.deviation == pytest.approx(7.0, rel=4 * 1.17 / np.sqrt(0.2 * RATE))
     assert (found.white, found.pink, found.brown) == tuple(one.background.variances[:3])
@@ -148,10 +148,10 @@ def test_noise_of_the_quiet_is_that_outside_the_gate() -> None:
 @pytest.mark.parametrize(("drift", "hum"), [(2.9, 3.1), (3.1, 2.9), (-3.1, 0.0)])
 def test_drift_and_hum_are_told_from_three_deviations_on(drift: float, hum: float) -> None:
     one = make_drop(1.0, RATE).contact
-    under = np.zeros(len(one.under))
+    under = np.zeros(len(one.removed))
     under[slice(*one.gate)] = np.linspace(-2, 12, len(one.gated))
     known = SimpleNamespace(drift=(drift * 4, 4.0), hum=(60.0, hum * 0.5, 0.5))
-    steps = estimates._told_background(replace(one, under=under, background=known))  # type: ignore[arg-type] # noqa: SLF001
+    steps = measured_drop._removed(replace(one, removed=under, background=known))  # type: ignore[arg-type] # noqa: SLF001
     told = " ".join(steps)
     # The mean of what lies under the contact.
     assert "offset of 5 N" in told
@@ -175,7 +175,7 @@ def test_content_that_folds_back_falls_with_the_square_of_the_frequency(
     top = np.sqrt(power[f > 0.4 * rate].mean()) * (0.45 * rate / (rate - 707.9)) ** 2
     own = np.sqrt(power[(f > 354.8) & (f < 707.9)].mean())
     expected = 20 * np.log10(1 + top / own)
-    told = estimates._told_aliased(one)  # noqa: SLF001
+    told = measured_drop._check_aliasing(one)  # noqa: SLF001
     assert bool(told) == (expected > 0.1)
     if told:
         assert f"by {expected:.1f} dB" in told[0]
@@ -184,7 +184,7 @@ def test_content_that_folds_back_falls_with_the_square_of_the_frequency(
     for factor, expected in ((0.1, bool(told)), (0.34, False)):
         draws = np.array([[factor * white, 0, 0, 0, 0]])
         noisy = replace(one, background=replace(one.background, draws=draws))
-        assert bool(estimates._told_aliased(noisy)) == expected  # noqa: SLF001
+        assert bool(measured_drop._check_aliasing(noisy)) == expected  # noqa: SLF001
 
 
 def test_level_at_an_edge_is_that_of_a_line_with_its_uncertainty() -> None:
@@ -357,7 +357,7 @@ def test_scale_of_a_contact_is_its_peak_below_the_band_edge() -> None:
     expected = uniform_filter1d(force - 40, round(RATE / 1250)).max()
     assert found.peak == pytest.approx(expected, rel=1e-3)
     assert found.gated.max() == pytest.approx((force - 40).max(), abs=0.5)
-    assert found.quiet == pytest.approx((0.1, 0.1), abs=1e-3)
+    assert found.background_lengths == pytest.approx((0.1, 0.1), abs=1e-3)
 
 
 @pytest.mark.parametrize("ahead", ["pulse", "step"])

@@ -15,13 +15,14 @@ from synthetic import band_limited, coloured_noise, half_sine, make_drop, make_r
 
 import thud
 from thud.impact.contact_time import contact_span
+from thud.level.estimate import Estimate
 from thud.level.levels import record_force
-from thud.recordings.budgets import average_mass, average_restitution, drop_quantities
+from thud.recordings.budgets import average_mass, average_restitution, drop_estimates
 from thud.recordings.config import Config
-from thud.recordings.contact import Contact, Estimate, find_contact
+from thud.recordings.contact import Contact, find_contact
 from thud.recordings.drops import find_windows
-from thud.recordings.estimates import Drop, measure_drop
 from thud.recordings.faults import repair
+from thud.recordings.measured_drop import Drop, measure_drop
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.restitution import GRAVITY, DropConditions
 from thud.recordings.signal import Signal
@@ -49,9 +50,12 @@ def pulse(impact: thud.Impact) -> np.ndarray:
     return impact.floor_force[: int(impact.exact_contact_time * impact.sample_rate) + 2]
 
 
-def drops(force: np.ndarray, rate: float, **knowledge: float) -> list[Drop]:
+def drops(force: np.ndarray, rate: float, **known: float) -> list[Drop]:
     windows = find_windows(Signal.from_array(force, rate, "file.wav"))
-    return [measure_drop(window, **{"height": 1.0, "mass": 2.5, **knowledge}) for window in windows]
+    return [
+        measure_drop(window, DropConditions(**{"height": 1.0, "mass": 2.5, **known}))
+        for window in windows
+    ]
 
 
 def levels(drop: Drop) -> np.ndarray:
@@ -118,11 +122,11 @@ def test_kilonewtons_for_newtons_are_told() -> None:
         thud.Recording.from_array(force * 1e3, 48e3)
 
 
-def test_small_peaks_that_one_check_remarked_and_another_refused() -> None:
+def test_small_peaks_that_one_check_warninged_and_another_refused() -> None:
     force, _ = make_recording(HALF_SINE, FINE, rate=48e3, noise_db=60)
     found = thud.Recording.from_array(force / 10, 48e3)
     assert found.peak_force == pytest.approx(150, rel=0.01)
-    assert any(re.search(r"peak\b.* 150", remark) for remark in found.remarks)
+    assert any(re.search(r"peak\b.* 150", warning) for warning in found.warnings)
     with pytest.raises(thud.InputError, match=naming("peak", "unit", "calibration", 300, 15000)):
         thud.Recording.from_array(force / 1e4, 48e3)
 
@@ -156,7 +160,7 @@ def test_sampled_half_sine_has_its_levels_at_every_rate(rate: float, shift: floa
     (drop,) = drops(half_sine(rate, start, int(0.25 * rate)) + 20.0, rate)
     sampling = aliased_levels(rate, start) - ORACLE
     np.testing.assert_allclose(levels(drop) - sampling, ORACLE, rtol=0, atol=1e-3)
-    told = any(f"{rate / 2:g} Hz" in remark for remark in drop.remarks)
+    told = any(f"{rate / 2:g} Hz" in warning for warning in drop.warnings)
     assert told or np.abs(sampling).max() < 0.2
     assert not told or rate < 10e3
 
@@ -195,7 +199,7 @@ def test_bounces_are_told_from_drops() -> None:
         assert abs(by.value - 0.8 * part - below) < 4 * by.uncertainty
     (without,) = drops(force[: int(5 * 24e3)], 24e3, height=None)  # type: ignore[arg-type]
     assert np.isnan(without.restitution.value)
-    assert any("0.800" in remark for remark in without.remarks)
+    assert any("0.800" in warning for warning in without.warnings)
 
 
 def test_disagreement_of_impulse_and_bounces_was_averaged_away() -> None:
@@ -206,16 +210,16 @@ def test_disagreement_of_impulse_and_bounces_was_averaged_away() -> None:
     fits = ratio / (1.75 + 9.81 * 0.02 / SPEED)
     for mass, differs in ((2.5, True), (fits, False)):
         found = thud.Recording.from_array(force, 24e3, height=1.0, mass=mass)
-        one = found.quantities["restitution"]
+        one = found.estimates["restitution"]
         named = {part.name: part.uncertainty for part in one.contributions}
         ways = [way.value for way in found.drops[0].restitutions.values()]
         assert ("impulse against bounces" in named) == differs
-        assert any(re.search(naming("impulse", "bounce"), one) for one in found.remarks) == differs
+        assert any(re.search(naming("impulse", "bounce"), one) for one in found.warnings) == differs
         if differs:
             width = abs(np.subtract(*ways))
             assert named["impulse against bounces"] == pytest.approx(width / np.sqrt(3))
             assert one.value - one.expanded <= min(ways) < max(ways) <= one.value + one.expanded
-            assert any(f"{fits:.3f} kg" in remark for remark in found.remarks)
+            assert any(f"{fits:.3f} kg" in warning for warning in found.warnings)
 
 
 def test_uncertainties_of_mass_and_height_follow_the_formulas() -> None:
@@ -224,10 +228,10 @@ def test_uncertainties_of_mass_and_height_follow_the_formulas() -> None:
     )
     (signal,) = [Signal.from_array(force, 24e3)]
     (window,) = find_windows(signal)
-    impulse, step = measure_drop(window, height=1.0, mass=2.5).impulse, 1e-5
+    impulse, step = measure_drop(window, DropConditions(1.0, 2.5)).impulse, 1e-5
 
     def at(**known: float) -> Drop:
-        return measure_drop(window, **{"height": 1.0, "mass": 2.5, **known})
+        return measure_drop(window, DropConditions(**{"height": 1.0, "mass": 2.5, **known}))
 
     for key, unit, name in (("mass", 2.5, "mass"), ("height", 1.0, "drop height")):
         fall = DropConditions(1.0, 2.5, **{f"{key}_uncertainty": step * unit})
@@ -244,10 +248,10 @@ def test_uncertainties_of_mass_and_height_follow_the_formulas() -> None:
     found = thud.Recording.from_array(
         force, 24e3, height=1.0, mass=2.5, mass_uncertainty=0.01, height_uncertainty=0.002
     )
-    budget = {part.name: part.uncertainty for part in found.quantities["restitution"].contributions}
+    budget = {part.name: part.uncertainty for part in found.estimates["restitution"].contributions}
     assert {"mass", "drop height"} < set(budget)
-    assert found.quantities["mass"].uncertainty == 0.01
-    assert found.quantities["drop_height"].uncertainty == 0.002
+    assert found.estimates["mass"].uncertainty == 0.01
+    assert found.estimates["drop_height"].uncertainty == 0.002
 
 
 def propagated(function: Callable[..., float], *estimates: Estimate) -> Estimate:
@@ -413,7 +417,7 @@ def test_edges_of_all_drops_share_the_smallest_uncertainty() -> None:
     times = [Estimate(0.02, 5e-5), Estimate(0.0201, 3e-5)]
     found = [replace(make_drop(), contact_time=time) for time in times]
     for ones, expected in ((found, 3e-5), (found[:1], None)):
-        quantity = drop_quantities(ones, Config(), None)["contact_time"]
+        quantity = drop_estimates(ones, Config(), None)["contact_time"]
         named = {part.name: part.uncertainty for part in quantity.contributions}
         assert named.get("edges of the pulse") == expected
 
@@ -429,7 +433,7 @@ def test_peaks_are_not_counted_in_noise() -> None:
     ):  # fmt: skip
         white = (factor * 0.1 * 1500 / 6) ** 2 / band
         noisy = replace(drop, force=force, noise=replace(drop.noise, white=white))
-        counted = drop_quantities([noisy], Config(), None)["peaks"].value
+        counted = drop_estimates([noisy], Config(), None)["peaks"].value
         assert counted == pytest.approx(expected, nan_ok=True)
 
 
@@ -440,7 +444,7 @@ def test_noise_behind_a_drop_was_taken_for_its_bounce() -> None:
     )
     (drop,) = drops(force, 24e3)
     assert drop.restitution_method == "impulse"
-    assert any(re.search(naming("bounce", "1 m"), remark) for remark in drop.remarks)
+    assert any(re.search(naming("bounce", "1 m"), warning) for warning in drop.warnings)
 
 
 def test_noise_that_ran_into_a_pulse_was_the_pulse() -> None:
@@ -458,11 +462,11 @@ def test_mass_that_is_not_stated_is_measured() -> None:
         HALF_SINE, FINE, rate=24e3, noise_db=60, drops=tuple(falling(1, 0.75))
     )
     found = thud.Recording.from_array(force, 24e3, height=1.0, calibration_uncertainty=0.01)
-    mass = found.quantities["mass"]
+    mass = found.estimates["mass"]
     expected = 1500 * 0.02 * 2 / np.pi / (SPEED * 1.75 + 9.81 * 0.02)
     assert mass.value == pytest.approx(expected, rel=1e-3)
     assert mass.uncertainty == pytest.approx(0.01 * mass.value, rel=1e-3)
-    assert any("effective mass" in remark for remark in found.remarks)
+    assert any("effective mass" in warning for warning in found.warnings)
 
 
 def test_restitution_and_mass_follow_from_the_impulse() -> None:
@@ -547,7 +551,7 @@ def test_short_dropouts_are_filled_and_long_ones_refused() -> None:
     lost = force.copy()
     lost[5200:5215] = 0
     (drop,) = drops(lost, 48e3)
-    assert any(re.search(naming("dropout", "0.312 ms"), remark) for remark in drop.remarks)
+    assert any(re.search(naming("dropout", "0.312 ms"), warning) for warning in drop.warnings)
     np.testing.assert_allclose(levels(drop)[:3], ORACLE[:3], rtol=0, atol=0.1)
     lost[5200:5300] = 0
     with pytest.raises(thud.InputError, match=naming("dropout", "ms")):
@@ -572,14 +576,14 @@ def test_held_samples_jump_by_a_part_of_the_peak_above_the_quiet(offset: float) 
         held = force.copy()
         held[first : first + count] = force[first]
         (window,) = find_windows(Signal.from_array(held, 48e3, "file.wav"))
-        filled, steps, remarks = repair(window)
-        assert bool(remarks) == bool(steps) == expected
+        filled, steps, warnings = repair(window)
+        assert bool(warnings) == bool(steps) == expected
         found = filled[first - window.start :][:count]
         truth = force[first : first + count] if expected else np.full(count, force[first])
         # A line between the ends of the flank, and the noise.
         np.testing.assert_allclose(found, truth, atol=1.5)
         if expected:
-            assert f"dropouts of {1e3 * count / 48e3:.3g} ms" in remarks[0]
+            assert f"dropouts of {1e3 * count / 48e3:.3g} ms" in warnings[0]
 
 
 @pytest.mark.parametrize("part", [slice(4900, None), slice(None, 5600)])
@@ -609,7 +613,7 @@ def test_contact_is_refused_from_a_quarter_of_uncertainty_on(
         }
         return replace(found, **ends)
 
-    monkeypatch.setattr("thud.recordings.estimates.find_contact", find)
+    monkeypatch.setattr("thud.recordings.measured_drop.find_contact", find)
     force, _ = make_recording(HALF_SINE, FINE, rate=24e3, noise_db=50)
     if ratio > 4:
         (drop,) = drops(force, 24e3)
@@ -728,4 +732,4 @@ def test_noise_that_rises_with_frequency_leaves_the_background_alone() -> None:
     white = np.random.default_rng(0).normal(scale=10, size=int(0.22 * 24e3) + 2)
     for noise in (np.diff(white)[1:], np.diff(white, 2)):
         (drop,) = drops(half_sine(24e3, 0.1, len(noise)) + noise + 12, 24e3)
-        np.testing.assert_allclose(drop.contact.under, 12, rtol=0, atol=0.01 * noise.std())
+        np.testing.assert_allclose(drop.contact.removed, 12, rtol=0, atol=0.01 * noise.std())

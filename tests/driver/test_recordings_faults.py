@@ -111,23 +111,16 @@ def test_length_of_a_text_in_hdf5_does_not_fill_memory(tmp_path: Path) -> None:
         open_signals(path)
 
 
-@pytest.mark.parametrize(
-    ("number", "outcome"), [(51359, "read"), (56588, "refused"), (84959, "refused")]
-)
-def test_damaged_matlab_files_do_not_crash(number: int, outcome: str, tmp_path: Path) -> None:
-    """The compiled reader of scipy died of these of the campaign's files."""
+@pytest.mark.parametrize("number", [51359, 56588, 84959])
+def test_damaged_matlab_files_do_not_crash(number: int, tmp_path: Path) -> None:
+    """The compiled reader of scipy dies of these of the campaign's files."""
     path = tmp_path / "plain.mat"
     force = half_sine(8000.0, 0.02, 0.02)
     force += np.random.default_rng(1).normal(0, 3, force.size)
     WRITERS["plain.mat"](path, force, 8000.0, "N")
     path.write_bytes(mutate(path.read_bytes(), np.random.default_rng([1, number])))
-    try:
-        assert open_signals(path)
-    except InputError as error:
-        assert outcome == "refused"
-        assert "plain.mat" in str(error)
-    else:
-        assert outcome == "read"
+    with pytest.raises(InputError, match=naming("plain.mat")):
+        open_signals(path)
 
 
 def test_library_of_tdms_writes_no_warnings(tmp_path: Path) -> None:

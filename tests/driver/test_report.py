@@ -25,10 +25,10 @@ from test_figure_look import assert_clean
 import thud
 from thud.base.errors import ReportWarning
 from thud.base.files import Results
+from thud.level.estimate import Estimate
 from thud.level.levels import record_force
-from thud.plot.recording_figure import recording_forces, recording_levels
+from thud.plot.recordings import recording_forces, recording_levels
 from thud.recordings.config import Config, PlateConfig
-from thud.recordings.estimates import Estimate
 from thud.recordings.read_recording import read_recording
 from thud.recordings.recording import Recording
 from thud.report import fonts
@@ -101,7 +101,7 @@ def crowded(one: Recording) -> Recording:
             drop,
             name=f"a_long_name_of_a_file_{i}" + "z" * 200,
             steps=tuple(f"step {chr(97 + k)}: {i} N were " + "moved " * 30 for k in range(9)),
-            remarks=tuple(
+            warnings=tuple(
                 f"doubt {chr(97 + k)} of {i} N, " + "a long one " * 20 for k in range(20)
             ),
         )
@@ -180,18 +180,18 @@ def numbers(recording: Recording) -> list[list[str]]:
     """Return value, expanded uncertainty, limits, margin and verdict of each criterion."""
     rows = []
     for decision, (unit, places) in zip(
-        recording.conformity().decisions, [(1.0, 2)] * 5 + list(STYLES), strict=True
+        recording.assess().criteria, [(1.0, 2)] * 5 + list(STYLES), strict=True
     ):
         value = decision.value / unit
-        is_bound, is_count = decision.quantity.upper_bound, decision.name == "peak_count"
+        is_bound, is_count = decision.estimate.upper_bound, decision.name == "peak_count"
         limits = [f"{end / unit:g}" for end in (decision.lower, decision.upper)]
         cells = ["not known" if np.isnan(value) else f"{value:.{places}f}"]
-        if decision.quantity.contributions and not np.isnan(value):
-            cells.append(f"{decision.quantity.expanded / unit:.{places + 1}f}")
+        if decision.estimate.contributions and not np.isnan(value):
+            cells.append(f"{decision.estimate.expanded / unit:.{places + 1}f}")
         cells.append(" to ".join(dict.fromkeys(limits)))
         if not (is_bound or is_count or np.isnan(value)):
             cells.append(f"{decision.margin / unit:.{places}f}")
-        rows.append([*cells, decision.verdict])
+        rows.append([*cells, decision.result])
     return rows
 
 
@@ -211,7 +211,7 @@ def test_page_is_one_and_holds_the_numbers_of_the_table(written: tuple[Recording
         assert places == sorted(places)
         line = " ".join(value for value in values if value)
         assert line in printed
-    assert recording.conformity().verdict in printed.lower()
+    assert recording.assess().result in printed.lower()
     assert recording.origins[0].checksum in printed
     assert thud.__version__ in printed
     for words in ("Signature", "Place and date", "report.json", "Force on the floor", "31.5"):
@@ -296,15 +296,15 @@ def test_data_are_those_of_the_recording(written: tuple[Recording, Path]) -> Non
         pytest.fail(f"{word} is no JSON")
 
     data = json.loads((folder / "report.json").read_text(), parse_constant=refuse)
-    verdict = recording.conformity()
-    assert data["verdict"] == verdict.verdict
-    for row, decision in zip(data["criteria"], verdict.decisions, strict=True):
+    verdict = recording.assess()
+    assert data["verdict"] == verdict.result
+    for row, decision in zip(data["criteria"], verdict.criteria, strict=True):
         known = not np.isnan(decision.value)
         assert row["value"] == (decision.value if known else None)
-        stated = bool(decision.quantity.contributions)
-        assert row["expanded_uncertainty"] == (decision.quantity.expanded if stated else None)
+        stated = bool(decision.estimate.contributions)
+        assert row["expanded_uncertainty"] == (decision.estimate.expanded if stated else None)
         assert (row["lower"], row["upper"]) == (decision.lower, decision.upper)
-        assert row["verdict"] == decision.verdict
+        assert row["verdict"] == decision.result
         assert row["limits_of_standard"]
     assert len(data["drops"]) == len(recording.drops)
     assert [one["sha256"] for one in data["files"]] == [o.checksum for o in recording.origins]
@@ -340,7 +340,7 @@ def test_names_are_no_code(one: Recording, tmp_path: Path) -> None:
     )
     texts = dict.fromkeys(("laboratory", "ball", "serial"), HOSTILE)
     recording = many(one, 2, **texts, instruments=(HOSTILE, HOSTILE))
-    drops = tuple(replace(d, name=HOSTILE + d.name, remarks=(HOSTILE,)) for d in recording.drops)
+    drops = tuple(replace(d, name=HOSTILE + d.name, warnings=(HOSTILE,)) for d in recording.drops)
     origins = tuple(replace(o, name=HOSTILE, calibration=HOSTILE) for o in recording.origins)
     write_report(replace(recording, drops=drops, origins=origins), tmp_path)
     page = (tmp_path / "report.html").read_text()
@@ -495,9 +495,7 @@ def test_figures_show_every_drop_the_average_and_the_limits(one: Recording, coun
         bars = axes.containers[0]
         np.testing.assert_allclose(bars.lines[0].get_ydata(), recording.levels(bands))
         half = [np.ptp(segment[:, 1]) / 2 for segment in bars.lines[2][0].get_segments()]
-        np.testing.assert_allclose(
-            half, [one.expanded for one in recording.level_quantities(bands)]
-        )
+        np.testing.assert_allclose(half, [one.expanded for one in recording.level_estimates(bands)])
 
 
 def test_levels_and_criteria_that_disagreed_on_uncertainty(one: Recording) -> None:
@@ -505,10 +503,10 @@ def test_levels_and_criteria_that_disagreed_on_uncertainty(one: Recording) -> No
     for recording in (one, many(one, 5), many(one, 5, plate=plate)):
         data = report_data(recording)
         found = data["levels"]["octave"]
-        for i, decision in enumerate(recording.conformity().decisions[:5]):
-            assert found["uncertainty"][i] == decision.quantity.uncertainty
-            assert found["expanded_uncertainty"][i] == decision.quantity.expanded
-    octaves, thirds = (recording.level_quantities(bands) for bands in ("octave", "third"))
+        for i, decision in enumerate(recording.assess().criteria[:5]):
+            assert found["uncertainty"][i] == decision.estimate.uncertainty
+            assert found["expanded_uncertainty"][i] == decision.estimate.expanded
+    octaves, thirds = (recording.level_estimates(bands) for bands in ("octave", "third"))
     for budgets in (octaves, thirds):
         names = [part.name for part in budgets[-1].contributions]
         assert names[-2:] == ["calibration", "plate"]

@@ -1,4 +1,4 @@
-"""Ringing of a plate is remarked, and nothing else is taken for it."""
+"""Ringing of a plate raises a warning, and nothing else is taken for it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def said(force: np.ndarray, colour: str = "white", deviation: float = 2.0) -> tu
     """Return what is said of ringing in a force with noise, N."""
     noise = coloured_noise(len(force), RATE, deviation, colour, np.random.default_rng(1))
     (drop,) = thud.Recording.from_array(force + noise, RATE, height=1.0, mass=2.5).drops
-    return tuple(remark for remark in drop.remarks if "ring" in remark)
+    return tuple(warning for warning in drop.warnings if "ring" in warning)
 
 
 @pytest.mark.parametrize("colour", ["white", "pink", "brown"])
@@ -72,9 +72,9 @@ def test_plate_that_is_stated_wrongly_rings_on() -> None:
     for stated, expected in ((1100.0, 0), (1600.0, 1)):
         changed = replace(config, plate=replace(config.plate, f0=stated))
         (drop,) = thud.read_recording(folder / "drop_1.wav", config=changed).drops
-        remarks = [remark for remark in drop.remarks if "ring" in remark]
-        assert len(remarks) == expected
-        assert all("[plate]" in remark for remark in remarks)
+        warnings = [warning for warning in drop.warnings if "ring" in warning]
+        assert len(warnings) == expected
+        assert all("[plate]" in warning for warning in warnings)
 
 
 def test_short_quiet_tells_nothing(force: np.ndarray) -> None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 PUBLISHED = REPOSITORY / "inputs" / "floors" / "field_levels.csv"
 OCTAVES = (63.0, 125.0, 250.0, 500.0)
-# A survey of which nothing has to be remarked.
+# A survey that raises no warning.
 GOOD = thud.RoomLevels(
     "good", "octave", np.array(OCTAVES),
     np.array([[70.0, 60, 50, 40], [73, 64, 51, 42], [71, 60, 52, 44], [69, 61, 49, 40]]),
@@ -116,7 +116,7 @@ def test_mean_background_and_scatter_of_positions(tmp_path: Path) -> None:
     energy = np.array([10 ** (thud.rating(one).a_weighted / 10) for one in levels])
     error = energy.std(ddof=1) / np.sqrt(6) / energy.mean() * 10 / np.log(10)
     assert found.position_uncertainty == pytest.approx(error)
-    assert any("maxima" in remark for remark in found.remarks)
+    assert any("maxima" in warning for warning in found.warnings)
 
 
 @pytest.mark.parametrize(
@@ -176,7 +176,7 @@ def test_command_rates_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert "46 (46.24)" in shown.out
     assert "background" in shown.err
     assert {path.name for path in folder.iterdir()} == {
-        ".thud", "room_levels.csv", "room_levels.png", "room_levels.svg",
+        ".thud", "room_levels.csv", "room_levels.svg",
     }  # fmt: skip
     lines = (folder / "room_levels.csv").read_text(encoding="utf-8").splitlines()
     assert len(lines) == 13
@@ -191,10 +191,10 @@ def test_columns_of_no_position_are_refused(tmp_path: Path, title: str) -> None:
         thud.read_room_levels(tmp_path / "levels.csv")
 
 
-def test_column_that_hardly_is_a_position_is_remarked(tmp_path: Path) -> None:
+def test_column_that_hardly_is_a_position_raises_a_warning(tmp_path: Path) -> None:
     rows = "".join(f"{f},60,1.2\n" for f in (63, 125, 250, 500))
     (tmp_path / "levels.csv").write_text(f"frequency,first,Nachhallzeit\n{rows}")
-    assert any("59 dB" in one for one in thud.read_room_levels(tmp_path / "levels.csv").remarks)
+    assert any("59 dB" in one for one in thud.read_room_levels(tmp_path / "levels.csv").warnings)
     # A known title is no position.
     (tmp_path / "levels.csv").write_text(f"frequency,first,RT60\n{rows}")
     found = thud.read_room_levels(tmp_path / "levels.csv", volume=50.0)
@@ -242,8 +242,8 @@ def test_class_is_the_best_one_whose_limit_is_kept() -> None:
         ({"volume": None, "reverberation_time": None}, 1),
     ],
 )
-def test_each_weakness_of_a_survey_is_remarked(change: dict[str, object], count: int) -> None:
-    assert len(replace(GOOD, **change).remarks) == count  # type: ignore[arg-type]
+def test_each_weakness_of_a_survey_raises_a_warning(change: dict[str, object], count: int) -> None:
+    assert len(replace(GOOD, **change).warnings) == count  # type: ignore[arg-type]
 
 
 def test_numbers_of_a_survey_are_those_of_its_definitions() -> None:

@@ -10,7 +10,7 @@ from conftest import REPOSITORY, naming
 
 import thud
 from thud import cli
-from thud.studies.designs import unit_sets
+from thud.studies.sampling import unit_samples
 from thud.studies.sensitivity import sobol_indices
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def lumped() -> Sensitivity:
 
 def test_indices_of_ishigami() -> None:
     # Ishigami and Homma (1990): sin x1 + 7 sin(x2)^2 + 0.1 x3^4 sin x1, x between -pi and pi.
-    x = np.pi * (2 * unit_sets("saltelli", 3, 2048, 1, 0, 2048 * 5) - 1)
+    x = np.pi * (2 * unit_samples("saltelli", 3, 2048, 1, 0, 2048 * 5) - 1)
     values = np.sin(x[:, 0]) + 7 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
     first, first_interval, total, total_interval = sobol_indices(values, 3)
     a, b = 7.0, 0.1
@@ -131,7 +131,7 @@ def test_command_writes_indices(tmp_path: Path, capsys: pytest.CaptureFixture[st
     lines = (tmp_path / "lumped_indices.csv").read_text().splitlines()
     assert lines[0] == "output,parameter,first_order,first_order_interval,total,total_interval"
     assert len(lines) == 1 + 7 * 2
-    assert (tmp_path / "lumped.png").exists()
+    assert (tmp_path / "lumped.svg").exists()
     assert "total index of" in capsys.readouterr().out
 
 

@@ -20,19 +20,6 @@ from thud.recordings.flanks import _table
 REPOSITORY = Path(__file__).parents[2]
 SOURCES = REPOSITORY / "src"
 
-# Fortran procedures longer than 60 lines, each for its reason.
-LONG = {
-    # Two loops that differ by one term: gfortran does not make two of one, and vectorises none
-    # that holds a condition.
-    "take_step",
-    # Twelve matrices by one recurrence: parted among procedures, its sums round otherwise.
-    "set_gram",
-    # One parallel loop over batches, whose private variables stand in one place.
-    "solve_ensemble",
-    # The arguments of a flat call, each with its line.
-    "drop_many",
-}
-
 
 def fortran_uses(root: Path) -> dict[str, set[str]]:
     """Return the modules that each Fortran file uses, by paths below the root.
@@ -98,23 +85,6 @@ def folders() -> list[str]:
     return found[1].split()
 
 
-def procedures(text: str) -> list[tuple[str, int]]:
-    """Return the Fortran procedures of a text, with those inside them, and their lines."""
-    prefix = (
-        r"(?:(?:pure|impure|elemental|recursive|module|integer|logical|real|type)(?:\(\w+\))? +)*"
-    )
-    found: list[tuple[str, int]] = []
-    open_ones: list[tuple[str, int]] = []
-    for number, line in enumerate(text.lower().splitlines()):
-        if begin := re.match(rf" *{prefix}(?:subroutine|function) +(\w+)", line):
-            open_ones.append((begin[1], number))
-        elif re.match(r" *end *(subroutine|function)\b", line):
-            name, first = open_ones.pop()
-            found.append((name, number - first + 1))
-    assert not open_ones
-    return found
-
-
 def require_no_circle(uses: dict[str, set[str]]) -> None:
     """Raise CycleError with the circle where modules use each other in one."""
     TopologicalSorter(uses).prepare()
@@ -162,17 +132,16 @@ def test_every_call_of_python_is_guarded() -> None:
     body = re.compile(r"(?sm)^   subroutine (\w+).*?\n\n(.*?)^   end subroutine")
     public = re.compile(r"(?m)^   public :: (.*)")
     unguarded = set()
-    for path in sorted((SOURCES / "api").glob("*.f90")):
-        text = path.read_text(encoding="utf-8")
-        bodies = dict(body.findall(text))
-        for name in re.findall(r"\w+", " ".join(public.findall(text))):
-            lines = [line.partition("!")[0].strip() for line in bodies[name].splitlines()]
-            ends = (lines[0], lines[-1])
-            early = any(re.search(r"\breturn\b", line) for line in lines)
-            if early or ends != ("call begin_call()", "call end_call()"):
-                unguarded.add(name)
-    # These compute nothing.
-    assert unguarded == {"collect", "end_calls", "get_progress"}
+    text = (SOURCES / "api/api.f90").read_text(encoding="utf-8")
+    bodies = dict(body.findall(text))
+    for name in re.findall(r"\w+", " ".join(public.findall(text))):
+        lines = [line.partition("!")[0].strip() for line in bodies[name].splitlines()]
+        ends = (lines[0], lines[-1])
+        early = any(re.search(r"\breturn\b", line) for line in lines)
+        if early or ends != ("call begin_call()", "call end_call()"):
+            unguarded.add(name)
+    # One asks another, the others compute nothing.
+    assert unguarded == {"ask_alone", "collect", "end_calls", "get_progress"}
 
 
 def test_fortran_names_no_figures_of_the_driver() -> None:
@@ -182,17 +151,6 @@ def test_fortran_names_no_figures_of_the_driver() -> None:
         if re.search(r"\.(png|svg|gif)\b", path.read_text(encoding="utf-8"))
     }
     assert not found
-
-
-def test_procedures_are_short() -> None:
-    assert len(LONG) <= 5
-    long = [
-        name
-        for path in SOURCES.rglob("*.f90")
-        for name, lines in procedures(path.read_text(encoding="utf-8"))
-        if lines > 60
-    ]
-    assert sorted(long) == sorted(LONG)
 
 
 def test_rooms_of_the_driver_are_in_order() -> None:
@@ -213,14 +171,6 @@ def test_circles_of_fortran_are_found(tmp_path: Path) -> None:
     assert fortran_uses(tmp_path) == {"a/one.f90": {"b/two.f90"}, "b/two.f90": {"a/one.f90"}}
     with pytest.raises(CycleError):
         require_no_circle(fortran_uses(tmp_path))
-
-
-def test_procedures_are_counted_with_those_inside() -> None:
-    inner = "pure function f(x) result(y)\nend function f\n"
-    text = (
-        f"subroutine s(a)\ncontains\n{inner}end subroutine s\nreal(wp) function g()\nend function"
-    )
-    assert procedures(text) == [("f", 2), ("s", 5), ("g", 2)]
 
 
 def test_caches_of_functions_with_arguments_are_bounded() -> None:

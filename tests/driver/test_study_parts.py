@@ -16,16 +16,15 @@ from scipy.stats import norm
 import thud
 from thud.base._schema import KEYS
 from thud.impact.quantities import RATING
-from thud.studies import designs
-from thud.studies.design_map import KIND as DESIGN, DesignMap, _mark
-from thud.studies.emulation.answered_levels import AnsweredLevels, confirmed, within_region
-from thud.studies.emulation.doubtful import judge_many
-from thud.studies.emulation.emulator import Surrogate
-from thud.studies.emulation.plan import MAX_DROPS, MIN_DROPS, Plan, read_plan
-from thud.studies.emulation.training import regress
+from thud.studies import sampling
+from thud.studies.design import KIND as DESIGN, Design, _mark
 from thud.studies.parameter import MAX_VALUES, Parameter, varied
 from thud.studies.sensitivity import sobol_indices
+from thud.studies.surrogate_levels import SurrogateLevels, confirmed, within_region
+from thud.studies.surrogate_plan import MAX_DROPS, MIN_DROPS, Plan, read_plan
+from thud.studies.surrogate_training import regress
 from thud.studies.temperature import Temperature, read_temperature
+from thud.studies.trained_surrogate import Surrogate, assess_many
 from thud.studies.uncertainty import Uncertainty
 
 OWNERS = ("modal_ball",)
@@ -127,34 +126,34 @@ def test_bounds_of_parameters(name: str, given: dict[str, Any], words: str) -> N
     ],
 )  # fmt: skip
 def test_bounds_of_designs(given: dict[str, Any], words: str) -> None:
-    kinds = (*designs.DRAWN, "grid", "list")
+    kinds = (*sampling.SAMPLED, "grid", "list")
     parameters = (real(low=1.0, high=2.0),)
     if words:
         with pytest.raises(thud.InputError, match=words):
-            designs.read_design(given, kinds, parameters)
+            sampling.read_design(given, kinds, parameters)
     else:
         kind = given.get("kind", "random")
         expected = {"design": kind, "size": given["size"], "seed": given.get("seed", 0)}
-        assert designs.read_design(given, kinds, parameters) == expected
+        assert sampling.read_design(given, kinds, parameters) == expected
 
 
 def test_grids_and_lists_need_values_that_fit() -> None:
     two, three = real(low=1.0, high=2.0, count=2), real(values=(1, 2, 3))
-    assert designs.read_design({"kind": "list"}, ("list",), (three, three)) == {"design": "list"}
+    assert sampling.read_design({"kind": "list"}, ("list",), (three, three)) == {"design": "list"}
     with pytest.raises(thud.InputError, match=naming("values")):
-        designs.read_design({"kind": "list"}, ("list",), (two, three))
+        sampling.read_design({"kind": "list"}, ("list",), (two, three))
     with pytest.raises(thud.InputError, match=naming("count", "random")):
-        designs.read_design({"size": 4}, ("random",), (two,))
+        sampling.read_design({"size": 4}, ("random",), (two,))
     largest = tuple(replace(two, count=2**21) for _ in range(3))
     with pytest.raises(thud.InputError, match=naming("grid", "2^63 - 1")):
-        designs.read_design({}, ("grid",), largest)
+        sampling.read_design({}, ("grid",), largest)
     fits = (*largest[:2], replace(two, count=2**21 - 1))
-    assert designs.read_design({}, ("grid",), fits) == {"design": "grid"}
+    assert sampling.read_design({}, ("grid",), fits) == {"design": "grid"}
 
 
 def test_sets_of_saltelli_exchange_one_column_each() -> None:
     """A, A with one column of B for each parameter, B: the points of Saltelli's design."""
-    points = designs.unit_sets("saltelli", 3, 8, 5, 0, 40).reshape(8, 5, 3)
+    points = sampling.unit_samples("saltelli", 3, 8, 5, 0, 40).reshape(8, 5, 3)
     first, second = points[:, 0], points[:, 4]
     for matrix in (first, second):
         # A point in each of eight strata.
@@ -164,13 +163,13 @@ def test_sets_of_saltelli_exchange_one_column_each() -> None:
         mixed = np.where(np.arange(3) == j, second, first)
         np.testing.assert_array_equal(points[:, 1 + j], mixed)
     np.testing.assert_array_equal(
-        designs.unit_sets("saltelli", 3, 8, 5, 7, 23), points.reshape(40, 3)[7:23]
+        sampling.unit_samples("saltelli", 3, 8, 5, 7, 23), points.reshape(40, 3)[7:23]
     )
-    other = designs.unit_sets("saltelli", 3, 8, 6, 0, 40)
+    other = sampling.unit_samples("saltelli", 3, 8, 6, 0, 40)
     assert not np.array_equal(other, points.reshape(40, 3))
-    assert set(designs.makers("saltelli")) == {"scipy_version", "salib_version"}
-    assert set(designs.makers("random")) == {"scipy_version"}
-    assert not designs.makers("grid")
+    assert set(sampling.sampler_versions("saltelli")) == {"scipy_version", "salib_version"}
+    assert set(sampling.sampler_versions("random")) == {"scipy_version"}
+    assert not sampling.sampler_versions("grid")
 
 
 def test_what_varies_by_rounding_only_has_no_indices() -> None:
@@ -260,13 +259,13 @@ def test_fewest_drops_are_those_of_the_order_statistic() -> None:
 
 
 def test_verdict_is_in_doubt_where_errors_reach_a_limit() -> None:
-    criteria = thud.judge(np.zeros(5), 0, 0, 0, 0, 0).criteria
+    criteria = thud.assess(np.zeros(5), 0, 0, 0, 0, 0).criteria
     middle = np.array([(one.lower + one.upper) / 2 for one in criteria])
     half = np.array([(one.upper - one.lower) / 2 for one in criteria])
 
     def verdict(value: np.ndarray, error: np.ndarray) -> tuple[float, bool, bool]:
         parts = [(row[None, :5], *(row[i : i + 1] for i in range(5, 10))) for row in (value, error)]
-        found = judge_many(parts[0], parts[1], "rubber_ball")  # type: ignore[arg-type]
+        found = assess_many(parts[0], parts[1], "rubber_ball")  # type: ignore[arg-type]
         return tuple(found[name][0] for name in ("margin", "conforms", "doubtful"))  # type: ignore[return-value]
 
     none = np.zeros(10)
@@ -289,8 +288,8 @@ def test_verdict_is_in_doubt_where_errors_reach_a_limit() -> None:
 
 def test_range_of_a_surrogate_counts_doubtful_sets_twice() -> None:
     dataset = xr.Dataset(
-        {"conforms": ("set", [True, True, True, False, False, False, False, False]),
-         "doubtful": ("set", [True, False, False, True, True, False, False, False])}
+        {"conforms": ("sample", [True, True, True, False, False, False, False, False]),
+         "doubtful": ("sample", [True, False, False, True, True, False, False, False])}
     )  # fmt: skip
     found = Uncertainty(dataset, np.empty((8, 5)), "rubber_ball", 3, 8, 0)
     assert found.surrogate_range == (2 / 8, 5 / 8)
@@ -299,14 +298,14 @@ def test_range_of_a_surrogate_counts_doubtful_sets_twice() -> None:
 
 
 def test_table_of_the_uncertainty_has_the_shares_within_the_limits() -> None:
-    criteria = thud.judge(np.zeros(5), 0, 0, 0, 0, 0).criteria[:5]
+    criteria = thud.assess(np.zeros(5), 0, 0, 0, 0, 0).criteria[:5]
     draw = np.random.default_rng(3)
     levels = np.array([(c.lower + c.upper) / 2 for c in criteria]) + draw.normal(0, 2, (200, 5))
     # Limits are allowed values.
     levels[0], levels[1] = ([getattr(c, end) for c in criteria] for end in ("lower", "upper"))
     # A set without result has no rating.
     rating = draw.normal(50, 20, 201)
-    rated = xr.Dataset({RATING: ("set", rating), "status": ("set", [0] * 200 + [1])})
+    rated = xr.Dataset({RATING: ("sample", rating), "status": ("sample", [0] * 200 + [1])})
 
     def spread(level: np.ndarray) -> tuple[str, ...]:
         ordered = np.sort(level)
@@ -329,11 +328,11 @@ def test_best_place_of_a_map_is_shown_in_its_unit() -> None:
             "mass": {"values": [2.6, 2.4]},
         }
     }
-    found = thud.design_map(study)
+    found = thud.design(study)
     margin = found.dataset["margin"].values
     rows = dict(found.table())
     i, j = np.unravel_index(margin.argmax(), margin.shape)
-    assert rows["sets"] == "6"
+    assert rows["samples"] == "6"
     assert float(rows["largest margin, dB"]) == pytest.approx(margin.max(), abs=0.006)
     assert float(rows["  at height, cm"]) == pytest.approx([90, 100, 110][i])
     assert float(rows["  at mass, kg"]) == [2.4, 2.6][j]
@@ -342,7 +341,7 @@ def test_best_place_of_a_map_is_shown_in_its_unit() -> None:
     # Of a room, the lowest rating.
     rating = xr.zeros_like(found.dataset["margin"]) + np.arange(6.0).reshape(3, 2)[::-1]
     dataset = found.dataset.assign(standardised_rating=rating)
-    rows = dict(DesignMap(dataset, found.axes, None, "case").table())
+    rows = dict(Design(dataset, found.axes, None, "case").table())
     assert (rows["  at height, cm"], rows["  at mass, kg"]) == ("110", "2.4")
 
 
@@ -388,7 +387,7 @@ class Found:
     warnings: tuple[str, ...]
 
 
-# What `AnsweredLevels` takes of a comparison with levels.
+# What `SurrogateLevels` takes of a comparison with levels.
 MISFIT: dict[str, Any] = {
     "kind": "floor", "bands": "octave", "known_noise": True, "places": np.array([1, 3]),
     "extra": ("contact_time", "restitution"), "target": np.array([40.0, 20.0, 0.02, 0.8]),
@@ -408,7 +407,7 @@ class _Answers:
 
 
 def test_errors_of_a_surrogate_add_to_the_variances() -> None:
-    found = AnsweredLevels(SimpleNamespace(**MISFIT), _Answers(), thud.Case())  # type: ignore[arg-type]
+    found = SurrogateLevels(SimpleNamespace(**MISFIT), _Answers(), thud.Case())  # type: ignore[arg-type]
     # dB of 20 lg: a relative error of ln 10/20 for each, and one sample of the contact time.
     relative = np.log(10) / 20
     expected = np.array([
@@ -417,7 +416,7 @@ def test_errors_of_a_surrogate_add_to_the_variances() -> None:
     assert found.model_error == pytest.approx(expected)
     assert found.deviation == pytest.approx(np.sqrt(MISFIT["deviation"] ** 2 + expected**2))
     with pytest.raises(thud.InputError, match="elastic_level"):
-        AnsweredLevels(
+        SurrogateLevels(
             SimpleNamespace(**{**MISFIT, "kind": "elastic"}),  # type: ignore[arg-type]
             _Answers(), thud.Case(),  # type: ignore[arg-type]
         )  # fmt: skip
@@ -461,7 +460,7 @@ def test_result_that_the_surrogate_misses_is_doubted(
         known_noise=noise,
         values=lambda impact: np.array([off, 5.0, 0.0]) if impact == "model" else np.zeros(3),
     )  # fmt: skip
-    monkeypatch.setattr("thud.studies.emulation.answered_levels.compute", lambda _: "model")
+    monkeypatch.setattr("thud.studies.surrogate_levels.compute", lambda _: "model")
     target = Target(case=None, misfit=misfit, impact="answer")
     found = confirmed(Found((target,), ("before",)))  # type: ignore[arg-type]
     assert found.targets[0].impact == "model"
@@ -518,7 +517,7 @@ def test_answers_are_the_verdict_of_what_is_predicted() -> None:
     worst = judged[int(np.argmax(surrogate.errors[judged]))]
     assert surrogate.worst == (surrogate.labels[worst], surrogate.errors[worst])
     # A level at its limit within the error is in doubt, and so is a time by its ratio.
-    limit = thud.judge(np.zeros(5), 0, 0, 0, 0, 0).criteria[5].upper
+    limit = thud.assess(np.zeros(5), 0, 0, 0, 0, 0).criteria[5].upper
     for decibels, doubt in ((0.5, True), (1.5, False)):
         mean = surrogate.mean.copy()
         mean[10] = 20 * np.log10(limit) - decibels * surrogate.errors[10]

@@ -13,10 +13,9 @@ from scipy.stats import binom, norm
 
 import thud
 from thud import cli
-from thud.studies.emulation.doubtful import judge_many
-from thud.studies.emulation.emulator import keys_of
-from thud.studies.emulation.plan import Plan
-from thud.studies.emulation.training import regress
+from thud.studies.surrogate_plan import Plan
+from thud.studies.surrogate_training import regress
+from thud.studies.trained_surrogate import assess_many, keys_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -104,7 +103,7 @@ def test_margin_and_verdict_are_those_of_the_library(direct: thud.Uncertainty) -
         np.array([1]), np.array([2.5]), known["height"].values,
     )  # fmt: skip
     none = (np.zeros((1, 5)), *[np.zeros(1)] * 5)
-    found = judge_many(values, none, "rubber_ball")
+    found = assess_many(values, none, "rubber_ball")
     np.testing.assert_array_equal(found["margin"], known["margin"])
     np.testing.assert_array_equal(found["conforms"], known["conforms"])
     assert not found["doubtful"].any()
@@ -114,7 +113,9 @@ def test_margin_and_verdict_are_those_of_the_library(direct: thud.Uncertainty) -
     by = (*none[:-1], np.full(1, 0.01))
     close = np.minimum(np.abs(height - 0.99), np.abs(height - 1.01)) < 0.01
     others = found["margin"] >= 0
-    np.testing.assert_array_equal(judge_many(values, by, "rubber_ball")["doubtful"], close & others)
+    np.testing.assert_array_equal(
+        assess_many(values, by, "rubber_ball")["doubtful"], close & others
+    )
 
 
 def test_powers_of_a_lumped_source_are_learned() -> None:
@@ -316,7 +317,7 @@ def test_training_resumes_and_results_are_kept(
     folder = tmp_path / "results"
     names = {entry.name for entry in folder.iterdir()}
     assert names == {
-        ".thud", "lumped_surrogate.npz", "lumped_training_64.nc", "lumped.png", "lumped.svg"
+        ".thud", "lumped_surrogate.npz", "lumped_training_64.nc", "lumped.svg"
     }  # fmt: skip
     first = thud.read_surrogate(folder / "lumped_surrogate.npz")
     drops = thud.read_sweep(folder / "lumped_training_64.nc")
@@ -356,14 +357,14 @@ def test_map_shows_verdicts_in_doubt(trained: thud.Surrogate) -> None:
             "youngs_modulus": {"low": 1.7, "high": 1.9, "count": 21, "unit": "MPa"},
         },
     }
-    margin = np.abs(thud.design_map(study, surrogate=trained).dataset["margin"].values)
+    margin = np.abs(thud.design(study, surrogate=trained).dataset["margin"].values)
     # Errors of the levels as large as half of the margins.
     error = float(np.median(margin))
     level = ["level" in name for name in trained.labels]
     residuals = np.full_like(trained.residuals, error) * level
-    found = thud.design_map(study, surrogate=replace(trained, residuals=residuals, bound=error))
+    found = thud.design(study, surrogate=replace(trained, residuals=residuals, bound=error))
     doubtful = found.dataset["doubtful"]
-    limits = {one.name: one for one in thud.judge([0] * 5, 0, 0, 1, 0, 0).criteria}
+    limits = {one.name: one for one in thud.assess([0] * 5, 0, 0, 1, 0, 0).criteria}
     rest = [
         (found.dataset[name] >= limits[name].lower) & (found.dataset[name] <= limits[name].upper)
         for name in ("contact_time", "restitution")
@@ -374,7 +375,7 @@ def test_map_shows_verdicts_in_doubt(trained: thud.Surrogate) -> None:
     )
     assert 0 < int(doubtful.sum()) < doubtful.size
     assert ("in doubt by the surrogate", f"{int(doubtful.sum())}") in found.table()
-    labels = [text.get_text() for text in thud.plot.draw_design_map(found).legends[0].get_texts()]
+    labels = [text.get_text() for text in thud.plot.draw_design(found).legends[0].get_texts()]
     assert "In doubt by surrogate" in labels
 
 

@@ -26,7 +26,7 @@ from thud.base._schema import MODELS
 from thud.base.units import MULTIPLES, scaled
 from thud.case.keys import known_keys, put
 from thud.impact.ensemble import get_cost
-from thud.studies import designs, directory, evaluation, fit, sweep
+from thud.studies import directory, evaluation, fit, sampling, sweep
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -62,7 +62,7 @@ def test_grid_holds_what_single_drops_give() -> None:
                     np.testing.assert_allclose(
                         cell[f"{force}_level"], impact.levels(force=force), rtol=0, atol=1e-6
                     )
-                verdict = impact.conformity()
+                verdict = impact.assess()
                 assert bool(cell["conforms"]) == verdict.conforms
                 margins = [min(c.value - c.lower, c.upper - c.value) for c in verdict.criteria[:5]]
                 assert float(cell["margin"]) == pytest.approx(min(margins), abs=1e-6)
@@ -116,8 +116,8 @@ def test_other_makers_of_points_are_another_study(monkeypatch: pytest.MonkeyPatc
     found = thud.sweep(drawn)
     assert found.attrs["scipy_version"] == scipy.__version__
     assert "salib_version" not in found.attrs
-    assert "salib_version" in designs.makers("saltelli")
-    monkeypatch.setattr(designs, "version", lambda _: "0.0.1")
+    assert "salib_version" in sampling.sampler_versions("saltelli")
+    monkeypatch.setattr(sampling, "version", lambda _: "0.0.1")
     assert drawn.identity != before[0]
     assert grid.identity == before[1]
 
@@ -144,10 +144,12 @@ def test_multiples_are_exact() -> None:
 
 @pytest.mark.parametrize("design", ["random", "latin_hypercube", "sobol"])
 def test_drawn_designs_fill_their_range(design: str) -> None:
-    whole = designs.unit_sets(design, 3, 256, 5, 0, 256)
-    parts = [designs.unit_sets(design, 3, 256, 5, a, b) for a, b in ((0, 1), (1, 100), (100, 256))]
+    whole = sampling.unit_samples(design, 3, 256, 5, 0, 256)
+    parts = [
+        sampling.unit_samples(design, 3, 256, 5, a, b) for a, b in ((0, 1), (1, 100), (100, 256))
+    ]
     np.testing.assert_array_equal(np.concatenate(parts), whole)
-    assert not np.array_equal(designs.unit_sets(design, 3, 256, 6, 0, 256), whole)
+    assert not np.array_equal(sampling.unit_samples(design, 3, 256, 6, 0, 256), whole)
     if design == "random":
         # Six standard errors of the mean of a uniform distribution.
         assert abs(whole.mean() - 0.5) < 6 / np.sqrt(12 * whole.size)
@@ -209,7 +211,7 @@ def test_list_pairs_values_and_entries_of_lists() -> None:
             },
         }
     )
-    assert found["contact_time"].dims == ("set",)
+    assert found["contact_time"].dims == ("sample",)
     options = {"damping_ratio": [0.04, 0.05], "effective_mass": [2.4, 0.1]}
     impact = thud.solve(model="measured_modes", frequency=[24.0, 80.0], **options)
     assert float(found["peak_force"][0]) == impact.peak_force
@@ -339,7 +341,7 @@ def test_sets_give_what_single_drops_give(fixed: dict[str, str]) -> None:
         for force in ("elastic", "floor"):
             levels = impact.levels(force=force)
             np.testing.assert_allclose(one[f"{force}_level"], levels, rtol=0, atol=1e-6)
-        verdict = impact.conformity(study.case.limits.source, study.case.levels.force)
+        verdict = impact.assess(study.case.limits.source, study.case.levels.force)
         assert bool(one["conforms"]) == verdict.conforms
 
 
@@ -455,7 +457,7 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         (
             "parameters = {height=$, mass=$, gravity=$}".replace(
                 "$", "{low=1, high=2, count=10_000_000}"),
-            naming("sets", "2^63 - 1", "grid"),
+            naming("samples", "2^63 - 1", "grid"),
         ),
         (f"design.seed = 1{'0' * 5000}", naming("TOML")),
         ("parameters.height = {std=1}", naming("height", "values", "grid")),
@@ -550,14 +552,14 @@ def test_bad_studies_are_reported(
 
 
 @pytest.mark.parametrize(
-    ("compute", "design"), [(thud.sweep, "grid"), (thud.sweep, "list"), (thud.design_map, "grid")]
+    ("compute", "design"), [(thud.sweep, "grid"), (thud.sweep, "list"), (thud.design, "grid")]
 )
 def test_exploding_designs_are_reported_before_they_are_made(
     compute: Callable[[dict[str, Any]], object], design: str
 ) -> None:
     spread = {"low": 1, "high": 2, "count": 10**9}
     study = {"design": {"kind": design}, "parameters": {"mass": spread, "height": spread}}
-    with pytest.raises(thud.InputError, match=naming("sets", "hollow_sphere")):
+    with pytest.raises(thud.InputError, match=naming("samples", "hollow_sphere")):
         compute(study)
 
 
@@ -623,7 +625,7 @@ def test_command_writes_figure_and_table(
     monkeypatch.chdir(tmp_path)
     assert cli.main(["sweep", str(REPOSITORY / "inputs/studies/sweep.toml")]) == 0
     folder = tmp_path / "outputs/sweep"
-    names = [".thud", "sweep.nc", "sweep.png", "sweep.svg"]
+    names = [".thud", "sweep.nc", "sweep.svg"]
     assert sorted(path.name for path in folder.iterdir()) == names
     printed = capsys.readouterr()
     assert re.search(naming(80, "hollow_sphere", "0.085 MB"), printed.err)
@@ -642,7 +644,7 @@ def test_study_without_results_is_a_failure(
 
 def test_study_of_another_kind_is_reported() -> None:
     study = thud.read_study(HEIGHTS)
-    for function in (thud.sensitivity, thud.design_map, thud.uncertainty):
+    for function in (thud.sensitivity, thud.design, thud.uncertainty):
         with pytest.raises(thud.InputError, match=naming("python", "sweep")):
             function(study)
 
@@ -712,5 +714,5 @@ def test_design_that_exceeds_the_memory_is_told(
 def test_sets_that_exceed_the_memory_are_told_before_they_are_computed() -> None:
     height = thud.Parameter(low=0.5, high=1.0, count=2**30)
     mass = thud.Parameter(low=2.4, high=2.6, count=2**30)
-    with pytest.raises(thud.InputError, match=f"{2**60} sets"):
+    with pytest.raises(thud.InputError, match=f"{2**60} samples"):
         thud.sweep({"parameters": {"height": height, "mass": mass}}, yes=True)

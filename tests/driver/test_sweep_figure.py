@@ -73,7 +73,7 @@ def test_texts_alone_are_the_axis() -> None:
     assert axes.get_xlabel() == "Momentum flux"
 
 
-def test_every_set_has_the_nominal_levels_of_its_source_and_its_judged_force() -> None:
+def test_every_set_has_the_nominal_levels_of_its_source_and_its_assessed_force() -> None:
     sources, forces = ["rubber_ball", "tyre"], ["elastic", "floor"]
     for force in forces:
         figure = draw(
@@ -81,7 +81,7 @@ def test_every_set_has_the_nominal_levels_of_its_source_and_its_judged_force() -
         )
         for axes, source in zip(figure.axes, sources, strict=True):
             impact = thud.solve()
-            limits = impact.conformity(source).criteria[:5]
+            limits = impact.assess(source).criteria[:5]
             nominal = [(limit.lower + limit.upper) / 2 for limit in limits]
             np.testing.assert_allclose(curves(axes)[1], impact.levels(force=force) - nominal)
     figure = draw(parameters={"force": {"values": forces}, "height": HEIGHTS})

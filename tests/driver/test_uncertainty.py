@@ -97,7 +97,7 @@ def test_figure_shows_distribution_over_tolerance() -> None:
     result = thud.uncertainty({**SMALL, "design": {"size": 40}})
     figure = thud.plot.draw_uncertainty(result)
     (axes,) = figure.axes
-    limits = thud.solve().conformity().criteria[:5]
+    limits = thud.solve().assess().criteria[:5]
     boxes = [body.get_datalim(axes.transData).intervaly for body in axes.collections[:5]]
     half = [(c.upper - c.lower) / 2 for c in limits]
     np.testing.assert_allclose(boxes, [(-h, h) for h in half])
@@ -108,7 +108,7 @@ def test_figure_shows_distribution_over_tolerance() -> None:
     share = f"{100 * result.probability:.1f} % ({100 * low:.1f} to {100 * high:.1f} %)"
     assert figure.legends[0].get_title().get_text() == f"All criteria met: {share}"
     words = {"floor": "force on the floor", "elastic": "elastic force"}
-    assert words[result.dataset.attrs["judged_force"]] in axes.get_ylabel()
+    assert words[result.dataset.attrs["assessed_force"]] in axes.get_ylabel()
 
 
 def test_command_writes_figure_and_table(

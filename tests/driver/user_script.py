@@ -29,7 +29,7 @@ again = (
     thud.solve(thud.read_case(folder / "mine.nml")),
     thud.read_results(folder / "outputs/mine"),
 )
-verdict: thud.Conformity = thud.judge([39, 31, 23, 17, 12], 0.02, 0.8, 1, 2.5, 1.0, "tyre")
+verdict: thud.Verdict = thud.assess([39, 31, 23, 17, 12], 0.02, 0.8, 1, 2.5, 1.0, "tyre")
 missed: list[thud.Criterion] = [one for one in verdict.criteria if not one.conforms]
 modes: thud.FreeModes = thud.free_modes(ball, thud.Modes(count=2).count, polar_elements=16)
 press = thud.Compression(gas="isothermal")
@@ -44,6 +44,7 @@ noise = np.random.default_rng(1).normal(scale=0.5, size=8000 + len(flagship.time
 plate = np.pad(flagship.floor_force, 4000) + noise
 np.savetxt(folder / "record.csv", np.c_[np.arange(len(plate)) / flagship.sample_rate, plate])
 record: thud.Recording = thud.read_recording(folder / "record.csv", height=1.0, mass=2.5)
+contact: thud.Estimate = record.estimates["contact_time"]
 page: thud.Comparison = thud.compare({**impacts, "record": record}, force="floor")
 restored: thud.Case = thud.read_case(folder / "mine.nml")
 files = thud.write_report(record, folder / "report")
@@ -85,7 +86,7 @@ modulus = {"youngs_modulus": thud.Parameter(values=[1.6, 2.08], unit="MPa")}
 study: thud.Study = thud.read_study({"parameters": height})
 thud.sweep(study, folder / "sweep")
 kept = thud.read_sweep(folder / f"sweep/{study.name}.nc")
-chart: thud.DesignMap = thud.design_map({"parameters": height | modulus})
+chart: thud.Design = thud.design({"parameters": height | modulus})
 learned: thud.Surrogate = thud.surrogate({"parameters": mass})
 learned.save(folder / "mass.npz")
 trained = thud.read_surrogate(folder / "mass.npz")

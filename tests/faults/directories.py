@@ -122,7 +122,7 @@ def check_calls(tries: Tries, folder: Path) -> Iterable[Finding]:
         place = made(folder / "calls", old, way)
         done, calls = fail(place.order(new), at, action)
         call = calls[at - 1]
-        # Where the call is of the screen, the results are there and their remarks are not.
+        # Where the call is of the screen, the results are there and their warnings are not.
         written = done.code == 0 or "are written" in done.said or "(deleted)" in call
         if done.code not in (0, 1, 2, -9, 130, 143):
             word = "crashed"
@@ -223,9 +223,9 @@ def check_damage(tries: Tries, folder: Path) -> Iterable[Finding]:
 
 
 def _compared(found: thud.Impact, whole: thud.Impact, said: str) -> Finding:
-    """Return whether results that were read are those before the damage, or come with a remark."""
-    if found.remarks != whole.remarks:
-        return Finding("read with a remark")
+    """Return whether results that were read are those before the damage, or come with a warning."""
+    if found.warnings != whole.warnings:
+        return Finding("read with a warning")
     same = np.array_equal(found.floor_force, whole.floor_force) and found.case == whole.case
     return Finding("read" if same and found.contact_time == whole.contact_time else "mixed", said)
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from thud.base.key import Group, Key
 
 # Changes of contact time and restitution by steps half as long, measured up to 2e-6; of levels by
-# four times as many samples, measured up to 0.19 dB where no remark tells of the rate.
+# four times as many samples, measured up to 0.19 dB where no warning tells of the rate.
 STEP_CHANGE, RATE_CHANGE = 1e-5, 0.25
 # Powers of mass, length and time in the units of keys.
 POWERS = {"": (0, 0, 0), "m": (0, 1, 0), "kg": (1, 0, 0), "s": (0, 0, 1), "Hz": (0, 0, -1),
@@ -41,9 +41,9 @@ def _finer_steps(impact: thud.Impact, _: random.Random) -> str:
 
 
 def is_of_step(impact: thud.Impact) -> bool:
-    """Return whether a restitution above 1 is remarked, and an error of the step."""
+    """Return whether a restitution above 1 raises a warning, and an error of the step."""
     excess = impact.restitution - 1
-    if not any("gives energy to the source" in one for one in impact.remarks):
+    if not any("gives energy to the source" in one for one in impact.warnings):
         return False
     finer = thud.solve(_sampled(impact.case, substeps=4 * impact.case.sampling.substeps))
     return abs(finer.restitution - 1) < excess / 4
@@ -51,7 +51,7 @@ def is_of_step(impact: thud.Impact) -> bool:
 
 def _more_samples(impact: thud.Impact, _: random.Random) -> str:
     case = impact.case
-    told = any("sample_rate in Hz" in one or "1e-12" in one for one in impact.remarks)
+    told = any("sample_rate in Hz" in one or "1e-12" in one for one in impact.warnings)
     if (
         told
         or case.model is None

@@ -1,4 +1,4 @@
-"""Laws that every answer keeps, and remarks that answers outside a theory must have."""
+"""Laws that every answer keeps, and warnings that answers outside a theory must have."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ def get_fault(impact: thud.Impact) -> str:
         if broken:
             return f"{'on floor' if one is impact.on_floor else 'rigid'}: {', '.join(broken)}"
     missing = [words for words, outside in _outside(impact).items()
-               if outside and not any(words in remark for remark in impact.remarks)]  # fmt: skip
-    return f"no remark on {', '.join(missing)}" if missing else ""
+               if outside and not any(words in warning for warning in impact.warnings)]  # fmt: skip
+    return f"no warning on {', '.join(missing)}" if missing else ""
 
 
 def _laws(impact: thud.Impact) -> dict[str, bool]:
@@ -78,7 +78,7 @@ def _energy(levels: np.ndarray) -> float:
 
 
 def _outside(impact: thud.Impact) -> dict[str, bool]:
-    """Return which remarks an answer must have."""
+    """Return which warnings an answer must have."""
     case = impact.case
     ball, rate, radius = case.ball, case.sampling.sample_rate, case.ball.outer_radius
     wall = case.model is not None and case.model.name in (

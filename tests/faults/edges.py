@@ -68,7 +68,7 @@ def _many(cases: list[thud.Case]) -> Iterable[Finding]:
         if right and many.restitution[i] <= 1 + BALANCE:
             yield Finding("computed")
         elif right and is_of_step(thud.solve(case)):
-            yield Finding("remarked")
+            yield Finding("warned")
         else:
             yield Finding("wrong", f"{many.restitution[i]}; {case_text(case).decode().split()}")
 
@@ -87,5 +87,5 @@ def _try(model: str, chance: random.Random) -> Finding:
         except thud.ThudError as error:
             return Finding("NaN", str(error)) if "NaN" in str(error) else Finding("refused")
     if wrong:
-        return Finding("wrong", f"{wrong}; {case_text(case).decode().split()} {impact.remarks}")
-    return Finding("remarked" if impact.remarks else "computed")
+        return Finding("wrong", f"{wrong}; {case_text(case).decode().split()} {impact.warnings}")
+    return Finding("warned" if impact.warnings else "computed")

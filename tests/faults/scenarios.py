@@ -87,7 +87,7 @@ def _sweep(*words: str) -> list[str]:
 
 SCENARIOS = {
     "run": Scenario(["thud", "IN/case.nml", "-q", "-o", OUT], 60),
-    "sets": Scenario(["thud", "IN/case.nml", "-q", "-o", OUT, "--sets", "table.csv"], 25),
+    "sets": Scenario(["thud", "IN/case.nml", "-q", "-o", OUT, "--samples", "table.csv"], 25),
     "sweep": Scenario(_sweep("--workers", "2"), 6, study=True),
     "zarr": Scenario(_driver("sweep", "IN/zarr.toml", "--no-figures"), 2, study=True),
     "surrogate": Scenario(_driver("uncertainty", "IN/learned.toml", "--no-figures"), 1, study=True),

@@ -116,7 +116,7 @@ def _read_recording(path: Path) -> np.ndarray:
 def _read_sets(path: Path, _: random.Random) -> str:
     Path("case.nml").write_text(CASE)
     done = subprocess.run(
-        [executable(), "case.nml", "--sets", str(path), "-q", "-o", "o", "--threads", "1"],
+        [executable(), "case.nml", "--samples", str(path), "-q", "-o", "o", "--threads", "1"],
         capture_output=True, timeout=PATIENCE, check=False,
     )  # fmt: skip
     found = [one.read_bytes() for one in Path("o").iterdir()] if Path("o").exists() else []
@@ -138,7 +138,7 @@ def _read_sets(path: Path, _: random.Random) -> str:
 def _read_mobility(path: Path, chance: random.Random) -> str:
     order = chance.choice([2, 4, 8, 8, 8, None if chance.random() < 0.1 else 1])
     found = fit_mobility(path, order=order)
-    said = format_rows(found.rows()) + "".join(found.remarks) + repr(found)
+    said = format_rows(found.rows()) + "".join(found.warnings) + repr(found)
     call(api.check_text, f"&ball / &drop / &model / {found.namelist()}".encode())
     return said if INNER.search(said) else ""
 
@@ -146,7 +146,7 @@ def _read_mobility(path: Path, chance: random.Random) -> str:
 def _read_levels(path: Path, chance: random.Random) -> str:
     found = read_room_levels(path, volume=chance.choice([None, 41.4, 1e5]))
     said = levels_csv(found).decode() + format_rows(found.rows()) + format_rows(rating_table(found))
-    return said if INNER.search(said + "".join(found.remarks)) else ""
+    return said if INNER.search(said + "".join(found.warnings)) else ""
 
 
 def _read_force(path: Path, _: random.Random) -> str:

@@ -28,7 +28,7 @@ def test_broken_laws_are_found(values: dict[str, float], words: str) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
-def test_missing_remark_is_found() -> None:
+def test_missing_warning_is_found() -> None:
     impact = thud.solve(thud.Ball(poisson_ratio=0.3))
     assert get_fault(impact) == ""
-    assert get_fault(replace(impact, remarks=())) == "no remark on poisson_ratio"
+    assert get_fault(replace(impact, warnings=())) == "no warning on poisson_ratio"

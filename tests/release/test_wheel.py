@@ -109,7 +109,7 @@ def test_a_newcomer_gets_figure_3_and_a_verdict(tmp_path: Path) -> None:
         return done.stdout
 
     driver("figures")
-    assert (tmp_path / "outputs/figures/figure3_levels.png").stat().st_size > 10_000
+    assert (tmp_path / "outputs/figures/figure3_levels.svg").stat().st_size > 10_000
     driver("examples")
     recordings = sorted(map(str, (tmp_path / "inputs/recordings").glob("drop_*.wav")))
     told = driver("measure", *recordings, "--config", "inputs/recordings/lab.toml")

@@ -21,9 +21,10 @@ import numpy as np
 import thud
 from thud.base.errors import InputError
 from thud.impact.contact_time import THRESHOLD, contact_span
+from thud.level.estimate import Estimate
 from thud.recordings import contact as contact_module
 from thud.recordings.band_noise import band_functionals
-from thud.recordings.contact import Contact, Estimate
+from thud.recordings.contact import Contact
 from thud.recordings.drops import Window
 from thud.recordings.noise import MAINS, Background
 from thud.recordings.recorded_levels import ENERGY_DECIBEL, measure_levels
@@ -32,7 +33,7 @@ from thud.recordings.signal import Signal
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from thud.recordings.estimates import Drop
+    from thud.recordings.measured_drop import Drop
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "driver"))
 from synthetic import HARMONICS, coloured_noise, noise_density

@@ -63,7 +63,7 @@ def test_restitution_of_every_flux_choice(choice: str, restitution: float) -> No
 
 
 def test_two_low_octaves_conform_and_the_others_do_not(impact: thud.Impact) -> None:
-    met = [criterion.conforms for criterion in impact.conformity().criteria[:5]]
+    met = [criterion.conforms for criterion in impact.assess().criteria[:5]]
     assert met == [True, True, False, False, False]
 
 

@@ -7,9 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal, Self
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 from thud.base.key import Group, Key
+from thud.base.quantity import Quantity
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 __all__ = [
     "Ball",
@@ -420,7 +425,7 @@ class FiniteElement(Group):
     prony_time: Sequence[float] = field(default=(), metadata={"group": "material"})
     friction: float = field(default=0.0, metadata={"group": "contact"})
     layer_stiffness: float = field(default=0.0, metadata={"group": "contact"})
-    snapshot_interval: float = field(default=0.001, metadata={"group": "output"})
+    snapshot_interval: float = field(default=0.0, metadata={"group": "output"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -818,24 +823,119 @@ GROUPS = {
     "limits": Limits,
 }
 
-# Unit and meaning of the numbers that describe an impact.
-SCALARS = {
-    "contact_time": ("s", "contact time"),
-    "peak_force": ("N", "maximum force on the floor"),
-    "peak_elastic_force": ("N", "maximum elastic force"),
-    "max_deflection": ("m", "maximum deflection"),
-    "restitution": ("", "coefficient of restitution"),
-    "impulse": ("N s", "time integral of the force on the floor"),
-    "impact_velocity": ("m/s", "velocity at first touch"),
-    "exact_contact_time": ("s", "contact time between steps"),
-    "touch_time": ("s", "time of first touch in the record"),
-    "sample_rate": ("Hz", "samples per second"),
-    "impulse_residual": ("", "what the balance of momentum misses, relative"),
-    "energy_residual": ("", "what the balance of energy misses, relative"),
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ImpactQuantities:
+    """Numbers that describe an impact.
+
+    Attributes
+    ----------
+    contact_time : float
+        Contact time, s.
+    peak_force : float
+        Maximum force on the floor, N.
+    peak_elastic_force : float
+        Maximum elastic force, N.
+    max_deflection : float
+        Maximum deflection, m.
+    restitution : float
+        Coefficient of restitution.
+    impulse : float
+        Time integral of the force on the floor, N s.
+    impact_velocity : float
+        Velocity at first touch, m/s.
+    exact_contact_time : float
+        Contact time between steps, s.
+    touch_time : float
+        Time of first touch in the record, s.
+    sample_rate : float
+        Samples per second, Hz.
+    impulse_residual : float
+        Relative residual of the balance of momentum.
+    energy_residual : float
+        Relative residual of the balance of energy.
+    """
+
+    contact_time: float
+    peak_force: float
+    peak_elastic_force: float
+    max_deflection: float
+    restitution: float
+    impulse: float
+    impact_velocity: float
+    exact_contact_time: float
+    touch_time: float
+    sample_rate: float
+    impulse_residual: float
+    energy_residual: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SampleQuantities:
+    """Numbers that describe each of many samples.
+
+    Attributes
+    ----------
+    contact_time : ndarray, shape (n_sample,)
+        Contact time, s.
+    peak_force : ndarray, shape (n_sample,)
+        Maximum force on the floor, N.
+    peak_elastic_force : ndarray, shape (n_sample,)
+        Maximum elastic force, N.
+    max_deflection : ndarray, shape (n_sample,)
+        Maximum deflection, m.
+    restitution : ndarray, shape (n_sample,)
+        Coefficient of restitution.
+    impulse : ndarray, shape (n_sample,)
+        Time integral of the force on the floor, N s.
+    """
+
+    contact_time: NDArray[np.float64]
+    peak_force: NDArray[np.float64]
+    peak_elastic_force: NDArray[np.float64]
+    max_deflection: NDArray[np.float64]
+    restitution: NDArray[np.float64]
+    impulse: NDArray[np.float64]
+
+# The table of quantities.
+QUANTITIES = {
+    "contact_time": Quantity("contact_time", "contact time", "T", "s", "ms", 1000.0, 3, "contact time"),
+    "peak_force": Quantity("peak_force", "peak force", "F_{max}", "N", "N", 1.0, 1, "maximum force on the floor"),
+    "peak_elastic_force": Quantity("peak_elastic_force", "peak elastic force", "F_{E,max}", "N", "N", 1.0, 1, "maximum elastic force"),
+    "max_deflection": Quantity("max_deflection", "maximum deflection", "d_{max}", "m", "mm", 1000.0, 3, "maximum deflection"),
+    "restitution": Quantity("restitution", "restitution", "e", "", "", 1.0, 4, "coefficient of restitution"),
+    "impulse": Quantity("impulse", "impulse", "I", "N s", "N s", 1.0, 3, "time integral of the force on the floor"),
+    "impact_velocity": Quantity("impact_velocity", "impact velocity", "v_0", "m/s", "m/s", 1.0, 3, "velocity at first touch"),
+    "exact_contact_time": Quantity("exact_contact_time", "exact contact time", "T", "s", "ms", 1000.0, 3, "contact time between steps"),
+    "touch_time": Quantity("touch_time", "time of first touch", "t_0", "s", "ms", 1000.0, 3, "time of first touch in the record"),
+    "sample_rate": Quantity("sample_rate", "sample rate", "f_s", "Hz", "kHz", 0.001, 3, "samples per second"),
+    "impulse_residual": Quantity("impulse_residual", "impulse residual", "", "", "", 1.0, 6, "relative residual of the balance of momentum"),
+    "energy_residual": Quantity("energy_residual", "energy residual", "", "", "", 1.0, 6, "relative residual of the balance of energy"),
 }
 
-# Those of them that describe each of many drops.
-OUTCOMES = tuple(SCALARS)[:6]
+# Those of them that describe each of many samples.
+SAMPLE_QUANTITIES = tuple(QUANTITIES)[:6]
+
+# Nominal and exact mid frequencies, and edges of the bands of each set, Hz.
+BANDS: dict[BandSet, dict[str, tuple[float, ...]]] = {
+    "octave": {"nominal": (31.5, 63.0, 125.0, 250.0, 500.0), "centre": (31.622776601683793, 63.09573444801933, 125.89254117941672, 251.188643150958, 501.18723362727224), "lower": (22.3872113856834, 44.6683592150963, 89.12509381337455, 177.8279410038923, 354.8133892335755), "upper": (44.6683592150963, 89.12509381337455, 177.8279410038923, 354.8133892335755, 707.9457843841379)},
+    "third": {"nominal": (25.0, 31.5, 40.0, 50.0, 63.0, 80.0, 100.0, 125.0, 160.0, 200.0, 250.0, 315.0, 400.0, 500.0, 630.0), "centre": (25.118864315095795, 31.622776601683793, 39.810717055349734, 50.11872336272722, 63.09573444801933, 79.43282347242814, 100.0, 125.89254117941672, 158.48931924611134, 199.526231496888, 251.188643150958, 316.22776601683796, 398.1071705534972, 501.18723362727224, 630.9573444801932), "lower": (22.3872113856834, 28.183829312644537, 35.48133892335755, 44.6683592150963, 56.23413251903491, 70.79457843841381, 89.12509381337455, 112.20184543019636, 141.25375446227545, 177.8279410038923, 223.87211385683395, 281.83829312644536, 354.8133892335755, 446.68359215096314, 562.341325190349), "upper": (28.183829312644537, 35.48133892335755, 44.6683592150963, 56.23413251903491, 70.79457843841381, 89.12509381337455, 112.20184543019636, 141.25375446227545, 177.8279410038923, 223.87211385683395, 281.83829312644536, 354.8133892335755, 446.68359215096314, 562.341325190349, 707.9457843841379)},
+}
+
+# Nominal frequencies of the bands of each set that a rating is made of, Hz.
+RATED_BANDS: dict[BandSet, tuple[float, ...]] = {
+    "octave": (63.0, 125.0, 250.0, 500.0),
+    "third": (50.0, 63.0, 80.0, 100.0, 125.0, 160.0, 200.0, 250.0, 315.0, 400.0, 500.0, 630.0),
+}
+
+# Name, unit, lower and upper limit of the criteria of each source.
+LIMITS: dict[LimitsSource, tuple[tuple[str, str, float, float], ...]] = {
+    "rubber_ball": (("octave_31_5", "dB", 38.0, 40.0), ("octave_63", "dB", 29.5, 32.5), ("octave_125", "dB", 21.5, 24.5), ("octave_250", "dB", 15.0, 19.0), ("octave_500", "dB", 10.5, 14.5), ("contact_time", "s", 0.018, 0.022), ("restitution", "", 0.7, 0.9), ("peak_count", "", 1.0, 1.0), ("mass", "kg", 2.4, 2.6), ("drop_height", "m", 0.99, 1.01)),
+    "tyre": (("octave_31_5", "dB", 46.0, 48.0), ("octave_63", "dB", 38.5, 41.5), ("octave_125", "dB", 20.5, 23.5), ("octave_250", "dB", 9.5, 13.5), ("octave_500", "dB", 3.5, 7.5), ("contact_time", "s", 0.018, 0.022), ("restitution", "", 0.7, 0.9), ("peak_count", "", 1.0, 1.0), ("mass", "kg", 7.1, 7.5), ("drop_height", "m", 0.84, 0.86)),
+}
+
+# Maximum A-weighted levels of the classes 1, 2, ... of KS F 2863-2, dB.
+CLASS_LIMITS = (37.0, 41.0, 45.0, 49.0)
 
 # Every key, in the order of an input file.
 KEYS = (

@@ -11,83 +11,83 @@ import threading
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from thud import _core
 from thud.base.errors import InputError, NumericalError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
 
     # By name: text, number, array, or more of them.
     Bundle = dict[str, Any]
 
 api = _core.thud_api
-floor_api = _core.thud_floor_api
-level_api = _core.thud_level_api
-ensemble_api = _core.thud_ensemble_api
-mobility_api = _core.thud_mobility_api
 
+# Questions whose answers keep their state in static memory: no other Python thread runs meanwhile.
+_ALONE = {"effective_case", "modes", "run"}
 # The status of an interrupt is this plus the number of the signal.
 _INTERRUPTED = 128
-# Place of the status among the results of procedures that leave a bundle.
-_OF_BUNDLE = -4
 _ERRORS = {error.exit_code: error for error in (InputError, NumericalError)}
 
 
-def call(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> Bundle:
-    """Call a procedure whose results are a status, a handle and sizes; return its bundle.
+def ask(question: str, /, **request: str | bytes | float | NDArray[np.float64]) -> Bundle:
+    """Ask the library a question of `thud_answer`; return its answer.
 
-    It holds texts, numbers and arrays by name; those named ``group.name`` are in a dictionary for
-    each group. Raise InputError or NumericalError with the message of the library.
+    The answer holds texts, numbers and arrays by name; those named ``group.name`` are in a
+    dictionary for each group. An interrupt ends the work early: where handlers of signals, which
+    run in the main thread, have raised nothing, it is done again; other threads raise
+    KeyboardInterrupt. Raise InputError or NumericalError with the message of the library.
     """
-    return collect(*call_through(routine, *arguments))
-
-
-def call_through(
-    routine: Callable[..., tuple[Any, ...]], *arguments: object, status: int = _OF_BUNDLE
-) -> tuple[Any, ...]:
-    """Call a procedure whose status is the result of that number; return all results.
-
-    An interrupt ends it early. Handlers of signals have run by then, in the main thread: where they
-    have raised nothing, the work is to go on and is done again. Other threads raise
-    KeyboardInterrupt.
-    """
-    while (results := routine(*arguments))[status] > _INTERRUPTED:
-        if status == _OF_BUNDLE:
-            api.collect(*results[-3:])
+    routine = api.ask_alone if question in _ALONE else api.ask
+    packed = _packed(request)
+    while (left := routine(question, *packed))[0] > _INTERRUPTED:
+        api.collect(*left[1:])
         if threading.current_thread() is not threading.main_thread():
             raise KeyboardInterrupt
-    return results
+    return _collect(*left)
 
 
-def call_direct(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> tuple[Any, ...]:
-    """Call a procedure whose last two results are a status and a message; return the others.
+def _packed(
+    request: Mapping[str, str | bytes | float | NDArray[np.float64]],
+) -> tuple[str, bytes, NDArray[np.float64]]:
+    """Return header, texts and values of a request; arrays are flattened in Fortran's order."""
+    header = ""
+    texts = b""
+    arrays = []
+    for name, value in request.items():
+        if isinstance(value, str | bytes):
+            encoded = value.encode(errors="surrogateescape") if isinstance(value, str) else value
+            header += f"{name}\tt{len(encoded)}\n"
+            texts += encoded
+        else:
+            array = np.asarray(value, dtype=np.float64).ravel(order="F")
+            header += f"{name}\tn{array.size}\n"
+            arrays.append(array)
+    # f2py knows no empty arrays.
+    return header, texts, np.concatenate(arrays) if arrays else np.zeros(1)
 
-    Raise InputError or NumericalError with the message.
-    """
-    *results, status, message = call_through(routine, *arguments, status=-2)
-    if status:
-        raise _ERRORS.get(status, NumericalError)(trimmed(message))
-    return tuple(results)
 
-
-def collect(status: int, handle: int, n_byte: int, n_value: int) -> Bundle:
-    """Return the results that the library holds under a handle; see `call`."""
+def _collect(status: int, handle: int, n_byte: int, n_value: int) -> Bundle:
+    """Return the answer that the library holds under a handle; see `ask`."""
     data, values = api.collect(handle, n_byte, n_value)
     header, _, texts = data.tobytes().partition(b"\0")
-    found: Bundle = {}
+    answer: Bundle = {}
     at = {"text": 0, "values": 0}
     for group, name, extents, length in _items(header):
-        place = found.setdefault(group, {}) if group else found
+        items = answer.setdefault(group, {}) if group else answer
         if extents is None:
-            place[name] = texts[at["text"] : at["text"] + length]
+            items[name] = texts[at["text"] : at["text"] + length]
             at["text"] += length
         else:
             chunk = values[at["values"] : at["values"] + length]
-            place[name] = chunk.reshape(extents, order="F") if extents else float(chunk[0])
+            items[name] = chunk.reshape(extents, order="F") if extents else float(chunk[0])
             at["values"] += length
     if status:
-        raise _ERRORS.get(status, NumericalError)(text(found["message"]))
-    return found
+        raise _ERRORS.get(status, NumericalError)(text(answer["message"]))
+    return answer
 
 
 @lru_cache(maxsize=64)
@@ -110,21 +110,16 @@ def text(value: bytes) -> str:
     return value.decode(errors="surrogateescape")
 
 
-def trimmed(value: bytes) -> str:
-    """Return a text of the library without trailing blanks."""
-    return text(value).rstrip()
-
-
 def version() -> str:
     """Return the version of the library."""
-    return text(call(api.describe_library)["version"])
+    return text(ask("library")["version"])
 
 
 def compiler() -> str:
     """Return the compiler of the library and its options, without those that hold paths."""
-    return re.sub(r" (-[IJ] ?)?\S*/\S*", "", text(call(api.describe_library)["compiler"]))
+    return re.sub(r" (-[IJ] ?)?\S*/\S*", "", text(ask("library")["compiler"]))
 
 
 def progress() -> float:
-    """Return the part of the latest long work of this process that is done, 0 to 1."""
+    """Return the fraction of the latest long work of this process that is done, 0 to 1."""
     return float(api.get_progress())

@@ -132,7 +132,7 @@ class Results:
             does not.
         marker
             Content of the file that identifies the results of a case, ``effective.nml`` or
-            ``sets.nml``, where the files belong to these results.
+            ``samples.nml``, where the files belong to these results.
 
         Raises
         ------
@@ -143,7 +143,7 @@ class Results:
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         with nullcontext() if self.is_locked else locked(self.folder):
-            held = {content_of(self.folder / name) for name in ("effective.nml", "sets.nml")}
+            held = {content_of(self.folder / name) for name in ("effective.nml", "samples.nml")}
             if marker not in {None, *held}:
                 refuse(f"{self.folder} now holds results of another input", "run the case again")
             listed = self._listed()

@@ -27,7 +27,7 @@ from thud.base._schema import (
     Room,
     Sampling,
 )
-from thud.base.bridge import api, call, text
+from thud.base.bridge import ask, text
 from thud.base.checks import LARGEST, refuse, require_choice, require_kind, require_words, shown
 from thud.base.display import Displayed
 from thud.base.errors import InputError
@@ -256,12 +256,12 @@ def read_case(path: str | os.PathLike[str]) -> Case:
     InputError
         Names file, group, key, value and allowed range.
     """
-    return Case.from_text(text(call(api.effective_case, os.fsencode(path))["case"]))
+    return Case.from_text(text(ask("effective_case", path=os.fsencode(path))["case"]))
 
 
 def check_case(case: Case) -> None:
     """Raise InputError with the message of the library where a case is invalid."""
-    call(api.check_text, case_text(case))
+    ask("check", case=case_text(case))
 
 
 def write_case(case: Case, path: str | os.PathLike[str]) -> None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 Value = float | int | str | bool
 
-# Group of the files that a run writes; it has no effect on sets.
+# Group of the files that a run writes; it has no effect on samples.
 OF_FILES = "output"
 
 # Names of persons and abbreviations, in lower case and as they are written.
@@ -50,7 +50,7 @@ def users(case: Case) -> tuple[str, ...]:
 
 @lru_cache
 def known_keys(owners: tuple[str, ...]) -> Mapping[str, Key]:
-    """Return the keys in which sets may differ, by name; see `users`.
+    """Return the keys in which samples may differ, by name; see `users`.
 
     Those of floor and room have names that begin with their group, such as ``"plate.thickness"``,
     and their own where no other key has it.

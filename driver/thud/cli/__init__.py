@@ -14,6 +14,7 @@ from thud.base.checks import suggestion
 from thud.base.errors import InputError, NumericalError, ThudError
 from thud.cli.calibrate_command import CALIBRATE
 from thud.cli.command import (
+    FORMAT,
     NO_FIGURES,
     QUIET,
     Command,
@@ -54,6 +55,13 @@ COMMANDS = {
             ),
             argument("--check", action="store_true", help="exit with 3 unless all sources conform"),
             NO_FIGURES,
+            FORMAT,
+            argument(
+                "--all",
+                action="store_true",
+                help="write also the quantities of the model against time (channels.csv), and "
+                "every figure",
+            ),
             argument(
                 "--animation", action="store_true", help="also motion.gif, of cases with snapshots"
             ),
@@ -114,7 +122,7 @@ COMMANDS = {
     "examples": EXAMPLES,
     "figures": Command(
         "draw the figures of the paper and of the documentation",
-        (*output("the figures (default: outputs/figures)"), QUIET),
+        (*output("the figures (default: outputs/figures)"), FORMAT, QUIET),
         draw_figures,
     ),
 }

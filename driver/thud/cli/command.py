@@ -84,20 +84,26 @@ def results_of(
 
 
 # Endings of the files of a page.
-PAGE = (".png", ".svg", ".html")
-QUIET = argument("-q", "--quiet", action="store_true", help="show only errors and remarks")
+PAGE = (".svg", ".html")
+QUIET = argument("-q", "--quiet", action="store_true", help="show only errors and warnings")
 NO_FIGURES = argument("--no-figures", action="store_true", help="results only")
+FORMAT = argument(
+    "--format",
+    choices=("svg", "png", "pdf"),
+    default="svg",
+    help="format of the figures (default: svg)",
+)
 
 
-def print_notes(remarks: Iterable[object]) -> None:
-    """Print remarks; a progress bar stays below them."""
-    for remark in remarks:
-        tqdm.write(f"thud-driver: {remark}", file=sys.stderr)
+def print_notes(warnings: Iterable[object]) -> None:
+    """Print warnings; a progress bar stays below them."""
+    for warning in warnings:
+        tqdm.write(f"thud-driver: {warning}", file=sys.stderr)
 
 
 @contextmanager
 def shown_at_once() -> Iterator[None]:
-    """Print warnings of reports, locks and workers as remarks, at once: the work may go on."""
+    """Print warnings of reports, locks and workers as warnings, at once: the work may go on."""
     usual = warnings.showwarning
     kinds = ReportWarning, LockWarning, WorkerWarning
 
@@ -122,7 +128,7 @@ def save_result(  # noqa: PLR0913, PLR0917 - each of them differs
     file: tuple[str, bytes],
     figure: str,
 ) -> int:
-    """Save a file and the figure of a result, print its text and remarks; return the exit code.
+    """Save a file and the figure of a result, print its text and warnings; return the exit code.
 
     The source is the file that the result is from.
     """
@@ -130,13 +136,13 @@ def save_result(  # noqa: PLR0913, PLR0917 - each of them differs
     contents = dict([file])
     if not options.no_figures:
         with left_out(figure):
-            from thud.plot.style import picture_files
+            from thud.plot.files import figure_files
 
-            contents |= picture_files(draw_all({figure: found.plot}))
+            contents |= figure_files(draw_all({figure: found.plot}))
     results.write(contents)
     if not options.quiet:
         print(shown)
-    print_notes(found.remarks)
+    print_notes(found.warnings)
     if not options.quiet:
         print(f"Results: {results.folder}")
     return 0

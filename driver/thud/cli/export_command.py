@@ -13,8 +13,7 @@ from thud.impact.compute import compute
 if TYPE_CHECKING:
     import argparse
 
-    from thud.impact.impact import Impact
-    from thud.recordings.recording import Recording
+    from thud.level.impact_result import ImpactResult
 
 # By option: what it writes.
 KINDS = {
@@ -34,7 +33,7 @@ def run_export(options: argparse.Namespace) -> int:
     if not chosen:
         refuse("export: no format is given", ", ".join(f"--{kind}" for kind in KINDS))
     source = _read(options.source, options.config)
-    print_notes(source.remarks)
+    print_notes(source.warnings)
     force = force_files.blocked_force(source, drop=options.drop, rate=options.rate)
     contents: dict[str, bytes] = {}
     for kind in chosen:
@@ -46,7 +45,7 @@ def run_export(options: argparse.Namespace) -> int:
     return 0
 
 
-def _read(path: str, config: str | None) -> Impact | Recording:
+def _read(path: str, config: str | None) -> ImpactResult:
     """Return the impact of a case, or the recording, of a file."""
     from thud.recordings.formats import FORMATS
     from thud.recordings.read_recording import read_recording

@@ -32,7 +32,7 @@ def compare_cases(options: argparse.Namespace) -> int:
             options.source,
             progress=not options.quiet and sys.stderr.isatty(),
         )
-    print_notes(page.remarks)
+    print_notes(page.warnings)
     paths = results.write(page.files())
     if not options.quiet:
         print(format_rows(page.table()))
@@ -42,14 +42,13 @@ def compare_cases(options: argparse.Namespace) -> int:
 
 def draw_figures(options: argparse.Namespace) -> int:
     """Draw the figures of the paper and of the documentation; return the exit code."""
-    from thud import plot
+    from thud.plot import documentation, figure_files
 
     results = results_of(options, "figures")
-    figures = plot.documentation_figures()
     for name, draw in tqdm(
-        figures.items(), unit="figure", disable=options.quiet or None, leave=False
+        documentation.FIGURES.items(), unit="figure", disable=options.quiet or None, leave=False
     ):
-        results.write(plot.picture_files(draw_all({name: draw})))
+        results.write(figure_files(draw_all({name: draw}), options.format))
     if not options.quiet:
         print(f"Figures: {results.folder}")
     return 0

@@ -33,7 +33,7 @@ def compare(options: argparse.Namespace) -> int:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PlausibilityWarning)
         found = compare_floors(cases, progress=not options.quiet and sys.stderr.isatty())
-    print_notes(found.remarks)
+    print_notes(found.warnings)
     paths = results.write(found.files())
     if not options.quiet:
         print(format_rows(found.rows()))

@@ -59,7 +59,7 @@ def measure(options: argparse.Namespace) -> int:
             workers=len(os.sched_getaffinity(0)) if options.workers is None else options.workers,
             keep=kept,
         )
-        verdict = recording.conformity()
+        verdict = recording.assess()
         recording_files.save(recording, files, figures=figures)
     if not options.quiet:
         rows = recording_files.drop_table(recording)
@@ -72,8 +72,8 @@ def measure(options: argparse.Namespace) -> int:
         for step in (*recording_files.sentences(recording, "steps"), *recording.level_steps):
             print(f"  {step}")
         print(f"  {recording_files.verdict_sentence(recording)}")
-    told = recording_files.sentences(recording, "remarks")
-    print_notes((*recording.doubts, *recording.outliers, *told))
+    told = recording_files.sentences(recording, "warnings")
+    print_notes((*recording.own_warnings, *recording.outliers, *told))
     if not options.quiet:
         print(f"Results: {folder}")
     return NOT_CONFORMING if options.check and not verdict else 0

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud.base.bridge import api, call, text
+from thud.base.bridge import ask, text
 from thud.base.display import left_out
 from thud.base.errors import InputError, ThudError
 from thud.base.files import Results
@@ -62,40 +62,44 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
         )
         raise InputError(message)
     options.done[case.name] = path
-    found = call(
-        api.run, os.fsencode(path), os.fsencode(output), options.replace, not options.quiet
-    )
-    for remark in found.get("run_remarks", {}).values():
-        tqdm.write(f"thud-driver: {text(remark)}", file=sys.stderr)
+    found = ask(
+        "run", path=os.fsencode(path), output=os.fsencode(output), replace=options.replace,
+        channels=options.all,        progress=not options.quiet,
+    )  # fmt: skip
+    for warning in found.get("messages", {}).values():
+        tqdm.write(f"thud-driver: {text(warning)}", file=sys.stderr)
     folder = Path(output or os.fsdecode(found["directory"]))
-    pictures = _pictures(found, figures=not options.no_figures, animation=options.animation)
-    if pictures:
+    figures = _figures(found, options)
+    if figures:
         results = Results(folder, inputs=(path,), replace=options.replace)
-        results.write(pictures, marker=found["case"])
+        results.write(figures, marker=found["case"])
     if not options.quiet:
         tqdm.write(f"{text(found['table'])}\n  Results: {folder}\n")
     return bool(found["conforms"])
 
 
-def _pictures(found: Bundle, *, figures: bool, animation: bool) -> dict[str, bytes]:
+def _figures(found: Bundle, options: argparse.Namespace) -> dict[str, bytes]:
     """Return the files of the figures of a run, drawn from its results in memory."""
-    if not (figures or animation):
-        return {}
+    contents: dict[str, bytes] = {}
+    if options.no_figures and not options.animation:
+        return contents
     case = Case.from_text(text(found["case"]))
     impact = new_impact(case, found) if "samples" in found else None
     modes = new_modes(case.ball, found) if "modes" in found else None
     curve = new_curve(case, found) if "compression" in found else None
-    shown = {} if impact is None else {"motion": impact, "floor_motion": impact.on_floor}
-    files: dict[str, bytes] = {}
+    moving = {"motion": impact, "floor_motion": impact and impact.on_floor}
     with TemporaryDirectory() as folder, left_out("a figure"):
         from thud import plot
 
-        if figures:
-            files = plot.picture_files(plot.case_figures(impact, modes, curve))
-        for name, moving in shown.items():
-            if animation and moving is not None and moving.motion:
+        if not options.no_figures:
+            count = None if options.all else plot.DEFAULT_COUNT
+            contents = plot.figure_files(
+                plot.case_figures(impact, modes, curve, count), options.format
+            )
+        for name, drop in moving.items():
+            if options.animation and drop and drop.motion:
                 path = Path(folder, f"{name}.gif")
                 with left_out(path.name):
-                    plot.animate(moving, path)
-                    files[path.name] = path.read_bytes()
-    return files
+                    plot.animate(drop, path)
+                    contents[path.name] = path.read_bytes()
+    return contents

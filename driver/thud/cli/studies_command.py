@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from thud.studies.kind import RunOptions
 
 _STUDY = argument("study", metavar="STUDY.toml", help="study file")
-_SETS = (
-    argument("--yes", action="store_true", help="start without limit to the number of sets"),
+_SAMPLES = (
+    argument("--yes", action="store_true", help="start without limit to the number of samples"),
     argument(
         "--backend",
         choices=("threads", "processes", "dask"),
-        help="how sets are computed; the results are the same (default: threads)",
+        help="how samples are computed; the results are the same (default: threads)",
     ),
     argument("--workers", type=int, metavar="N", help="threads or processes"),
     argument("--scheduler", metavar="ADDRESS", help="of Dask, tcp://host:8786"),
@@ -40,15 +40,15 @@ def study_commands() -> dict[str, Command]:
                 _STUDY,
                 *output(
                     "the results"
-                    + ("; an interrupted study resumes there" if entry.has_sets else "")
+                    + ("; an interrupted study resumes there" if entry.has_samples else "")
                     + " (default: outputs/<study name>)"
                 ),
-                *(_SETS if entry.has_sets else ()),
+                *(_SAMPLES if entry.has_samples else ()),
                 NO_FIGURES,
                 QUIET,
             ),
             run_study,
-            Command._field_defaults["kept"] if entry.has_sets else "nothing is written",
+            Command._field_defaults["kept"] if entry.has_samples else "nothing is written",
         )
         for name, entry in KINDS.items()
     }
@@ -59,7 +59,7 @@ def run_study(options: argparse.Namespace) -> int:
     kind = get_kind(options.name)
     study = kind.read_study(options.study)
     how: RunOptions = {"progress": not options.quiet, "replace": options.replace}
-    if KINDS[options.name].has_sets:
+    if KINDS[options.name].has_samples:
         how |= {
             "backend": options.backend,
             "workers": options.workers,
@@ -79,13 +79,13 @@ def run_study(options: argparse.Namespace) -> int:
             raise type(error)(message) from error
         if not options.quiet:
             tqdm.write(kind.table(result, study))
-        print_notes(f"{options.study}: {remark}" for remark in kind.remarks(result))
+        print_notes(f"{options.study}: {warning}" for warning in kind.warnings(result))
         contents = kind.files(result, study)
         if drawn:
             with left_out("the figure of the study"):
-                from thud.plot import picture_files
+                from thud.plot import figure_files
 
-                contents |= picture_files(kind.figures(result, study))
+                contents |= figure_files(kind.figures(result, study))
         results.write(contents)
     if not options.quiet:
         tqdm.write(f"Results: {folder}")

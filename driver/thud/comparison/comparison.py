@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from itertools import chain, count
+from itertools import chain, combinations, count
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
@@ -20,29 +21,21 @@ from thud.base.errors import InputError, PlausibilityWarning, ThudError
 from thud.base.files import Results
 from thud.case.case import Case, read_case
 from thud.impact.compute import compute
-from thud.impact.impact import Impact
+from thud.level.impact_result import ImpactResult
 from thud.level.levels import FORCES, SOURCES, get_bands
-from thud.plot.comparison_html import comparison_html
-from thud.plot.comparison_page import comparison_page
-from thud.plot.levels_figure import common_source
-from thud.plot.style import page_files
+from thud.plot.files import page_files
+from thud.plot.impacts import common_source
+from thud.plot.pages import comparison_html, comparison_page
 from thud.recordings.read_recording import read_recording
-from thud.recordings.recording import Recording
-from thud.recordings.restitution import DropConditions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from thud.base._schema import LevelsForce, LimitsSource
-    from thud.level.criteria import Criterion
-    from thud.recordings.verdict import CriterionResult
+    from thud.level.assessment import Criterion
 
 # Endings of namelist files; all others are recordings.
 NAMELISTS = (".nml", ".namelist", "")
-
-# Maximum ratio of the speeds of one drop with recordings: the limits of its height, 1 cm on both
-# sides of 0.85 m or more, make 1.2 %.
-MAX_SPREAD = 1.015
 
 # Criteria after the octaves: name and unit, size of the unit, decimals.
 _ROWS = (
@@ -70,15 +63,15 @@ class Comparison(Displayed):
         Source of the limits.
     """
 
-    impacts: dict[str, Impact | Recording]
+    impacts: dict[str, ImpactResult]
     run_times: dict[str, float]
     force: LevelsForce | None = None
     source: LimitsSource = "rubber_ball"
 
     @property
-    def remarks(self) -> list[str]:
+    def warnings(self) -> list[str]:
         """What is possible but not plausible, or doubtful, with the names of the impacts."""
-        return [f"{name}: {remark}" for name, i in self.impacts.items() for remark in i.remarks]
+        return [f"{name}: {warning}" for name, i in self.impacts.items() for warning in i.warnings]
 
     def __repr__(self) -> str:
         """Return the names of what is compared."""
@@ -94,11 +87,11 @@ class Comparison(Displayed):
         Columns are the impacts and, in the last, the limits.
         """
         impacts = self.impacts.values()
-        verdicts = [impact.conformity(self.source, self.force) for impact in impacts]
+        verdicts = [impact.assess(self.source, self.force) for impact in impacts]
         octaves = [(f"{nominal:g} Hz, dB", 1.0, 2) for nominal in get_bands().nominal]
         rows = [
             ("", *self.impacts, f"limits, {self.source.replace('_', ' ')}"),
-            ("force", *(impact.judged(self.force) for impact in impacts), ""),
+            ("force", *(impact.assessed_force(self.force) for impact in impacts), ""),
             ("levels", *(impact.level_method for impact in impacts), ""),
         ]
         together = zip(*(verdict.criteria for verdict in verdicts), strict=True)
@@ -115,7 +108,7 @@ class Comparison(Displayed):
         if self.run_times:
             times = (self.run_times.get(name) for name in self.impacts)
             rows.append(("computed in, ms", *(f"{1e3 * t:.1f}" if t else "" for t in times), ""))
-        return [*rows, ("verdict", *(verdict.verdict for verdict in verdicts), "")]
+        return [*rows, ("verdict", *(verdict.result for verdict in verdicts), "")]
 
     def figure(self) -> Figure:
         """Return the page as a matplotlib figure."""
@@ -126,7 +119,7 @@ class Comparison(Displayed):
         return comparison_html(self.impacts, self.force, self.source, self.table())
 
     def files(self) -> dict[str, bytes]:
-        """Return ``comparison.png``, ``.svg`` and ``.html`` by name."""
+        """Return ``comparison.svg`` and ``comparison.html`` by name."""
         return page_files("comparison", self.figure, self.html())
 
     def save(self, directory: str | os.PathLike[str], *, replace: bool = False) -> list[Path]:
@@ -149,20 +142,23 @@ def _digits(force: float) -> str:
     return f"{force:.1f}" if force >= 1 else f"{force:.3g}"
 
 
-def _cell(criterion: Criterion | CriterionResult, unit: float, decimals: int) -> str:
+def _cell(criterion: Criterion, unit: float, decimals: int) -> str:
     """Return the value of a criterion, and how it misses its limits."""
     if np.isnan(criterion.value):
         return "not known"
-    word = "" if criterion.conforms else "low" if criterion.value < criterion.lower else "high"
-    if not criterion.conforms and criterion.lower <= criterion.value <= criterion.upper:
-        word = "open"
+    if criterion.conforms:
+        word = ""
+    elif criterion.value < criterion.lower:
+        word = "low"
+    else:
+        word = "high" if criterion.value > criterion.upper else "open"
     return f"{criterion.value / unit:z.{decimals}f} {word}".rstrip()
 
 
 # mypy infers the type of a dictionary of several kinds from the parameter of an overload only.
 @overload
 def compare(
-    impacts: Mapping[str, Case | Impact | Recording],
+    impacts: Mapping[str, Case | ImpactResult],
     force: LevelsForce | None = None,
     source: LimitsSource | None = None,
     *,
@@ -170,14 +166,14 @@ def compare(
 ) -> Comparison: ...
 @overload
 def compare(
-    impacts: Iterable[Case | Impact | Recording],
+    impacts: Iterable[Case | ImpactResult],
     force: LevelsForce | None = None,
     source: LimitsSource | None = None,
     *,
     progress: bool = False,
 ) -> Comparison: ...
 def compare(
-    impacts: Mapping[str, Case | Impact | Recording] | Iterable[Case | Impact | Recording],
+    impacts: Mapping[str, Case | ImpactResult] | Iterable[Case | ImpactResult],
     force: LevelsForce | None = None,
     source: LimitsSource | None = None,
     *,
@@ -212,14 +208,14 @@ def compare(
     Warns
     -----
     PlausibilityWarning
-        As `Comparison.remarks`.
+        As `Comparison.warnings`.
     """
     if force is not None:
         require_choice("force", force, FORCES)
     if source is not None:
         require_choice("source", source, SOURCES)
     named = _named(impacts)
-    solved: dict[str, Impact | Recording] = {}
+    solved: dict[str, ImpactResult] = {}
     run_times = {}
     for name, given in tqdm(named.items(), unit="case", disable=not progress, leave=False):
         if isinstance(given, Case):
@@ -234,30 +230,27 @@ def compare(
             solved[name] = given
     _require_same_drop(solved)
     found = Comparison(solved, run_times, force, common_source(solved, source))
-    for remark in found.remarks:
-        warnings.warn(remark, PlausibilityWarning, stacklevel=2)
+    for warning in found.warnings:
+        warnings.warn(warning, PlausibilityWarning, stacklevel=2)
     return found
 
 
-def _require_same_drop(impacts: Mapping[str, Impact | Recording]) -> None:
+def _require_same_drop(impacts: Mapping[str, ImpactResult]) -> None:
     """Raise InputError where drops differ; measured heights differ within their tolerance."""
-    computed = {n: i.impact_velocity for n, i in impacts.items() if isinstance(i, Impact)}
-    falls = {
-        n: DropConditions(i.config.height) for n, i in impacts.items() if isinstance(i, Recording)
-    }
-    speeds = computed | {n: fall.speed for n, fall in falls.items() if fall.height}
-    if not speeds:
-        return
-    spread = max(speeds.values()) / min(speeds.values())
-    if len(set(computed.values())) > 1 or spread > MAX_SPREAD:
-        listed = ", ".join(f"{name} falls with {speed:.4g} m/s" for name, speed in speeds.items())
+    known = {n: i for n, i in impacts.items() if not math.isnan(i.impact_velocity)}
+    for one, other in combinations(known.values(), 2):
+        tolerance = max(one.velocity_tolerance, other.velocity_tolerance)
+        slow, fast = sorted((one.impact_velocity, other.impact_velocity))
+        if fast <= slow * (1 + tolerance):
+            continue
+        listed = ", ".join(f"{n} falls with {i.impact_velocity:.4g} m/s" for n, i in known.items())
         refuse(
             f"&drop: height or gravity differs ({listed})",
-            f"the same drop, of recordings within {MAX_SPREAD - 1:.1%} of the speed",
+            f"the same drop, here within {tolerance:.1%} of the speed",
         )
 
 
-def _named(impacts: object) -> dict[str, Case | Impact | Recording]:
+def _named(impacts: object) -> dict[str, Case | ImpactResult]:
     """Return what is compared by name, checked."""
     allowed = (
         "one or more cases, impacts or recordings, by name or in a list "
@@ -266,28 +259,23 @@ def _named(impacts: object) -> dict[str, Case | Impact | Recording]:
     if isinstance(impacts, Mapping):
         pairs = list(impacts.items())
     else:
-        row = [impacts] if isinstance(impacts, Case | Impact | Recording) else impacts
+        row = [impacts] if isinstance(impacts, Case | ImpactResult) else impacts
         if not isinstance(row, Iterable) or isinstance(row, str | bytes | os.PathLike):
             refuse_value("impacts", row, allowed)
-        pairs = [(_name(given), given) for given in row]
+        pairs = [(getattr(given, "name", type(given).__name__.lower()), given) for given in row]
     if not pairs:
         refuse("impacts is empty", allowed)
-    named: dict[str, Case | Impact | Recording] = {}
+    named: dict[str, Case | ImpactResult] = {}
     for name, given in pairs:
         require_kind("name", name, str)
-        require_kind(name, given, Case | Impact | Recording)
+        require_kind(name, given, Case | ImpactResult)
         # Cases from Python often share their name.
         names = chain([name], (f"{name} ({n})" for n in count(2)))
         named[next(free for free in names if free not in named)] = given
     return named
 
 
-def _name(given: object) -> str:
-    named = given.case if isinstance(given, Impact) else given
-    return named.name if isinstance(named, Case | Recording) else type(named).__name__.lower()
-
-
-def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Recording]:
+def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | ImpactResult]:
     """Read namelist files (``.nml``) and recordings; their names are those of cases and files.
 
     Raises
@@ -295,9 +283,9 @@ def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Record
     InputError
         Names the file; also raised where two have the same name.
     """
-    found: dict[str, Case | Recording] = {}
+    found: dict[str, Case | ImpactResult] = {}
     for path in map(Path, paths):
-        given: Case | Recording
+        given: Case | ImpactResult
         given = read_case(path) if path.suffix.lower() in NAMELISTS else read_recording(path)
         name = given.name
         if name in found:

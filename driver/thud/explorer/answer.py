@@ -17,10 +17,9 @@ from thud.impact.compute import compute
 from thud.impact.ensemble import get_cost
 from thud.impact.floor_impact import FloorImpact
 from thud.level.levels import get_bands
-from thud.plot.force_history_figure import contact_force
+from thud.plot.impacts import contact_force
 from thud.plot.style import FORCE_WORDS
 from thud.recordings.read_recording import read_recording
-from thud.recordings.verdict import CriterionResult
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -29,8 +28,8 @@ if TYPE_CHECKING:
 
     from thud.case.case import Case
     from thud.impact.impact import Impact
-    from thud.level.criteria import Criterion
-    from thud.recordings.recording import Recording
+    from thud.level.assessment import Criterion
+    from thud.level.impact_result import ImpactResult
 
     Answer = dict[str, Any]
 
@@ -68,20 +67,20 @@ def answer_quickly(case: Case) -> Answer | None:
 
 
 def answer_case(case: Case) -> Answer:
-    """Return force, levels, verdict, remarks and, where there are, motion, floor and room."""
+    """Return force, levels, verdict, warnings and, where there are, motion, floor and room."""
     start = time.perf_counter()
     impact = compute(case)
     force = case.levels.force
     found = _answer(impact, *contact_force(impact, force), impact.peak())
     found["force"]["words"] = FORCE_WORDS[force]
-    found["remarks"] += impact.remarks
+    found["warnings"] += impact.warnings
     moving = impact.on_floor
     found["motion"] = _motion(moving or impact)
     found["floor"] = None if moving is None else _floor(impact, moving)
     if case.room is not None and case.floor is not None:
         found["room"] = _room(impact)
-        further = found["room"].pop("remarks")
-        found["remarks"] += [remark for remark in further if remark not in found["remarks"]]
+        further = found["room"].pop("warnings")
+        found["warnings"] += [warning for warning in further if warning not in found["warnings"]]
     found["seconds"] = time.perf_counter() - start
     return found
 
@@ -101,7 +100,8 @@ def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answe
     start = time.perf_counter()
     try:
         recording = read_recording(path, **settings)
-        times, force = recording.to_force_history()
+        drop = recording.drop_force()
+        times, force = drop.time, drop.force
         kept = (times >= 0) & (times <= MARGIN * recording.contact_time)
         curve = 1e3 * times[kept], 1e-3 * force[kept]
         found = _answer(recording, *curve, recording.peak())
@@ -111,18 +111,18 @@ def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answe
     found["seconds"] = time.perf_counter() - start
     found["drops"] = len(recording.drops)
     copy = Path(path).name
-    # The page says whose the remarks are.
-    found["remarks"] += [
-        remark.removeprefix(f"{copy}: ").replace(copy, name) for remark in recording.remarks
+    # The page says whose the warnings are.
+    found["warnings"] += [
+        warning.removeprefix(f"{copy}: ").replace(copy, name) for warning in recording.warnings
     ]
     return found
 
 
 def _answer(
-    source: Impact | Recording, times: NDArray[np.float64], force: NDArray[np.float64], peak: float
+    source: ImpactResult, times: NDArray[np.float64], force: NDArray[np.float64], peak: float
 ) -> Answer:
     """Return what cases and recordings share; times in ms, the force in kN."""
-    verdict = source.conformity()
+    verdict = source.assess()
     return {
         "force": _curve(times, 1e3 * force),
         "levels": {
@@ -131,33 +131,30 @@ def _answer(
         },
         "criteria": [_criterion(one) for one in verdict.criteria],
         "conforms": bool(verdict.conforms),
-        "verdict": verdict.verdict,
+        "verdict": verdict.result,
         "numbers": [
             ["peak", float(peak), "N"],
             ["contact", 1e3 * source.contact_time, "ms"],
             ["restitution", *_plain([source.restitution]), ""],
         ],
-        "remarks": [],
+        "warnings": [],
     }
 
 
-def _criterion(one: Criterion | CriterionResult) -> Answer:
+def _criterion(one: Criterion) -> Answer:
     """Return a criterion; times are in ms, as on the screen."""
     scale, unit = (1e3, "ms") if one.unit == "s" else (1.0, one.unit)
     name, band = one.name.rpartition("octave_")[1:]
-    if isinstance(one, CriterionResult):
-        verdict, uncertainty = one.verdict, scale * one.quantity.expanded or None
-    else:
-        verdict, uncertainty = ("conforms" if one.conforms else "does not conform"), None
+    expanded = scale * one.estimate.expanded
     return {
         "name": f"{band.replace('_', '.')} Hz" if name else humanize(band),
         "band": bool(name),
         "unit": unit,
         "value": None if np.isnan(one.value) else round(scale * one.value, 6),
-        "uncertainty": uncertainty,
+        "uncertainty": expanded if 0 < expanded < np.inf else None,
         "lower": round(scale * one.lower, 6),
         "upper": round(scale * one.upper, 6),
-        "verdict": verdict,
+        "verdict": one.result,
     }
 
 
@@ -224,7 +221,7 @@ def _room(impact: Impact) -> Answer:
         "level": _plain(found.level),
         "rating": found.rating.rounded,
         "standardised": found.standardised_rating.rounded,
-        "remarks": list(found.remarks),
+        "warnings": list(found.warnings),
     }
 
 

@@ -14,7 +14,7 @@ from thud.case.keys import find_key, known_keys, users
 from thud.comparison.comparison import compare
 from thud.explorer.answer import new_case
 from thud.impact.compute import compute
-from thud.plot.comparison_html import comparison_html
+from thud.plot.pages import comparison_html
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     Values = dict[str, dict[str, Any]]
 
-# Points of a grid along one parameter, and sets of a design with more than two.
+# Points of a grid along one parameter, and samples of a design with more than two.
 POINTS = 11
 SETS = 256
 # Group of a request that is no group of the case: the ends of the moves of sliders, by group.key.
@@ -74,7 +74,7 @@ def study(values: Values) -> bytes:
         if group in values:
             given = [f"{key} = {_toml(keys[key])}" for key in keys if key in values[group]]
             lines += ["", f"[case.{group}]", *given]
-    grid = len(ranges) <= 2  # noqa: PLR2004 - more would be many sets
+    grid = len(ranges) <= 2  # noqa: PLR2004 - more would be many samples
     lines += ["", "[design]"]
     lines += ['kind = "grid"'] if grid else ['kind = "sobol"', f"size = {SETS}", "seed = 1"]
     lines += ["", "[parameters]"]

@@ -6,7 +6,7 @@ import hashlib
 import io
 import math
 import os
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,14 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.bridge import version
-from thud.base.checks import refuse, refuse_value, require_kind, require_number, require_whole
+from thud.base.checks import refuse, refuse_value, require_kind, require_number
 from thud.base.files import content_of, refuse_foreign, replace_file
-from thud.base.immutable import Immutable
-from thud.case.case import case_text
-from thud.impact.impact import Impact
+from thud.level.impact_result import DropForce, ImpactResult
 from thud.level.levels import RECORDED_BAND
 from thud.recordings.channel import library
-from thud.recordings.recording import Recording
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -47,46 +44,8 @@ UFF_LINE = 80
 UFF_NAME = 10
 
 
-@dataclass(frozen=True, eq=False)
-class BlockedForce(Immutable):
-    """The force of a source on a rigid floor.
-
-    Attributes
-    ----------
-    name : str
-        Name of the case or the recording.
-    force : ndarray, shape (n_sample,)
-        Force, N, positive into the floor.
-    sample_rate : float
-        Samples per second, Hz.
-    start : float
-        Time of the first sample since first touch, s.
-    kind : str
-        ``"floor"`` or ``"elastic"``.
-    origin : str
-        What the force is from, in words.
-    checksum : str
-        SHA-256 of the case as `thud.write_case` writes it, or of the recording's file.
-    date : str
-        Date of the measurement where it is known, or empty.
-    remarks : tuple of str
-        What was done to the force, a sentence each.
-    """
-
-    name: str
-    force: NDArray[np.float64]
-    sample_rate: float
-    start: float
-    kind: str
-    origin: str
-    checksum: str
-    date: str = ""
-    remarks: tuple[str, ...] = ()
-
-    @property
-    def time(self) -> NDArray[np.float64]:
-        """Time since first touch, s, shape (n_sample,)."""
-        return self.start + np.arange(len(self.force)) / self.sample_rate
+class BlockedForce(DropForce):
+    """The force of a source on a rigid floor, for other programs."""
 
     def spectrum(self) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
         """Return frequencies, Hz, and the transform ∫ F exp(-i 2π f t) dt, N s, of the force.
@@ -109,7 +68,7 @@ class BlockedForce(Immutable):
             f"Sample rate: {self.sample_rate:.10g} Hz",
             f"Origin: {self.origin}",
             f"SHA-256: {self.checksum}",
-            *self.remarks,
+            *self.notes,
             f"{NOTE_END}{version()}",
         )
         # Names of files may not be UTF-8, and words of a laboratory have several lines.
@@ -118,14 +77,14 @@ class BlockedForce(Immutable):
 
 
 def blocked_force(
-    source: Impact | Recording, *, drop: int = 1, rate: float | None = None
+    source: ImpactResult, *, drop: int = 1, rate: float | None = None
 ) -> BlockedForce:
-    """Return the force of an impact that its case judges, or that of a drop of a recording.
+    """Return the assessed force of a drop.
 
     Parameters
     ----------
     source
-        Result of a model, or recording.
+        Impact or recording.
     drop
         Number of the drop of a recording, from 1.
     rate
@@ -136,48 +95,9 @@ def blocked_force(
     InputError
         Where the drop or the rate are not possible.
     """
-    require_kind("source", source, Impact | Recording)
-    if isinstance(source, Impact):
-        require_whole("drop", drop, 1, 1)
-        found = _of_impact(source)
-    else:
-        found = _of_recording(source, drop)
+    require_kind("source", source, ImpactResult)
+    found = BlockedForce(**vars(source.drop_force(drop)))
     return found if rate is None else _resampled(found, rate)
-
-
-def _of_impact(impact: Impact) -> BlockedForce:
-    case = impact.case
-    model = case.model.name if case.model else ""
-    return BlockedForce(
-        name=case.name,
-        force=impact.force(),
-        sample_rate=impact.sample_rate,
-        start=float(impact.time[0] - impact.touch_time),
-        kind=impact.judged(),
-        origin=f"case {case.name}, model {model}, drop height {case.drop.height:g} m",
-        checksum=hashlib.sha256(case_text(case)).hexdigest(),
-    )
-
-
-def _of_recording(recording: Recording, drop: int) -> BlockedForce:
-    time, force = recording.to_force_history(drop)
-    one = recording.drops[drop - 1]
-    number = drop
-    for origin in recording.origins:
-        if number <= origin.drops:
-            break
-        number -= origin.drops
-    return BlockedForce(
-        name=recording.name if len(recording.drops) == 1 else f"{recording.name}_drop_{drop}",
-        force=force,
-        sample_rate=one.sample_rate,
-        start=float(time[0]),
-        kind=recording.judged(),
-        origin=f"recording {one.name}, {origin.calibration or 'calibration not known'}",
-        checksum=origin.checksum,
-        date=origin.date,
-        remarks=(*one.steps, f"noise of {one.noise.deviation:.3g} N remains"),
-    )
 
 
 def _resampled(given: BlockedForce, rate: float) -> BlockedForce:
@@ -207,7 +127,7 @@ def _resampled(given: BlockedForce, rate: float) -> BlockedForce:
         f"Resampled from {given.sample_rate:g} Hz, band-limited; to {RECORDED_BAND:g} Hz the "
         f"spectrum has changed by up to {error:.1e} of its maximum"
     )
-    return replace(found, remarks=(*given.remarks, told))
+    return replace(found, notes=(*given.notes, told))
 
 
 def wav_files(force: BlockedForce, path: str) -> dict[str, bytes]:

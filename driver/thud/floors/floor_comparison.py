@@ -39,10 +39,10 @@ class FloorComparison(Displayed):
     predictions: dict[str, RoomPrediction]
 
     @property
-    def remarks(self) -> list[str]:
+    def warnings(self) -> list[str]:
         """What a reader of the numbers has to know, with the names of the floors."""
         found = self.predictions.items()
-        return [f"{name}: {remark}" for name, one in found for remark in one.remarks]
+        return [f"{name}: {warning}" for name, one in found for warning in one.warnings]
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text; columns are the floors."""
@@ -68,19 +68,19 @@ class FloorComparison(Displayed):
 
     def figure(self) -> Figure:
         """Return the page as a matplotlib figure."""
-        from thud.plot.floors_page import draw_floors
+        from thud.plot.pages import draw_floors
 
         return draw_floors(self)
 
     def html(self) -> str:
         """Return the page as self-contained HTML with interactive plots."""
-        from thud.plot.floors_page import floors_html
+        from thud.plot.pages import floors_html
 
         return floors_html(self)
 
     def files(self) -> dict[str, bytes]:
-        """Return ``floors.png``, ``.svg`` and ``.html`` by name."""
-        from thud.plot.style import page_files
+        """Return ``floors.svg`` and ``floors.html`` by name."""
+        from thud.plot.files import page_files
 
         return page_files("floors", self.figure, self.html())
 

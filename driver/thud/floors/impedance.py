@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base._schema import BandSet, InfinitePlate
-from thud.base.bridge import call, floor_api
+from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_array, require_kind, require_real
 from thud.base.display import Displayed
 from thud.case.case import Case, case_text
@@ -157,7 +157,7 @@ class BallImpedance(Displayed):
         floors
             Floors by their names in the legend.
         """
-        from thud.plot.impedance_figure import ball_impedances
+        from thud.plot.floors import ball_impedances
 
         return ball_impedances({"": self}, floors or {})
 
@@ -229,9 +229,7 @@ def _force_on(source: Impact, resistance: float) -> NDArray[np.float64]:
     case = replace(
         source.case, modes=None, compression=None, room=None, floor=InfinitePlate(resistance)
     )
-    moved = new_floor_impact(
-        case, call(floor_api.drop_on_floor, case_text(case)), source.floor_force
-    )
+    moved = new_floor_impact(case, ask("floor_impact", case=case_text(case)), source.floor_force)
     if moved is None:
         refuse(
             "source: its model has one force on all floors", "an impact of a model that feels them"

@@ -12,7 +12,7 @@ import f90nml
 import numpy as np
 
 from thud.base._schema import MeasuredMobility
-from thud.base.bridge import call, mobility_api
+from thud.base.bridge import ask
 from thud.base.checks import (
     refuse,
     refuse_value,
@@ -62,7 +62,7 @@ _ORDERS = (2, 4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64)
 _PATIENCE = 5
 # Error below which no more poles are tried: that of a table with eight digits.
 _EXACT = 1e-8
-# Error of the fit that is remarked, and of the change that makes it passive.
+# Error of the fit that raises a warning, and of the change that makes it passive.
 _POOR = 0.1
 _CHANGED = 1.5
 
@@ -122,7 +122,7 @@ class MobilityFit(Displayed):
         return found
 
     @property
-    def remarks(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:
         """What a reader of the fit has to know."""
         found = []
         negative = np.mean(self.measured.real < 0)
@@ -157,7 +157,7 @@ class MobilityFit(Displayed):
 
     def plot(self) -> Figure:
         """Draw the measured mobility and the fit."""
-        from thud.plot.mobility_fit_figure import mobility_fit
+        from thud.plot.floors import mobility_fit
 
         return mobility_fit(self)
 
@@ -287,9 +287,9 @@ def _fit(
     name: str, frequency: NDArray[np.float64], values: NDArray[np.complex128], order: int
 ) -> MobilityFit:
     """Return the fit with a number of poles."""
-    n = len(frequency)
-    routine = mobility_api.fit_mobility
-    found: dict[str, Any] = call(routine, frequency, values.real, values.imag, int(order), n)
+    found: dict[str, Any] = ask(
+        "mobility_fit", frequency=frequency, real=values.real, imaginary=values.imag, order=order
+    )
     lists: dict[str, Any] = {
         key: value if isinstance(value, float) else tuple(map(float, value))
         for key, value in found["floor"].items()

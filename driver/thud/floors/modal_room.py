@@ -16,7 +16,7 @@ import numpy as np
 from scipy.signal import lfilter, sosfilt
 
 from thud.base._schema import Plate, Room
-from thud.base.bridge import call, floor_api
+from thud.base.bridge import ask
 from thud.base.checks import (
     refuse,
     refuse_value,
@@ -36,8 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.impact.impact import Impact
-    from thud.recordings.recording import Recording
+    from thud.level.impact_result import ImpactResult
 
     Array = NDArray[np.float64]
     ComplexArray = NDArray[np.complex128]
@@ -134,7 +133,7 @@ class ModalRoom(Displayed):
 
     def plot(self) -> Figure:
         """Draw the levels of all positions against the statistical answer."""
-        from thud.plot.modal_room_figure import draw_modal_room
+        from thud.plot.rooms import draw_modal_room
 
         return draw_modal_room(self)
 
@@ -149,7 +148,7 @@ class ModalRoom(Displayed):
 
 
 def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in them
-    source: Impact | Recording,
+    source: ImpactResult,
     floor: Plate | None = None,
     room: Room | None = None,
     *,
@@ -208,10 +207,10 @@ def positions_below(
     heard = _positions("microphones", microphones, size, draw)
     numbers, plate_frequency = _plate_modes(floor)
     orders, room_frequency = _room_modes(size, room.sound_speed)
-    found = call(
-        floor_api.get_radiator,
-        case_text(Case(floor=floor, room=room)),
-        np.maximum(plate_frequency, 1.0),
+    found = ask(
+        "radiator",
+        case=case_text(Case(floor=floor, room=room)),
+        frequency=np.maximum(plate_frequency, 1.0),
     )
     losses = 2 * np.pi * plate_frequency * found["loss_factor"]
     decay = 6 * math.log(10) / _times(prediction, room_frequency)
@@ -358,7 +357,7 @@ def _receptance(omega: Array, frequency: Array, decay: Array) -> ComplexArray:
     return (omega > 0) / divisor
 
 
-def _spectrum(source: Impact | Recording, duration: float) -> tuple[Array, ComplexArray]:
+def _spectrum(source: ImpactResult, duration: float) -> tuple[Array, ComplexArray]:
     """Return angular frequencies, rad/s, and the Fourier transform of the force, N s."""
     force = source.force("floor")
     # An even number, which the inverse transform takes its length for.

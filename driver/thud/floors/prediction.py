@@ -8,16 +8,15 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from thud.base.bridge import call, floor_api, text
+from thud.base.bridge import ask, text
 from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
 from thud.case.case import Case, case_text
 from thud.floors.survey import RoomLevels
 from thud.impact.floor_impact import FloorImpact, new_floor_impact
-from thud.impact.impact import Impact
+from thud.level.impact_result import ImpactResult
 from thud.level.levels import BANDWIDTHS, get_bands
 from thud.level.rating import Rating, rated_bands, rating, standardised_level
-from thud.recordings.recording import Recording
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     from thud.base._schema import FloorOptions, Room
 
 THIRDS = BANDWIDTHS[1]
-# Change of the force by a floor that gives way, dB, from which it is remarked.
+# Change of the force by a floor that gives way, dB, that raises a warning.
 NOTICED = 0.1
 
 
@@ -76,7 +75,7 @@ class RoomPrediction(Displayed):
     force_change : float
         Change of the peak of the force by the floor, dB; of a blocked force that which a linear
         source with the mass and the contact time of the impact would have.
-    floor_remarks : tuple of str
+    floor_warnings : tuple of str
         Where the floor is not what it claims to be.
     """
 
@@ -99,10 +98,10 @@ class RoomPrediction(Displayed):
     octave_time: NDArray[np.float64]
     history_time: NDArray[np.float64]
     history: NDArray[np.float64]
-    source: Impact | Recording
+    source: ImpactResult
     force: Literal["contact", "blocked"]
     force_change: float
-    floor_remarks: tuple[str, ...]
+    floor_warnings: tuple[str, ...]
 
     @property
     def rating(self) -> Rating:
@@ -140,10 +139,10 @@ class RoomPrediction(Displayed):
         return np.minimum(self.floor_modes, self.room_modes) < self.few_modes
 
     @property
-    def remarks(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:
         """What a reader of the numbers has to know."""
         few = self.has_few_modes
-        found = [*self.floor_remarks]
+        found = [*self.floor_warnings]
         if few.any():
             bands = ", ".join(f"{f:g}" for f in self.frequency[few])
             found.append(
@@ -186,7 +185,7 @@ class RoomPrediction(Displayed):
 
     def plot(self, measured: RoomLevels | None = None) -> Figure:
         """Draw the chain: force, energy, floor and room, with measured levels if given."""
-        from thud.plot.prediction_figure import draw_prediction
+        from thud.plot.rooms import draw_prediction
 
         return draw_prediction(self, measured)
 
@@ -199,7 +198,7 @@ class RoomPrediction(Displayed):
 
 
 def predict_level(
-    source: Impact | Recording, floor: FloorOptions | None = None, room: Room | None = None
+    source: ImpactResult, floor: FloorOptions | None = None, room: Room | None = None
 ) -> RoomPrediction:
     """Predict the level that an impact causes in the room below.
 
@@ -220,57 +219,52 @@ def predict_level(
     InputError
         Where floor or room are missing or out of range.
     """
-    require_kind("source", source, Impact | Recording)
-    case = source.case if isinstance(source, Impact) else Case()
+    require_kind("source", source, ImpactResult)
+    case = source.case
     floor, room = floor or case.floor, room or case.room
     if floor is None or room is None:
         refuse(
             f"{'floor' if floor is None else 'room'} is not given", "an object of Plate and of Room"
         )
     asked = replace(case, modes=None, floor=floor, room=room)
-    moved = _on_floor(source, asked) if isinstance(source, Impact) else None
-    levels = (
-        (moved or source).levels(THIRDS, force="floor")
-        if isinstance(source, Impact)
-        else source.levels(THIRDS)
-    )
+    moved = _on_floor(source, asked)
+    levels = (moved or source).levels(THIRDS, force="floor")
     rated = np.isin(get_bands(THIRDS).nominal, rated_bands(THIRDS))
-    found = call(floor_api.predict_room, case_text(asked), np.ascontiguousarray(levels[rated]))
-    bands = found["bands"]
-    if moved and isinstance(source, Impact):
+    found = ask("room_level", case=case_text(asked), levels=levels[rated])
+    bands = found["room_bands"]
+    if moved:
         blocked = (
             source.blocked_force.max() if isinstance(source, FloorImpact) else source.peak("floor")
         )
         change = 20 * math.log10(moved.peak("floor") / blocked)
     else:
-        mass = case.ball.mass if isinstance(source, Impact) else source.quantities["mass"].value
-        change = _force_change(mass, source.contact_time, 1 / bands["conductance"].max())
+        change = _force_change(source.mass, source.contact_time, 1 / bands["conductance"].max())
     return RoomPrediction(
         floor=floor,
         room=room,
         source=moved or source,
         force="contact" if moved else "blocked",
         force_change=change,
-        floor_remarks=tuple(map(text, found.get("remarks", {}).values())),
+        floor_warnings=tuple(map(text, found.get("warnings", {}).values())),
         time_of_maximum=bands.pop("time"),
-        few_modes=found["few_modes"],
-        mass_per_area=found["surface_mass"],
-        octave_level=found["octaves"]["level"],
-        octave_time=found["octaves"]["time"],
-        history_time=found["history"]["time"],
-        history=found["history"]["level"],
+        few_modes=found["room"]["few_modes"],
+        mass_per_area=found["room"]["surface_mass"],
+        octave_level=found["room_octaves"]["level"],
+        octave_time=found["room_octaves"]["time"],
+        history_time=found["room_history"]["time"],
+        history=found["room_history"]["level"],
         **bands,
     )
 
 
-def _on_floor(source: Impact, case: Case) -> FloorImpact | None:
+def _on_floor(source: ImpactResult, case: Case) -> FloorImpact | None:
     """Return the impact on the floor of a case; None where its force is the blocked one."""
     known = source if isinstance(source, FloorImpact) else source.on_floor
-    if source.case.floor == case.floor:
+    if source.case.model is None or source.case.floor == case.floor:
         return known
     plain = replace(case, compression=None)
-    blocked = source.blocked_force if isinstance(source, FloorImpact) else source.floor_force
-    return new_floor_impact(case, call(floor_api.drop_on_floor, case_text(plain)), blocked)
+    blocked = source.blocked_force if isinstance(source, FloorImpact) else source.force("floor")
+    return new_floor_impact(case, ask("floor_impact", case=case_text(plain)), blocked)
 
 
 def _force_change(mass: float, contact_time: float, resistance: float) -> float:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.bridge import level_api
+from thud.base.bridge import ask
 from thud.base.checks import refuse
 from thud.base.columns import read_titled
 from thud.base.display import Displayed
@@ -145,7 +145,7 @@ class RoomLevels(Displayed):
         return float(10 / math.log(10) * error)
 
     @property
-    def remarks(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:
         """What a reader of the numbers has to know."""
         found = []
         if len(self.positions) < MIN_POSITIONS:
@@ -205,7 +205,7 @@ class RoomLevels(Displayed):
 
     def plot(self) -> Figure:
         """Draw the levels of positions, their mean, the standardised ones and the background."""
-        from thud.plot.room_figure import room_levels
+        from thud.plot.rooms import room_levels
 
         return room_levels(self)
 
@@ -228,8 +228,8 @@ class RoomLevels(Displayed):
     def _corrected(self) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         if self.background is None:
             return self.measured, np.zeros(len(self.frequency), dtype=bool)
-        level, is_upper_bound = level_api.remove_background(self.measured, self.background)
-        return level, is_upper_bound.astype(bool)
+        found = ask("background", levels=self.measured, background=self.background)
+        return found["levels"], found["is_upper_bound"].astype(bool)
 
 
 def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) -> RoomLevels:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeGuard
 import numpy as np
 
 from thud.base._schema import Plate, Room
-from thud.base.bridge import call, floor_api
+from thud.base.bridge import ask
 from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
 from thud.case.case import Case, case_text
@@ -122,7 +122,7 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
             "1 and 1",
         )
     case = Case(floor=floor, room=require_room(room))
-    found = call(floor_api.get_radiator, case_text(case), THIRDS)
+    found = ask("radiator", case=case_text(case), frequency=THIRDS)
     time = 2.2 / (THIRDS * found["loss_factor"])
     radiated = time * found["radiation_factor"] * THIRDS / 1000
     level = 155 - 30 * np.log10(found["surface_mass"]) + 10 * np.log10(radiated)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from thud.base._schema import Ball, Compression
-from thud.base.bridge import api, call
+from thud.base.bridge import ask
 from thud.base.display import Displayed
 from thud.base.extras import require_extra
 from thud.base.key import check_keywords
@@ -54,7 +54,7 @@ class CompressionCurve(Displayed):
 
     def plot(self) -> Figure:
         """Return a figure of the force against the deflection."""
-        from thud.plot.compression_figure import compression
+        from thud.plot.ball import compression
 
         return compression({"": self})
 
@@ -115,7 +115,7 @@ def compress(
         model=new_model(model, {}),
         compression=Compression(max_deflection, points, gas),
     )
-    return new_curve(case, call(api.compress, case_text(case)))
+    return new_curve(case, ask("compression", case=case_text(case)))
 
 
 def new_curve(case: Case, found: Bundle) -> CompressionCurve:

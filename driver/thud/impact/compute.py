@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from thud.base.bridge import api, call, text
+from thud.base.bridge import ask, text
 from thud.base.checks import require_kind
 from thud.base.errors import InputError
 from thud.case.case import Case, case_text
@@ -24,11 +24,11 @@ def compute(case: Case) -> Impact:
         raise InputError(message)
     # Free modes and compression of the case have their own functions.
     plain = replace(case, modes=None, compression=None)
-    return new_impact(case, call(api.solve, case_text(plain)))
+    return new_impact(case, ask("solve", case=case_text(plain)))
 
 
 def new_impact(case: Case, found: Bundle) -> Impact:
     """Return the impact in a bundle of the library."""
-    remarks = tuple(map(text, found.get("remarks", {}).values()))
-    common = history(case, found, remarks)
+    warnings = tuple(map(text, found.get("warnings", {}).values()))
+    common = history(case, found, warnings)
     return Impact(**common, on_floor=new_floor_impact(case, found, common["floor_force"]))

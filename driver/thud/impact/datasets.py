@@ -15,12 +15,11 @@ from thud.base.bridge import compiler, version
 from thud.case.keys import find_key, users
 from thud.impact.quantities import (
     ALL_QUANTITIES,
-    CONTACT_LEVEL,
     FLOOR_QUANTITIES,
     LEVELS,
     ROOM_BAND,
     ROOM_LEVEL,
-    SET_QUANTITIES,
+    SAMPLE_RESULTS,
 )
 from thud.level.levels import BANDWIDTHS, get_bands
 from thud.level.rating import rated_bands
@@ -32,9 +31,11 @@ if TYPE_CHECKING:
 
     from thud.base._schema import BandSet
     from thud.base.key import Key
+    from thud.base.quantity import Quantity
     from thud.case.case import Case
     from thud.impact.impact import Impact
     from thud.impact.outcomes import Ensemble
+    from thud.level.impact_result import ImpactResult
 
 # Name and unit of a history.
 _HISTORY = re.compile(r"(.*?)_((?:m|s|N|Pa|J|Hz|kg)(?:_per_\w+)?)")
@@ -46,63 +47,86 @@ def impact_dataset(impact: Impact, histories: Mapping[str, NDArray[np.float64]])
     for column, values in histories.items():
         named = _HISTORY.fullmatch(column)
         name, unit = named.groups() if named else (column, "")
-        words = attributes(unit.replace("_per_", "/"), name.replace("_", " "))
+        words = _attributes(unit.replace("_per_", "/"), name.replace("_", " "))
         variables[name] = ("time", values, words)
     for name, (force, bands) in LEVELS.items():
         variables[name] = (
             bands,
             impact.levels(bands, force=force),
-            attributes(*SET_QUANTITIES[name]),
+            attributes(SAMPLE_RESULTS[name]),
         )
-    for name, entry in schema.SCALARS.items():
-        variables[name] = ((), getattr(impact, name), attributes(*entry))
-    conforms = impact.conformity().conforms
-    variables["conforms"] = ((), conforms, attributes(*SET_QUANTITIES["conforms"]))
+    for name, quantity in schema.QUANTITIES.items():
+        variables[name] = ((), getattr(impact, name), attributes(quantity))
+    conforms = impact.assess().conforms
+    variables["conforms"] = ((), conforms, attributes(SAMPLE_RESULTS["conforms"]))
     coordinates = {"time": _time(impact.time), **band_coordinates(BANDWIDTHS)}
-    remarks = {"remarks": "\n".join(impact.remarks)}
-    found = xr.Dataset(variables, coordinates, origin(impact.case) | impact.facts | remarks)
+    warnings = {"warnings": "\n".join(impact.warnings)}
+    found = xr.Dataset(variables, coordinates, origin(impact.case) | impact.facts | warnings)
     # The arrays of the impact are read-only.
     return found.copy(deep=True)
 
 
+def recording_dataset(recording: ImpactResult) -> xr.Dataset:
+    """Return the dataset of a force on the floor, its levels and its numbers."""
+    variables: dict[str, Any] = {
+        "floor_force": ("time", recording.force(), _attributes("N", "floor force")),
+        **{
+            name: (bands, recording.levels(bands), attributes(SAMPLE_RESULTS[name]))
+            for name, (force, bands) in LEVELS.items()
+            if force == "floor"
+        },
+        **{
+            name: ((), getattr(recording, name), attributes(schema.QUANTITIES[name]))
+            for name in ("sample_rate", "contact_time", "peak_force", "restitution", "impulse")
+        },
+    }
+    coordinates = {"time": _time(recording.time), **band_coordinates(BANDWIDTHS)}
+    provenance = {"recording": recording.name, "warnings": "\n".join(recording.warnings)}
+    return xr.Dataset(variables, coordinates, provenance).copy(deep=True)
+
+
 def ensemble_dataset(ensemble: Ensemble) -> xr.Dataset:
-    """Return the dataset of many drops, along the dimension ``set``."""
+    """Return the dataset of many drops, along the dimension ``sample``."""
     assert ensemble.case.model is not None  # noqa: S101 - `solve_many` has set it
     coordinates: dict[str, Any] = band_coordinates(bands for _, bands in ensemble.levels)
     for name, values in ensemble.parameters.items():
         key, _ = find_key(name, users(ensemble.case))
-        words = attributes(key.unit, key.meaning)
-        coordinates[coordinate(name, key)] = ("set", values, words)
+        words = attributes(key)
+        coordinates[coordinate(name, key)] = ("sample", values, words)
     variables: dict[str, Any] = {}
-    for name, entry in SET_QUANTITIES.items():
+    for name, quantity in SAMPLE_RESULTS.items():
         if name not in LEVELS:
-            variables[name] = ("set", getattr(ensemble, name), attributes(*entry))
+            variables[name] = ("sample", getattr(ensemble, name), attributes(quantity))
         elif LEVELS[name] in ensemble.levels:
             values = ensemble.levels[LEVELS[name]]
-            variables[name] = (("set", LEVELS[name][1]), values, attributes(*entry))
+            variables[name] = (("sample", LEVELS[name][1]), values, attributes(quantity))
     for bands, level in ensemble.contact_levels.items():
-        words = attributes(*CONTACT_LEVEL)
-        variables[f"contact_{bands}_level"] = (("set", bands), level, words)
-    for name, (unit, meaning) in FLOOR_QUANTITIES.items():
+        name = f"contact_{bands}_level"
+        variables[name] = (("sample", bands), level, attributes(ALL_QUANTITIES[name]))
+    for name, quantity in FLOOR_QUANTITIES.items():
         if (values := getattr(ensemble, name)) is not None:
-            dimensions = ("set", ROOM_BAND) if name == ROOM_LEVEL else ("set",)
-            variables[name] = (dimensions, values, attributes(unit, meaning))
+            dimensions = ("sample", ROOM_BAND) if name == ROOM_LEVEL else ("sample",)
+            variables[name] = (dimensions, values, attributes(quantity))
             coordinates |= room_coordinates() if name == ROOM_LEVEL else {}
     for force in ("elastic", "floor"):
         if (values := getattr(ensemble, f"{force}_force")) is not None:
             seconds = np.arange(values.shape[1]) / ensemble.sample_rate
             coordinates["time"] = _time(seconds)
-            words = attributes("N", f"{force} force")
-            variables[f"{force}_force"] = (("set", "time"), values, words)
+            words = _attributes("N", f"{force} force")
+            variables[f"{force}_force"] = (("sample", "time"), values, words)
     return xr.Dataset(variables, coordinates, origin(ensemble.case)).copy(deep=True)
 
 
 def _time(seconds: NDArray[np.float64]) -> tuple[str, NDArray[np.float64], dict[str, str]]:
-    return "time", seconds, attributes("s", "time since the start of the record")
+    return "time", seconds, _attributes("s", "time since the start of the record")
 
 
-def attributes(unit: str, meaning: str) -> dict[str, str]:
-    """Return unit and meaning as attributes of a variable."""
+def attributes(quantity: Quantity | Key) -> dict[str, str]:
+    """Return unit and meaning of a quantity or a key as attributes of a variable."""
+    return _attributes(quantity.unit, quantity.meaning)
+
+
+def _attributes(unit: str, meaning: str) -> dict[str, str]:
     return {"units": unit or "1", "long_name": meaning}
 
 
@@ -125,14 +149,14 @@ def room_coordinates() -> dict[str, Any]:
 def _frequencies(
     dimension: str, nominal: NDArray[np.float64]
 ) -> tuple[str, NDArray[np.float64], dict[str, str]]:
-    return dimension, nominal, attributes("Hz", "nominal frequency")
+    return dimension, nominal, _attributes("Hz", "nominal frequency")
 
 
 def origin(case: Case) -> dict[str, str]:
     """Return the case of results and what has computed them."""
     return {
         "model": case.model.name if case.model else "",
-        "judged_force": case.levels.force,
+        "assessed_force": case.levels.force,
         "limits": case.limits.source,
         "case": f"{case.to_namelist()}",
         "thud_version": version(),

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import KEYS, OUTCOMES, HollowSphere, Limits, Sampling
-from thud.base.bridge import call, call_through, collect, ensemble_api, text
+from thud.base._schema import KEYS, SAMPLE_QUANTITIES, HollowSphere, Limits, Sampling
+from thud.base.bridge import ask, text
 from thud.base.checks import (
     refuse,
     refuse_value,
@@ -44,8 +44,9 @@ if TYPE_CHECKING:
 MAX_THREADS = 1024
 # Approximate time of one call of the library, s: interrupts are handled between calls.
 _CALL_TIME = 1.0
-# Maximum number of sets of one call, whose results the library holds in memory.
+# Maximum number of samples of one call, and of values of their forces, which the library holds.
 _MAX_CALL = 2**17
+_MAX_VALUES = 2**26
 
 
 @check_keywords
@@ -70,7 +71,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     forces and 1e-6 dB in the levels of bands that hold 1e-8 or more of the energy of the force, for
     the others bit for bit. Rounding counts in bands that hold less, as of slow contacts at 500 Hz:
     10 times less energy makes the difference 10 times greater. Results do not depend on the number
-    of threads or on the order of the sets.
+    of threads or on the order of the samples.
 
     Parameters
     ----------
@@ -92,9 +93,9 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         Bands of the levels in addition to octaves, such as ``"third"``; by default those of the
         case.
     forces
-        Keep the force histories: 16 bytes per sample and set.
+        Keep the force histories: 16 bytes for each instant of each sample.
     sample_rate, duration, substeps
-        As in `solve`, shared by all sets; by default those of the case.
+        As in `solve`, shared by all samples; by default those of the case.
     source
         ``"rubber_ball"`` or ``"tyre"``: the limits that apply; by default those of the case.
     progress
@@ -103,7 +104,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     Returns
     -------
     Ensemble
-        Outcomes, levels and verdicts. Sets that fail have a status, a reason and NaN, and do not
+        Outcomes, levels and verdicts. Samples that fail have a status, a reason and NaN, and do not
         affect the others.
 
     Raises
@@ -143,7 +144,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     try:
         columns, numbers = _columns(given, base)
     except MemoryError as error:
-        refuse("the parameters do not fit in memory", "fewer sets", error)
+        refuse("the parameters do not fit in memory", "fewer samples", error)
     shared = {
         "sample_rate": sample_rate,
         "duration": duration,
@@ -153,19 +154,22 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     for name in columns:
         if shared.get(name) is not None:
             refuse(f"{name!r} is given twice", "once, as a parameter or as a keyword")
-    sizes = _sizes(content, columns)
+    cost = _cost(content, columns)
     width = min(len(os.sched_getaffinity(0)), MAX_THREADS) if threads is None else threads
     require_whole("threads", width, 1, MAX_THREADS)
     width = 1 if _FORKED else width
-    work = int(np.clip(_CALL_TIME * width / sizes["cost"], 1, _MAX_CALL))
+    length = int(cost["force_length"]) if forces else 0
+    most = min(_MAX_CALL, _MAX_VALUES // max(1, len(FORCES) * length))
+    work = int(np.clip(_CALL_TIME * width / cost["cost"], 1, max(1, most)))
     parts = []
     try:
-        with tqdm(total=len(numbers), unit="set", disable=not progress, leave=False) as bar:
+        force = np.empty((len(numbers), len(FORCES), length))
+        with tqdm(total=len(numbers), unit="sample", disable=not progress, leave=False) as bar:
             for start in range(0, max(len(numbers), 1), work):
                 some = numbers[start : start + work]
-                parts.append(
-                    _compute(content, columns, some, width, sizes, judged=levels, forces=forces)
-                )
+                part = _compute(content, columns, some, width, levels=levels, forces=forces)
+                force[start : start + work] = part.pop("force")
+                parts.append(part)
                 bar.update(len(some))
         results = (
             parts[0]
@@ -173,16 +177,17 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
             else {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         )
     except MemoryError as error:
-        size = f"{len(numbers)} sets" + (f" of {sizes['sample']:.0f} samples" if forces else "")
-        refuse(f"forces = {forces} for {size} does not fit in memory", "fewer sets", error)
+        size = f"{len(numbers)} samples"
+        size += f" with forces of {length} values" if forces else ""
+        refuse(f"forces = {forces} for {size} does not fit in memory", "fewer samples", error)
     # They may fill the memory: once is enough.
-    force = freeze(results["force"])
+    force = freeze(force)
     return Ensemble(
-        base,
-        columns,
-        results["status"],
-        results["reason"],
-        **dict(zip(OUTCOMES, results["outcome"].T, strict=True)),
+        case=base,
+        parameters=columns,
+        status=results["status"],
+        reason=results["reason"],
+        **dict(zip(SAMPLE_QUANTITIES, results["quantity"].T, strict=True)),
         levels=_by_bands(results["level"], base.levels.bands),
         margin=results["margin"],
         conforms=results["verdict"],
@@ -191,11 +196,11 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         elastic_force=force[:, 0] if forces else None,
         floor_force=force[:, 1] if forces else None,
         sample_rate=base.sampling.sample_rate,
-        **_further(results["further"], base),
+        **_floor_results(results["floor_value"], base),
     )
 
 
-def _further(values: NDArray[np.float64], case: Case) -> dict[str, Any]:
+def _floor_results(values: NDArray[np.float64], case: Case) -> dict[str, Any]:
     """Return what cases with a floor have in addition, by name; see `Ensemble`."""
     if not case.floor:
         return {}
@@ -231,63 +236,48 @@ def _by_bands(
 
 def _compute(  # noqa: PLR0913 - those of the library
     content: bytes,
-    columns: Mapping[str, Any],
+    keys: Iterable[str],
     numbers: NDArray[np.float64],
     threads: int,
-    sizes: Bundle,
     *,
-    judged: bool,
+    levels: bool,
     forces: bool,
 ) -> dict[str, NDArray[Any]]:
-    """Return the results of some sets, the sets first."""
-    count = len(numbers)
-    # f2py knows no empty arrays: one set stands in for none.
-    given = numbers if count else np.zeros((1, numbers.shape[1]))
-    status, outcome, level, conforms, margin, verdict, further, force, *left = call_through(
-        ensemble_api.drop_many,
-        content,
-        _joined(columns),
-        given.T,
-        threads,
-        int(judged),
-        int(sizes["outcome"]),
-        int(sizes["band"]),
-        int(sizes["force"]),
-        int(sizes["sample"]) if forces else 1,
-        len(given) if forces else 1,
-        max(1, int(sizes["further"])),
-    )
-    reason = np.full(len(given), "", dtype=object)
-    sentences = text(collect(*left)["reasons"]).split("\n")
-    reason[status != 0] = sentences[:-1]
-    found = {
+    """Return the results of some samples, the samples first."""
+    found = ask(
+        "samples", case=content, **_named(keys), values=numbers.T, threads=threads, levels=levels,
+        forces=forces,
+    )  # fmt: skip
+    status = found["status"].astype(np.int32)
+    reason = np.full(len(numbers), "", dtype=object)
+    reason[status != 0] = text(found["reasons"]).split("\n")[:-1]
+    return {
         "status": status,
         "reason": reason,
-        "outcome": outcome.T,
-        "level": level.T,
-        "conforms": conforms.T != 0,
-        "margin": margin,
-        "verdict": verdict != 0,
-        "further": further.T,
-        "force": force.T,
+        "quantity": found["quantity"].T,
+        "level": found["level"].T,
+        "conforms": found["conforms"].T != 0,
+        "margin": found["margin"],
+        "verdict": found["verdict"] != 0,
+        "floor_value": found["floor_value"].T,
+        "force": found["force"].T,
     }
-    return {name: values[:count] for name, values in found.items()}
 
 
-def _sizes(content: bytes, keys: Iterable[str]) -> Bundle:
-    """Return the sizes of the results of drops that differ in some keys, and what one costs."""
+def _cost(content: bytes, keys: Iterable[str]) -> Bundle:
+    """Return the cost of a sample, s on one core, and the length of its forces."""
+    return ask("samples", case=content, **_named(keys))
+
+
+def _named(keys: Iterable[str]) -> dict[str, Any]:
+    """Return keys as the library reads them."""
     names = list(keys)
-    return call(ensemble_api.size_many, content, _joined(names), len(names))
-
-
-def _joined(names: Iterable[str]) -> bytes:
-    """Return names as the library reads them."""
-    return ",".join(names).encode("ascii", "replace")
+    return {"keys": ",".join(names).encode("ascii", "replace"), "key_count": len(names)}
 
 
 def get_cost(case: Case, keys: Iterable[str]) -> float:
     """Return the estimated time of one of many drops that differ in some keys, on one core, s."""
-    return float(_sizes(case_text(case), keys)["cost"])
+    return float(_cost(case_text(case), keys)["cost"])
 
 
 def _columns(

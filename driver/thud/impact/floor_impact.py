@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.bridge import call, floor_api
+from thud.base.bridge import ask
 from thud.base.checks import require_pair
+from thud.base.extras import require_extra
 from thud.base.immutable import Immutable
 from thud.case.case import Case, case_text
 from thud.impact.impact import Impact, history
@@ -51,7 +52,7 @@ class FloorEnergy(Immutable):
 class FloorImpact(Impact):
     """Impact on a floor that moves: `floor_force` is the contact force.
 
-    The standards judge the force on a rigid floor, that of the `Impact` whose `on_floor` this is.
+    The standards assess the force on a rigid floor, that of the `Impact` whose `on_floor` this is.
 
     Attributes
     ----------
@@ -100,9 +101,9 @@ class FloorImpact(Impact):
 
     def injected_energy(self, bands: BandSet = "octave") -> FloorEnergy:
         """Return the energy that goes into the floor in bands, in two ways."""
-        found = call(
-            floor_api.floor_energies, case_text(Case(floor=self.floor)), bands,
-            self.floor_force, self.floor_velocity, self.sample_rate,
+        found = ask(
+            "floor_energy", case=case_text(Case(floor=self.floor)), bands=bands,
+            force=self.floor_force, velocity=self.floor_velocity, sample_rate=self.sample_rate,
         )  # fmt: skip
         return FloorEnergy(**found)
 
@@ -117,9 +118,9 @@ class FloorImpact(Impact):
 
         Raise InputError where the floor has no such point.
         """
-        found = call(
-            floor_api.point_velocity, case_text(Case(floor=self.floor)), self.floor_force,
-            self.sample_rate, *require_pair("point", (x, y)),
+        found = ask(
+            "point_velocity", case=case_text(Case(floor=self.floor)), force=self.floor_force,
+            sample_rate=self.sample_rate, point=np.array(require_pair("point", (x, y))),
         )  # fmt: skip
         velocity: NDArray[np.float64] = found["velocity"]
         return velocity
@@ -145,13 +146,15 @@ class FloorImpact(Impact):
 
     def to_xarray(self) -> xr.Dataset:
         """Return the dataset of an impact, see `Impact.to_xarray`, with the work on the floor."""
-        unit, meaning = FLOOR_QUANTITIES["floor_work"]
-        words = {"units": unit, "long_name": meaning}
+        with require_extra("studies"):
+            from thud.impact.datasets import attributes
+
+        words = attributes(FLOOR_QUANTITIES["floor_work"])
         return super().to_xarray().assign(floor_work=((), self.floor_work, words))
 
     def plot(self) -> Figure:
         """Draw contact against blocked force, their levels, and the mobility of the floor."""
-        from thud.plot.floor_figure import draw_floor
+        from thud.plot.floors import draw_floor
 
         return draw_floor(self)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base._schema import Ball, FiniteElement, Modes
-from thud.base.bridge import api, call, text
+from thud.base.bridge import ask, text
 from thud.base.checks import require_kind
 from thud.base.display import Displayed
 from thud.base.errors import InputError, PlausibilityWarning
@@ -46,8 +46,8 @@ class FreeModes(Displayed):
         Nodes relative to the centre of the ball, m; nine per element.
     shape : ndarray, shape (n_mode, n_line, n_ring, 2)
         Displacements of maximum length 1, the lowest point moving upwards.
-    remarks : tuple of str
-        As `Impact.remarks`.
+    warnings : tuple of str
+        As `Impact.warnings`.
     """
 
     ball: Ball
@@ -57,7 +57,7 @@ class FreeModes(Displayed):
     rigid_frequency: float
     start: NDArray[np.float64]
     shape: NDArray[np.float64]
-    remarks: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """Return the frequencies, without the shapes."""
@@ -104,16 +104,16 @@ def free_modes(
     Warns
     -----
     PlausibilityWarning
-        As `FreeModes.remarks`.
+        As `FreeModes.warnings`.
     """
     case = Case(
         ball=Ball() if ball is None else ball,
         model=None,
         modes=Modes(count, radial_elements, polar_elements),
     )
-    modes = new_modes(case.ball, call(api.free_modes, case_text(case)))
-    for remark in modes.remarks:
-        warnings.warn(remark, PlausibilityWarning, stacklevel=3)
+    modes = new_modes(case.ball, ask("modes", case=case_text(case)))
+    for warning in modes.warnings:
+        warnings.warn(warning, PlausibilityWarning, stacklevel=3)
     return modes
 
 
@@ -128,7 +128,7 @@ def new_modes(ball: Ball, found: Bundle) -> FreeModes:
         modes["rigid_frequency"],
         np.stack((modes["r"], modes["z"]), axis=-1),
         np.moveaxis(modes["shape"], (-1, 0), (0, -1)),
-        tuple(map(text, found.get("remarks", {}).values())),
+        tuple(map(text, found.get("warnings", {}).values())),
     )
 
 
@@ -155,7 +155,6 @@ def loss_factors(model: FiniteElement, frequency: ArrayLike) -> NDArray[np.float
     if wanted.ndim != 1 or not wanted.size or not np.all(wanted > 0):
         message = "frequency is not allowed; allowed: a list of frequencies above 0, Hz"
         raise InputError(message)
-    result: NDArray[np.float64] = call(api.loss_factors, case_text(Case(model=model)), wanted)[
-        "loss_factors"
-    ]
+    found = ask("loss_factors", case=case_text(Case(model=model)), frequency=wanted)
+    result: NDArray[np.float64] = found["loss_factors"]
     return result

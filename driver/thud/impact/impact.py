@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base.checks import require_choice
+from thud.base._schema import ImpactQuantities
+from thud.base.checks import require_choice, require_whole
 from thud.base.display import Displayed
 from thud.base.extras import require_extra
+from thud.case.case import case_text
 from thud.impact.contact_time import contact_span
 from thud.impact.motion import Motion, new_motion
-from thud.level.levels import FORCES, force_exposure_levels, judge, peak_count
+from thud.level.assessment import assess
+from thud.level.impact_result import DropForce
+from thud.level.levels import FORCES, force_exposure_levels, peak_count
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,12 +35,15 @@ if TYPE_CHECKING:
     from thud.base.bridge import Bundle
     from thud.case.case import Case
     from thud.impact.floor_impact import FloorImpact
-    from thud.level.criteria import Conformity
+    from thud.level.assessment import Verdict
 
 
-@dataclass(frozen=True, eq=False)
-class Impact(Displayed):
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Impact(ImpactQuantities, Displayed):
     """Force and motion of one impact, sampled from first touch on.
+
+    It has the attributes of `ImpactQuantities`, and those below. Peak forces of finite elements
+    are those of the force below 1.25 kHz, which a force plate records.
 
     Attributes
     ----------
@@ -55,33 +63,10 @@ class Impact(Displayed):
         Other histories of the model, such as the contact radius; the names end with units.
     facts : dict of str to float
         Other numbers of the model, such as the bulk modulus; SI units.
-    remarks : tuple of str
+    warnings : tuple of str
         What is possible but not plausible, such as a wall with the density of no rubber.
     motion : Motion or None
         Snapshots of the deformed ball; None where the model has none.
-    sample_rate : float
-        Samples per second, Hz.
-    impact_velocity : float
-        Velocity at first touch, m/s.
-    contact_time : float
-        Time from first touch to release, s.
-    peak_force : float
-        Maximum force on the floor, N; of finite elements of its part below 1.25 kHz, which a force
-        plate records.
-    peak_elastic_force : float
-        Maximum elastic force, N, likewise.
-    max_deflection : float
-        Maximum deflection, m.
-    restitution : float
-        Velocity at release over velocity at first touch.
-    impulse : float
-        Time integral of the force on the floor, N s.
-    exact_contact_time : float
-        Contact time interpolated between samples, s, for models whose contact ends on a step.
-    touch_time : float
-        Time of first touch in the record, s.
-    impulse_residual, energy_residual : float
-        Relative residuals of the balances of impulse and energy.
     on_floor : FloorImpact or None
         The same drop on the floor of the case; None where there is none, it is rigid, or the model
         knows the force on a rigid floor only.
@@ -96,21 +81,29 @@ class Impact(Displayed):
     parts: dict[str, NDArray[np.float64]]
     channels: dict[str, NDArray[np.float64]]
     facts: dict[str, float]
-    remarks: tuple[str, ...]
+    warnings: tuple[str, ...]
     motion: Motion | None
-    sample_rate: float
-    impact_velocity: float
-    contact_time: float
-    peak_force: float
-    peak_elastic_force: float
-    max_deflection: float
-    restitution: float
-    impulse: float
-    exact_contact_time: float
-    touch_time: float
-    impulse_residual: float
-    energy_residual: float
     on_floor: FloorImpact | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the case."""
+        return self.case.name
+
+    @property
+    def mass(self) -> float:
+        """Mass of the source, kg."""
+        return self.case.ball.mass
+
+    @property
+    def velocity_tolerance(self) -> float:
+        """Relative tolerance of the impact velocity: none."""
+        return 0.0
+
+    @property
+    def limits_source(self) -> LimitsSource:
+        """Source whose limits apply."""
+        return self.case.limits.source
 
     @property
     def measured_contact_time(self) -> float:
@@ -130,8 +123,8 @@ class Impact(Displayed):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
-        remarks = [("remark", remark, "", "") for remark in self.remarks]
-        return [*self.conformity().rows(), *remarks]
+        warnings = [("warning", warning, "", "", "") for warning in self.warnings]
+        return [*self.assess().rows(), *warnings]
 
     @property
     def shell_force(self) -> NDArray[np.float64]:
@@ -157,16 +150,18 @@ class Impact(Displayed):
     def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:
         """Return the ``"floor"`` or the ``"elastic"`` force, N, shape (n_sample,).
 
-        By default that which the case judges.
+        By default that which the case assesses.
         """
-        return self.elastic_force if self.judged(kind) == "elastic" else self.floor_force
+        return self.elastic_force if self.assessed_force(kind) == "elastic" else self.floor_force
 
     def peak(self, force: LevelsForce | None = None) -> float:
         """Return the maximum of a force, N; see `force` and `peak_force`."""
-        return self.peak_elastic_force if self.judged(force) == "elastic" else self.peak_force
+        return (
+            self.peak_elastic_force if self.assessed_force(force) == "elastic" else self.peak_force
+        )
 
-    def judged(self, force: LevelsForce | None = None) -> LevelsForce:
-        """Return a force, checked, or without it that which the case judges."""
+    def assessed_force(self, force: LevelsForce | None = None) -> LevelsForce:
+        """Return a force, checked, or without it that which the case assesses."""
         chosen = self.case.levels.force if force is None else force
         require_choice("force", chosen, FORCES)
         return chosen
@@ -200,9 +195,9 @@ class Impact(Displayed):
             method or self.level_method,
         )
 
-    def conformity(
+    def assess(
         self, source: LimitsSource | None = None, force: LevelsForce | None = None
-    ) -> Conformity:
+    ) -> Verdict:
         """Return the verdict of the standards.
 
         Parameters
@@ -212,7 +207,7 @@ class Impact(Displayed):
         force
             ``"floor"`` or ``"elastic"``; by default that of the case.
         """
-        return judge(
+        return assess(
             self.levels(force=force),
             self.contact_time,
             self.restitution,
@@ -222,9 +217,24 @@ class Impact(Displayed):
             source or self.case.limits.source,
         )
 
+    def drop_force(self, drop: int = 1) -> DropForce:
+        """Return the force that the case assesses; the only drop is 1."""
+        require_whole("drop", drop, 1, 1)
+        case = self.case
+        model = case.model.name if case.model else ""
+        return DropForce(
+            name=case.name,
+            force=self.force(),
+            sample_rate=self.sample_rate,
+            start=float(self.time[0] - self.touch_time),
+            kind=self.assessed_force(),
+            origin=f"case {case.name}, model {model}, drop height {case.drop.height:g} m",
+            checksum=hashlib.sha256(case_text(case)).hexdigest(),
+        )
+
     def plot(self) -> Figure:
-        """Return a figure of the force that the case judges, and of its octave levels."""
-        from thud.plot.overview_figure import overview
+        """Return a figure of the force that the case assesses, and of its octave levels."""
+        from thud.plot.impacts import overview
 
         return overview(self)
 
@@ -265,17 +275,17 @@ class Impact(Displayed):
         return {}
 
 
-def history(case: Case, found: Bundle, remarks: tuple[str, ...]) -> dict[str, Any]:
+def history(case: Case, found: Bundle, warnings: tuple[str, ...]) -> dict[str, Any]:
     """Return what every history in a bundle has."""
-    samples, scalars = found["samples"], found["scalars"]
+    samples, quantities = found["samples"], found["quantities"]
     return {
         "case": case,
-        "time": np.arange(len(samples["deflection"])) / scalars["sample_rate"],
+        "time": np.arange(len(samples["deflection"])) / quantities["sample_rate"],
         **samples,
         "parts": found["parts"],
         "channels": found.get("channels", {}),
         "facts": found.get("facts", {}),
-        "remarks": remarks,
+        "warnings": warnings,
         "motion": new_motion(**found["motion"]) if "motion" in found else None,
-        **scalars,
+        **quantities,
     }

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base._schema import FloorOptions
-from thud.base.bridge import call, floor_api
+from thud.base.bridge import ask
 from thud.base.checks import refuse, require_array, require_kind, require_pair, require_real
 from thud.case.case import Case, case_text
 
@@ -53,5 +53,6 @@ def mobility(
     x, y = require_pair("point", place)
     text = case_text(Case(floor=floor))
     asked = np.ascontiguousarray(np.atleast_1d(values))
-    found = call(floor_api.floor_mobility, text, asked, int(point is not None), x, y)
+    points = {} if point is None else {"point": np.array((x, y))}
+    found = ask("mobility", case=text, frequency=asked, **points)
     return np.asarray(found["real"] + 1j * found["imaginary"])

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base._schema import OUTCOMES, SCALARS
+from thud.base._schema import SampleQuantities
 from thud.base.display import Displayed
 from thud.base.extras import require_extra
-from thud.impact.quantities import FLOOR_QUANTITIES, ROOM_LEVEL
+from thud.impact.quantities import FLOOR_QUANTITIES, ROOM_LEVEL, SAMPLE_RESULTS, SCALAR_QUANTITIES
 from thud.level.levels import BANDWIDTHS
 
 if TYPE_CHECKING:
@@ -21,51 +21,43 @@ if TYPE_CHECKING:
     from thud.case.case import Case
 
 
-@dataclass(frozen=True, eq=False)
-class Ensemble(Displayed):
-    """Outcomes of many drops; NaN where a drop could not be computed.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Ensemble(SampleQuantities, Displayed):
+    """Results of many samples of a case; NaN where a sample could not be computed.
+
+    It has the attributes of `SampleQuantities`, and those below.
 
     Attributes
     ----------
     case : Case
         All other keys.
-    parameters : dict of str to ndarray, shape (n_set,)
+    parameters : dict of str to ndarray, shape (n_sample,)
         Parameters in which the drops differ.
-    status : ndarray of int, shape (n_set,)
+    status : ndarray of int, shape (n_sample,)
         0, or the exit code of the error: 1 bad input, 2 numerical failure.
-    reason : ndarray of str, shape (n_set,)
+    reason : ndarray of str, shape (n_sample,)
         The sentence of the error.
-    contact_time : ndarray, shape (n_set,)
-        Time from first touch to release, s.
-    peak_force, peak_elastic_force : ndarray, shape (n_set,)
-        Maximum of the force on the floor and of the elastic force, N.
-    max_deflection : ndarray, shape (n_set,)
-        Maximum deflection, m.
-    restitution : ndarray, shape (n_set,)
-        Velocity at release over velocity at first touch.
-    impulse : ndarray, shape (n_set,)
-        Impulse given to the floor, N s.
-    levels : dict of (force, bands) to ndarray, shape (n_set, n_band)
+    levels : dict of (force, bands) to ndarray, shape (n_sample, n_band)
         Force exposure levels, dB: of ``"elastic"`` and ``"floor"``, in octaves, on which the
         verdict is based, and in the other bands of the case.
-    margin : ndarray, shape (n_set,)
+    margin : ndarray, shape (n_sample,)
         Minimum distance of an octave level of the judged force to its limits, dB, positive inside.
-    conforms : ndarray of bool, shape (n_set,)
-        Verdict of the standards on the force that the case judges.
-    elastic_conforms, floor_conforms : ndarray of bool, shape (n_set,)
+    conforms : ndarray of bool, shape (n_sample,)
+        Verdict of the standards on the force that the case assesses.
+    elastic_conforms, floor_conforms : ndarray of bool, shape (n_sample,)
         The same on the elastic force and on the force on the floor.
-    elastic_force, floor_force : ndarray, shape (n_set, n_sample), or None
+    elastic_force, floor_force : ndarray, shape (n_sample, n_time), or None
         Forces, N; None unless requested.
     sample_rate : float
         Samples per second, Hz.
-    contact_levels : dict of bands to ndarray, shape (n_set, n_band)
+    contact_levels : dict of bands to ndarray, shape (n_sample, n_band)
         Of cases with a floor: levels of the force on it, dB; on a rigid floor, and of models that
         know no other, those of the force there.
-    floor_work : ndarray, shape (n_set,), or None
+    floor_work : ndarray, shape (n_sample,), or None
         Likewise the energy that the source gives to the floor, J.
-    room_level : ndarray, shape (n_set, 12), or None
+    room_level : ndarray, shape (n_sample, 12), or None
         Of cases with a room: maximum Fast levels in the thirds from 50 to 630 Hz, dB re 20 uPa.
-    room_rating, standardised_rating : ndarray, shape (n_set,), or None
+    room_rating, standardised_rating : ndarray, shape (n_sample,), or None
         Their A-weighted sum L_iA,Fmax, dB, and that of the standardised levels; see `rating`.
     """
 
@@ -73,12 +65,6 @@ class Ensemble(Displayed):
     parameters: dict[str, NDArray[np.generic]]
     status: NDArray[np.int32]
     reason: NDArray[np.object_]
-    contact_time: NDArray[np.float64]
-    peak_force: NDArray[np.float64]
-    peak_elastic_force: NDArray[np.float64]
-    max_deflection: NDArray[np.float64]
-    restitution: NDArray[np.float64]
-    impulse: NDArray[np.float64]
     levels: dict[tuple[LevelsForce, BandSet], NDArray[np.float64]]
     margin: NDArray[np.float64]
     conforms: NDArray[np.bool_]
@@ -94,7 +80,7 @@ class Ensemble(Displayed):
     standardised_rating: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
-        """Return the number of sets."""
+        """Return the number of samples."""
         return len(self.status)
 
     def __repr__(self) -> str:
@@ -109,9 +95,10 @@ class Ensemble(Displayed):
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
         rows: list[tuple[str, ...]] = [("", "minimum", "median", "maximum")]
-        units = {name: SCALARS[name][0] for name in OUTCOMES} | {"margin": "dB"}
-        units |= {name: unit for name, (unit, _) in FLOOR_QUANTITIES.items() if name != ROOM_LEVEL}
-        for name, unit in units.items():
+        shown = SCALAR_QUANTITIES | {"margin": SAMPLE_RESULTS["margin"]} | FLOOR_QUANTITIES
+        for name, quantity in shown.items():
+            if name == ROOM_LEVEL:
+                continue
             values = getattr(self, name)
             if values is None:
                 continue
@@ -120,12 +107,11 @@ class Ensemble(Displayed):
             if not known.size:
                 continue
             shares = np.quantile(known, [0, 0.5, 1])
-            label = f"{name.replace('_', ' ')}, {unit}".removesuffix(", ")
-            rows.append((label, *(f"{value:.4g}" for value in shares)))
+            rows.append((quantity.label, *map(quantity.show, shares)))
         return rows
 
     def to_xarray(self) -> xr.Dataset:
-        """Return the outcomes along the dimension ``set``, with units and provenance.
+        """Return the outcomes along the dimension ``sample``, with units and provenance.
 
         Raise InputError where xarray is not installed.
         """
@@ -136,10 +122,10 @@ class Ensemble(Displayed):
 
     @property
     def elastic_octaves(self) -> NDArray[np.float64]:
-        """Octave levels of the elastic force, dB, shape (n_set, 5)."""
+        """Octave levels of the elastic force, dB, shape (n_sample, 5)."""
         return self.levels["elastic", BANDWIDTHS[0]]
 
     @property
     def floor_octaves(self) -> NDArray[np.float64]:
-        """Octave levels of the force on the floor, dB, shape (n_set, 5)."""
+        """Octave levels of the force on the floor, dB, shape (n_sample, 5)."""
         return self.levels["floor", BANDWIDTHS[0]]

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import base64
 import fcntl
-import re
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree as ET
 
 import f90nml.scanner
 import numpy as np
 
-from thud.base._schema import SCALARS
+from thud.base._schema import QUANTITIES
 from thud.base.checks import refuse, shown
 from thud.base.errors import PlausibilityWarning, ThudError
 from thud.base.files import MANIFEST, checksum, locked, read_input, read_manifest
@@ -64,7 +63,7 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
     Warns
     -----
     PlausibilityWarning
-        Where the file that says so, ``.thud``, is missing; also in `Impact.remarks`.
+        Where the file that says so, ``.thud``, is missing; also in `Impact.warnings`.
     """
     try:
         folder = Path(directory)
@@ -112,18 +111,18 @@ def _new_impact(files: _Files) -> Impact:
     case = Case.from_text(files.read("effective.nml"))
     numbers = f90nml.reads(files.read("summary.nml"))
     history, _ = _read_history(files, "", numbers["summary"], numbers.get("facts", {}))
-    remarks = _texts(numbers.get("remarks", {}).get("remark", []))
+    found = _texts(numbers.get("warnings", {}).get("warning", []))
     if not files.listed:
-        remark = f"{MANIFEST} is missing: nothing shows that the files belong together"
-        warnings.warn(f"{files.folder}: {remark}", PlausibilityWarning, stacklevel=3)
-        remarks += (remark,)
+        warning = f"{MANIFEST} is missing: nothing shows that the files belong together"
+        warnings.warn(f"{files.folder}: {warning}", PlausibilityWarning, stacklevel=3)
+        found += (warning,)
     on_floor = None
     if "floor_summary" in numbers:
         scalars, facts = numbers["floor_summary"], numbers.get("floor_facts", {})
         moving, columns = _read_history(files, "floor_", scalars, facts)
         on_floor = FloorImpact(
             case=case,
-            remarks=(),
+            warnings=(),
             blocked_force=columns.pop("blocked_force_N"),
             floor_displacement=columns.pop("floor_displacement_m"),
             floor_velocity=columns.pop("floor_velocity_m_per_s"),
@@ -131,7 +130,7 @@ def _new_impact(files: _Files) -> Impact:
             point_velocity=np.array([*columns.values()]).reshape(-1, len(moving["time"])),
             **moving,
         )
-    return Impact(case=case, remarks=remarks, on_floor=on_floor, **history)
+    return Impact(case=case, warnings=found, on_floor=on_floor, **history)
 
 
 def _read_history(
@@ -149,8 +148,8 @@ def _read_history(
         "parts": {name[: -len("_N")]: force[name] for name in columns[len(_MOTION) : last - 1]},
         "channels": {name: values for name, values in found.items() if name != "time_s"},
         "facts": dict(facts),
-        "motion": _read_motion(files, prefix) if f"{prefix}motion.pvd" in files else None,
-        **{name: scalars[name] for name in SCALARS},
+        "motion": _read_motion(files, prefix) if f"{prefix}snapshots.xmf" in files else None,
+        **{name: scalars[name] for name in QUANTITIES},
     }
     return history, {name: force[name] for name in columns[last + 1 :]}
 
@@ -171,41 +170,43 @@ def _table(text: str) -> dict[str, NDArray[np.float64]]:
 
 
 def _read_motion(files: _Files, prefix: str) -> Motion:
-    """Return the snapshots of the VTU files that ``motion.pvd`` lists."""
-    listed = files.read(f"{prefix}motion.pvd")
-    entries = re.findall(r'timestep="(.*?)" file="(.*?)"', listed)
-    shots = [_read_vtu(files.read(name)) for _, name in entries]
-    # The first element has its first two nodes on neighbouring rings.
-    line = int(shots[0]["connectivity"][1])
-    size = (len(shots[0]["cavity_pressure"]) // line, line)
+    """Return the snapshots of ``snapshots.xmf``."""
+    text = files.read(f"{prefix}snapshots.xmf")
+    _, *grids = ET.fromstring(text).iter("Grid")  # noqa: S314 - expat limits entities
+    shots = [_read_grid(grid) for grid in grids]
+    # The first element has its first two nodes on neighboring rings.
+    line = int(shots[0]["Topology"][0, 1])
+    size = (len(shots[0]["Geometry"]) // line, line)
     plane = {
         name: np.stack([shot[name].reshape(*size, 3)[..., :2].swapaxes(0, 1) for shot in shots])
-        for name in ("Points", "displacement", "velocity")
+        for name in ("Geometry", "displacement", "velocity")
     }
     outer = {
         name: np.stack([shot[name].reshape(size)[-1] for shot in shots])
         for name in ("contact_pressure", "contact_shear")
     }
+    first = {
+        name: np.array([shot[name].flat[0] for shot in shots])
+        for name in ("Time", "cavity_pressure", "floor_displacement")
+    }
     return Motion(
-        np.array([float(time) for time, _ in entries]),
-        plane["Points"][0] - plane["displacement"][0],
-        plane["Points"],
+        first["Time"],
+        plane["Geometry"][0] - plane["displacement"][0],
+        plane["Geometry"],
         plane["velocity"],
         outer["contact_pressure"],
         outer["contact_shear"],
-        np.array([float(shot["cavity_pressure"][0]) for shot in shots]),
-        # Left out where the floor is rigid.
-        np.array([float(shot.get("floor_displacement", [0.0])[0]) for shot in shots]),
+        first["cavity_pressure"],
+        first["floor_displacement"],
     )
 
 
-def _read_vtu(text: str) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a VTU file as thud writes it."""
-    arrays = re.findall(
-        r'<DataArray type="(Float64|Int64)" Name="(.*?)".*?>(.*?)</DataArray>', text
-    )
-    # The first eight bytes are the length of the data.
-    return {
-        name: np.frombuffer(base64.b64decode(data), f"<{kind[0].lower()}8", offset=8)
-        for kind, name, data in arrays
-    }
+def _read_grid(grid: ET.Element) -> dict[str, NDArray[np.float64]]:
+    """Return the arrays of a grid as thud writes it."""
+    time, *parts = grid
+    arrays = {"Time": np.array(float(time.attrib["Value"]))}
+    for part in parts:
+        extents = [int(extent) for extent in part[0].attrib["Dimensions"].split()]
+        values = np.array((part[0].text or "").split(), dtype=np.float64)
+        arrays[part.attrib.get("Name", part.tag)] = values.reshape(extents)
+    return arrays

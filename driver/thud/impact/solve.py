@@ -46,7 +46,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
         Integration steps per sampling interval.
     floor
         Floor on which the ball is dropped too, an object of `Rigid`, `InfinitePlate`, `Oscillator`,
-        `Plate`, `FloatingFloor`, `JoistFloor` or `MeasuredMobility`; the standards judge the force
+        `Plate`, `FloatingFloor`, `JoistFloor` or `MeasuredMobility`; the standards assess the force
         on a rigid one.
     **options
         Options of the model, see `HollowSphere`, `ModalBall`, `FiniteElement`, `MeasuredModes`,
@@ -67,7 +67,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     Warns
     -----
     PlausibilityWarning
-        As `Impact.remarks`.
+        As `Impact.warnings`.
     """
     sampling = {"sample_rate": sample_rate, "duration": duration, "substeps": substeps}
     given = {name: value for name, value in sampling.items() if value is not None}
@@ -84,6 +84,6 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
             floor=floor,
         )
     impact = compute(case)
-    for remark in impact.remarks:
-        warnings.warn(remark, PlausibilityWarning, stacklevel=2)
+    for warning in impact.warnings:
+        warnings.warn(warning, PlausibilityWarning, stacklevel=2)
     return impact

@@ -1,39 +1,26 @@
-"""Force exposure levels of any force record, and the verdict of the standards."""
+"""Force exposure levels and peaks of any force record."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, cast, get_args
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
-from thud.base._schema import LevelsForce, LevelsMethod
-from thud.base.bridge import call_direct, level_api, trimmed
-from thud.base.checks import refuse_value, require_array, require_choice, require_real
+from thud.base._schema import BANDS, BandSet, LevelsForce, LevelsMethod, LimitsSource
+from thud.base.bridge import ask
+from thud.base.checks import require_array, require_choice, require_real
 from thud.base.display import Displayed
 from thud.base.errors import InputError
-from thud.level.criteria import Conformity, Criterion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.base._schema import BandSet, LimitsSource
 
-
-def _names(values: Iterable[bytes]) -> tuple[str, ...]:
-    """Return names from the library."""
-    return tuple(map(trimmed, values))
-
-
-_N_SET, _N_SOURCE, _N_CRITERION = level_api.count_names()
-_sets, _sources = map(_names, level_api.get_names(_N_SET, _N_SOURCE))
-BANDWIDTHS = cast("tuple[BandSet, ...]", _sets)
-SOURCES = cast("tuple[LimitsSource, ...]", _sources)
+BANDWIDTHS: tuple[BandSet, ...] = get_args(BandSet)
+SOURCES: tuple[LimitsSource, ...] = get_args(LimitsSource)
 FORCES: tuple[LevelsForce, ...] = ("elastic", "floor")
-_MAX_PEAKS = 2**31
 # Upper limit of the band of a force plate, Hz (paper, section 3).
 RECORDED_BAND = 1250.0
 
@@ -87,10 +74,9 @@ def get_bands(bands: BandSet = "octave") -> Bands:
 
 
 @lru_cache
-def _bands(name: str) -> Bands:
+def _bands(name: BandSet) -> Bands:
     """Return the bands of a name."""
-    (n_band,) = call_direct(level_api.count_bands, name)
-    return Bands(*level_api.get_bands(name, n_band))
+    return Bands(**{column: np.array(values) for column, values in BANDS[name].items()})
 
 
 def force_exposure_levels(
@@ -128,13 +114,13 @@ def force_exposure_levels(
         Where the record is empty, zero throughout, not finite or not one-dimensional, or the
         rate, the bands or the method are invalid.
     """
-    count = len(get_bands(bands).nominal)
+    require_choice("bands", bands, BANDWIDTHS)
     require_choice("method", method, get_args(LevelsMethod))
     record = _record(force)
-    rate = _number("sample_rate", sample_rate)
-    (levels,) = call_direct(level_api.force_exposure, record, rate, bands, method, count)
-    result: NDArray[np.float64] = levels
-    return result
+    rate = to_float("sample_rate", sample_rate)
+    found = ask("levels", force=record, sample_rate=rate, bands=bands, method=method)
+    levels: NDArray[np.float64] = found["levels"]
+    return levels
 
 
 def record_force(force: NDArray[np.float64], sample_rate: float) -> NDArray[np.float64]:
@@ -142,7 +128,8 @@ def record_force(force: NDArray[np.float64], sample_rate: float) -> NDArray[np.f
 
     Forces, N, have the shape (n_sample,) and start and end at zero; the rate is in Hz.
     """
-    recorded: NDArray[np.float64] = level_api.record_force(force, sample_rate)
+    recorded: NDArray[np.float64]
+    recorded = ask("recorded_force", force=force, sample_rate=sample_rate)["force"]
     return recorded
 
 
@@ -158,80 +145,11 @@ def peak_count(force: ArrayLike, sample_rate: float) -> int:
         what = "holds a value that is not finite" if record.size else "has no samples"
         message = f"force {what}; allowed: real numbers, N"
         raise InputError(message)
-    rate = _number("sample_rate", sample_rate)
+    rate = to_float("sample_rate", sample_rate)
     if not 0 < rate < np.inf:
         message = f"sample_rate = {rate} is not allowed; allowed: sample_rate > 0"
         raise InputError(message)
-    return int(level_api.count_peaks(record, rate))
-
-
-def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
-    levels: ArrayLike,
-    contact_time: float,
-    restitution: float,
-    peaks: int,
-    mass: float,
-    drop_height: float,
-    source: LimitsSource = "rubber_ball",
-) -> Conformity:
-    """Return the verdict of the standards on a source.
-
-    Parameters
-    ----------
-    levels : array_like, shape (5,)
-        Force exposure levels of the octaves 31.5 to 500 Hz, dB.
-    contact_time
-        Contact time, s.
-    restitution
-        Coefficient of restitution.
-    peaks
-        Number of peaks of the force.
-    mass
-        Mass of the source, kg.
-    drop_height
-        Drop height, m.
-    source
-        ``"rubber_ball"`` or ``"tyre"``.
-
-    Raises
-    ------
-    InputError
-        Where the source is not known or `levels` are not five numbers.
-    """
-    require_choice("source", source, SOURCES)
-    octaves = _record(levels, "levels")
-    nominal = get_bands(BANDWIDTHS[0]).nominal
-    if octaves.shape != nominal.shape:
-        message = (
-            f"levels have the shape {octaves.shape}; allowed: {nominal.shape}, "
-            f"the octaves {nominal[0]:g} to {nominal[-1]:g}"
-        )
-        raise InputError(message)
-    if not isinstance(peaks, int | np.integer) or not 0 <= peaks < _MAX_PEAKS:
-        refuse_value("peaks", peaks, f"0 <= peaks < {_MAX_PEAKS}, whole")
-    numbers = {
-        "contact_time": contact_time,
-        "restitution": restitution,
-        "mass": mass,
-        "drop_height": drop_height,
-    }
-    time, bounce, kilograms, height = (_number(name, value) for name, value in numbers.items())
-    names, units, value, lower, upper, met = call_direct(
-        level_api.judge, source, octaves, time, bounce, int(peaks), kilograms, height,
-        _N_CRITERION,
-    )  # fmt: skip
-    rows = zip(_names(names), _names(units), value, lower, upper, met, strict=True)
-    return Conformity(
-        source,
-        tuple(Criterion(n, u, float(v), float(a), float(b), bool(m)) for n, u, v, a, b, m in rows),
-    )
-
-
-def octave_limits(source: LimitsSource) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the minimum and maximum conforming octave levels of a source, dB, shape (5,)."""
-    count = len(get_bands(BANDWIDTHS[0]).nominal)
-    octaves = judge(np.zeros(count), 0, 0, 0, 0, 0, source).criteria[:count]
-    return np.array([o.lower for o in octaves]), np.array([o.upper for o in octaves])
+    return int(ask("peak_count", force=record, sample_rate=rate)["peak_count"])
 
 
 def _record(values: ArrayLike, name: str = "force") -> NDArray[np.float64]:
@@ -239,7 +157,7 @@ def _record(values: ArrayLike, name: str = "force") -> NDArray[np.float64]:
     return require_real(name, require_array(name, values, dimensions=(1,)))
 
 
-def _number(name: str, value: object) -> float:
+def to_float(name: str, value: object) -> float:
     """Return a number as float; raise InputError where it is not one."""
     try:
         return float(value)  # type: ignore[arg-type]

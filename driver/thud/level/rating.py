@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base.bridge import call_direct, level_api
-from thud.base.checks import refuse, refuse_value, require_array, require_real
+from thud.base._schema import CLASS_LIMITS, RATED_BANDS
+from thud.base.bridge import ask
+from thud.base.checks import refuse, refuse_value, require_array, require_choice, require_real
 from thud.base.display import Displayed
 from thud.level.levels import BANDWIDTHS
 
@@ -20,8 +21,7 @@ if TYPE_CHECKING:
 # Levels beyond it, dB, are none of sound.
 LARGEST_LEVEL = 1000.0
 # Words of the Korean classes, and their maximum levels, dB.
-CLASSES = ("none", "1", "2", "3", "4")
-CLASS_LIMITS: tuple[float, ...] = tuple(level_api.get_class_limits(len(CLASSES) - 1))
+CLASSES = ("none", *(f"{i}" for i in range(1, len(CLASS_LIMITS) + 1)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -76,9 +76,8 @@ def rated_bands(bands: BandSet) -> NDArray[np.float64]:
 
     Raise InputError where `bands` is not known.
     """
-    (count,) = call_direct(level_api.count_rated, bands)
-    nominal: NDArray[np.float64] = level_api.get_rated(bands, count)
-    return nominal
+    require_choice("bands", bands, RATED_BANDS)
+    return np.array(RATED_BANDS[bands])
 
 
 def rating(levels: ArrayLike, bands: BandSet = "octave") -> Rating:
@@ -114,14 +113,14 @@ def rating(levels: ArrayLike, bands: BandSet = "octave") -> Rating:
     wild = values[abs(values) > LARGEST_LEVEL]
     if wild.size:
         refuse_value("levels", float(wild[0]), f"{-LARGEST_LEVEL:g} to {LARGEST_LEVEL:g} dB")
-    total, rounded, grade, curve = call_direct(level_api.rate, bands, values)
+    found = ask("rating", bands=bands, levels=values)
     has_classes = bands == BANDWIDTHS[0]
     return Rating(
         bands,
-        float(total),
-        int(rounded),
-        int(grade) if has_classes else None,
-        int(curve) if has_classes else None,
+        found["a_weighted"],
+        int(found["rounded"]),
+        int(found["class"]) if has_classes else None,
+        int(found["curve"]) if has_classes else None,
     )
 
 
@@ -163,8 +162,11 @@ def standardised_level(
         )
     if (times <= 0).any():
         refuse_value("reverberation_time", float(times.min()), "reverberation_time > 0, s")
-    found: NDArray[np.float64] = level_api.standardise(values, times, require_volume(volume))
-    return found
+    standardised: NDArray[np.float64]
+    standardised = ask(
+        "standardization", levels=values, reverberation_time=times, volume=require_volume(volume)
+    )["levels"]
+    return standardised
 
 
 def require_volume(volume: Any) -> float:  # noqa: ANN401 - of a user

@@ -1,21 +1,18 @@
-"""Figures, each in a file of its own.
+"""Figures by theme: impacts, ball, floors, rooms, recordings, fits, studies, pages.
 
-A file holds the function that draws its figure, as wide as a column of a journal page, and declares
-its use: ``thud-driver run`` adds ``IMPACT_FIGURES``, ``ROOM_FIGURES``, ``MODES_FIGURES`` and
-``COMPRESSION_FIGURES`` to the results of a case, ``thud-driver figures`` draws
-``DOCUMENTATION_FIGURES``.
+`case_figures` has the figures of a case by the names of their files; `thud.plot.documentation` has
+those of the paper and of the documentation.
 """
 
-import importlib
-import pkgutil
-from collections.abc import Callable
+from __future__ import annotations
+
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse
 
 try:
-    from matplotlib.figure import Figure
+    import matplotlib.figure  # noqa: F401 - to report a damaged matplotlibrc
 except ValueError as error:
     refuse(
         f"matplotlib cannot be imported ({error})",
@@ -23,91 +20,123 @@ except ValueError as error:
         error,
     )
 
+from thud.base._schema import Plate
 from thud.base.display import draw_all, left_out
-from thud.floors.prediction import predict_level
-from thud.impact.compression import CompressionCurve
-from thud.impact.free_modes import FreeModes
-from thud.impact.impact import Impact
-from thud.plot.comparison_page import comparison_page as comparison_page
-from thud.plot.compression_figure import compression as compression
-from thud.plot.design_map_figure import draw_design_map as draw_design_map
-from thud.plot.fit_figure import draw_fit as draw_fit
-from thud.plot.floor_figure import draw_floor as draw_floor
-from thud.plot.floor_mobilities_figure import floor_mobilities as floor_mobilities
-from thud.plot.force_history_figure import force_history as force_history
-from thud.plot.impedance_figure import ball_impedances as ball_impedances
-from thud.plot.level_changes_figure import level_changes as level_changes
-from thud.plot.levels_figure import levels as levels
-from thud.plot.loss_factor_figure import loss_factor as loss_factor
-from thud.plot.mobility_fit_figure import mobility_fit as mobility_fit
-from thud.plot.modes_figure import mode_shapes as mode_shapes
-from thud.plot.motion_figure import animate as animate, motion as motion
-from thud.plot.plate_modes_figure import plate_modes as plate_modes
-from thud.plot.prediction_figure import draw_decay as draw_decay, draw_prediction as draw_prediction
-from thud.plot.recording_figure import (
+from thud.plot.ball import (
+    animate as animate,
+    compression as compression,
+    draw_material as draw_material,
+    loss_factor as loss_factor,
+    mode_shapes as mode_shapes,
+    motion as motion,
+)
+from thud.plot.files import (
+    FORMATS as FORMATS,
+    figure_files as figure_files,
+    save as save,
+    save_all as save_all,
+)
+from thud.plot.fits import draw_fit as draw_fit
+from thud.plot.floors import (
+    ball_impedances as ball_impedances,
+    draw_floor as draw_floor,
+    floor_mobilities as floor_mobilities,
+    mobility_fit as mobility_fit,
+    plate_modes as plate_modes,
+)
+from thud.plot.impacts import (
+    force_history as force_history,
+    level_changes as level_changes,
+    levels as levels,
+)
+from thud.plot.pages import comparison_page as comparison_page
+from thud.plot.recordings import (
     recording_forces as recording_forces,
     recording_levels as recording_levels,
 )
-from thud.plot.room_figure import room_levels as room_levels
-from thud.plot.sensitivity_figure import draw_sensitivity as draw_sensitivity
+from thud.plot.rooms import (
+    draw_decay as draw_decay,
+    draw_positions as draw_positions,
+    draw_prediction as draw_prediction,
+    room_levels as room_levels,
+)
+from thud.plot.studies import (
+    draw_design as draw_design,
+    draw_sensitivity as draw_sensitivity,
+    draw_surrogate as draw_surrogate,
+    draw_sweep as draw_sweep,
+    draw_uncertainty as draw_uncertainty,
+)
 from thud.plot.style import (
-    COLOURS as COLOURS,
-    FORMATS as FORMATS,
+    COLORS as COLORS,
     LINES as LINES,
     MARKERS as MARKERS,
-    SIZE as SIZE,
     WIDTH as WIDTH,
     add_curves as add_curves,
     empty_axes as empty_axes,
     legend_above as legend_above,
+    named,
     octave_axis as octave_axis,
-    picture_files as picture_files,
-    save as save,
-    save_all as save_all,
-    style_axes as style_axes,
+    own_style as own_style,
 )
-from thud.plot.surrogate_figure import draw_surrogate as draw_surrogate
-from thud.plot.sweep_figure import draw_sweep as draw_sweep
-from thud.plot.uncertainty_figure import draw_uncertainty as draw_uncertainty
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.figure import Figure
+
+    from thud.impact.compression import CompressionCurve
+    from thud.impact.free_modes import FreeModes
+    from thud.impact.impact import Impact
+
+# Figures that a run draws by default: the first of these that the case has.
+DEFAULT_COUNT = 3
 
 
 def case_figures(
     impact: Impact | None = None,
     modes: FreeModes | None = None,
     curve: CompressionCurve | None = None,
+    count: int | None = None,
 ) -> dict[str, Figure]:
-    """Draw the figures of a case: of its impact, the level below, free modes, slow compression.
+    """Draw the figures of a case: impact, floor, room below, free modes, quasi-static compression.
 
-    Return the figures by the names of their files, without those that have nothing to show or, with
-    a warning, cannot be drawn.
+    Parameters
+    ----------
+    impact, modes, curve
+        Results of the case.
+    count
+        Number of figures, the most informative first; by default all.
+
+    Returns
+    -------
+    dict of str to Figure
+        Figures by the names of their files, without those that, with a warning, cannot be drawn.
     """
-    prediction = None
+    draws: dict[str, Callable[[], Figure | None]] = {}
+    if impact:
+        draws["force"] = partial(force_history, named(impact))
+        draws["levels"] = partial(levels, named(impact))
     if impact and impact.case.room:
+        # SciPy takes its time.
+        from thud.floors.prediction import predict_level
+
         with left_out("the level in the room"):
             prediction = predict_level(impact)
-    given = {
-        "IMPACT_FIGURES": impact,
-        "ROOM_FIGURES": prediction,
-        "MODES_FIGURES": modes,
-        "COMPRESSION_FIGURES": curve,
-    }
-    return draw_all(
-        {
-            name: partial(draw, results)
-            for kind, results in given.items()
-            if results
-            for name, draw in _declared(kind).items()
-        }
-    )
-
-
-def documentation_figures() -> dict[str, Callable[[], Figure]]:
-    """Return functions that compute and draw the figures of the documentation, by name."""
-    return _declared("DOCUMENTATION_FIGURES")
-
-
-def _declared(kind: str) -> dict[str, Callable[..., Any]]:
-    """Return the figures that the files of this package declare under a name."""
-    found = pkgutil.iter_modules(__path__, f"{__name__}.")
-    modules = [importlib.import_module(file.name) for file in found]
-    return {name: draw for module in modules for name, draw in getattr(module, kind, {}).items()}
+            draws["room"] = partial(draw_prediction, prediction)
+            draws["room_decay"] = partial(draw_decay, prediction)
+            draws["room_positions"] = partial(draw_positions, prediction)
+    if impact and impact.on_floor:
+        draws["floor"] = partial(draw_floor, impact.on_floor)
+    if modes:
+        draws["modes"] = partial(mode_shapes, modes)
+    if curve:
+        draws["compression"] = curve.plot
+    if impact and isinstance(impact.case.floor, Plate):
+        draws["floor_modes"] = partial(plate_modes, impact.case.floor)
+    if impact:
+        draws["loss_factor"] = partial(draw_material, impact)
+    for name, drop in (("motion", impact), ("floor_motion", impact and impact.on_floor)):
+        if drop and drop.motion:
+            draws[name] = partial(motion, drop)
+    return draw_all(dict([*draws.items()][:count]))

@@ -1,89 +1,90 @@
-"""The look of all figures: colours, sizes, axes, legends; and how they are saved."""
+"""Look of all figures: colors, lines, axes, legends."""
 
-import io
-import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from __future__ import annotations
+
+from collections.abc import Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from textwrap import fill
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.legend import Legend
 from matplotlib.ticker import NullLocator
-from numpy.typing import NDArray
 
-from thud.base._schema import BandSet, LevelsForce
-from thud.base.checks import require_kind, shown
-from thud.base.display import draw_all, left_out
+from thud.base.checks import require_kind
 from thud.base.errors import InputError
-from thud.base.files import Results, replace_file
-from thud.impact.impact import Impact
+from thud.level.impact_result import ImpactResult
 from thud.level.levels import get_bands
-from thud.recordings.recording import Recording
 
-Curve = TypeVar("Curve", bound=Impact | Recording)
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
 
-# Okabe and Ito's colours, for any colour vision; line styles distinguish curves in print.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+    from matplotlib.axes import Axes
+    from matplotlib.legend import Legend
+    from numpy.typing import NDArray
+
+    from thud.base._schema import BandSet, LevelsForce
+    from thud.impact.impact import Impact
+
+    Curve = TypeVar("Curve", bound=ImpactResult)
+
+# Okabe and Ito's colors, for any color vision; line styles distinguish curves in print.
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
-# Of bars; in print they tell colours apart.
-HATCHES = (None, "//////", "......", "\\\\\\\\\\\\", "xxxxxx", "------", "||||||", "++++++")
 # Areas behind curves.
 GREY = "0.85"
-# Width of a column, inch, and size of text, pt.
+# Width of a column, inch.
 WIDTH = 3.5
-SIZE = 8
-FORMATS = ("pdf", "png", "svg")
 FORCE_WORDS = {"elastic": "elastic force", "floor": "force on the floor"}
 BAND_WORDS = {"octave": "Octave band", "third": "One-third-octave band"}
 LEVEL = "Force exposure level, dB re 1 N"
-# Maximum number of letters of a line of a legend.
+# Maximum number of characters in a line of a legend.
 _LINE = 44
-# Beside matplotlib's defaults: text in vector graphics stays text, and the same figure gives the
-# same bytes everywhere.
-_STYLE: dict[Any, Any] = {"svg.fonttype": "none", "svg.hashsalt": "thud", "timezone": "UTC"}
+# Without the backend: figures have no window.
+_STYLE = dict(mpl.rc_params_from_file(Path(__file__).with_name("thud.mplstyle")))
+del _STYLE["backend"]
 
 
 @contextmanager
 def own_style() -> Iterator[None]:
-    """Draw and save in the style of all figures, whatever a user's matplotlibrc says.
-
-    It decorates the functions that draw.
-    """
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(_STYLE)
+    """Draw in the style of thud; the settings of the user neither act nor change."""
+    with mpl.rc_context(_STYLE):
         yield
+
+
+class StyledFigure(Figure):
+    """Figure that keeps the style of thud where a user draws or saves it."""
+
+    def draw(self, *arguments: Any, **options: Any) -> None:  # noqa: ANN401 - of matplotlib
+        """Draw the figure."""
+        with own_style():
+            super().draw(*arguments, **options)
+
+    def savefig(self, *arguments: Any, **options: Any) -> None:  # noqa: ANN401 - of matplotlib
+        """Save the figure."""
+        with own_style():
+            super().savefig(*arguments, **options)
 
 
 def new_figure(height: float, width: float = WIDTH) -> Figure:
     """Return an empty figure; lengths in inches."""
-    return Figure(figsize=(width, height), dpi=300, layout="constrained")
+    with own_style():
+        return StyledFigure(figsize=(width, height))
 
 
+@own_style()
 def empty_axes(height: float) -> tuple[Figure, Axes]:
-    """Return an empty figure of column width and its axes."""
+    """Return an empty figure of column width, inches high, and its axes."""
     figure = new_figure(height)
-    return figure, style_axes(figure.add_subplot())
+    return figure, figure.add_subplot()
 
 
-def style_axes(axes: Axes) -> Axes:
-    """Give axes the look of all figures."""
-    axes.tick_params(labelsize=SIZE)
-    axes.grid(visible=True, linewidth=0.4, alpha=0.5)
-    axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
-    return axes
-
-
-def legend_above(axes: Axes, title: str = "") -> Legend:
-    """Put the legend of axes above all axes of their figure, in as few rows as its width allows.
+@own_style()
+def legend_above(axes: Axes, *others: Axes, title: str = "") -> Legend:
+    """Put one legend of axes above their figure, in as few rows as its width allows.
 
     The figure becomes higher by the legend.
     """
@@ -91,15 +92,18 @@ def legend_above(axes: Axes, title: str = "") -> Legend:
     if figure is None:
         message = "the axes are removed from their figure; allowed: axes of a figure"
         raise InputError(message)
-    handles, names = axes.get_legend_handles_labels()
+    entries = [
+        (handle, fill(name, _LINE))
+        for one in (axes, *others)
+        for handle, name in zip(*one.get_legend_handles_labels(), strict=True)
+    ]
+    handles, names = zip(*entries, strict=True)
     rows = 0
     while True:
         rows += 1
         legend = figure.legend(
-            handles, [fill(name, _LINE) for name in names], loc="outside upper left",
-            ncols=-(-len(names) // rows), title=title, title_fontsize=SIZE - 1, alignment="left",
-            fontsize=SIZE - 1, frameon=False, borderpad=0, handlelength=2.4, handletextpad=0.4,
-            columnspacing=0.8,
+            handles, names, loc="outside upper left", ncols=-(-len(names) // rows), title=title,
+            alignment="left",
         )  # fmt: skip
         size = legend.get_window_extent()
         if rows >= len(names) or size.width < 0.97 * figure.bbox.width:
@@ -115,28 +119,24 @@ def escape_label(label: str) -> str:
 
 
 def styled(i: int, styles: Sequence[Any]) -> Any:  # noqa: ANN401 - of matplotlib
-    """Return the style of a curve by its number; each round of colours has it shifted by one."""
-    return styles[(i + i // len(COLOURS)) % len(styles)]
+    """Return the style of a curve by its index; each round of colors has it shifted by one."""
+    return styles[(i + i // len(COLORS)) % len(styles)]
 
 
 def line_style(i: int) -> dict[str, Any]:
-    """Return colour and line style of a curve by its number."""
-    return {
-        "color": COLOURS[i % len(COLOURS)],
-        "linestyle": styled(i, LINES),
-        "linewidth": 1.2,
-    }
+    """Return color and line style of a curve by its index."""
+    return {"color": COLORS[i % len(COLORS)], "linestyle": styled(i, LINES), "linewidth": 1.2}
 
 
 def marker_style(i: int, size: float = 4) -> dict[str, Any]:
-    """Return the marker of a curve by its number."""
+    """Return the marker of a curve by its index."""
     return {"marker": styled(i, MARKERS), "markersize": size}
 
 
 def add_curves(
     axes: Axes, curves: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
 ) -> None:
-    """Draw curves of x and y by their names, each in its colour and line style."""
+    """Draw curves of x and y by their names, each in its color and line style."""
     for i, (name, (x, y)) in enumerate(curves.items()):
         axes.plot(x, y, label=escape_label(name), **line_style(i))
 
@@ -151,19 +151,19 @@ def iterate_curves(
 ) -> Iterator[tuple[str, Curve, LevelsForce]]:
     """Yield label, impact and kind of force of each curve.
 
-    Without `force` each case has the one that it judges. Labels say which where they differ.
+    Without `force` each case has the force that it assesses. Labels say which where they differ.
 
     Raises
     ------
     InputError
-        Where `impacts` is not a mapping of names to impacts, or empty.
+        If `impacts` is not a mapping of names to impacts, or empty.
     """
     if not isinstance(impacts, Mapping) or not impacts:
         message = "impacts are not given; allowed: a mapping of names to one or more impacts"
         raise InputError(message)
     for name, impact in impacts.items():
-        require_kind(name, impact, Impact | Recording)
-    kinds = [impact.judged(force) for impact in impacts.values()]
+        require_kind(name, impact, ImpactResult)
+    kinds = [impact.assessed_force(force) for impact in impacts.values()]
     for (name, impact), kind in zip(impacts.items(), kinds, strict=True):
         which = f", {FORCE_WORDS[kind]}" if len(set(kinds)) > 1 else ""
         yield f"{name}{which}", impact, kind
@@ -189,10 +189,10 @@ def octave_axis(axes: Axes, bands: BandSet = "octave") -> None:
 
 
 def band_axis(axes: Axes, nominal: NDArray[np.float64], bands: BandSet) -> None:
-    """Label the axis with some of the bands of a set, by their rounded mid frequencies, Hz."""
+    """Label the axis with some of the bands of a set, by their nominal mid-band frequencies, Hz."""
     axes.set_xticks(np.arange(len(nominal)), [f"{frequency:g}" for frequency in nominal])
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.set_xlabel(f"{BAND_WORDS[bands]}, Hz", fontsize=SIZE)
+    axes.set_xlabel(f"{BAND_WORDS[bands]}, Hz")
     if bands == "third":
         axes.tick_params(axis="x", labelrotation=90)
 
@@ -201,89 +201,6 @@ def octave_boxes(
     axes: Axes, lower: NDArray[np.float64], upper: NDArray[np.float64], label: str
 ) -> None:
     """Draw the range of each octave as a grey box; the label is that of all of them."""
-    for place, limits in enumerate(zip(lower, upper, strict=True)):
-        name = label if place == 0 else None
-        line = [place - 0.4, place + 0.4]
-        axes.fill_between(line, *limits, color="0.82", linewidth=0, label=name)
-
-
-def save(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Save a figure atomically, in the format of the ending of its path.
-
-    Parameters
-    ----------
-    figure
-        The figure.
-    path
-        Path of the file; an existing one is replaced.
-
-    Raises
-    ------
-    InputError
-        Where the ending is not one of png, svg and pdf.
-    OSError
-        Where the file cannot be written.
-    """
-    kind = Path(path).suffix[1:].lower()
-    if kind not in FORMATS:
-        message = f"{path}: ending {shown(kind)} is not known; allowed: {', '.join(FORMATS)}"
-        raise InputError(message)
-    replace_file(path, _picture(figure, Path(path).stem, kind))
-
-
-@own_style()
-def _picture(figure: Figure, name: str, kind: str) -> bytes:
-    """Return the content of the file of a figure."""
-    content = io.BytesIO()
-    # Without a date, the same figure gives the same bytes.
-    date = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind, {})
-    title = name.replace("_", " ").capitalize()
-    figure.savefig(content, format=kind, metadata={"Title": title, **date})
-    return content.getvalue()
-
-
-def picture_files(figures: Mapping[str, Figure]) -> dict[str, bytes]:
-    """Return the contents of figures as PNG and SVG by the names of their files.
-
-    Those that cannot be drawn are left out, with a `ReportWarning`.
-    """
-    contents = {}
-    for name, figure in figures.items():
-        for kind in ("png", "svg"):
-            with left_out(f"{name}.{kind}"):
-                contents[f"{name}.{kind}"] = _picture(figure, name, kind)
-    return contents
-
-
-def save_all(
-    figures: Mapping[str, Figure], directory: str | os.PathLike[str], *, replace: bool = False
-) -> list[Path]:
-    """Save figures as PNG and SVG under their names and return the paths of the files.
-
-    Parameters
-    ----------
-    figures
-        Figures by name.
-    directory
-        Directory of the files; it is made where there is none.
-    replace
-        Replace also files that thud has not written.
-
-    Raises
-    ------
-    InputError
-        Where a file is in the way.
-    OSError
-        Where a file cannot be written.
-
-    Warns
-    -----
-    ReportWarning
-        Where a figure cannot be drawn.
-    """
-    return Results(Path(directory), "plot", replace=replace).write(picture_files(figures))
-
-
-def page_files(name: str, draw: Callable[[], Figure], html: str) -> dict[str, bytes]:
-    """Return the contents of a figure and of the page of the same name by the names of files."""
-    return {**picture_files(draw_all({name: draw})), f"{name}.html": html.encode()}
+    for i, limits in enumerate(zip(lower, upper, strict=True)):
+        name = None if i else label
+        axes.fill_between([i - 0.4, i + 0.4], *limits, color="0.82", linewidth=0, label=name)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.level.levels import Bands
-    from thud.recordings.estimates import Drop
+    from thud.recordings.measured_drop import Drop
 
 # Functionals whose energy is less than this part of the largest one add nothing.
 NEGLIGIBLE = 1e-14
@@ -80,7 +80,7 @@ def _energies(
         # The first term is too large by twice the second, on the mean.
         variance = 4 * np.einsum("di,dij,dj->d", values, covariance, values) - 2 * squares
         middle = sum(edge) / 2
-        density, doubt = np.array([one.background.density(middle) for one in contacts]).T
-        variance = np.maximum(variance, 2 * squares) + (noise * doubt / density) ** 2
+        density, spread = np.array([one.background.density(middle) for one in contacts]).T
+        variance = np.maximum(variance, 2 * squares) + (noise * spread / density) ** 2
         found[:, band] = np.column_stack([noise, np.sqrt(variance)])
     return found

@@ -1,4 +1,4 @@
-"""Criteria other than levels, from drops: values with their budgets."""
+"""Quantities averaged over drops, with their uncertainty budgets after the GUM."""
 
 from __future__ import annotations
 
@@ -7,163 +7,226 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thud.level.estimate import Contribution, Estimate
 from thud.level.levels import RECORDED_BAND, peak_count
-from thud.recordings.contact import Estimate
 from thud.recordings.outliers import SIGNIFICANCE, find_outliers
+from thud.recordings.recorded_levels import WITHIN_REPEATABILITY
 from thud.recordings.restitution import BOUNCES, IMPULSE, DropConditions
-from thud.recordings.verdict import Contribution, Quantity, average_estimates
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from thud.recordings.config import Config
-    from thud.recordings.estimates import Drop
-    from thud.recordings.outliers import Outlier
+    from numpy.typing import NDArray
 
-# Prominence of a peak that counts, as part of the peak force, and the least of it in standard
-# deviations of the noise.
+    from thud.recordings.config import Config
+    from thud.recordings.measured_drop import Drop
+    from thud.recordings.outliers import Outlier
+    from thud.recordings.recorded_levels import AverageLevels
+
+# dB per relative change of a force.
+AMPLITUDE_DECIBEL = 20 / math.log(10)
+# Prominence of a counted peak over the peak force, and its minimum in standard deviations of the
+# noise.
 PROMINENCE = 0.1
 CLEAR_PEAK = 6.0
-
-# Quantities of drops, besides levels, that are compared, with words for them and their unit.
-DEVIANT = (
+# Quantities of drops, besides levels, that are searched for outliers: attribute, title and unit.
+SEARCHED = (
     ("contact_time", "contact time, ms,", 1e-3),
     ("restitution", "restitution", 1.0),
     ("peak_force", "peak force, N,", 1.0),
 )
 
 
-def drop_quantities(
-    drops: Sequence[Drop], config: Config, calibration: float | None
-) -> dict[str, Quantity]:
-    """Return contact time, restitution, peaks, mass and drop height, as `decide` names them.
+def average_estimates(estimates: Sequence[Estimate], *systematic: Contribution) -> Estimate:
+    """Return the mean of one quantity over drops.
 
-    A mass that is not stated is the effective mass; `calibration` is the relative standard
-    uncertainty of the force.
+    Parameters
+    ----------
+    estimates
+        Value of each drop with the uncertainty that differs from drop to drop: its noise, which the
+        repeatability of two or more drops includes. Unknown values are left out.
+    systematic
+        Contributions that all drops share and an average does not reduce (calibration, height).
+    """
+    known = [estimate for estimate in estimates if math.isfinite(estimate.value)]
+    if not known:
+        return Estimate.unknown()
+    count = len(known)
+    values = np.array([estimate.value for estimate in known])
+    noise = float(np.sqrt(np.sum([estimate.uncertainty**2 for estimate in known]))) / count
+    contributions = [Contribution("noise", noise, counted=count == 1)]
+    if count > 1:
+        error = float(values.std(ddof=1)) / math.sqrt(count)
+        contributions.insert(0, Contribution("repeatability", error, count - 1))
+    return Estimate.from_budget(float(values.mean()), *contributions, *systematic)
+
+
+def level_estimates(
+    levels: AverageLevels,
+    calibration: float | None = None,
+    plate: NDArray[np.float64] | None = None,
+) -> tuple[Estimate, ...]:
+    """Return average levels with their budgets, dB, shape (n_band,).
+
+    Parameters
+    ----------
+    levels
+        Average over drops.
+    calibration
+        Relative standard uncertainty of the force; None if unknown.
+    plate : ndarray, shape (n_band,), optional
+        Standard uncertainty from the correction of the force plate, dB; zero if that of its
+        resonance is not stated.
+    """
+    count = len(levels.names)
+    parts = dict(levels.contributions)
+    if calibration is not None:
+        parts["calibration"] = np.full(len(levels.level), AMPLITUDE_DECIBEL * calibration)
+    if plate is not None and plate.any():
+        parts["plate"] = plate
+    budgets = (
+        [
+            Contribution(
+                name,
+                float(part[band]),
+                count - 1 if name == "repeatability" else math.inf,
+                counted=count == 1 or name not in WITHIN_REPEATABILITY,
+            )
+            for name, part in parts.items()
+        ]
+        for band in range(len(levels.level))
+    )
+    return tuple(
+        Estimate.from_budget(float(level), *budget, upper_bound=bool(flag == "background"))
+        for level, budget, flag in zip(levels.level, budgets, levels.flag, strict=True)
+    )
+
+
+def drop_estimates(
+    drops: Sequence[Drop], config: Config, calibration: float | None
+) -> dict[str, Estimate]:
+    """Return contact time, restitution, peaks, mass and drop height, as `assess` names them.
+
+    An unstated mass is the effective mass; `calibration` is the relative standard uncertainty of
+    the force.
     """
     times = [drop.contact_time for drop in drops]
-    # The flanks of all drops have one shape: what is wrong with it does not average.
-    shared = min(time.uncertainty for time in times)
-    edges = [Contribution("edges of the pulse", shared)] if len(times) > 1 else []
-    fall = known_fall(config, calibration)
+    # The flanks of all drops have one shape: its error does not average.
+    common = min(time.uncertainty for time in times)
+    edges = [Contribution("edges of the pulse", common)] if len(times) > 1 else []
+    conditions = config.conditions(calibration)
     mass = _stated(config.mass, config.mass_uncertainty)
     return {
         "contact_time": average_estimates(times, *edges),
-        "restitution": average_restitution(drops, fall)[0],
-        "peaks": Quantity(float(np.max([_peaks(drop) for drop in drops]))),
-        "mass": average_mass(drops, fall) if config.mass is None else mass,
+        "restitution": average_restitution(drops, conditions)[0],
+        "peaks": Estimate(float(np.max([_count_peaks(drop) for drop in drops]))),
+        "mass": average_mass(drops, conditions) if config.mass is None else mass,
         "drop_height": _stated(config.height, config.height_uncertainty),
     }
 
 
-def known_fall(config: Config, calibration: float | None) -> DropConditions:
-    """Return what a laboratory says of its drops; what is not known counts as exact."""
-    return DropConditions(
-        config.height,
-        config.mass,
-        calibration or 0.0,
-        config.mass_uncertainty or 0.0,
-        config.height_uncertainty or 0.0,
-    )
-
-
-def told_restitution(
-    drops: Sequence[Drop], config: Config, calibration: float | None
-) -> tuple[str, ...]:
-    """Return a sentence where impulse and bounces differ by more than their uncertainties."""
-    fall = known_fall(config, calibration)
-    _, difference = average_restitution(drops, fall)
+def check_restitution(drops: Sequence[Drop], conditions: DropConditions) -> tuple[str, ...]:
+    """Return a warning if impulse and bounces differ by more than their uncertainties."""
+    _, difference = average_restitution(drops, conditions)
     if not abs(difference.value) > difference.expanded:
         return ()
-    mass = average_mass(drops, fall)
-    told = (
+    mass = average_mass(drops, conditions)
+    warning = (
         f"the restitution by impulse and by bounces differ by {difference.value:.3f}, with an "
         f"expanded uncertainty of {difference.expanded:.2g}; the effective mass is "
         f"{mass.value:.3f} kg: check mass, height and calibration"
     )
-    return (told,)
+    return (warning,)
 
 
-def average_restitution(drops: Sequence[Drop], fall: DropConditions) -> tuple[Quantity, Quantity]:
-    """Return the restitution, and impulse minus bounces, with their budgets; NaN where not known.
+def average_restitution(
+    drops: Sequence[Drop], conditions: DropConditions
+) -> tuple[Estimate, Estimate]:
+    """Return the restitution, and impulse minus bounces, with their budgets; NaN if unknown.
 
-    Where the ways differ by more than the expanded uncertainty of the difference, one of them is
-    wrong and nobody knows which: a rectangle as wide on each side as the difference is part of the
-    uncertainty of their mean, so that its interval holds both.
+    If the methods differ by more than the expanded uncertainty of the difference, either may be
+    wrong: a rectangle with the difference as half width enters the budget of their mean, so that
+    its interval includes both.
     """
     known = [drop for drop in drops if drop.restitutions]
-    names = dict.fromkeys(name for drop in known for name in drop.restitution_shared)
-    shared = [
-        Contribution(
-            name, abs(float(np.mean([drop.restitution_shared.get(name, 0.0) for drop in known])))
-        )
-        for name in names
+    causes = dict.fromkeys(cause for drop in known for cause in drop.restitution_shared)
+    systematic = [
+        _mean_effect(cause, [drop.restitution_shared.get(cause, 0.0) for drop in known])
+        for cause in causes
     ]
-    difference = _difference([d for d in known if {IMPULSE, BOUNCES} <= set(d.restitutions)], fall)
+    both = [drop for drop in known if {IMPULSE, BOUNCES} <= set(drop.restitutions)]
+    difference = _difference(both, conditions)
     if abs(difference.value) > difference.expanded:
-        shared.append(Contribution("impulse against bounces", abs(difference.value) / math.sqrt(3)))
-    return average_estimates([drop.restitution for drop in known], *shared), difference
+        half_width = abs(difference.value)
+        systematic.append(Contribution("impulse against bounces", half_width / math.sqrt(3)))
+    return average_estimates([drop.restitution for drop in known], *systematic), difference
 
 
-def _difference(drops: Sequence[Drop], fall: DropConditions) -> Quantity:
+def _difference(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
     """Return restitution by impulse minus that by bounces."""
     differences = []
-    parts: dict[str, list[float]] = {}
+    effects: dict[str, list[float]] = {}
     for drop in drops:
-        by, other = (drop.restitutions[way] for way in (IMPULSE, BOUNCES))
-        doubt = math.hypot(by.uncertainty, other.uncertainty)
-        differences.append(Estimate(by.value - other.value, doubt))
-        one, two = (fall.shared(drop.restitutions, drop.impulse)[w] for w in (IMPULSE, BOUNCES))
-        for name in one:
-            parts.setdefault(name, []).append(one[name] - two.get(name, 0.0))
-    shared = [Contribution(name, abs(float(np.mean(found)))) for name, found in parts.items()]
-    return average_estimates(differences, *shared)
+        impulse, bounces = (drop.restitutions[name] for name in (IMPULSE, BOUNCES))
+        combined = math.hypot(impulse.uncertainty, bounces.uncertainty)
+        differences.append(Estimate(impulse.value - bounces.value, combined))
+        shared = conditions.shared(drop.restitutions, drop.impulse)
+        for cause, effect in shared[IMPULSE].items():
+            effects.setdefault(cause, []).append(effect - shared[BOUNCES].get(cause, 0.0))
+    systematic = [_mean_effect(cause, values) for cause, values in effects.items()]
+    return average_estimates(differences, *systematic)
 
 
-def average_mass(drops: Sequence[Drop], fall: DropConditions) -> Quantity:
-    """Return the effective mass with its budget, kg; NaN where bounces or height are not known."""
+def _mean_effect(cause: str, effects: Sequence[float]) -> Contribution:
+    return Contribution(cause, abs(float(np.mean(effects))))
+
+
+def average_mass(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
+    """Return the effective mass with its budget, kg; NaN if bounces or height are unknown."""
     known = [drop for drop in drops if math.isfinite(drop.effective_mass.value)]
-    if not known or not fall.height:
-        return Quantity(math.nan)
+    if not known or not conditions.height:
+        return Estimate.unknown()
     value = float(np.mean([drop.effective_mass.value for drop in known]))
-    # Of m = J/(v0 + g (t_f/2 + t_c)), in which the height changes v0 alone.
+    # From m = J/(v0 + g (t_f/2 + t_c)): the height changes v0 only.
     change = float(np.mean([drop.impulse.value for drop in known])) / value
-    height = value * fall.speed / change * fall.height_uncertainty / (2 * fall.height)
-    shared = {"calibration": value * fall.calibration, "drop height": height}
+    height = value * conditions.speed / change * conditions.height_uncertainty
+    height /= 2 * conditions.height
+    systematic = {"calibration": value * conditions.calibration, "drop height": height}
     return average_estimates(
         [drop.effective_mass for drop in known],
-        *(Contribution(name, part) for name, part in shared.items() if part),
+        *(Contribution(cause, part) for cause, part in systematic.items() if part),
     )
 
 
 def find_deviant(drops: Sequence[Drop]) -> tuple[Outlier, ...]:
-    """Return the drops that differ in contact time, restitution or peak, at 5 % for all three."""
+    """Return the outliers in contact time, restitution or peak, at 5 % for all three together."""
     names = [drop.name for drop in drops]
-    found: list[Outlier] = []
-    for attribute, words, unit in DEVIANT:
-        ones = [getattr(drop, attribute) for drop in drops]
-        found += find_outliers(
-            [one.value / unit for one in ones],
+    outliers: list[Outlier] = []
+    for attribute, title, unit in SEARCHED:
+        estimates = [getattr(drop, attribute) for drop in drops]
+        outliers += find_outliers(
+            [estimate.value / unit for estimate in estimates],
             names,
-            words,
-            [one.uncertainty / unit for one in ones],
-            SIGNIFICANCE / len(DEVIANT),
+            title,
+            [estimate.uncertainty / unit for estimate in estimates],
+            SIGNIFICANCE / len(SEARCHED),
         )
-    return tuple(found)
+    return tuple(outliers)
 
 
-def _stated(value: float | None, uncertainty: float | None) -> Quantity:
-    """Return what the laboratory states."""
+def _stated(value: float | None, uncertainty: float | None) -> Estimate:
+    """Return a value that the laboratory states."""
     if value is None:
-        return Quantity(math.nan)
-    return Quantity(value, () if uncertainty is None else (Contribution("stated", uncertainty),))
+        return Estimate.unknown()
+    stated = () if uncertainty is None else (Contribution("stated", uncertainty),)
+    return Estimate.from_budget(value, *stated)
 
 
-def _peaks(drop: Drop) -> float:
-    """Return the number of peaks of the force of a drop; NaN where noise may have made some."""
+def _count_peaks(drop: Drop) -> float:
+    """Return the number of peaks of the force; NaN if some may be noise."""
     force = drop.force[slice(*drop.gate)]
     count = peak_count(force, drop.sample_rate)
-    # Slower noise than the contact tilts the pulse, and makes no peak.
+    # Noise slower than the contact tilts the pulse without adding peaks.
     noise = drop.noise.deviation_between(1 / drop.contact_time.value, RECORDED_BAND)
     clear = PROMINENCE * drop.peak_force.value >= CLEAR_PEAK * noise
     return float(count) if clear or count == 1 else math.nan

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Self
 from thud.base.bridge import version
 from thud.base.errors import InputError, ReportWarning
 from thud.base.files import is_regular, replace_file, uninterrupted
-from thud.recordings.estimates import Drop
+from thud.recordings.measured_drop import Drop
 
 if TYPE_CHECKING:
     import os
@@ -138,12 +138,12 @@ def _read(path: Path) -> dict[int, Drop]:
 
 
 class _DataOnly(pickle.Unpickler):
-    """Reads data of recordings and arrays, and calls nothing else."""
+    """Reads dataclasses of thud and arrays, and calls nothing else."""
 
     def find_class(self, module: str, name: str) -> Any:  # noqa: ANN401 - a class
         """Return a class; raise UnpicklingError of what is no data."""
         found = super().find_class(module, name) if module in sys.modules else None
-        ours = module.startswith("thud.recordings.") and dataclasses.is_dataclass(found)
+        ours = module.startswith("thud.") and dataclasses.is_dataclass(found)
         if not ours and not (module.partition(".")[0] == "numpy" and name in NUMPY):
             message = f"{module}.{name} is no data"
             raise pickle.UnpicklingError(message)

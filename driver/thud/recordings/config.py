@@ -8,15 +8,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from thud.base.checks import refuse, require_choice, require_number, shown
 from thud.base.errors import InputError
-from thud.level.levels import SOURCES, get_bands, judge
+from thud.level.assessment import get_criteria
+from thud.level.levels import SOURCES
 from thud.recordings.channel import MIB, shown_path, shown_text
 from thud.recordings.excursion import POLARITIES
 from thud.recordings.force_units import read_chain, require_unit
 from thud.recordings.plate import Plate, check_plate
+from thud.recordings.restitution import DropConditions
 from thud.recordings.signal_files import regular_file
 
 if TYPE_CHECKING:
@@ -122,6 +122,16 @@ class Config:
             return None
         return Plate(plate.f0, plate.Q, frequency_uncertainty=plate.f0_uncertainty or 0.0)
 
+    def conditions(self, calibration: float | None) -> DropConditions:
+        """Return the conditions of the drops; an unknown uncertainty counts as zero."""
+        return DropConditions(
+            self.height,
+            self.mass,
+            calibration or 0.0,
+            self.mass_uncertainty or 0.0,
+            self.height_uncertainty or 0.0,
+        )
+
     @property
     def plate_checks(self) -> tuple[PlateCheck, ...]:
         """The standard's demands on the plate; none where there is no ``[plate]``."""
@@ -130,10 +140,9 @@ class Config:
             return ()
         return check_plate(
             self.resonance,
-            corrected=True,
             time_constant=plate.time_constant,
             full_scale=plate.full_scale,
-            calibration=plate.linearity or None,
+            linearity=plate.linearity or None,
         )
 
 
@@ -304,10 +313,9 @@ def _flag(value: object, place: str) -> bool:
 
 def _limits(value: object, place: str) -> dict[str, tuple[float, float]]:
     """Return limits by criterion."""
-    octaves = np.zeros(len(get_bands().nominal))
-    criteria = judge(octaves, 0.0, 0.0, 0, 0.0, 0.0).criteria
+    names = [one.name for one in get_criteria(SOURCES[0])]
     found = {}
-    for key, span in _table(value, place, [one.name for one in criteria]).items():
+    for key, span in _table(value, place, names).items():
         if not isinstance(span, list | tuple) or len(span) != 2:  # noqa: PLR2004 - minimum, maximum
             refuse(f"{place}: {key} = {shown(span)} is not allowed", "[minimum, maximum]")
         low, high = (_number(one, f"{place}: {key}", -1e6, 1e6) for one in span)

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.ndimage import convolve1d, uniform_filter1d
 
 from thud.base.immutable import Immutable
+from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND
 from thud.recordings.flanks import SMOOTHING, Flank, Posterior, find_touch
 from thud.recordings.noise import Background, fit_background
@@ -52,23 +53,6 @@ FLOOR = 2e-4
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate(Immutable):
-    """A value and its standard uncertainty, in the same unit; NaN where not known."""
-
-    value: float
-    uncertainty: float
-
-    def __float__(self) -> float:
-        """Return the value."""
-        return float(self.value)
-
-    @classmethod
-    def unknown(cls) -> Estimate:
-        """Return the estimate of what is not known."""
-        return cls(math.nan, math.nan)
-
-
-@dataclass(frozen=True, eq=False)
 class Contact(Immutable):
     """Contact of one pulse: its times, in s from the first sample of the window.
 
@@ -84,14 +68,14 @@ class Contact(Immutable):
         First sample of the part with its background removed, and the one behind it.
     force : ndarray, shape (span[1] - span[0],)
         Force of the part, N.
-    under : ndarray, shape (span[1] - span[0],)
+    removed : ndarray, shape (span[1] - span[0],)
         Background that was removed, N.
     gate : tuple of int
         First sample of the contact with its margins, and the one behind it.
     covariance : ndarray, shape (n_cell, n_cell)
         Covariance of the background's error in even cells of the gate, N2.
-    quiet : tuple of float
-        Quiet before and after, s.
+    background_lengths : tuple of float
+        Lengths of the background before and after, s.
     background : Background
         The noise, fitted.
     sample_rate : float
@@ -105,10 +89,10 @@ class Contact(Immutable):
     peak: float
     span: tuple[int, int]
     force: NDArray[np.float64]
-    under: NDArray[np.float64]
+    removed: NDArray[np.float64]
     gate: tuple[int, int]
     covariance: NDArray[np.float64]
-    quiet: tuple[float, float]
+    background_lengths: tuple[float, float]
     background: Background
     sample_rate: float
 
@@ -155,7 +139,7 @@ def _quiet_edges(length: int, rate: float) -> NDArray[np.intp]:
 
 def _spread(rate: float, plate: Plate | None) -> int:
     """Return the samples over which filters spread an edge."""
-    periods = int(PLATE_PERIODS * rate / plate.resonance / 2) if plate else 0
+    periods = int(PLATE_PERIODS * rate / plate.frequency / 2) if plate else 0
     return int((GATE_RATE / rate) ** 2) + periods
 
 
@@ -198,7 +182,7 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
     (t0, s0), begin = edges.touch.edge()
     (t1, s1), end = edges.release.edge()
     t1 = -t1
-    left_by_plate = PLATE_LEFT / window.plate.resonance if window.plate else 0.0
+    left_by_plate = PLATE_LEFT / window.plate.frequency if window.plate else 0.0
     margin = GATE_SAMPLES + _spread(rate, window.plate)
     gate = (
         max(int((t0 - 3 * s0) * rate) - margin, 0),
@@ -344,7 +328,7 @@ def find_edge(  # noqa: PLR0913, PLR0917 - what a flank is
 @lru_cache(maxsize=4)
 def _response(plate: Plate, rate: float) -> NDArray[np.float64]:
     """Return what the correction of a plate makes of one sample; its middle is that sample."""
-    reach = int(PLATE_PERIODS * rate / plate.resonance)
+    reach = int(PLATE_PERIODS * rate / plate.frequency)
     unit = np.zeros(2 * reach + 1)
     unit[reach] = 1
     return correct_plate(unit, rate, plate)

@@ -74,7 +74,7 @@ class Window:
         First sample of the contact and the one behind it, within the part; to about 1 ms.
     bounces : tuple of Window
         The parts around the later bounces, in order.
-    remarks : tuple of str
+    warnings : tuple of str
         Doubts about the pulse as a whole.
     plate : Plate, optional
         The plate whose resonance was taken out of the signal.
@@ -86,7 +86,7 @@ class Window:
     stop: int
     contact: tuple[int, int]
     bounces: tuple[Window, ...] = ()
-    remarks: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     plate: Plate | None = None
 
     @property
@@ -108,7 +108,7 @@ class _Pulse:
     stop: int
     peak: float
     bounces: list[_Pulse] = field(default_factory=list)
-    remarks: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
 
 
 def find_windows(signal: Signal, *, progress: bool = False) -> list[Window]:
@@ -218,10 +218,13 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]
         start = _walk(local, low, -1, FOOT * peak) - MARGIN
         stop = _walk(local, high, 1, FOOT * peak) + 1 + MARGIN
         start = max(start, behind)
-        doubt = _told_double(local[max(group[0], behind) : group[-1] + 1])
+        warning = _told_double(local[max(group[0], behind) : group[-1] + 1])
         pulses.append(
             _Pulse(
-                first + start * width, first + stop * width, peak, remarks=[doubt] if doubt else []
+                first + start * width,
+                first + stop * width,
+                peak,
+                warnings=[warning] if warning else [],
             )
         )
     return pulses
@@ -282,7 +285,7 @@ def _windows(signal: Signal, pulses: list[_Pulse]) -> Iterator[Window]:
         high = min(high, pulse.stop + round(AFTER * signal.sample_rate), signal.n_sample)
         low, high = min(low, pulse.start), max(high, min(pulse.stop, signal.n_sample))
         contact = (pulse.start - low, min(pulse.stop, signal.n_sample) - low)
-        return Window(name, signal, low, high, contact, (), tuple(pulse.remarks))
+        return Window(name, signal, low, high, contact, (), tuple(pulse.warnings))
 
     for k, drop in enumerate(drops, start=1):
         name = signal.name if len(drops) == 1 else f"{signal.name}, drop {k}"

@@ -89,8 +89,8 @@ def find_sign(
     return -1.0, (f"The sign was changed: the largest excursion, {-down:.4g} N, is negative.",)
 
 
-def doubt(seen: Excursions, scale: float, name: str, *, assumed: bool) -> tuple[str, ...]:
-    """Return doubts about a force of which the scale is N per value, its sign included.
+def check_peak(seen: Excursions, scale: float, name: str, *, assumed: bool) -> tuple[str, ...]:
+    """Return warnings about a peak force; `scale` is N per value, with its sign.
 
     Raise InputError where the unit must be wrong, also where it is only assumed.
     """
@@ -105,11 +105,11 @@ def doubt(seen: Excursions, scale: float, name: str, *, assumed: bool) -> tuple[
             refuse(f"{name}: {what}", allowed)
     if not low / BEYOND <= peak <= high * BEYOND:
         refuse(f"{name}: the peak is {peak:.4g} N; unit or calibration are wrong", allowed)
-    remarks: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     if not low <= peak <= high:
-        remarks += (f"The peak is {peak:.4g} N; usual are {allowed}.",)
+        warnings += (f"The peak is {peak:.4g} N; usual are {allowed}.",)
     if other > CLEAR * peak:
-        remarks += (
+        warnings += (
             f"The force goes {other:.4g} N down and {peak:.4g} N up; the polarity may be wrong.",
         )
-    return remarks
+    return warnings

@@ -1,4 +1,4 @@
-"""Faults of a pulse: clipped, cut, doubled, with dropouts; repaired where that can be seen."""
+"""Faults of a pulse: clipped, cut, doubled, with dropouts; short dropouts are repaired."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ if TYPE_CHECKING:
 
     from thud.recordings.drops import Window
 
-# Least quiet on each side, s, and samples of it.
-MIN_QUIET = 1e-3
-LEAST_SAMPLES = 4
-# Samples of one value at the top that are clipped, where the force beside them falls by more than
-# FALL steps of the digits: a smooth top of this length falls by 4.
-FLAT = 4
-FALL = 12.0
-# A sample within this part of the full scale is at it.
+# Minimum background on each side, s and samples.
+MIN_BACKGROUND = 1e-3
+MIN_SAMPLES = 4
+# Equal samples at the top are clipped if they are this many and the force beside them falls by more
+# than MIN_FALL quantization steps: a smooth top of this length falls by 4.
+MIN_CLIPPED = 4
+MIN_FALL = 12.0
+# Fraction of the full scale from which a sample is clipped.
 FULL = 0.999
-# A jump into or out of samples of one value that makes them a dropout, over the peak force: no
-# flank rises by this much between two samples of 20 kHz.
-JUMP = 0.04
-# Samples of one value that may be held.
-HELD = 3
-# Longest total of dropouts that is repaired, s.
-REPAIRED = 1e-3
+# Minimum jump into or out of equal samples of a dropout, over the peak force: no flank rises by
+# this much between two samples of 20 kHz.
+MIN_JUMP = 0.04
+# Minimum number of equal samples of a dropout.
+MIN_HELD = 3
+# Maximum total length of dropouts that are repaired, s.
+MAX_REPAIRED = 1e-3
 
 
 def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
-    """Return the force with its dropouts filled, what was done, and doubts.
+    """Return the force with its dropouts filled, what was done, and warnings.
 
     Raises
     ------
@@ -41,29 +41,29 @@ def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[
         Where the pulse is cut, clipped, doubled or has long dropouts.
     """
     rate, (first, stop), name = window.sample_rate, window.contact, window.name
-    least = least_quiet(rate)
-    if first < least or window.stop - window.start - stop < least:
-        side = "starts" if first < least else "ends"
+    minimum = min_background(rate)
+    if first < minimum or window.stop - window.start - stop < minimum:
+        side = "starts" if first < minimum else "ends"
         refuse(
             f"{name}: the signal {side} within the pulse or less than 1 ms "
-            f"{'before' if first < least else 'behind'} it",
-            "quiet of 1 ms or more, better 100 ms, before and after the contact",
+            f"{'before' if first < minimum else 'after'} it",
+            "background of 1 ms or more, better 100 ms, before and after the contact",
         )
-    for remark in window.remarks:
-        if remark.startswith("two impacts"):
-            refuse(f"{name}: {remark}", "one impact, with quiet before and after it")
+    for warning in window.warnings:
+        if warning.startswith("two impacts"):
+            refuse(f"{name}: {warning}", "one impact, with background before and after it")
     force = window.force
     _refuse_clipped(window, force)
     return _fill(window, force)
 
 
-def least_quiet(rate: float) -> int:
-    """Return the samples of quiet that each side of a contact needs."""
-    return max(math.ceil(MIN_QUIET * rate), LEAST_SAMPLES)
+def min_background(rate: float) -> int:
+    """Return the minimum number of background samples on each side of a contact."""
+    return max(math.ceil(MIN_BACKGROUND * rate), MIN_SAMPLES)
 
 
 def _runs(force: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the first samples of the runs of one value, and the lengths of the runs."""
+    """Return the first indices and the lengths of the runs of equal values."""
     starts = np.flatnonzero(np.diff(force, prepend=np.nan) != 0)
     return starts, np.diff(np.append(starts, len(force)))
 
@@ -78,10 +78,10 @@ def _refuse_clipped(window: Window, whole: NDArray[np.float64]) -> None:
     k = int(np.argmax(np.where(at_top, lengths, 0)))
     start, length = int(starts[k]), int(lengths[k])
     changes = np.abs(np.diff(force))
-    digit = changes[changes > 0].min(initial=np.inf)
+    step = changes[changes > 0].min(initial=np.inf)
     half = max(length // 2, 1)
     beside = [force[max(start - half, 0)], force[min(start + length - 1 + half, len(force) - 1)]]
-    clipped = length >= FLAT and top - max(beside) > FALL * digit
+    clipped = length >= MIN_CLIPPED and top - max(beside) > MIN_FALL * step
     if window.signal.full_scale is not None:
         at_scale = np.count_nonzero(force >= FULL * window.signal.full_scale)
         clipped, length = clipped or at_scale > 1, max(length, int(at_scale))
@@ -96,10 +96,10 @@ def _refuse_clipped(window: Window, whole: NDArray[np.float64]) -> None:
 def _fill(
     window: Window, force: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
-    """Return the force with dropouts filled from both sides, what was done, and doubts."""
+    """Return the force with dropouts filled from both sides, what was done, and warnings."""
     first, stop = window.contact
     rate = window.sample_rate
-    guard = int(MIN_QUIET * rate)
+    guard = int(MIN_BACKGROUND * rate)
     first, stop = first + guard, stop - guard
     level = force - np.median(
         np.concatenate([force[: window.contact[0]], force[window.contact[1] :]])
@@ -111,20 +111,20 @@ def _fill(
     before = np.abs(part[starts] - part[np.maximum(starts - 1, 0)])
     ends = starts + lengths - 1
     after = np.abs(part[np.minimum(ends + 1, len(part) - 1)] - part[ends])
-    limit = JUMP * part.max()
+    limit = MIN_JUMP * part.max()
     zero = (force[first:stop][starts] == 0) & (before > limit) & (after > limit)
-    held = (lengths >= HELD) & ((before > limit) | (after > limit))
+    held = (lengths >= MIN_HELD) & ((before > limit) | (after > limit))
     lost = np.flatnonzero(zero | held)
     total = int(lengths[lost].sum())
     if not total:
         return force, (), ()
-    told = f"{len(lost)} dropouts of {1e3 * total / rate:.3g} ms in all"
-    if total > REPAIRED * rate:
-        refuse(f"{window.name}: the contact has {told}", f"up to {1e3 * REPAIRED:g} ms")
+    found = f"{len(lost)} dropouts of {1e3 * total / rate:.3g} ms in all"
+    if total > MAX_REPAIRED * rate:
+        refuse(f"{window.name}: the contact has {found}", f"up to {1e3 * MAX_REPAIRED:g} ms")
     good = np.ones(len(force), dtype=bool)
     for k in lost:
         good[first + starts[k] : first + starts[k] + lengths[k]] = False
     filled = force.copy()
-    places = np.arange(len(force))
-    filled[~good] = np.interp(places[~good], places[good], force[good])
-    return filled, (f"{told} were filled by lines",), (f"the contact has {told}",)
+    index = np.arange(len(force))
+    filled[~good] = np.interp(index[~good], index[good], force[good])
+    return filled, (f"{found} were filled by lines",), (f"the contact has {found}",)

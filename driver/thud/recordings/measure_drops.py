@@ -1,11 +1,11 @@
-"""Signals of one source to drops and where they come from."""
+"""Measurement of all drops in signals of one source."""
 
 from __future__ import annotations
 
 from collections import deque
 from concurrent.futures import BrokenExecutor
 from contextlib import ExitStack, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -17,8 +17,8 @@ from thud.base.processes import no_interrupt_in_processes, process_pool
 from thud.base.threads import limit_threads, one_thread
 from thud.recordings.checkpoint import Checkpoint
 from thud.recordings.drops import find_windows
-from thud.recordings.estimates import measure_drop
-from thud.recordings.plate_correction import correct_window
+from thud.recordings.measured_drop import measure_drop
+from thud.recordings.plate import correct_window
 from thud.recordings.ringing import check_ringing
 
 if TYPE_CHECKING:
@@ -28,28 +28,24 @@ if TYPE_CHECKING:
 
     from thud.recordings.config import Config
     from thud.recordings.drops import Window
-    from thud.recordings.estimates import Drop
+    from thud.recordings.measured_drop import Drop
     from thud.recordings.signal import Signal
 
-# Drops, and seconds of a signal, that are worth processes, which take a second to start.
+# Drops, and seconds of a signal, from which processes pay off, which take a second to start.
 MIN_FOR_POOL = 40
 LONG = 600.0
 
 
 @dataclass(frozen=True)
 class Origin:
-    """Where drops come from.
+    """Signal that drops come from.
 
     Attributes
     ----------
-    name, path, checksum, date, calibration : str
-        As those of a `Signal`; the checksum is SHA-256.
-    sample_rate : float
-        Samples per second, Hz.
+    name, path, checksum, date, calibration, sample_rate, steps, warnings
+        As those of the `Signal`; the checksum is SHA-256.
     drops : int
-        Number of drops that were found.
-    steps, remarks : tuple of str
-        What reading has done, and what is doubtful; a sentence each.
+        Number of drops.
     """
 
     name: str
@@ -58,24 +54,15 @@ class Origin:
     date: str
     calibration: str
     sample_rate: float
-    drops: int
     steps: tuple[str, ...]
-    remarks: tuple[str, ...]
+    warnings: tuple[str, ...]
+    drops: int
 
     @classmethod
     def of(cls, signal: Signal, drops: int) -> Origin:
         """Return the origin of a number of drops of a signal."""
-        return cls(
-            signal.name,
-            signal.path,
-            signal.checksum,
-            signal.date,
-            signal.calibration,
-            signal.sample_rate,
-            drops,
-            signal.steps,
-            signal.remarks,
-        )
+        names = (field.name for field in fields(cls)[:-1])
+        return cls(**{name: getattr(signal, name) for name in names}, drops=drops)
 
 
 def measure_signals(
@@ -88,7 +75,7 @@ def measure_signals(
 ) -> tuple[tuple[Drop, ...], tuple[Origin, ...], float | None]:
     """Return the drops of signals, their origins, and the relative uncertainty of the force.
 
-    The last is the largest of the signals, and None where it is not known of one. The others are
+    The uncertainty is the largest of all signals, None if it is unknown for one. The arguments are
     those of `read_recording`.
 
     Raises
@@ -99,14 +86,14 @@ def measure_signals(
     drops: list[Drop] = []
     origins: list[Origin] = []
     uncertainties: list[float | None] = []
-    # Its many small products are slower by threads.
+    # Threads slow down the many small products.
     keeping = nullcontext(keep) if isinstance(keep, Checkpoint) else Checkpoint(keep)
     with one_thread(), keeping as kept, _Processes(workers) as processes:
         for given in signals:
             signal = given
             if config.calibration_uncertainty is not None:
                 signal = replace(given, calibration_uncertainty=config.calibration_uncertainty)
-            # They start while the signal is searched.
+            # Processes start while the signal is searched.
             processes.start(worth=signal.path and signal.n_sample > LONG * signal.sample_rate)
             windows = find_windows(signal, progress=progress)
             drops += _measure(windows, config, kept, processes, progress=progress)
@@ -114,7 +101,7 @@ def measure_signals(
             origins.append(Origin.of(signal, len(windows)))
     if not drops:
         refuse("there are no recordings", "one file or more")
-    known = [one for one in uncertainties if one is not None]
+    known = [uncertainty for uncertainty in uncertainties if uncertainty is not None]
     uncertainty = max(known) if len(known) == len(uncertainties) else None
     return tuple(drops), tuple(origins), uncertainty
 
@@ -127,11 +114,11 @@ def _measure(
     *,
     progress: bool,
 ) -> list[Drop]:
-    """Return the drops in the windows of one signal, those that are kept among them."""
+    """Return the drops in the windows of one signal, including those of the checkpoint."""
     signal = windows[0].signal
     found = kept.open(signal, config)
     left = [window for window in windows if window.start not in found]
-    # An array would go to the processes with each of its windows.
+    # A signal in memory would be copied to the processes with each window.
     processes.start(worth=signal.path and len(left) >= MIN_FOR_POOL)
     call = partial(measure_window, config=config)
     results = processes.map(call, left) if signal.path else map(call, left)
@@ -147,7 +134,7 @@ def _measure(
 
 
 class _Processes(ExitStack):
-    """Processes that measure drops, started where that is worth it; a context manager."""
+    """Pool of processes that measure drops, started if it pays off; a context manager."""
 
     def __init__(self, workers: int) -> None:
         super().__init__()
@@ -155,8 +142,8 @@ class _Processes(ExitStack):
         self._pool: ProcessPoolExecutor | None = None
 
     def start(self, *, worth: object) -> None:
-        """Start the processes where it is worth it, and wait for nothing."""
-        if not worth or self.workers < 2 or self._pool:  # noqa: PLR2004 - one is this process
+        """Start the processes if they pay off, without waiting for them."""
+        if not worth or self.workers < 2 or self._pool:  # noqa: PLR2004 - 1 is this process
             return
         self._pool = self.enter_context(process_pool(self.workers, limit_threads))
         with no_interrupt_in_processes():
@@ -164,14 +151,14 @@ class _Processes(ExitStack):
                 self._pool.submit(int)
 
     def map(self, call: Callable[[Window], Drop], windows: Sequence[Window]) -> Iterator[Drop]:
-        """Yield the results of calls in order, here where no processes were started."""
+        """Yield the results of calls in order, from this process if there is no pool."""
         if not self._pool:
             yield from map(call, windows)
             return
         calls = deque(self._pool.submit(call, window) for window in windows)
         try:
             while calls:
-                # What was taken is dropped, so that it is not held twice.
+                # A result that was taken is not held twice.
                 yield calls.popleft().result()
         except BrokenExecutor as error:
             message = (
@@ -180,28 +167,22 @@ class _Processes(ExitStack):
             )
             raise NumericalError(message) from error
         finally:
-            for one in calls:
-                one.cancel()
+            for future in calls:
+                future.cancel()
 
 
 def measure_window(window: Window, config: Config) -> Drop:
-    """Return what the drop in a window tells, the resonance of the plate taken out before."""
-    steps, remarks = tuple[str, ...](), tuple[str, ...]()
+    """Return the drop in a window, after correction of the resonance of the plate."""
+    steps, warnings = tuple[str, ...](), tuple[str, ...]()
     plate = config.resonance
     if plate is not None:
-        window, steps, remarks = correct_window(window, plate)
-    drop = measure_drop(
-        window,
-        height=config.height,
-        mass=config.mass,
-        calibration_uncertainty=window.signal.calibration_uncertainty or 0.0,
-        mass_uncertainty=config.mass_uncertainty or 0.0,
-        height_uncertainty=config.height_uncertainty or 0.0,
-    )
-    # Factors that the background has cached serve the fit alone, and are larger than all else.
+        window, steps, warnings = correct_window(window, plate)
+    drop = measure_drop(window, config.conditions(window.signal.calibration_uncertainty))
+    # The cached factors of the background serve the fit only and need much memory.
     contact = replace(drop.contact, background=replace(drop.contact.background))
-    ringing = check_ringing(contact, plate)
-    drop = replace(drop, contact=contact, remarks=(*drop.remarks, *ringing))
-    if plate is None:
-        return drop
-    return replace(drop, steps=(*steps, *drop.steps), remarks=(*remarks, *drop.remarks))
+    return replace(
+        drop,
+        contact=contact,
+        steps=(*steps, *drop.steps),
+        warnings=(*warnings, *drop.warnings, *check_ringing(contact, plate)),
+    )

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
-    from thud.recordings.estimates import Drop
+    from thud.recordings.measured_drop import Drop
 
 METHODS = ("exact", "fft", "filter")
 # Level above the background, dB, below which a level is only an upper bound, and below which the

@@ -10,31 +10,42 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from thud.base.checks import refuse
+from thud.base.checks import require_whole
 from thud.base.display import Displayed
-from thud.recordings.budgets import drop_quantities, find_deviant, told_restitution
+from thud.base.extras import require_extra
+from thud.case.case import Case
+from thud.level.assessment import assess
+from thud.level.impact_result import DropForce
+from thud.recordings.budgets import (
+    check_restitution,
+    drop_estimates,
+    find_deviant,
+    level_estimates,
+)
 from thud.recordings.config import Config, checked_config
-from thud.recordings.excursion import doubt, scan
+from thud.recordings.excursion import check_peak, scan
 from thud.recordings.low_pass import describe_low_pass
 from thud.recordings.measure_drops import measure_signals
 from thud.recordings.recorded_levels import average_levels, compare_methods, measure_levels
 from thud.recordings.signal import Signal
-from thud.recordings.verdict import decide, level_quantities
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Iterable
 
+    import pandas as pd
+    import xarray as xr
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.base._schema import BandSet, LevelsForce, LimitsSource
+    from thud.base._schema import BandSet, LevelsForce, LevelsMethod, LimitsSource
+    from thud.level.assessment import Verdict
+    from thud.level.estimate import Estimate
     from thud.recordings.checkpoint import Checkpoint
-    from thud.recordings.estimates import Drop
     from thud.recordings.measure_drops import Origin
+    from thud.recordings.measured_drop import Drop
     from thud.recordings.outliers import Outlier
     from thud.recordings.recorded_levels import AverageLevels
-    from thud.recordings.verdict import Quantity, Verdict
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +85,7 @@ class Recording(Displayed):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text: the criteria."""
-        return self.conformity().rows()
+        return self.assess().rows()
 
     @classmethod
     def from_array(  # noqa: PLR0913 - what a laboratory knows
@@ -113,8 +124,8 @@ class Recording(Displayed):
             calibration_uncertainty=calibration_uncertainty,
         )
         signal = Signal.from_array(force, sample_rate, name)
-        doubts = doubt(scan(signal.read, signal.n_sample, name), 1.0, name, assumed=False)
-        return cls.from_signals([replace(signal, remarks=doubts)], config)
+        warnings = check_peak(scan(signal.read, signal.n_sample, name), 1.0, name, assumed=False)
+        return cls.from_signals([replace(signal, warnings=warnings)], config)
 
     @classmethod
     def from_signals(
@@ -145,11 +156,6 @@ class Recording(Displayed):
         return self.drops[0].time
 
     @property
-    def record(self) -> NDArray[np.float64]:
-        """Force of the first drop, corrected, N, shape (n_sample,)."""
-        return self.drops[0].force
-
-    @property
     def sample_rate(self) -> float:
         """Samples per second of the first drop, Hz."""
         return self.drops[0].sample_rate
@@ -159,29 +165,53 @@ class Recording(Displayed):
         """Time of first touch, s: 0."""
         return 0.0
 
-    @property
-    def origin(self) -> float:
-        """Time of first touch of the first drop in its file, s."""
-        return self.drops[0].onset
-
-    def judged(self, force: LevelsForce | None = None) -> LevelsForce:  # noqa: ARG002 - there is one
+    def assessed_force(self, force: LevelsForce | None = None) -> LevelsForce:  # noqa: ARG002 - there is one
         """Return the force that a force plate measures: ``"floor"``."""
         return "floor"
 
     @property
-    def level_method(self) -> str:
+    def level_method(self) -> LevelsMethod:
         """Method of the levels: ``"exact"``."""
         return "exact"
 
     @property
+    def case(self) -> Case:
+        """Case without a model, a floor or a room."""
+        return Case(model=None)
+
+    @property
+    def on_floor(self) -> None:
+        """None: the force on a mobile floor is not known."""
+
+    @property
+    def limits_source(self) -> LimitsSource | None:
+        """Source of the configuration; None if it is the default, which nobody may have stated."""
+        return None if self.config.source == Config.source else self.config.source
+
+    @property
+    def mass(self) -> float:
+        """Stated or effective mass, kg; NaN if unknown."""
+        return self.estimates["mass"].value
+
+    @property
+    def impact_velocity(self) -> float:
+        """Velocity at first touch by the stated drop height, m/s; NaN without it."""
+        return self.config.conditions(None).speed
+
+    @property
+    def velocity_tolerance(self) -> float:
+        """Relative tolerance of the velocity: that of a drop height of 0.85 m or more ± 1 cm."""
+        return 0.015
+
+    @property
     def contact_time(self) -> float:
         """Mean contact time, s."""
-        return self.quantities["contact_time"].value
+        return self.estimates["contact_time"].value
 
     @property
     def restitution(self) -> float:
         """Mean coefficient of restitution; NaN where it is not known."""
-        return self.quantities["restitution"].value
+        return self.estimates["restitution"].value
 
     @property
     def peak_force(self) -> float:
@@ -189,24 +219,29 @@ class Recording(Displayed):
         return float(np.mean([drop.peak_force.value for drop in self.drops]))
 
     @property
-    def remarks(self) -> tuple[str, ...]:
+    def impulse(self) -> float:
+        """Mean time integral of the force, N s."""
+        return float(np.mean([drop.impulse.value for drop in self.drops]))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
         """What is doubtful: of the whole, of files and of drops; a sentence each."""
-        found = [*self.doubts, *map(str, self.outliers)]
-        found += [remark for one in self.origins for remark in one.remarks]
-        found += [f"{drop.name}: {remark}" for drop in self.drops for remark in drop.remarks]
+        found = [*self.own_warnings, *map(str, self.outliers)]
+        found += [warning for one in self.origins for warning in one.warnings]
+        found += [f"{drop.name}: {warning}" for drop in self.drops for warning in drop.warnings]
         return tuple(dict.fromkeys(found))
 
     @cached_property
-    def doubts(self) -> tuple[str, ...]:
+    def own_warnings(self) -> tuple[str, ...]:
         """What is doubtful of the recording as a whole; a sentence each."""
         config, found = self.config, list[str]()
-        if math.isnan(self.quantities["peaks"].value):
+        if math.isnan(self.estimates["peaks"].value):
             found.append("the number of peaks is not known: noise may have made some")
         known = sum(math.isfinite(drop.restitution.value) for drop in self.drops)
         if 0 < known < len(self.drops):
             found.append(f"the restitution is known of {known} of {len(self.drops)} drops")
-        found += told_restitution(self.drops, config, self.calibration_uncertainty)
-        if config.mass is None and math.isfinite(self.quantities["mass"].value):
+        found += check_restitution(self.drops, config.conditions(self.calibration_uncertainty))
+        if config.mass is None and math.isfinite(self.estimates["mass"].value):
             found.append("the mass is not given: the effective mass is judged")
         found += [f"force plate: {one.sentence}" for one in config.plate_checks if one.met is False]
         plate = config.resonance
@@ -238,8 +273,8 @@ class Recording(Displayed):
         return tuple(dict.fromkeys(f"levels: {describe_low_pass(rate)}" for rate in rates))
 
     def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - there is one
-        """Return the force of the first drop, N, shape (n_sample,), for any `kind`."""
-        return self.record
+        """Return the force of the first drop, corrected, N, shape (n_sample,), for any `kind`."""
+        return self.drops[0].force
 
     def peak(self, force: LevelsForce | None = None) -> float:  # noqa: ARG002 - there is one
         """Return the mean maximum force, N."""
@@ -284,9 +319,9 @@ class Recording(Displayed):
         }
 
     @cached_property
-    def quantities(self) -> dict[str, Quantity]:
+    def estimates(self) -> dict[str, Estimate]:
         """Contact time, restitution, peaks, mass and drop height with their budgets."""
-        return drop_quantities(self.drops, self.config, self.calibration_uncertainty)
+        return drop_estimates(self.drops, self.config, self.calibration_uncertainty)
 
     @cached_property
     def outliers(self) -> tuple[Outlier, ...]:
@@ -296,16 +331,16 @@ class Recording(Displayed):
         """
         return (*self.average().outliers, *find_deviant(self.drops))
 
-    def level_quantities(self, bands: BandSet = "octave") -> tuple[Quantity, ...]:
+    def level_estimates(self, bands: BandSet = "octave") -> tuple[Estimate, ...]:
         """Return the average levels with all that makes them uncertain, dB, shape (n_band,)."""
         plate = self.config.resonance
-        return level_quantities(
+        return level_estimates(
             self.average(bands),
             self.calibration_uncertainty,
             plate.level_uncertainty(bands) if plate else None,
         )
 
-    def conformity(
+    def assess(
         self,
         source: LimitsSource | None = None,
         force: LevelsForce | None = None,  # noqa: ARG002 - there is one
@@ -319,31 +354,58 @@ class Recording(Displayed):
         force
             Not used: a force plate measures the force on the floor.
         """
-        return decide(
-            self.level_quantities(),
+        return assess(
+            self.level_estimates(),
             source=source or self.config.source,
             limits=self.config.limits,
-            **self.quantities,
+            **self.estimates,
         )
 
     def plot(self, what: Literal["levels", "force"] = "levels") -> Figure:
         """Draw the levels of the drops over the tolerance band, or their forces."""
-        from thud.plot.recording_figure import recording_figure
+        from thud.plot.recordings import recording_figure
 
         return recording_figure(self, what)
 
-    def to_force_history(self, drop: int = 1) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return time since first touch, s, and force, N, of one contact, shape (n_sample,).
+    def to_xarray(self) -> xr.Dataset:
+        """Return the force of the first drop, the average levels and the means over the drops.
 
-        The force is zero before and after: it may drive another program's floor.
-
-        Parameters
-        ----------
-        drop
-            Number of the drop, from 1.
+        Raise InputError where xarray is not installed.
         """
-        if not 1 <= drop <= len(self.drops):
-            refuse(f"drop = {drop} does not exist", f"1 to {len(self.drops)}")
+        with require_extra("studies"):
+            from thud.impact.datasets import recording_dataset
+
+        return recording_dataset(self)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the force of the first drop over time.
+
+        Raise InputError where pandas is not installed.
+        """
+        with require_extra("studies"):
+            import pandas as pd
+
+        index = pd.Index(self.time, name="time_s")
+        return pd.DataFrame({"floor_force_N": self.force()}, index=index)
+
+    def drop_force(self, drop: int = 1) -> DropForce:
+        """Return the force of a contact by its number, from 1; it is zero before and after."""
+        require_whole("drop", drop, 1, len(self.drops))
+        number = drop
+        for origin in self.origins:
+            if number <= origin.drops:
+                break
+            number -= origin.drops
         one = self.drops[drop - 1]
-        gate = slice(*one.gate)
-        return one.time[gate], one.force[gate].copy()
+        first, stop = one.gate
+        return DropForce(
+            name=self.name if len(self.drops) == 1 else f"{self.name}_drop_{drop}",
+            force=one.force[first:stop],
+            sample_rate=one.sample_rate,
+            start=float(one.time[first]),
+            kind=self.assessed_force(),
+            origin=f"recording {one.name}, {origin.calibration or 'calibration not known'}",
+            checksum=origin.checksum,
+            date=origin.date,
+            notes=(*one.steps, f"noise of {one.noise.deviation:.3g} N remains"),
+        )

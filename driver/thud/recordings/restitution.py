@@ -1,4 +1,4 @@
-"""Restitution and effective mass, by impulse and by bounces (docs/recordings_theory.md, 5)."""
+"""Restitution and effective mass by impulse and by bounces (docs/recordings_theory.md, 5)."""
 
 from __future__ import annotations
 
@@ -7,26 +7,26 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from thud.base._schema import Drop
-from thud.recordings.contact import Estimate
+from thud.level.estimate import Estimate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-# Acceleration of free fall, m/s2: that of a model by default.
+# Default of the models, m/s2.
 GRAVITY = Drop.gravity
 IMPULSE, BOUNCES = "impulse", "bounces"
 
 
 @dataclass(frozen=True)
 class DropConditions:
-    """What is known of a drop.
+    """Height, mass and calibration of drops, with the standard uncertainties that all drops share.
 
     Attributes
     ----------
     height, mass : float or None
-        Drop height of the lowest point, m, and mass, kg.
+        Drop height of the lowest point, m, and mass, kg; None if unknown.
     calibration, mass_uncertainty, height_uncertainty : float
-        Standard uncertainties, which all drops share: of the force, relative, and in kg and m.
+        Standard uncertainties: of the force, relative, and in kg and m.
     """
 
     height: float | None = None
@@ -43,65 +43,68 @@ class DropConditions:
     def restitutions(
         self, impulse: Estimate, contact_time: Estimate, flights: Sequence[Estimate]
     ) -> tuple[dict[str, Estimate], tuple[str, ...]]:
-        """Return the restitution by each way that is known, and remarks."""
-        ways: dict[str, Estimate] = {}
+        """Return the restitution by each method that can be applied, and warnings."""
+        methods: dict[str, Estimate] = {}
         speed = self.speed
         if self.height and self.mass:
             momentum = self.mass * speed
             value = impulse.value / momentum - 1 - GRAVITY * contact_time.value / speed
-            doubt = (impulse.uncertainty / momentum, GRAVITY * contact_time.uncertainty / speed)
-            ways[IMPULSE] = Estimate(value, math.hypot(*doubt))
+            parts = (impulse.uncertainty / momentum, GRAVITY * contact_time.uncertainty / speed)
+            methods[IMPULSE] = Estimate(value, math.hypot(*parts))
         if self.height and flights:
             scale = GRAVITY / (2 * speed)
-            ways[BOUNCES] = Estimate(scale * flights[0].value, scale * flights[0].uncertainty)
+            methods[BOUNCES] = Estimate(scale * flights[0].value, scale * flights[0].uncertainty)
         elif len(flights) > 1:
-            one, two = flights[:2]
-            told = (
-                f"the restitution of the first bounce is {two.value / one.value:.3f}; that of the "
-                "drop itself is not known without the drop height"
+            first, second = flights[:2]
+            warning = (
+                f"the restitution of the first bounce is {second.value / first.value:.3f}; that of "
+                "the drop itself is unknown without the drop height"
             )
-            return ways, (told,)
-        return ways, ()
+            return methods, (warning,)
+        return methods, ()
 
-    def shared(self, ways: dict[str, Estimate], impulse: Estimate) -> dict[str, dict[str, float]]:
-        """Return what calibration, mass and drop height make of each way, signed."""
-        found: dict[str, dict[str, float]] = {}
+    def shared(
+        self, methods: dict[str, Estimate], impulse: Estimate
+    ) -> dict[str, dict[str, float]]:
+        """Return the signed effect of calibration, mass and drop height on each method."""
+        effects: dict[str, dict[str, float]] = {}
         height = self.height_uncertainty / (2 * self.height) if self.height else 0.0
-        if IMPULSE in ways:
+        if IMPULSE in methods:
             ratio = impulse.value / ((self.mass or math.nan) * self.speed)
-            found[IMPULSE] = {
+            effects[IMPULSE] = {
                 "calibration": ratio * self.calibration,
                 "mass": -ratio * self.mass_uncertainty / (self.mass or math.nan),
-                "drop height": -(1 + ways[IMPULSE].value) * height,
+                "drop height": -(1 + methods[IMPULSE].value) * height,
             }
-        if BOUNCES in ways:
-            found[BOUNCES] = {"drop height": -ways[BOUNCES].value * height}
-        return found
+        if BOUNCES in methods:
+            effects[BOUNCES] = {"drop height": -methods[BOUNCES].value * height}
+        return effects
 
     def mean(
-        self, ways: dict[str, Estimate], impulse: Estimate
+        self, methods: dict[str, Estimate], impulse: Estimate
     ) -> tuple[Estimate, dict[str, float]]:
-        """Return the mean of the ways, and what all drops share of its uncertainty.
+        """Return the weighted mean of the methods, and the shared effects on it.
 
-        The weights are 1/uncertainty2, that of the shared parts included; the uncertainty of the
-        mean is without them.
+        The weights are the inverse variances, shared effects included; the uncertainty of the mean
+        excludes these.
         """
-        if not ways:
+        if not methods:
             return Estimate.unknown(), {}
-        shared = self.shared(ways, impulse)
-        own = {way: max(one.uncertainty, 1e-12) for way, one in ways.items()}
-        weight = {
-            way: 1 / (own[way] ** 2 + sum(part**2 for part in shared[way].values())) for way in ways
+        effects = self.shared(methods, impulse)
+        own = {name: max(estimate.uncertainty, 1e-12) for name, estimate in methods.items()}
+        weights = {
+            name: 1 / (own[name] ** 2 + sum(effect**2 for effect in effects[name].values()))
+            for name in methods
         }
-        total = sum(weight.values())
-        weight = {way: one / total for way, one in weight.items()}
-        value = sum(weight[way] * one.value for way, one in ways.items())
-        doubt = math.hypot(*(weight[way] * one for way, one in own.items()))
-        parts: dict[str, float] = {}
-        for way, found in shared.items():
-            for name, part in found.items():
-                parts[name] = parts.get(name, 0.0) + weight[way] * part
-        return Estimate(value, doubt), {name: part for name, part in parts.items() if part}
+        total = sum(weights.values())
+        weights = {name: weight / total for name, weight in weights.items()}
+        value = sum(weights[name] * estimate.value for name, estimate in methods.items())
+        uncertainty = math.hypot(*(weights[name] * own[name] for name in methods))
+        combined: dict[str, float] = {}
+        for name, by_cause in effects.items():
+            for cause, effect in by_cause.items():
+                combined[cause] = combined.get(cause, 0.0) + weights[name] * effect
+        return Estimate(value, uncertainty), {k: effect for k, effect in combined.items() if effect}
 
     def effective_mass(
         self, impulse: Estimate, contact_time: Estimate, restitution: Estimate | None

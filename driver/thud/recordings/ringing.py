@@ -25,7 +25,7 @@ HIGHEST = 0.3
 CLEAR = 25.0
 # Energy over that of the quiet before, whose tones are no ringing.
 OVER_BEFORE = 4.0
-# Amplitude that is worth a remark, as part of the peak: of a plate that nothing is said of, and
+# Amplitude that is worth a warning, as part of the peak: of a plate that nothing is said of, and
 # left by the correction; and the fewest oscillations.
 NOTABLE = (3e-4, 1e-3)
 OSCILLATIONS = 3.0

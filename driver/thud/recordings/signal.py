@@ -46,7 +46,7 @@ class Signal(Immutable):
         Relative standard uncertainty of the calibration; None where it is not known.
     steps : tuple of str
         What reading has done, a sentence each.
-    remarks : tuple of str
+    warnings : tuple of str
         What is possible but not plausible, a sentence each.
     samples : callable
         Returns the force, N, shape (stop - start,), of the samples from start to before stop.
@@ -62,7 +62,7 @@ class Signal(Immutable):
     calibration: str = ""
     calibration_uncertainty: float | None = None
     steps: tuple[str, ...] = ()
-    remarks: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @classmethod
     def from_array(cls, force: ArrayLike, sample_rate: float, name: str = "recording") -> Signal:

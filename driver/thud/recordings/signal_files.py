@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse, require_choice, require_kind, require_number, shown
 from thud.recordings.channel import MIB, Channel, shown_path, shown_text
-from thud.recordings.excursion import POLARITIES, doubt, find_sign, scan
+from thud.recordings.excursion import POLARITIES, check_peak, find_sign, scan
 from thud.recordings.force_units import (
     ALLOWED,
     ASSUMED,
@@ -198,7 +198,7 @@ def _signal(path: Path, one: Channel, given: _Given, *, several: bool) -> Signal
         calibration=words,
         calibration_uncertainty=uncertainty,
         steps=(*one.steps, *steps, *told, *changed),
-        remarks=doubt(seen, sign * scale, name, assumed=unit == ASSUMED),
+        warnings=check_peak(seen, sign * scale, name, assumed=unit == ASSUMED),
     )
 
 

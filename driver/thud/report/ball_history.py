@@ -15,7 +15,7 @@ from scipy.stats import t as student
 from thud.base.checks import refuse
 from thud.base.files import read_input
 from thud.base.immutable import Immutable
-from thud.recordings.verdict import VERDICTS
+from thud.level.assessment import RESULTS
 from thud.report.contents import FORMAT, read_date
 from thud.report.rows import Style, criterion_row, limits_of, number, style_of
 
@@ -35,7 +35,7 @@ FARTHEST = 100.0
 # Reports in the table: the first, and the last ones.
 MAX_COLUMNS = 8
 # Marks of values in the table.
-WORDS = {VERDICTS[0]: "", VERDICTS[1]: " no", VERDICTS[2]: " ?"}
+WORDS = {RESULTS[0]: "", RESULTS[1]: " no", RESULTS[2]: " ?"}
 # Largest report, bytes.
 LARGEST = 2**28
 # What a point of a chart needs of a report.
@@ -141,7 +141,7 @@ class History:
         columns.append(("limit on", *(self._limit(trend) for _, trend in together), ""))
         return list(zip(*columns, strict=True))
 
-    def remarks(self) -> list[str]:
+    def warnings(self) -> list[str]:
         """Return a sentence for each criterion with a trend that is more than chance."""
         found = []
         for one, trend in zip(self.criteria(), self.trends(), strict=True):
@@ -271,7 +271,7 @@ def _is_whole(report: dict[str, Any]) -> bool:
             )
         )
         and all(isinstance(one[key], str) for key in ("name", "unit"))
-        and one["verdict"] in VERDICTS
+        and one["verdict"] in RESULTS
         for one in entries
     )  # fmt: skip
 

@@ -9,16 +9,7 @@ import numpy as np
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.ticker import MultipleLocator
 
-from thud.plot.style import (
-    COLOURS,
-    GREY,
-    SIZE,
-    WIDTH,
-    legend_above,
-    new_figure,
-    own_style,
-    style_axes,
-)
+from thud.plot.style import COLORS, GREY, WIDTH, legend_above, new_figure, own_style
 from thud.report.rows import NOT_KNOWN, limits_of, style_of
 
 if TYPE_CHECKING:
@@ -29,11 +20,11 @@ if TYPE_CHECKING:
 
 # Marker and its filling by verdict: distinct in grey as well.
 MARKS = {
-    "conforms": ("o", COLOURS[0]),
-    "cannot be decided": ("s", "white"),
-    "does not conform": ("X", COLOURS[1]),
+    "conforms": ("o", COLORS[0]),
+    "inconclusive": ("s", "white"),
+    "does not conform": ("X", COLORS[1]),
 }
-# Room beyond the first and the last report, as part of the time between them, and at least.
+# Margin before the first and after the last report, as fraction of the time between, and minimum.
 ROOM, MIN_ROOM = 0.06, timedelta(days=15)
 
 
@@ -41,7 +32,7 @@ ROOM, MIN_ROOM = 0.06, timedelta(days=15)
 def draw_history(history: History) -> Figure:
     """Draw each criterion of a ball against the date of its reports.
 
-    Grey is what the limits allow, bars are expanded uncertainties (95 %), markers tell the verdict;
+    Grey is what the limits allow, bars are expanded uncertainties (95 %), markers show the verdict;
     trends that are more than chance have a line.
     """
     criteria, trends = history.criteria(), history.trends()
@@ -49,7 +40,7 @@ def draw_history(history: History) -> Figure:
     figure = new_figure(0.5 + 1.15 * rows, 2 * WIDTH)
     panels = figure.subplots(rows, 2, sharex=True, squeeze=False).T.ravel()
     for axes, entries, trend in zip(panels, criteria, trends, strict=False):
-        _draw_criterion(style_axes(axes), history, entries, trend)
+        _draw_criterion(axes, history, entries, trend)
     for axes in panels[len(criteria) :]:
         axes.remove()
     figure.align_ylabels()
@@ -58,8 +49,7 @@ def draw_history(history: History) -> Figure:
     first.set_xlim(history.dates[0] - room, history.dates[-1] + room)
     locator = AutoDateLocator(minticks=3, maxticks=6)  # type: ignore[no-untyped-call]
     first.xaxis.set_major_locator(locator)
-    formatter = ConciseDateFormatter(locator)  # type: ignore[no-untyped-call]
-    first.xaxis.set_major_formatter(formatter)
+    first.xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]
     _add_legend(first, trends)
     return figure
 
@@ -81,32 +71,32 @@ def _draw_criterion(
     for date, one in zip(history.dates, entries, strict=True):
         if one["value"] is None:
             continue
-        marker, colour = MARKS.get(one["verdict"], ("D", "white"))
+        marker, color = MARKS.get(one["verdict"], ("D", "white"))
         bar = (one["expanded_uncertainty"] or 0.0) / style.unit
         axes.errorbar(
             date, one["value"] / style.unit, yerr=bar,  # type: ignore[arg-type]
-            marker=marker, markersize=4.5, markerfacecolor=colour, color="black", capsize=2,
+            marker=marker, markersize=4.5, markerfacecolor=color, color="black", capsize=2,
             elinewidth=0.8, markeredgewidth=0.7,
         )  # fmt: skip
     if all(one["value"] is None for one in entries):
-        axes.text(0.5, 0.5, NOT_KNOWN, transform=axes.transAxes, ha="center", fontsize=SIZE)
+        axes.text(0.5, 0.5, NOT_KNOWN, transform=axes.transAxes, ha="center")
     if trend is not None and trend.significant:
         dates = np.array([history.day(year) for year in trend.time])
-        axes.plot(dates, trend.value / style.unit, color=COLOURS[0], linewidth=1, linestyle="--")
+        axes.plot(dates, trend.value / style.unit, color=COLORS[0], linewidth=1, linestyle="--")
     axes.margins(y=0.15)
     if is_count:
         axes.yaxis.set_major_locator(MultipleLocator(1))
-    axes.set_ylabel(style.title.replace(", ", ",\n"), fontsize=SIZE)
+    axes.set_ylabel(style.title.replace(", ", ",\n"))
 
 
 def _add_legend(axes: Axes, trends: list[Trend | None]) -> None:
     """Put a legend above the panels."""
     axes.fill_between([], [], color=GREY, linewidth=0, label="allowed")
-    for verdict, (marker, colour) in MARKS.items():
+    for verdict, (marker, color) in MARKS.items():
         axes.errorbar(
-            [], [], yerr=[], label=verdict, marker=marker, markersize=4.5, markerfacecolor=colour,
+            [], [], yerr=[], label=verdict, marker=marker, markersize=4.5, markerfacecolor=color,
             color="black", linestyle="none", capsize=2, elinewidth=0.8, markeredgewidth=0.7,
         )  # fmt: skip
     if any(trend is not None and trend.significant for trend in trends):
-        axes.plot([], [], color=COLOURS[0], linewidth=1, linestyle="--", label="trend")
+        axes.plot([], [], color=COLORS[0], linewidth=1, linestyle="--", label="trend")
     legend_above(axes)

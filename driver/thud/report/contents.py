@@ -9,16 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.base.bridge import version
-from thud.level.levels import BANDWIDTHS, get_bands, judge
-from thud.recordings.verdict import CONFIDENCE
+from thud.level.assessment import get_criteria
+from thud.level.estimate import CONFIDENCE
+from thud.level.levels import BANDWIDTHS, get_bands
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from thud.base._schema import BandSet, LimitsSource
-    from thud.recordings.estimates import Drop, Estimate
+    from thud.level.assessment import Criterion
+    from thud.level.estimate import Estimate
+    from thud.recordings.measured_drop import Drop
     from thud.recordings.recording import Recording
-    from thud.recordings.verdict import CriterionResult
 
 FORMAT = "thud calibration report 1"
 DATE_FORMATS = ("%d.%m.%Y", "%Y/%m/%d", "%Y:%m:%d", "%d-%b-%y", "%d-%b-%Y", "%d %b %Y")
@@ -30,7 +32,7 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
 
     Numbers are in SI units, uncertainties are standard ones unless named expanded.
     """
-    config, verdict = recording.config, recording.conformity(source)
+    config, verdict = recording.config, recording.assess(source)
     found: dict[str, Any] = {
         "format": FORMAT,
         "thud": version(),
@@ -47,7 +49,7 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
         "mass_uncertainty": config.mass_uncertainty,
         "height_uncertainty": config.height_uncertainty,
         "calibration_uncertainty": recording.calibration_uncertainty,
-        "verdict": verdict.verdict,
+        "verdict": verdict.result,
         "confidence": CONFIDENCE,
         "criteria": criteria_data(recording, source),
         "levels": {bands: _levels(recording, bands) for bands in BANDWIDTHS},
@@ -57,7 +59,7 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
         "drops": [_drop(drop) for drop in recording.drops],
         "plate": [vars(one) for one in config.plate_checks],
         "steps": list(recording.level_steps),
-        "remarks": list(recording.doubts),
+        "warnings": list(recording.own_warnings),
         "outliers": [vars(one) for one in recording.outliers],
         "files": [
             {
@@ -68,7 +70,7 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
                 "sample_rate": one.sample_rate,
                 "drops": one.drops,
                 "steps": list(one.steps),
-                "remarks": list(one.remarks),
+                "warnings": list(one.warnings),
             }
             for one in recording.origins
         ],
@@ -82,8 +84,8 @@ def criteria_data(recording: Recording, source: LimitsSource | None = None) -> l
 
     An uncertainty that nobody states is None; so is the margin of an upper bound or a count.
     """
-    verdict = recording.conformity(source)
-    found: list[dict[str, Any]] = _known(_criteria(recording, verdict.source, verdict.decisions))
+    verdict = recording.assess(source)
+    found: list[dict[str, Any]] = _known(_criteria(recording, verdict.source, verdict.criteria))
     return found
 
 
@@ -117,40 +119,40 @@ def _dates(texts: Iterable[str]) -> str:
 
 
 def _criteria(
-    recording: Recording, source: LimitsSource, decisions: tuple[CriterionResult, ...]
+    recording: Recording, source: LimitsSource, criteria: tuple[Criterion, ...]
 ) -> list[dict[str, Any]]:
     """Return the criteria with their budgets."""
     average = recording.average()
     count = len(average.level)
-    standard = judge(np.zeros(count), 0.0, 0.0, 0, 0.0, 0.0, source).criteria
+    standard = get_criteria(source)
     spreads = {f"{i}": float(average.spread[i]) for i in range(count)}
     for name in ("contact_time", "restitution"):
         spreads[name] = _spread(getattr(drop, name).value for drop in recording.drops)
     rows = []
-    for i, (one, usual) in enumerate(zip(decisions, standard, strict=True)):
-        is_level, quantity = i < count, one.quantity
-        stated = bool(quantity.contributions)
+    for i, (one, usual) in enumerate(zip(criteria, standard, strict=True)):
+        is_level, estimate = i < count, one.estimate
+        stated = bool(estimate.contributions)
         rows.append(
             {
                 "name": one.name,
                 "unit": one.unit,
                 "band": float(get_bands().nominal[i]) if is_level else None,
                 "value": one.value,
-                "uncertainty": quantity.uncertainty if stated else None,
-                "freedom": quantity.freedom,
-                "coverage_factor": quantity.coverage_factor,
-                "expanded_uncertainty": quantity.expanded if stated else None,
-                "upper_bound": quantity.upper_bound,
+                "uncertainty": estimate.uncertainty if stated else None,
+                "freedom": estimate.freedom,
+                "coverage_factor": estimate.coverage_factor,
+                "expanded_uncertainty": estimate.expanded if stated else None,
+                "upper_bound": estimate.upper_bound,
                 "lower": one.lower,
                 "upper": one.upper,
                 "limits_of_standard": (one.lower, one.upper) == (usual.lower, usual.upper),
-                "margin": None if quantity.upper_bound or one.lower == one.upper else one.margin,
+                "margin": None if estimate.upper_bound or one.lower == one.upper else one.margin,
                 "probability": one.probability,
-                "verdict": one.verdict,
+                "verdict": one.result,
                 "spread": spreads.get(f"{i}" if is_level else one.name),
                 "background": float(average.background[i]) if is_level else None,
                 "flag": str(average.flag[i]) if is_level else "",
-                "contributions": [vars(part) for part in quantity.contributions],
+                "contributions": [vars(part) for part in estimate.contributions],
             }
         )
     return rows
@@ -158,7 +160,7 @@ def _criteria(
 
 def _levels(recording: Recording, bands: BandSet) -> dict[str, Any]:
     """Return the levels of the average and of the drops."""
-    average, budgets = recording.average(bands), recording.level_quantities(bands)
+    average, budgets = recording.average(bands), recording.level_estimates(bands)
     columns = ("background", "spread", "flag", "drops")
     return {
         "band": get_bands(bands).nominal.tolist(),
@@ -182,7 +184,7 @@ def _drop(drop: Drop) -> dict[str, Any]:
         "bounces": list(drop.bounces),
         "noise": drop.noise.deviation,
         "steps": list(drop.steps),
-        "remarks": list(drop.remarks),
+        "warnings": list(drop.warnings),
     }
 
 

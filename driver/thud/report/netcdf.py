@@ -90,7 +90,7 @@ def _attributes(data: dict[str, Any]) -> dict[str, Any]:
                 ]
             )
         )
-        for kind in ("steps", "remarks")
+        for kind in ("steps", "warnings")
     }
     found = {**known, "instruments": "\n".join(data["instruments"]), **told}
     return {k: _plain(one) if isinstance(one, str) else one for k, one in found.items()}

@@ -9,9 +9,9 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from thud.base.display import left_out
+from thud.level.assessment import RESULTS
 from thud.plot.style import own_style
 from thud.recordings.recorded_levels import BACKGROUND, MARGIN
-from thud.recordings.verdict import VERDICTS
 from thud.report.fonts import FAMILY, clip, count_lines, font_faces, text_width
 from thud.report.notes import fit_lines, group_places
 from thud.report.rows import HEAD, NOT_KNOWN, criterion_row, limits_of, number, style_of
@@ -28,7 +28,7 @@ SIZE = 7.3
 WIDTH, COLUMN, LABEL, REASON = 186.0, 91.0, 23.0, 112.0
 # Lines of a value, of the instruments, of files, of the blocks of notes and of a note.
 VALUE_LINES, INSTRUMENT_LINES, FILES = 2, 6, 5
-RESULT_LINES, STEP_LINES, REMARK_LINES = 13, 8, 7
+RESULT_LINES, STEP_LINES, WARNING_LINES = 13, 8, 7
 SENTENCE_LINES = 3
 # Of two drops, none is an outlier.
 MIN_DROPS = 2
@@ -65,7 +65,7 @@ def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) 
         figures="\n".join(_cells(figures)),
         results=_notes("Drops and methods", _results(data), RESULT_LINES),
         done=_notes("Signal processing", _told(data, "steps") or ["nothing"], STEP_LINES),
-        remarks=_notes("Remarks", _told(data, "remarks") or ["none"], REMARK_LINES),
+        warnings=_notes("Warnings", _told(data, "warnings") or ["none"], WARNING_LINES),
         files=_files(data["files"]),
         footer=_text(f"thud {data['thud']} · report.json: SHA-256 {checksum}"),
     )
@@ -101,7 +101,7 @@ def _text(text: str) -> str:
 def _reason(criteria: Sequence[dict[str, Any]]) -> str:
     """Return which criteria are not met."""
     parts = []
-    for verdict in VERDICTS[1:]:
+    for verdict in RESULTS[1:]:
         names = [style_of(one).title.split(",")[0] for one in criteria if one["verdict"] == verdict]
         if names:
             parts.append(f"{verdict}: {', '.join(names).lower().replace(' hz', ' Hz')}")
@@ -256,7 +256,7 @@ def _outliers(outliers: Iterable[dict[str, Any]]) -> str:
 
 
 def _told(data: dict[str, Any], kind: str) -> list[str]:
-    """Return the steps or remarks of all, of files and of drops; those of several as one."""
+    """Return the steps or warnings of all, of files and of drops; those of several as one."""
     places = {key: [(one["name"], one[kind]) for one in data[key]] for key in ("files", "drops")}
     return [*data[kind], *group_places(places)]
 

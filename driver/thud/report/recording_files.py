@@ -13,9 +13,9 @@ from thud.base.bridge import version
 from thud.base.display import draw_all, left_out
 from thud.base.errors import InputError, ReportWarning
 from thud.base.extras import require_extra
+from thud.level.assessment import RESULTS
+from thud.level.estimate import Estimate
 from thud.level.levels import get_bands
-from thud.recordings.contact import Estimate
-from thud.recordings.verdict import VERDICTS
 from thud.report.contents import criteria_data, report_data
 from thud.report.notes import group_places
 from thud.report.rows import HEAD, NOT_KNOWN, criterion_rows
@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 
 # Columns of the page that the screen leaves out.
 _HIDDEN = ("Spread", "Background")
-_PLURALS = {VERDICTS[0]: "conform", VERDICTS[1]: "do not conform"}
+_PLURALS = {RESULTS[0]: "conform", RESULTS[1]: "do not conform"}
 DATASET = "recording.nc"
-_PAGE = (HTML, PDF, "force.png", "force.svg", "levels.png", "levels.svg")
+_PAGE = (HTML, PDF, "force.svg", "levels.svg")
 
 
 def drop_table(recording: Recording) -> list[tuple[str, ...]]:
@@ -62,7 +62,7 @@ def drop_table(recording: Recording) -> list[tuple[str, ...]]:
 
 
 def sentences(recording: Recording, kind: str) -> list[str]:
-    """Return the ``"steps"`` or ``"remarks"`` of files and drops, those that are alike as one."""
+    """Return the ``"steps"`` or ``"warnings"`` of files and drops, those that are alike as one."""
     return group_places(
         {
             "files": [(one.name, getattr(one, kind)) for one in recording.origins],
@@ -86,17 +86,16 @@ def _with_doubt(estimate: Estimate, unit: float, decimals: int) -> str:
 
 def verdict_sentence(recording: Recording) -> str:
     """Return the verdict in a sentence, and another one where limits are the laboratory's."""
-    found = recording.conformity()
+    found = recording.assess()
     name = found.source.replace("_", " ")
     sentence = {
         "conforms": f"The source conforms to the limits of the {name}",
         "does not conform": f"The source does not conform to the limits of the {name}",
-        "cannot be decided": f"Whether the source conforms to the limits of the {name} "
-        "cannot be decided",
-    }[found.verdict]
+        "inconclusive": f"The result is inconclusive by the limits of the {name}",
+    }[found.result]
     own = any(not one["limits_of_standard"] for one in criteria_data(recording))
     more = " Limits marked * are those of the laboratory." if own else ""
-    return f"{sentence} at 95 %: {count_verdicts(d.verdict for d in found.decisions)}.{more}"
+    return f"{sentence} at 95 %: {count_verdicts(d.result for d in found.criteria)}.{more}"
 
 
 def count_verdicts(verdicts: Iterable[str]) -> str:
@@ -106,7 +105,7 @@ def count_verdicts(verdicts: Iterable[str]) -> str:
     '2 criteria conform, 1 does not conform'
     """
     given = list(verdicts)
-    counts = {verdict: given.count(verdict) for verdict in VERDICTS if verdict in given}
+    counts = {verdict: given.count(verdict) for verdict in RESULTS if verdict in given}
     parts = [
         f"{count} {verdict if count == 1 else _PLURALS.get(verdict, verdict)}"
         for verdict, count in counts.items()
@@ -187,11 +186,11 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
     }
     if figures and _has_matplotlib():
         # It takes its time.
-        from thud.plot.style import picture_files
+        from thud.plot.files import figure_files
 
         drawn = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
         contents |= page_contents(data, list(drawn.values()), results.folder)
-        contents |= picture_files(drawn)
+        contents |= figure_files(drawn)
     write_files(results, data, contents, file_names())
 
 

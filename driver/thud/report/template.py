@@ -26,7 +26,7 @@ $figures
 </tr></table>
 <table class="columns"><tr>
 <td>$results</td>
-<td>$done$remarks</td>
+<td>$done$warnings</td>
 </tr></table>
 <h2>Files and their SHA-256</h2>
 <table class="files">$files</table>
@@ -73,7 +73,7 @@ td, th { padding: 0; vertical-align: top; text-align: left; }
 .criteria th:first-child, .criteria td:first-child { text-align: left; padding-left: 0; }
 .criteria th:last-child, .criteria td:last-child { text-align: left; width: 29mm; }
 .does-not-conform td:last-child { font-weight: bold; }
-.cannot-be-decided td:last-child { text-decoration: underline; }
+.inconclusive td:last-child { text-decoration: underline; }
 .range { width: 34mm; height: 3.4mm; display: block; margin: 0 auto; }
 .rule { margin: 0.8mm 0 1.2mm; }
 .figures { height: 64mm; }

@@ -114,7 +114,7 @@ def _collect(
         except Exception as error:
             del running[future]
             said = f"{type(error).__name__}: {error}".partition("\n")[0].removesuffix(": ")
-            message = _sentence(f"the backend lost a block of sets ({said})")
+            message = _sentence(f"the backend lost a block of samples ({said})")
             raise NumericalError(message) from error
         keep(running[future], found)
         del running[future]

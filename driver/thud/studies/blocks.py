@@ -1,4 +1,4 @@
-"""Files of sets: finished blocks while a study runs, then one file or Zarr group."""
+"""Files of samples: finished blocks while a study runs, then one file or Zarr group."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from thud.studies.evaluation import Block
-    from thud.studies.sets import Columns, SetStudy
+    from thud.studies.samples import Columns, SampleStudy
 
 # Results that need more bytes than this are written as Zarr.
 LARGE = 256 * 2**20
@@ -43,13 +43,13 @@ _SEAL = b"thud sha256 "
 
 
 class Blocks:
-    """The finished blocks of a study, of `size` sets each, in its directory, and their joining."""
+    """The finished blocks of a study in its directory, `size` samples each."""
 
-    def __init__(self, folder: Path, study: SetStudy, size: int) -> None:
+    def __init__(self, folder: Path, study: SampleStudy, size: int) -> None:
         self._study = study
         self.path = folder / result_names(study)[0]
         self._partial = self.path.with_suffix(".partial")
-        self._identity = {**study.identity, "sets in a block": f"{size}"}
+        self._identity = {**study.identity, "samples in a block": f"{size}"}
 
     def open(self) -> None:
         """Begin or continue the study. Raises InputError where the disk is too small."""
@@ -77,14 +77,14 @@ class Blocks:
         if needed > free:
             refuse(
                 f"{self.path} needs about {needed / 1e6:.3g} MB and {free / 1e6:.3g} MB are free",
-                "fewer sets, or another disk",
+                "fewer samples, or another disk",
             )
 
     def _block(self, start: int) -> Path:
         return self._partial / f"block_{start:012d}.nc"
 
     def has(self, start: int) -> bool:
-        """Return whether the block that begins with a set is finished."""
+        """Return whether the block that begins with a sample is finished."""
         return self._block(start).exists()
 
     def keep(self, block: Block, found: Columns) -> None:
@@ -124,7 +124,7 @@ class Blocks:
             shutil.rmtree(part, ignore_errors=True)
 
 
-def result_names(study: SetStudy) -> list[str]:
+def result_names(study: SampleStudy) -> list[str]:
     """Return the possible names of results of a study; the first is that of a finished one."""
     large = disk_space(study) > LARGE
     endings = ["nc", "zarr", "partial"]
@@ -147,7 +147,7 @@ def read_identity(path: Path) -> dict[str, str] | None:
         if not block_paths(path) and not (path / MARK).exists():
             return None
         content = json.loads(read_input(path / MARK))
-        del content["sets in a block"]
+        del content["samples in a block"]
         if not block_paths(path):
             return None
     else:
@@ -164,7 +164,7 @@ def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
     ----------
     path
         A file ``.nc``, a Zarr group ``.zarr``, or the directory ``.partial`` of a study that is not
-        done: its finished sets.
+        done: its finished samples.
 
     Returns
     -------
@@ -182,7 +182,7 @@ def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
     if place.suffix == ".partial":
         paths = block_paths(place)
         if not paths:
-            refuse(f"{place} holds no finished sets", "results of a study")
+            refuse(f"{place} holds no finished samples", "results of a study")
         return _join(paths)
     if place.suffix == ".zarr":
         with _readable(place):
@@ -203,7 +203,7 @@ def _join(
         with _open(path, known_whole=known_whole) as dataset:
             parts.append(_loaded(dataset if names is None else dataset[names]))
     return xr.concat(
-        parts, "set", data_vars="minimal", coords="minimal", compat="override",
+        parts, "sample", data_vars="minimal", coords="minimal", compat="override",
         join="override", combine_attrs="override",
     )  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Sets of a study, computed in blocks by a backend, kept or continued in a directory."""
+"""Samples of a study, computed in blocks by a backend, kept or continued in a directory."""
 
 from __future__ import annotations
 
@@ -23,17 +23,19 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from thud.studies.kind import RunOptions
-    from thud.studies.sets import Columns, SetStudy
+    from thud.studies.samples import Columns, SampleStudy
 
 
-def compute_sets(study: SetStudy, folder: Path | None, how: RunOptions) -> xr.Dataset:
+def compute_samples(study: SampleStudy, folder: Path | None, how: RunOptions) -> xr.Dataset:
     """Compute or continue a study; without a folder its results are not written.
 
     Raises InputError where they cannot fit in memory, and NumericalError where the backend loses
-    sets; sets that fail have a status and a reason.
+    samples; samples that fail have a status and a reason.
     """
     if not folder and disk_space(study) > os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"):
-        refuse(f"{study.count} sets do not fit in memory", "fewer sets, or a directory for them")
+        refuse(
+            f"{study.count} samples do not fit in memory", "fewer samples, or a directory for them"
+        )
     size = study.block_size
     blocks = Blocks(folder, study, size) if folder else None
     memory: dict[int, Columns] = {}
@@ -54,7 +56,7 @@ def compute_sets(study: SetStudy, folder: Path | None, how: RunOptions) -> xr.Da
         with tqdm(
             total=study.count,
             initial=done,
-            unit="set",
+            unit="sample",
             disable=not how.get("progress", False),
             file=sys.stderr,
         ) as bar:
@@ -68,7 +70,7 @@ def compute_sets(study: SetStudy, folder: Path | None, how: RunOptions) -> xr.Da
     return grid_of(study, new_dataset(study, study.parameter_columns(0, study.count), whole))
 
 
-def _blocks(study: SetStudy, starts: list[int], size: int) -> Iterator[Block]:
+def _blocks(study: SampleStudy, starts: list[int], size: int) -> Iterator[Block]:
     for start in starts:
         columns = study.parameter_columns(start, min(start + size, study.count))
         yield Block(

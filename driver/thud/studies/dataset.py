@@ -7,33 +7,33 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from thud.impact.datasets import band_coordinates, origin, room_coordinates
+from thud.impact.datasets import attributes, band_coordinates, origin, room_coordinates
 from thud.impact.quantities import ALL_QUANTITIES, BANDS, CONTACT_LEVELS, ROOM_BAND, ROOM_LEVEL
 from thud.level.levels import get_bands
-from thud.studies.designs import makers
 from thud.studies.evaluation import level_names
+from thud.studies.sampling import sampler_versions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.studies.parameter import Parameter
-    from thud.studies.sets import Columns, SetStudy
+    from thud.studies.samples import Columns, SampleStudy
 
-# Bytes of a set on disk without its levels and parameters, and of an empty file.
-_SET_BYTES = 95
+# Bytes of a sample on disk without its levels and parameters, and of an empty file.
+_SAMPLE_BYTES = 95
 _FILE_BYTES = 27_000
 
 
-def disk_space(study: SetStudy) -> int:
+def disk_space(study: SampleStudy) -> int:
     """Return the estimated bytes of the results of a study, blocks included."""
     total = study.count
     files = 1 - (-total // study.block_size)
     levels = sum(len(get_bands(bands).nominal) for _, bands in level_names(study.case).values())
-    return files * _FILE_BYTES + 2 * total * (_SET_BYTES + 8 * (levels + len(study.parameters)))
+    return files * _FILE_BYTES + 2 * total * (_SAMPLE_BYTES + 8 * (levels + len(study.parameters)))
 
 
-def new_dataset(study: SetStudy, columns: Columns, found: Columns) -> xr.Dataset:
-    """Return the results of some sets, along the dimension ``set`` (levels also along their bands).
+def new_dataset(study: SampleStudy, columns: Columns, found: Columns) -> xr.Dataset:
+    """Return the results of some samples, along the dimension ``sample``, levels also along bands.
 
     `columns` holds their parameters by name, `found` what `evaluate` returns.
     """
@@ -49,22 +49,21 @@ def new_dataset(study: SetStudy, columns: Columns, found: Columns) -> xr.Dataset
     for parameter in study.parameters:
         values = _objects(columns[parameter.name])
         coordinates[parameter.coordinate] = (
-            "set",
+            "sample",
             values,
             _attributes(study, parameter),
         )
     variables = {}
     for name, values in found.items():
-        unit, meaning = ALL_QUANTITIES[name]
-        dimensions = ("set", dimension[name]) if name in dimension else ("set",)
-        attributes: dict[str, Any] = {"units": unit, "long_name": meaning}
+        dimensions = ("sample", dimension[name]) if name in dimension else ("sample",)
+        words: dict[str, Any] = {**attributes(ALL_QUANTITIES[name])}
         if study.surrogate and name in study.surrogate.outputs:
-            attributes["surrogate_error"] = study.surrogate.error_of(name)
-        variables[name] = (dimensions, values, attributes)
+            words["surrogate_error"] = study.surrogate.error_of(name)
+        variables[name] = (dimensions, values, words)
     return in_order(xr.Dataset(variables, coordinates, provenance(study)))
 
 
-def _attributes(study: SetStudy, parameter: Parameter) -> dict[str, Any]:
+def _attributes(study: SampleStudy, parameter: Parameter) -> dict[str, Any]:
     key, law = parameter.key, study.temperature
     shown_unit, power = parameter.shown_unit
     meaning = key.meaning
@@ -81,7 +80,7 @@ def _attributes(study: SetStudy, parameter: Parameter) -> dict[str, Any]:
     }
 
 
-def provenance(study: SetStudy) -> dict[str, str]:
+def provenance(study: SampleStudy) -> dict[str, str]:
     """Return where results come from."""
     return {
         "title": f"{study.kind} {study.name}",
@@ -92,7 +91,7 @@ def provenance(study: SetStudy) -> dict[str, str]:
         "seed": str(study.seed) if study.size else "none",
         "parameters": " ".join(parameter.coordinate for parameter in study.parameters),
         **({"surrogate": study.surrogate.sentence} if study.surrogate else {}),
-        **makers(study.design),
+        **sampler_versions(study.design),
         **origin(study.case),
     }
 
@@ -107,8 +106,8 @@ def in_order(dataset: xr.Dataset) -> xr.Dataset:
     return xr.Dataset(results, coordinates, dataset.attrs)
 
 
-def grid_of(study: SetStudy, dataset: xr.Dataset) -> xr.Dataset:
-    """Return the dataset of a complete grid with one dimension per parameter instead of ``set``."""
+def grid_of(study: SampleStudy, dataset: xr.Dataset) -> xr.Dataset:
+    """Return the dataset of a complete grid with a dimension for each parameter."""
     if study.design != "grid":
         return dataset
     coordinates = {name: dataset[name] for name in BANDS if name in dataset.coords}

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from thud.studies.kind import Kind
     from thud.studies.study import Study
 
-FORMATS = (".png", ".svg")
+FORMATS = (".svg",)
 # Further differences are only counted.
 _MAX_SHOWN = 3
 

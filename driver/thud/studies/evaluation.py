@@ -1,4 +1,4 @@
-"""How a block of sets is computed, by any backend: one call of the library."""
+"""How a block of samples is computed, by any backend: one call of the library."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ if TYPE_CHECKING:
 
     from thud.base._schema import BandSet, LevelsForce
     from thud.case.case import Case
-    from thud.studies.emulation.emulator import Surrogate
+    from thud.studies.trained_surrogate import Surrogate
 
     Columns = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
 class Block:
-    """Sets from number `start` on that are computed together.
+    """Samples from number `start` on that are computed together.
 
-    They differ from the case in the columns, shape (n_set,), by names of keys; `version` is that of
-    thud which has to compute them. A surrogate, where there is one, answers instead of the model.
+    They differ from the case in the columns, shape (n_sample,), by names of keys; `version` is that
+    of thud which has to compute them. A surrogate answers instead of the model if there is one.
     """
 
     start: int
@@ -40,17 +40,17 @@ class Block:
 
 
 def evaluate(block: Block) -> Columns:
-    """Compute the sets of a block.
+    """Compute the samples of a block.
 
-    Returns the `SCALAR_QUANTITIES`; the levels of `level_names`, dB, shape (n_set, n_band);
+    Returns the `SCALAR_QUANTITIES`; the levels of `level_names`, dB, shape (n_sample, n_band);
     ``margin``, dB; ``conforms``; ``status`` and ``reason``; on floors ``contact_octave_level`` and
     the like, and `FLOOR_QUANTITIES`; of a surrogate ``doubtful``; where they are counted, the
-    ``peaks`` of the judged force. Sets with an error have no numbers: NaN.
+    ``peaks`` of the judged force. Samples with an error have no numbers: NaN.
     Raises InputError where this is another version of thud.
     """
     if block.version != version():
         refuse(
-            f"thud {version()} cannot compute sets of thud {block.version}",
+            f"thud {version()} cannot compute samples of thud {block.version}",
             "the same version everywhere",
         )
     if block.surrogate:
@@ -75,7 +75,7 @@ def evaluate(block: Block) -> Columns:
 
 
 def level_names(case: Case) -> dict[str, tuple[LevelsForce, BandSet]]:
-    """Return force and bands of the levels of each set, by name.
+    """Return force and bands of the levels of each sample, by name.
 
     Octaves are always among them: the verdict needs them.
     """

@@ -22,9 +22,6 @@ from thud.base.key import check_keywords
 from thud.base.units import scaled
 from thud.case.case import Case, check_case
 from thud.studies.directory import FORMATS
-from thud.studies.emulation.answered_levels import answered, confirmed, within_region
-from thud.studies.emulation.emulator import Surrogate, read_surrogate
-from thud.studies.emulation.plan import read_plan
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.inference import require_confidence
 from thud.studies.fitting.ranges import bound_parameters, fitted_parameter, get_ranges
@@ -33,6 +30,9 @@ from thud.studies.fitting.result import Fit, file_ends
 from thud.studies.fitting.search import search
 from thud.studies.kind import Kind
 from thud.studies.study import Study, fix_keys, table_of, with_density
+from thud.studies.surrogate_levels import answered, confirmed, within_region
+from thud.studies.surrogate_plan import read_plan
+from thud.studies.trained_surrogate import Surrogate, read_surrogate
 
 if TYPE_CHECKING:
     import os
@@ -327,9 +327,9 @@ class FitKind(Kind[FitStudy, Fit]):
         """Return the fit as text."""
         return f"{study.name}\n\n{result.table(study.units)}"
 
-    def remarks(self, result: Fit) -> list[str]:
+    def warnings(self, result: Fit) -> list[str]:
         """Return the warnings, and what is not plausible in the impacts that were found."""
-        own = [remark for target in result.targets for remark in target.impact.remarks]
+        own = [warning for target in result.targets for warning in target.impact.warnings]
         return [*result.warnings, *dict.fromkeys(own)]
 
     def succeeded(self, result: Fit) -> bool:

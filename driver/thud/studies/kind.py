@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from thud.base.files import Results
     from thud.case.case import Case
     from thud.case.keys import Value
-    from thud.studies.emulation.emulator import Surrogate
     from thud.studies.parameter import Parameter
     from thud.studies.study import Source
+    from thud.studies.trained_surrogate import Surrogate
 
 S = TypeVar("S", bound=Study)
 R = TypeVar("R")
@@ -41,14 +41,14 @@ class RunOptions(TypedDict, total=False):
     scheduler : str or None
         Address of a Dask scheduler.
     yes : bool
-        Start also with more sets than have to be confirmed.
+        Start also with more samples than have to be confirmed.
     progress : bool
         Show a progress bar.
     replace : bool
         Replace what is in the way: results of another version of the study, and files that thud
         has not written.
     surrogate : Surrogate or str or None
-        What answers the sets instead of the model, or the path of its file.
+        What answers the samples instead of the model, or the path of its file.
     """
 
     backend: Literal["threads", "processes", "dask"] | None
@@ -125,7 +125,7 @@ class Kind(ABC, Generic[S, R]):
 
     def with_surrogate(self, study: S, given: Surrogate | str | os.PathLike[str]) -> S:  # noqa: ARG002
         """Return a study whose drops a surrogate answers."""
-        refuse(f"surrogate is not allowed for a {self.name} study", "studies of sets of drops")
+        refuse(f"surrogate is not allowed for a {self.name} study", "studies of samples of drops")
 
     def require(self, study: S, **how: Unpack[RunOptions]) -> None:
         """Raise InputError where a study cannot be computed this way."""
@@ -155,7 +155,7 @@ class Kind(ABC, Generic[S, R]):
         """Return the result as text."""
 
     @abstractmethod
-    def remarks(self, result: R) -> list[str]:
+    def warnings(self, result: R) -> list[str]:
         """Return warnings, as sentences."""
 
     @abstractmethod

@@ -22,23 +22,23 @@ class KindInfo(NamedTuple):
         Module of this package that holds the `Kind` as ``KIND``.
     help : str
         What the command line says of it.
-    has_sets : bool
-        It computes sets of drops, on any backend.
+    has_samples : bool
+        It computes samples of drops, on any backend.
     """
 
     module: str
     help: str
-    has_sets: bool = True
+    has_samples: bool = True
 
 
 # By the name of the command.
 KINDS = {
     "sweep": KindInfo("sweep", "drops over a grid, a list or a random design of parameters"),
     "sensitivity": KindInfo("sensitivity", "Sobol indices: which parameter matters for what"),
-    "design": KindInfo("design_map", "which geometry and material conform to the standards"),
+    "design": KindInfo("design", "which geometry and material conform to the standards"),
     "uncertainty": KindInfo("uncertainty", "how tolerances spread levels and conformity"),
     "surrogate": KindInfo("surrogate", "what other studies ask instead of a slow model"),
-    "fit": KindInfo("fit", "parameters of a model from a force or from levels", has_sets=False),
+    "fit": KindInfo("fit", "parameters of a model from a force or from levels", has_samples=False),
 }
 
 

@@ -253,7 +253,7 @@ def _between(
         refuse(f"{place} has no high end", "high beside low")
     low, high = read("low"), read("high")
     whole = key.kind == "whole"
-    # Ends that are other keys depend on the set.
+    # Ends that are other keys depend on the sample.
     lower = -math.inf if isinstance(key.lower, str) else key.lower
     upper = math.inf if isinstance(key.upper, str) else key.upper
     if whole and not lower <= low <= high <= upper:

@@ -12,8 +12,8 @@ from thud.base.checks import refuse
 from thud.base.display import Displayed
 from thud.impact.quantities import FLOOR_QUANTITIES
 from thud.level.levels import get_bands
-from thud.studies.designs import MIN_SAMPLES
-from thud.studies.set_kind import SetKind
+from thud.studies.sample_kind import SampleKind
+from thud.studies.sampling import MIN_BASE_SAMPLES
 
 if TYPE_CHECKING:
     import os
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.studies.kind import RunOptions
-    from thud.studies.sets import SetStudy
+    from thud.studies.samples import SampleStudy
     from thud.studies.study import Source
 
 INDICES = {
@@ -44,13 +44,13 @@ class Sensitivity(Displayed):
     Attributes
     ----------
     dataset : Dataset
-        Every set of the study.
+        Every sample of the study.
     indices : Dataset
         ``first_order`` and ``total`` index of each ``output`` and ``parameter``, and half widths
         of their confidence intervals of 95 %. Outputs that do not vary have none: NaN. Of a
         surrogate also ``surrogate``, the variance of its errors over that of each output.
     left_out : int
-        Base samples left out because one of their sets has no result.
+        Base samples left out because one of their samples has no result.
     """
 
     dataset: xr.Dataset
@@ -88,21 +88,21 @@ class Sensitivity(Displayed):
         return text.encode()
 
 
-class SensitivityKind(SetKind[Sensitivity]):
+class SensitivityKind(SampleKind[Sensitivity]):
     """Sensitivity as a kind of study."""
 
     name = "sensitivity"
     designs = ("saltelli",)
 
-    def conclude(self, study: SetStudy, dataset: xr.Dataset) -> Sensitivity:
-        """Return the Sobol indices of all sets."""
+    def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
+        """Return the Sobol indices of all samples."""
         return _indices(study, dataset.load())
 
-    def listed_files(self, study: SetStudy) -> list[str]:
+    def listed_files(self, study: SampleStudy) -> list[str]:
         """Return the names of figures and table."""
         return [*super().listed_files(study), f"{study.name}_indices.csv"]
 
-    def files(self, result: Sensitivity, study: SetStudy) -> dict[str, bytes]:
+    def files(self, result: Sensitivity, study: SampleStudy) -> dict[str, bytes]:
         """Return the table of all indices."""
         return {f"{study.name}_indices.csv": result.csv()}
 
@@ -125,24 +125,24 @@ def sensitivity(
     ----------
     study
         Path of a TOML file, or what would stand in it. ``[design] size`` is the number of base
-        samples N, a power of 2 from 4; N (d + 2) sets are computed for d parameters.
+        samples N, a power of 2 from 4; N (d + 2) samples are computed for d parameters.
     output, **how
         See `sweep`.
 
     Returns
     -------
     Sensitivity
-        Indices of the force that the case judges, with confidence intervals.
+        Indices of the force that the case assesses, with confidence intervals.
 
     Raises
     ------
     InputError
-        As `sweep`; also where too few sets have results.
+        As `sweep`; also where too few samples have results.
     """
     return KIND.run(study, output, **how)
 
 
-def _indices(study: SetStudy, dataset: xr.Dataset) -> Sensitivity:
+def _indices(study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
     force = study.case.levels.force
     levels = dataset[f"{force}_level"].values
     peak = "peak_elastic_force" if force == "elastic" else "peak_force"
@@ -153,11 +153,11 @@ def _indices(study: SetStudy, dataset: xr.Dataset) -> Sensitivity:
     outputs |= {name.replace("_", " "): dataset[name].values for name in further}
     dimension = len(study.parameters)
     usable = (dataset["status"].values == 0).reshape(-1, dimension + 2).all(axis=1)
-    if usable.sum() < MIN_SAMPLES:
+    if usable.sum() < MIN_BASE_SAMPLES:
         reason = next(text for text in dataset["reason"].values if text)
         refuse(
             f"only {usable.sum()} of {study.size} base samples have results ({reason})",
-            "ranges in which sets have results",
+            "ranges in which samples have results",
         )
     rows = np.repeat(usable, dimension + 2)
     found = [sobol_indices(values[rows], dimension, study.seed) for values in outputs.values()]

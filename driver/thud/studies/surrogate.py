@@ -6,10 +6,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Unpack
 
 from thud.base.checks import refuse
-from thud.studies.emulation.emulator import Surrogate, read_surrogate
-from thud.studies.emulation.training import surrogate_name, train
 from thud.studies.parameter import Parameter
-from thud.studies.set_kind import DropsKind
+from thud.studies.sample_kind import DropsKind
+from thud.studies.surrogate_training import surrogate_name, train
+from thud.studies.trained_surrogate import Surrogate, read_surrogate
 
 if TYPE_CHECKING:
     import os
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from thud.case.case import Case
     from thud.case.keys import Value
     from thud.studies.kind import RunOptions
-    from thud.studies.sets import SetStudy
+    from thud.studies.samples import SampleStudy
     from thud.studies.study import Source, Study
 
 
@@ -40,10 +40,10 @@ class SurrogateKind(DropsKind[Surrogate]):
         found = super().new_parameter(name, given, case, centre)
         if found.low is None or found.count or found.scale != Parameter.scale:
             refuse(f"[parameters] {name} is not a range of a surrogate", "low, high and unit")
-        # The sets of the study are the corners of the region.
+        # The samples of the study are the corners of the region.
         return replace(found, count=2)
 
-    def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SetStudy:
+    def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SampleStudy:
         """Return a study with the plan of its training."""
         found = super().complete(study, {"surrogate": {}, **given}, folder)
         if found.plan is None:
@@ -51,18 +51,18 @@ class SurrogateKind(DropsKind[Surrogate]):
         return found
 
     def compute(
-        self, study: SetStudy, results: Results | None, **how: Unpack[RunOptions]
+        self, study: SampleStudy, results: Results | None, **how: Unpack[RunOptions]
     ) -> Surrogate:
         """Return the surrogate, trained or read."""
         return train(study, results, how)
 
-    def describe(self, study: SetStudy) -> str:
+    def describe(self, study: SampleStudy) -> str:
         """Return what is learned."""
         names = ", ".join(p.name for p in study.parameters)
         size = study.plan.size if study.plan else 0
         return f"{study.name}: {study.model} by {names}, up to {size} drops"
 
-    def identity_files(self, study: SetStudy) -> list[str]:
+    def identity_files(self, study: SampleStudy) -> list[str]:
         """Return the name of the file."""
         return [surrogate_name(study)]
 
@@ -70,7 +70,7 @@ class SurrogateKind(DropsKind[Surrogate]):
         """Return the identity of results."""
         return read_surrogate(path).identity
 
-    def remarks(self, result: Surrogate) -> list[str]:
+    def warnings(self, result: Surrogate) -> list[str]:
         """Return how close it is, and what it does not answer."""
         return [result.sentence]
 

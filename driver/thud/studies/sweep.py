@@ -8,7 +8,7 @@ import xarray as xr
 
 from thud.base.tables import format_rows
 from thud.level.levels import BANDWIDTHS
-from thud.studies.set_kind import SetKind
+from thud.studies.sample_kind import SampleKind
 
 if TYPE_CHECKING:
     import os
@@ -16,21 +16,21 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from thud.studies.kind import RunOptions
-    from thud.studies.sets import SetStudy
+    from thud.studies.samples import SampleStudy
     from thud.studies.study import Source
 
 
-class Sweep(SetKind[xr.Dataset]):
+class Sweep(SampleKind[xr.Dataset]):
     """Sweeps as a kind of study."""
 
     name = "sweep"
     designs = ("grid", "list", "random", "latin_hypercube", "sobol")
 
-    def conclude(self, study: SetStudy, dataset: xr.Dataset) -> xr.Dataset:  # noqa: ARG002
-        """Return the results of all sets as they are."""
+    def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> xr.Dataset:  # noqa: ARG002
+        """Return the results of all samples as they are."""
         return dataset
 
-    def table(self, result: xr.Dataset, study: SetStudy) -> str:  # noqa: ARG002
+    def table(self, result: xr.Dataset, study: SampleStudy) -> str:  # noqa: ARG002
         """Return the range of each result as text."""
         rows: list[tuple[str, ...]] = [("", "minimum", "median", "maximum")]
         for name, variable in result.data_vars.items():
@@ -42,7 +42,7 @@ class Sweep(SetKind[xr.Dataset]):
                     label = f"{name}{place}, {variable.attrs['units']}"
                     numbers = (values.min(), values.median(), values.max())
                     rows.append((label, *(f"{float(number):.4g}" for number in numbers)))
-        rows.append(("conforming sets", "", "", f"{int(result['conforms'].sum())}"))
+        rows.append(("conforming samples", "", "", f"{int(result['conforms'].sum())}"))
         return format_rows(rows)
 
     def draw(self, result: xr.Dataset) -> Figure:
@@ -58,7 +58,7 @@ KIND = Sweep()
 def sweep(
     study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[RunOptions]
 ) -> xr.Dataset:
-    """Compute every set of a study.
+    """Compute every sample of a study.
 
     Parameters
     ----------
@@ -73,14 +73,14 @@ def sweep(
     Returns
     -------
     Dataset
-        A grid has one dimension per parameter, other designs the dimension ``set``.
+        A grid has one dimension per parameter, other designs the dimension ``sample``.
 
     Raises
     ------
     InputError
         Names what cannot be used and what is allowed.
     NumericalError
-        Where the backend loses sets; single sets that fail have a status and a reason instead.
+        Where the backend loses samples; samples that fail have a status and a reason instead.
     OSError
         Where the results cannot be written.
 

@@ -66,13 +66,13 @@ class Temperature:
             power = np.where(self.c2 + above > 0, -self.c1 * above / (self.c2 + above), np.nan)
             return np.asarray(10.0**power)
 
-    def act(self, case: Case, sets: dict[str, Any]) -> dict[str, Any]:
-        """Return sets with the values of keys at their ``temperature``, shape (n_set,).
+    def act(self, case: Case, samples: dict[str, Any]) -> dict[str, Any]:
+        """Return samples with the values of keys at their ``temperature``, shape (n_sample,).
 
         Modulus and loss factor stay those at the `loss_frequency` of the case: of the fractional
         law 1 + p (cos + i sin) (a**order - 1) with the angle pi order/2 and p = loss factor/sin.
         """
-        found = dict(sets)
+        found = dict(samples)
         temperature = found.pop(TEMPERATURE.name)
         values = {**vars(case.ball), **vars(case.model), **found}
         above = temperature - self.reference

@@ -12,8 +12,9 @@ from scipy.stats import binomtest
 from thud.base.checks import refuse
 from thud.base.display import Displayed
 from thud.impact.quantities import RATING
-from thud.level.levels import get_bands, octave_limits
-from thud.studies.set_kind import SetKind
+from thud.level.assessment import octave_limits
+from thud.level.levels import get_bands
+from thud.studies.sample_kind import SampleKind
 
 if TYPE_CHECKING:
     import os
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from thud.case.keys import Value
     from thud.studies.kind import RunOptions
     from thud.studies.parameter import Parameter
-    from thud.studies.sets import SetStudy
+    from thud.studies.samples import SampleStudy
     from thud.studies.study import Source
 
 CONFIDENCE = 0.95
@@ -40,13 +41,13 @@ class Uncertainty(Displayed):
     Attributes
     ----------
     dataset : Dataset
-        Every set.
-    levels : ndarray, shape (n_set, 5)
-        Octave levels of the force that is judged, dB; sets without results are left out.
+        Every sample.
+    levels : ndarray, shape (n_sample, 5)
+        Octave levels of the force that is judged, dB; samples without results are left out.
     source : str
         Source whose limits apply.
     conforming, computed, failed : int
-        Sets that meet all criteria, that have results, and that have none.
+        Samples that meet all criteria, that have results, and that have none.
     """
 
     dataset: xr.Dataset
@@ -57,8 +58,8 @@ class Uncertainty(Displayed):
     failed: int
 
     def __repr__(self) -> str:
-        """Return how many sets conform."""
-        return f"<Uncertainty, {self.source}: {self.conforming} of {self.computed} sets conform>"
+        """Return how many samples conform."""
+        return f"<Uncertainty, {self.source}: {self.conforming} of {self.computed} samples conform>"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
@@ -66,7 +67,7 @@ class Uncertainty(Displayed):
 
     @property
     def probability(self) -> float:
-        """Share of the computed sets that conform."""
+        """Share of the computed samples that conform."""
         return self.conforming / self.computed
 
     @property
@@ -121,7 +122,7 @@ class Uncertainty(Displayed):
         return rows
 
 
-class UncertaintyKind(SetKind[Uncertainty]):
+class UncertaintyKind(SampleKind[Uncertainty]):
     """Uncertainty as a kind of study."""
 
     name = "uncertainty"
@@ -130,21 +131,21 @@ class UncertaintyKind(SetKind[Uncertainty]):
     def new_parameter(
         self, name: str, given: object, case: Case, centre: Value | None
     ) -> Parameter:
-        """Return a parameter that varies; the limits are the same for all sets."""
+        """Return a parameter that varies; the limits are the same for all samples."""
         if name in {"source", "force"}:
             refuse(
-                f"[parameters] {name} is not allowed, because all sets have the same limits",
+                f"[parameters] {name} is not allowed, because all samples have the same limits",
                 f"{name} in [fixed]",
             )
         return super().new_parameter(name, given, case, centre)
 
-    def conclude(self, study: SetStudy, dataset: xr.Dataset) -> Uncertainty:
-        """Return the distribution over all sets."""
+    def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> Uncertainty:
+        """Return the distribution over all samples."""
         dataset = dataset.load()
         good = dataset["status"].values == 0
         if good.sum() < 2:  # noqa: PLR2004 - a spread needs two
             reason = next((f" ({text})" for text in dataset["reason"].values if text), "")
-            refuse(f"only {good.sum()} of {study.size} sets have results{reason}", "two or more")
+            refuse(f"only {good.sum()} of {study.size} samples have results{reason}", "two or more")
         return Uncertainty(
             dataset,
             dataset[f"{study.case.levels.force}_level"].values[good],
@@ -179,11 +180,11 @@ def uncertainty(
     Returns
     -------
     Uncertainty
-        Levels of the force that the case judges, and the probability of conformity.
+        Levels of the force that the case assesses, and the probability of conformity.
 
     Raises
     ------
     InputError
-        As `sweep`; also where fewer than two sets have results.
+        As `sweep`; also where fewer than two samples have results.
     """
     return KIND.run(study, output, **how)

@@ -81,17 +81,18 @@ function _shtab_thud_using
 end
 
 set -g _shtab_thud_commands 
-set -g _shtab_thud_opts_with_value --output --sets --threads -o
+set -g _shtab_thud_opts_with_value --output --samples --threads -o
 
 complete -c thud -e
 complete -c thud -f
 
-complete -c thud -n _shtab_thud_using -s o -l output -xka "(__fish_complete_directories)" -d 'directory for the results (default: outputs/<case>, of sets <case>_sets)'
+complete -c thud -n _shtab_thud_using -s o -l output -xka "(__fish_complete_directories)" -d 'directory for the results (default: outputs/<case>, with --samples outputs/<case>_samples)'
 complete -c thud -n _shtab_thud_using -l replace -d 'replace also files that thud has not written'
-complete -c thud -n _shtab_thud_using -l sets -xka "(_shtab_glob_compgen_3930277c)" -d 'many drops: keys in the first line, one drop in each other; the rest is as in CASE.nml'
-complete -c thud -n _shtab_thud_using -l threads -x -d 'threads for them (default: 1)'
+complete -c thud -n _shtab_thud_using -l all -d 'write also channels.csv: energies and other quantities of the model against time'
+complete -c thud -n _shtab_thud_using -l samples -xka "(_shtab_glob_compgen_3930277c)" -d 'a header row of keys and one drop, a sample, in each further row; all other keys are those of CASE.nml'
+complete -c thud -n _shtab_thud_using -l threads -x -d 'threads for the samples (default: 1)'
 complete -c thud -n _shtab_thud_using -l check -d 'exit with 3 where the source does not conform to the limits'
-complete -c thud -n _shtab_thud_using -s q -l quiet -d 'show nothing but errors and remarks'
+complete -c thud -n _shtab_thud_using -s q -l quiet -d 'show only errors and warnings'
 complete -c thud -n _shtab_thud_using -l keys -d 'show every key with default, range and meaning'
 complete -c thud -n _shtab_thud_using -l schema -d 'the same and more as JSON, for programs'
 complete -c thud -n _shtab_thud_using -s h -l help -d 'show this text'

@@ -1,15 +1,18 @@
 !> Keys, models and results as data for other programs, in JSON: what the Python package and the reference of
 !> all keys are made from.
 module thud_schema
-   use thud_band, only: band_set_names
+   use thud_band, only: band_set_names, band_type, get_bands, octave_count
    use thud_case, only: case_type, get_fields, new_case
    use thud_constants, only: version
+   use thud_error, only: error_type
    use thud_field, only: field_type
-   use thud_force_history, only: outcome_count, scalar_fields
    use thud_interval, only: interval_type, new_interval
    use thud_kinds, only: wp
+   use thud_quantities, only: quantities, quantity_type, sample_quantity_count
+   use thud_rating, only: class_limits, find_rated_bands, rated_set_names
    use thud_registry, only: floor_names, model_names
-   use thud_source_limits, only: source_names
+   use thud_source_limits, only: criterion_count, criterion_type, get_criteria, get_source_limits, source_limits_type, &
+      source_names
    use thud_text, only: newline, to_text
    implicit none (type, external)
    private
@@ -24,6 +27,8 @@ contains
       character(len=:), allocatable, intent(out) :: text
       type(case_type), target :: case
       type(field_type), allocatable :: fields(:)
+      type(band_type), allocatable :: bands(:)
+      type(error_type), allocatable :: error
       character(len=:), allocatable :: entry
       integer :: i
 
@@ -31,21 +36,69 @@ contains
       allocate (fields, source=get_fields(case))
       text = '{"version": '//text_value(version)//','//newline//'"models": '//list_of(model_names)//','//newline &
          //'"floors": '//list_of(floor_names)//','//newline//'"sources": '//list_of(source_names)//','//newline &
-         //'"band_sets": '//list_of(band_set_names)//','//newline &
-         //'"scalars": ['
-      do i = 1, size(scalar_fields)
-         associate (field => scalar_fields(i))
-            text = text//newline//'{"name": '//text_value(field%name)//', "unit": '//text_value(field%unit) &
-               //', "meaning": '//text_value(field%meaning)//'}'//trim(merge(',', ' ', i < size(scalar_fields)))
-         end associate
+         //'"band_sets": {'
+      do i = 1, size(band_set_names)
+         bands = get_bands(band_set_names(i))
+         text = text//newline//text_value(band_set_names(i))//': {"nominal": '//numbers(bands%nominal)//', "centre": ' &
+            //numbers(bands%centre)//', "lower": '//numbers(bands%lower)//', "upper": '//numbers(bands%upper)//'}' &
+            //trim(merge(',', ' ', i < size(band_set_names)))
       end do
-      text = text//'],'//newline//'"outcomes": '//to_text(outcome_count)//','//newline//'"keys": ['
+      text = text//'},'//newline//'"rated_bands": {'
+      do i = 1, size(rated_set_names)
+         call find_rated_bands(rated_set_names(i), bands, error)
+         text = text//newline//text_value(rated_set_names(i))//': '//numbers(bands%nominal) &
+            //trim(merge(',', ' ', i < size(rated_set_names)))
+      end do
+      text = text//'},'//newline//'"limits": {'
+      do i = 1, size(source_names)
+         call describe_limits(source_names(i), entry)
+         text = text//newline//entry//trim(merge(',', ' ', i < size(source_names)))
+      end do
+      text = text//'},'//newline//'"class_limits": '//numbers(class_limits)//','//newline//'"quantities": ['
+      do i = 1, size(quantities)
+         call describe_quantity(quantities(i), entry)
+         text = text//newline//entry//trim(merge(',', ' ', i < size(quantities)))
+      end do
+      text = text//'],'//newline//'"sample_quantities": '//to_text(sample_quantity_count)//','//newline//'"keys": ['
       do i = 1, size(fields)
          call describe(fields(i), entry)
          text = text//newline//entry//trim(merge(',', ' ', i < size(fields)))
       end do
       text = text//']}'
    end subroutine get_schema
+
+   !> The criteria of a source.
+   subroutine describe_limits(source, text)
+      character(len=*), intent(in) :: source
+      !> A JSON member.
+      character(len=:), allocatable, intent(out) :: text
+      type(source_limits_type) :: limits
+      type(criterion_type) :: criteria(criterion_count)
+      type(error_type), allocatable :: error
+      integer :: i
+
+      call get_source_limits(source, limits, error)
+      criteria = get_criteria(limits, spread(0.0_wp, 1, octave_count), 0.0_wp, 0.0_wp, 0, 0.0_wp, 0.0_wp)
+      text = text_value(source)//': ['
+      do i = 1, criterion_count
+         text = text//'{"name": '//text_value(criteria(i)%name)//', "unit": '//text_value(criteria(i)%unit)//', "lower": ' &
+            //to_text(criteria(i)%lower)//', "upper": '//to_text(criteria(i)%upper)//'}' &
+            //trim(merge(',', ' ', i < criterion_count))
+      end do
+      text = text//']'
+   end subroutine describe_limits
+
+   !> One quantity.
+   subroutine describe_quantity(quantity, text)
+      type(quantity_type), intent(in) :: quantity
+      !> A JSON object.
+      character(len=:), allocatable, intent(out) :: text
+
+      text = '{"name": '//text_value(quantity%name)//', "title": '//text_value(quantity%title)//', "symbol": ' &
+         //text_value(quantity%symbol)//', "unit": '//text_value(quantity%unit)//', "display_unit": ' &
+         //text_value(quantity%display_unit)//', "display_scale": '//to_text(quantity%display_scale)//', "decimals": ' &
+         //to_text(quantity%decimals)//', "meaning": '//text_value(quantity%meaning)//'}'
+   end subroutine describe_quantity
 
    !> One key.
    subroutine describe(field, text)
@@ -106,6 +159,21 @@ contains
       end do
       value = value//'"'
    end function text_value
+
+   !> Numbers as a JSON list.
+   function numbers(values) result(list)
+      !> The numbers: [n].
+      real(wp), intent(in) :: values(:)
+      character(len=:), allocatable :: list
+      integer :: i
+
+      list = '['
+      do i = 1, size(values)
+         if (i > 1) list = list//', '
+         list = list//to_text(values(i))
+      end do
+      list = list//']'
+   end function numbers
 
    !> Words as a JSON list.
    pure function list_of(words) result(list)

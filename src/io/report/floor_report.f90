@@ -2,11 +2,15 @@
 module thud_floor_report
    use thud_band, only: get_band_name
    use thud_case, only: case_type
+   use thud_compute, only: impact_type
+   use thud_csv, only: get_table_csv
    use thud_floor_result, only: floor_result_type
-   use thud_force_history, only: force_history_type
+   use thud_force_history, only: force_history_type, force_names
    use thud_kinds, only: wp
-   use thud_report, only: get_fact_group, get_force_csv, get_scalar_lines, line
-   use thud_text, only: fixed, newline, to_text
+   use thud_quantities, only: get_quantities, quantities, sample_quantity_count
+   use thud_report, only: get_fact_group, get_force_csv, get_quantity_lines, line
+   use thud_table, only: is_peak_of_other
+   use thud_text, only: fixed, flush_right, newline, padded, to_text
    implicit none (type, external)
    private
 
@@ -44,68 +48,77 @@ contains
    end subroutine get_floor_force_csv
 
    !> Levels of both forces and energies per band.
-   subroutine get_floor_levels_csv(found, text)
+   subroutine get_floor_levels_csv(impact, found, text)
+      !> The drop on a rigid floor.
+      type(impact_type), intent(in) :: impact
       type(floor_result_type), intent(in) :: found
       !> Text of `floor_levels.csv`.
       character(len=:), allocatable, intent(out) :: text
-      integer :: i, j
 
-      text = 'bandwidth,nominal_Hz,lower_edge_Hz,upper_edge_Hz,blocked_level_dB,contact_level_dB,difference_dB,' &
-         //'energy_by_motion_J,energy_by_mobility_J,conductance_m_per_Ns'//newline
-      do i = 1, size(found%bands)
-         associate (band => found%bands(i))
-            text = text//trim(band%set)
-            associate (numbers => [band%nominal, band%lower, band%upper, found%blocked_level(i), found%contact_level(i), &
-               found%contact_level(i) - found%blocked_level(i), found%energy_by_motion(i), found%energy_by_mobility(i), &
-               found%conductance(i)])
-               do j = 1, size(numbers)
-                  text = text//','//to_text(numbers(j))
-               end do
-            end associate
-         end associate
-         text = text//newline
-      end do
+      associate (bands => found%bands, blocked => get_blocked_levels(impact), contact => found%contact_level)
+         text = get_table_csv('bandwidth,nominal_Hz,lower_edge_Hz,upper_edge_Hz,blocked_level_dB,contact_level_dB,' &
+            //'difference_dB,energy_by_motion_J,energy_by_mobility_J,conductance_m_per_Ns', reshape([bands%nominal, &
+            bands%lower, bands%upper, blocked, contact, contact - blocked, found%energy_by_motion, &
+            found%energy_by_mobility, found%conductance], [size(bands), 9]), bands%set)
+      end associate
    end subroutine get_floor_levels_csv
 
-   !> The scalars of the drop on the floor.
+   !> Levels of the force on a rigid floor in the bands that the case asks for, dB: [n_band].
+   pure function get_blocked_levels(impact) result(level)
+      type(impact_type), intent(in) :: impact
+      real(wp), allocatable :: level(:)
+
+      level = impact%assessment%level(impact%assessment%first_band:, findloc(force_names, 'floor', dim=1))
+   end function get_blocked_levels
+
+   !> The quantities of the drop on the floor.
    subroutine get_floor_summary(contact, text)
       type(force_history_type), intent(in) :: contact
       !> Groups of `summary.nml`.
       character(len=:), allocatable, intent(out) :: text
 
-      text = newline//'&floor_summary'//newline//get_scalar_lines(contact)//line('floor_work', to_text(contact%floor_work), &
-         'J')//'/'//newline
+      text = newline//'&floor_summary'//newline//get_quantity_lines(contact)//line('floor_work', &
+         to_text(contact%floor_work), 'J')//'/'//newline
       if (size(contact%fact) > 0) text = text//newline//get_fact_group('floor_facts', contact)
    end subroutine get_floor_summary
 
    !> The drop on the floor beside the blocked one.
-   subroutine get_floor_table(case, blocked, contact, found, text)
+   subroutine get_floor_table(case, impact, contact, found, text)
       type(case_type), intent(in) :: case
-      !> The drop on a rigid floor, and on the floor.
-      type(force_history_type), intent(in) :: blocked, contact
+      !> The drop on a rigid floor.
+      type(impact_type), intent(in) :: impact
+      !> The drop on the floor.
+      type(force_history_type), intent(in) :: contact
       type(floor_result_type), intent(in) :: found
       !> The table.
       character(len=:), allocatable, intent(out) :: text
       character(len=name_column) :: name
       character(len=13) :: energy
       character(len=:), allocatable :: cells
+      real(wp), allocatable :: blocked_level(:)
+      real(wp) :: values(size(quantities), 2)
       integer :: i
 
+      blocked_level = get_blocked_levels(impact)
       name = 'on '//trim(case%floor)
       text = '  '//name//'   blocked       contact    difference       energy'//newline
       do i = 1, size(found%bands)
          name = 'level, '//get_band_name(found%bands(i))//' Hz '//trim(found%bands(i)%set)
-         associate (blocked_level => found%blocked_level(i), contact_level => found%contact_level(i))
-            call get_cells([blocked_level, contact_level, contact_level - blocked_level], 2, spread('dB', 1, 3), cells)
-         end associate
+         call get_cells([blocked_level(i), found%contact_level(i), found%contact_level(i) - blocked_level(i)], 2, &
+            spread('dB', 1, 3), cells)
          write (energy, '(es11.2, " J")') found%energy_by_motion(i)
          text = text//'  '//name//cells//'  '//energy//newline
       end do
       text = text//newline
-      call add_row('peak force', blocked%peak_force, contact%peak_force, 1, 'N')
-      call add_row('contact time', 1.0e3_wp*blocked%contact_time, 1.0e3_wp*contact%contact_time, 3, 'ms')
-      call add_row('restitution', blocked%restitution, contact%restitution, 4, '')
-      call add_row('impulse', blocked%impulse, contact%impulse, 3, 'N s')
+      values(:, 1) = get_quantities(impact%history)
+      values(:, 2) = get_quantities(contact)
+      do i = 1, sample_quantity_count
+         if (is_peak_of_other(quantities(i), case)) cycle
+         associate (quantity => quantities(i))
+            call add_row(trim(quantity%title), quantity%display_scale*values(i, 1), quantity%display_scale*values(i, 2), &
+               quantity%decimals, trim(quantity%display_unit))
+         end associate
+      end do
       call add_row('velocity of the floor', 0.0_wp, 1.0e3_wp*maxval(abs(contact%floor_velocity)), 3, 'mm/s')
       call add_row('its displacement', 0.0_wp, 1.0e3_wp*maxval(abs(contact%floor_displacement)), 4, 'mm')
       call add_row('energy to the floor', 0.0_wp, 1.0e3_wp*contact%floor_work, 3, 'mJ')
@@ -148,15 +161,11 @@ contains
       !> Their units: [n].
       character(len=*), intent(in) :: units(:)
       character(len=:), allocatable, intent(out) :: text
-      character(len=:), allocatable :: number
-      character(len=unit_column) :: unit
       integer :: i
 
       text = ''
       do i = 1, size(values)
-         number = fixed(values(i), decimals)
-         unit = units(i)
-         text = text//repeat(' ', max(number_column - len(number), 0))//number//' '//unit
+         text = text//flush_right(fixed(values(i), decimals), number_column)//' '//padded(units(i), unit_column)
       end do
       text = trim(text)
    end subroutine get_cells

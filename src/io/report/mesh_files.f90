@@ -6,19 +6,20 @@ module thud_mesh_files
    use thud_motion, only: motion_type
    use thud_text, only: fixed, newline, to_text
    use thud_text_buffer, only: text_buffer_type
-   use thud_vtu, only: biquadratic_quadrilateral, get_pvd, get_vtu, quadrilateral
+   use thud_vtu, only: biquadratic_quadrilateral, get_vtu
+   use thud_xdmf, only: add_snapshot, begin_snapshots, end_snapshots
    implicit none (type, external)
    private
 
-   public :: estimate_motion_bytes, get_frame_name, get_modes_files, get_motion_files, modes_names, motion_names
+   public :: estimate_motion_bytes, get_modes_files, get_motion_files, modes_names, motion_names
 
    !> Files of free modes.
    character(len=9), parameter :: modes_names(2) = [character(len=9) :: 'modes.csv', 'modes.vtu']
 
-   !> Files of an impact beside its snapshots.
-   character(len=12), parameter :: motion_names(2) = [character(len=12) :: 'motion.pvd', 'pressure.csv']
+   !> Files of the snapshots of an impact.
+   character(len=13), parameter :: motion_names(2) = [character(len=13) :: 'snapshots.xmf', 'pressure.csv']
 
-   !> Scalars of a snapshot; the last one on floors that move.
+   !> Scalars of a snapshot.
    character(len=18), parameter :: motion_scalars(4) = [character(len=18) :: 'contact_pressure', 'contact_shear', &
       'cavity_pressure', 'floor_displacement']
 
@@ -30,9 +31,7 @@ contains
       !> The files: [2].
       type(text_file_type), intent(out) :: files(:)
       character(len=48) :: name(size(modes%frequency))
-      character(len=1) :: no_name(0)
       real(wp) :: vector(2, size(modes%mesh%r), size(modes%frequency))
-      real(wp) :: no_scalar(size(modes%mesh%r), 0)
       integer :: i
 
       files%name = modes_names
@@ -45,46 +44,36 @@ contains
          vector(:, :, i) = reshape(modes%shape(:, :, :, i), [2, size(modes%mesh%r)])
       end do
       call get_vtu(get_points(modes%mesh%r, modes%mesh%z), get_cells(modes%mesh%n_polar, modes%mesh%n_radial, 2), &
-         biquadratic_quadrilateral, name, vector, no_name, no_scalar, files(2)%content)
+         biquadratic_quadrilateral, name, vector, files(2)%content)
    end subroutine get_modes_files
 
-   !> Name of the file of a snapshot.
-   pure function get_frame_name(i) result(name)
-      !> Number of the snapshot.
-      integer, intent(in) :: i
-      character(len=16) :: name
-
-      write (name, '("motion_", i5.5, ".vtu")') i
-   end function get_frame_name
-
-   !> Bytes that the files of the snapshots will take, about.
+   !> Approximate size of the snapshots of an impact, bytes.
    pure function estimate_motion_bytes(extents) result(bytes)
       !> Nodes from pole to pole, nodes through the wall, snapshots.
       integer, intent(in) :: extents(3)
       real(wp) :: bytes
 
-      ! Three vectors and up to four scalars a node; four corners, an offset and a type an element; in base 64.
+      ! Six numbers of a node have 17 digits, the others are mostly zero; an element has four nodes.
       associate (n => real(extents, wp))
-         bytes = n(3)*(2000 + 4*(104*n(1)*n(2) + 41*(n(1) - 1)*(n(2) - 1))/3)
+         bytes = n(3)*(1600 + 150*n(1)*n(2) + 20*(n(1) - 1)*(n(2) - 1))
       end associate
    end function estimate_motion_bytes
 
-   !> Snapshots, their list, and the pressures on the floor.
+   !> Snapshots, and the pressures on the floor.
    subroutine get_motion_files(motion, prefix, files)
       type(motion_type), intent(in) :: motion
-      !> What the names of the files begin with.
+      !> Beginning of the names of the files.
       character(len=*), intent(in) :: prefix
-      !> The files: [n_frame + 2].
+      !> The files: [2].
       type(text_file_type), intent(out) :: files(:)
+      type(text_buffer_type) :: buffer
       real(wp) :: vector(2, size(motion%start, 1)*size(motion%start, 2), 2), scalar(size(vector, 2), size(motion_scalars))
-      integer :: i, n_polar, n_radial, n_scalar
+      integer :: i, n_polar, n_radial
 
       n_polar = ubound(motion%start, 1)
       n_radial = ubound(motion%start, 2)
-      n_scalar = size(motion_scalars)
-      if (.not. any(abs(motion%floor_displacement(:motion%n_frame)) > 0.0_wp)) n_scalar = n_scalar - 1
+      call begin_snapshots(buffer)
       do i = 1, motion%n_frame
-         files(i)%name = prefix//get_frame_name(i)
          vector(:, :, 1) = get_points(motion%position(:, :, 1, i) - motion%start(:, :, 1), &
             motion%position(:, :, 2, i) - motion%start(:, :, 2))
          vector(:, :, 2) = get_points(motion%velocity(:, :, 1, i), motion%velocity(:, :, 2, i))
@@ -93,15 +82,14 @@ contains
          scalar(size(scalar, 1) - n_polar:, 2) = motion%contact_shear(:, i)
          scalar(:n_polar + 1, 3) = motion%cavity_pressure(i)
          scalar(:, 4) = motion%floor_displacement(i)
-         call get_vtu(get_points(motion%position(:, :, 1, i), motion%position(:, :, 2, i)), &
-            get_cells(n_polar, n_radial, 1), quadrilateral, [character(len=12) :: 'displacement', 'velocity'], vector, &
-            motion_scalars(:n_scalar), scalar(:, :n_scalar), files(i)%content)
+         call add_snapshot(buffer, motion%time(i), get_points(motion%position(:, :, 1, i), motion%position(:, :, 2, i)), &
+            get_cells(n_polar, n_radial, 1), [character(len=12) :: 'displacement', 'velocity'], vector, motion_scalars, &
+            scalar)
       end do
-      do i = 1, size(motion_names)
-         files(motion%n_frame + i)%name = prefix//trim(motion_names(i))
-      end do
-      call get_pvd(files(:motion%n_frame)%name, motion%time(:motion%n_frame), files(motion%n_frame + 1)%content)
-      call get_pressure_csv(motion, files(motion%n_frame + 2)%content)
+      call end_snapshots(buffer)
+      files%name = prefix//motion_names
+      files(1)%content = buffer%get_text()
+      call get_pressure_csv(motion, files(2)%content)
    end subroutine get_motion_files
 
    !> Pressures on the floor and its radial stresses, one line for each snapshot and node that touches it.

@@ -4,14 +4,16 @@ module thud_result_bundle
    use thud_case, only: case_type
    use thud_compression, only: compression_type
    use thud_compute, only: results_type
-   use thud_force_history, only: force_history_type, get_scalars, scalar_fields
+   use thud_force_history, only: force_history_type
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
+   use thud_quantities, only: get_quantities, quantities
+   use thud_room, only: few_modes, room_level_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: add_compression, add_history, add_remarks, add_results
+   public :: add_compression, add_history, add_warnings, add_results, add_room_level
 
 contains
 
@@ -21,24 +23,25 @@ contains
       type(case_type), intent(in) :: case
       type(results_type), intent(in) :: results
 
-      if (case%has_impact) call add_history(bundle, '', results%history)
+      if (case%has_impact) call add_history(bundle, '', results%impact%history)
       if (allocated(results%on_floor)) call add_history(bundle, 'on_floor.', results%on_floor)
+      if (allocated(results%room%bands)) call add_room_level(bundle, results%room)
       if (case%has_modes) call add_modes(bundle, results%modes)
       if (case%has_compression) call add_compression(bundle, results%compression)
-      call add_remarks(bundle, results%remark)
+      call add_warnings(bundle, results%warning)
    end subroutine add_results
 
-   !> Adds remarks to a bundle.
-   subroutine add_remarks(bundle, remarks)
+   !> Adds warnings to a bundle.
+   subroutine add_warnings(bundle, warnings)
       type(bundle_type), intent(inout) :: bundle
-      !> Sentences: [n].
-      character(len=*), intent(in) :: remarks(:)
+      !> Messages: [n].
+      character(len=*), intent(in) :: warnings(:)
       integer :: i
 
-      do i = 1, size(remarks)
-         call bundle%add_text('remarks.'//to_text(i), trim(remarks(i)))
+      do i = 1, size(warnings)
+         call bundle%add_text('warnings.'//to_text(i), trim(warnings(i)))
       end do
-   end subroutine add_remarks
+   end subroutine add_warnings
 
    !> Adds a force history to a bundle.
    subroutine add_history(bundle, prefix, history)
@@ -46,14 +49,14 @@ contains
       !> What the names of its items begin with.
       character(len=*), intent(in) :: prefix
       type(force_history_type), intent(in) :: history
-      real(wp) :: scalars(size(scalar_fields))
+      real(wp) :: values(size(quantities))
       integer :: n(1)
       integer :: i
 
       n = size(history%deflection)
-      scalars = get_scalars(history)
-      do i = 1, size(scalars)
-         call bundle%add_number(prefix//'scalars.'//scalar_fields(i)%name, scalars(i))
+      values = get_quantities(history)
+      do i = 1, size(quantities)
+         call bundle%add_number(prefix//'quantities.'//quantities(i)%name, values(i))
       end do
       do i = 1, size(history%fact)
          call bundle%add_number(prefix//'facts.'//history%fact_name(i), history%fact(i))
@@ -87,6 +90,34 @@ contains
          call bundle%add_array(prefix//'motion.floor_displacement', [n_frame], motion%floor_displacement)
       end associate
    end subroutine add_history
+
+   !> Adds the level in the room below to a bundle.
+   subroutine add_room_level(bundle, room)
+      type(bundle_type), intent(inout) :: bundle
+      type(room_level_type), intent(in) :: room
+      integer :: n(1)
+
+      n = size(room%bands)
+      call bundle%add_number('room.surface_mass', room%surface_mass)
+      call bundle%add_number('room.few_modes', few_modes)
+      call bundle%add_array('room_bands.conductance', n, room%conductance)
+      call bundle%add_array('room_bands.frequency', n, room%bands%nominal)
+      call bundle%add_array('room_bands.energy', n, room%energy)
+      call bundle%add_array('room_bands.radiation_factor', n, room%radiation_factor)
+      call bundle%add_array('room_bands.loss_factor', n, room%loss_factor)
+      call bundle%add_array('room_bands.reverberation_time', n, room%reverberation_time)
+      call bundle%add_array('room_bands.floor_modes', n, room%floor_modes)
+      call bundle%add_array('room_bands.room_modes', n, room%room_modes)
+      call bundle%add_array('room_bands.level', n, room%level)
+      call bundle%add_array('room_bands.time', n, room%time)
+      call bundle%add_array('room_bands.spread', n, room%spread)
+      n = size(room%octaves)
+      call bundle%add_array('room_octaves.frequency', n, room%octaves%nominal)
+      call bundle%add_array('room_octaves.level', n, room%octave_level)
+      call bundle%add_array('room_octaves.time', n, room%octave_time)
+      call bundle%add_array('room_history.time', shape(room%history_time), room%history_time)
+      call bundle%add_array('room_history.level', shape(room%history), room%history)
+   end subroutine add_room_level
 
    !> Adds free modes to a bundle.
    subroutine add_modes(bundle, modes)

@@ -2,12 +2,12 @@
 module thud_room_report
    use thud_band, only: get_band_name
    use thud_case, only: case_type
+   use thud_csv, only: get_table_csv
    use thud_file, only: text_file_type
    use thud_kinds, only: wp
    use thud_rating, only: get_a_weighted_level, get_grade, get_rounded
    use thud_room, only: few_modes, room_level_type
    use thud_text, only: fixed, newline, to_text
-   use thud_text_buffer, only: text_buffer_type
    implicit none (type, external)
    private
 
@@ -35,41 +35,19 @@ contains
       integer :: i
 
       files%name = room_file_names
-      call get_table_csv('nominal_Hz,level_dB,time_of_maximum_s,spread_dB,energy_J,radiation_factor,loss_factor,' &
-         //'reverberation_time_s,floor_modes,room_modes', reshape([prediction%bands%nominal, prediction%level, &
+      files(1)%content = get_table_csv('nominal_Hz,level_dB,time_of_maximum_s,spread_dB,energy_J,radiation_factor,' &
+         //'loss_factor,reverberation_time_s,floor_modes,room_modes', reshape([prediction%bands%nominal, prediction%level, &
          prediction%time, prediction%spread, prediction%energy, prediction%radiation_factor, prediction%loss_factor, &
-         prediction%reverberation_time, prediction%floor_modes, prediction%room_modes], [size(prediction%level), 10]), &
-         files(1)%content)
-      call get_table_csv('nominal_Hz,level_dB,time_of_maximum_s', reshape([prediction%octaves%nominal, &
-         prediction%octave_level, prediction%octave_time], [size(prediction%octave_level), 3]), files(2)%content)
+         prediction%reverberation_time, prediction%floor_modes, prediction%room_modes], [size(prediction%level), 10]))
+      files(2)%content = get_table_csv('nominal_Hz,level_dB,time_of_maximum_s', reshape([prediction%octaves%nominal, &
+         prediction%octave_level, prediction%octave_time], [size(prediction%octave_level), 3]))
       header = 'time_s'
       do i = 1, size(prediction%bands)
          header = header//',level_'//trim(get_band_name(prediction%bands(i)))//'_Hz_dB'
       end do
-      call get_table_csv(header, reshape([prediction%history_time, prediction%history], &
-         [size(prediction%history_time), size(prediction%bands) + 1]), files(3)%content)
+      files(3)%content = get_table_csv(header, reshape([prediction%history_time, prediction%history], &
+         [size(prediction%history_time), size(prediction%bands) + 1]))
    end subroutine get_room_files
-
-   !> Columns of numbers with titles.
-   subroutine get_table_csv(header, columns, text)
-      !> Titles of the columns.
-      character(len=*), intent(in) :: header
-      !> The columns: [n_row, n_column].
-      real(wp), intent(in) :: columns(:, :)
-      character(len=:), allocatable, intent(out) :: text
-      type(text_buffer_type) :: buffer
-      integer :: i, j
-
-      call buffer%append(header//newline)
-      do i = 1, size(columns, 1)
-         do j = 1, size(columns, 2)
-            if (j > 1) call buffer%append(',')
-            call buffer%append(to_text(columns(i, j)))
-         end do
-         call buffer%append(newline)
-      end do
-      text = buffer%get_text()
-   end subroutine get_table_csv
 
    !> The levels for the screen; thirds of few modes are marked.
    subroutine get_room_table(case, prediction, contact_time, coupled, text)

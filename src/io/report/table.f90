@@ -3,36 +3,39 @@ module thud_table
    use thud_band, only: get_band_name, octave_count
    use thud_case, only: case_type
    use thud_compression, only: compression_type
-   use thud_compute, only: get_judged_force, verdict_type
+   use thud_compute, only: assessment_type, get_assessed_force
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
+   use thud_quantities, only: get_quantities, quantities, quantity_type, sample_quantity_count
    use thud_report, only: get_word
    use thud_source_limits, only: conforms, criterion_type
-   use thud_text, only: fixed, newline, replaced, to_text
+   use thud_text, only: fixed, flush_right, newline, padded, replaced, to_text
    implicit none (type, external)
    private
 
    public :: get_defaults_line, get_compression_table, get_force_title, get_modes_table, get_span_row, get_table
+   public :: is_peak_of_other
 
 contains
 
    !> The table that a run shows on the screen.
-   function get_table(case, history, verdict) result(text)
+   function get_table(case, history, assessment) result(text)
       type(case_type), intent(in) :: case
       type(force_history_type), intent(in) :: history
-      type(verdict_type), intent(in) :: verdict
+      type(assessment_type), intent(in) :: assessment
       character(len=:), allocatable :: text
-      integer :: i, judged, other
+      real(wp) :: values(size(quantities))
+      integer :: i, assessed, other
 
-      judged = get_judged_force(case)
-      other = force_count + 1 - judged
+      assessed = get_assessed_force(case)
+      other = force_count + 1 - assessed
       ! Most models have the same force twice.
-      if (.not. any(abs(verdict%level(:, other) - verdict%level(:, judged)) > 0.0_wp)) other = 0
+      if (.not. any(abs(assessment%level(:, other) - assessment%level(:, assessed)) > 0.0_wp)) other = 0
       text = '  '//padded(get_force_title(case%level_force), 27)//padded('value', 16)//padded('limits', 13)//'verdict'
       if (other > 0) text = text//'    '//get_force_title(force_names(other))
       text = text//newline
-      associate (criteria => verdict%criteria(:, judged))
+      associate (criteria => assessment%criteria(:, assessed))
          do i = 1, octave_count
             text = text//level_row(i, criteria(i))
          end do
@@ -41,14 +44,19 @@ contains
             //row('peaks of the force', criteria(octave_count + 3)%value, 0, '', criteria(octave_count + 3), 1.0_wp) &
             //row('mass', case%ball%mass, 3, 'kg', criteria(octave_count + 4), 1.0_wp) &
             //row('drop height', case%drop%height, 3, 'm', criteria(octave_count + 5), 1.0_wp)//newline
-         do i = octave_count + 1, size(verdict%bands)
+         do i = octave_count + 1, size(assessment%bands)
             text = text//level_row(i)
          end do
-         if (size(verdict%bands) > octave_count) text = text//newline
-         text = text//row('peak force', merge(history%peak_force, history%peak_elastic_force, &
-            case%level_force == 'floor'), 1, 'N') &
-            //row('maximum deflection', history%max_deflection*1000, 3, 'mm') &
-            //row('impulse', history%impulse, 3, 'N s')//facts(history)//newline
+         if (size(assessment%bands) > octave_count) text = text//newline
+         values = get_quantities(history)
+         do i = 1, sample_quantity_count
+            ! Those with limits stand above.
+            if (any(criteria%name == quantities(i)%name)) cycle
+            if (is_peak_of_other(quantities(i), case)) cycle
+            text = text//row(trim(quantities(i)%title), quantities(i)%display_scale*values(i), quantities(i)%decimals, &
+               trim(quantities(i)%display_unit))
+         end do
+         text = text//facts(history)//newline
          text = text//'  The source '//trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
             //' to the limits of the '//replaced(trim(case%source), '_', ' ')//': it meets ' &
             //to_text(count(conforms(criteria)))//' of '//to_text(size(criteria))//' criteria.'//newline &
@@ -65,13 +73,22 @@ contains
          type(criterion_type), intent(in), optional :: criterion
          character(len=:), allocatable :: line
 
-         line = row('level, '//get_band_name(verdict%bands(band))//' Hz '//trim(verdict%bands(band)%set), &
-            verdict%level(band, judged), 2, 'dB', criterion, 1.0_wp)
+         line = row('level, '//get_band_name(assessment%bands(band))//' Hz '//trim(assessment%bands(band)%set), &
+            assessment%level(band, assessed), 2, 'dB', criterion, 1.0_wp)
          if (other == 0) return
-         line = line(:len(line) - 1)//right(fixed(verdict%level(band, other), 2), 79 - len(line))//' dB'//newline
+         line = line(:len(line) - 1)//flush_right(fixed(assessment%level(band, other), 2), 79 - len(line))//' dB'//newline
       end function level_row
 
    end function get_table
+
+   !> Whether a quantity is the peak of the force that is not assessed.
+   pure function is_peak_of_other(quantity, case) result(yes)
+      type(quantity_type), intent(in) :: quantity
+      type(case_type), intent(in) :: case
+      logical :: yes
+
+      yes = quantity%name == merge('peak_elastic_force', 'peak_force        ', case%level_force == 'floor')
+   end function is_peak_of_other
 
    !> Which groups a file has left out.
    function get_defaults_line(case) result(line)
@@ -100,10 +117,11 @@ contains
 
       text = '  free modes     frequency   harmonic   participation'//newline &
          //'                       Hz                of the pole'//newline &
-         //'   rigid        '//right(fixed(modes%rigid_frequency, 3), 9)//right('1', 11)//right('1.000', 16)//newline
+         //'   rigid        '//flush_right(fixed(modes%rigid_frequency, 3), 9)//flush_right('1', 11) &
+         //flush_right('1.000', 16)//newline
       do i = 1, size(modes%frequency)
-         text = text//right(to_text(i), 6)//right(fixed(modes%frequency(i), 3), 19) &
-            //right(to_text(modes%harmonic(i)), 11)//right(fixed(modes%participation(i), 3), 16)//newline
+         text = text//flush_right(to_text(i), 6)//flush_right(fixed(modes%frequency(i), 3), 19) &
+            //flush_right(to_text(modes%harmonic(i)), 11)//flush_right(fixed(modes%participation(i), 3), 16)//newline
       end do
    end function get_modes_table
 
@@ -135,7 +153,7 @@ contains
       real(wp), intent(in), optional :: scale
       character(len=:), allocatable :: text
 
-      text = '  '//padded(name, 22)//right(fixed(value, decimals), 10)//' '//padded(unit, 5)
+      text = '  '//padded(name, 22)//flush_right(fixed(value, decimals), 10)//' '//padded(unit, 5)
       if (present(criterion) .and. present(scale)) text = text//get_limits(criterion, scale)//get_word(criterion)
       text = trim(text)//newline
    end function row
@@ -147,7 +165,7 @@ contains
       real(wp), intent(in) :: scale
       character(len=:), allocatable :: text
 
-      text = right(short(criterion%lower*scale), 7)
+      text = flush_right(short(criterion%lower*scale), 7)
       if (criterion%upper > criterion%lower) text = text//' to '//short(criterion%upper*scale)
       text = padded(text, 18)
    end function get_limits
@@ -162,8 +180,8 @@ contains
       character(len=*), intent(in) :: unit
       character(len=:), allocatable :: text
 
-      text = '  '//padded(name, 22)//right(fixed(span(1), decimals), 10)//' to '//right(fixed(span(2), decimals), 8)//' ' &
-         //unit//newline
+      text = '  '//padded(name, 22)//flush_right(fixed(span(1), decimals), 10)//' to ' &
+         //flush_right(fixed(span(2), decimals), 8)//' '//unit//newline
    end function get_span_row
 
    !> Numbers that the model chose or found, as rows.
@@ -194,25 +212,5 @@ contains
       text = text(:verify(text, '0', back=.true.))
       if (text(len(text):) == '.') text = text(:len(text) - 1)
    end function short
-
-   !> Left-justified text.
-   pure function padded(text, width) result(cell)
-      character(len=*), intent(in) :: text
-      !> Width of the cell; longer text keeps its length.
-      integer, intent(in) :: width
-      character(len=:), allocatable :: cell
-
-      cell = trim(text)//repeat(' ', max(width - len_trim(text), 0))
-   end function padded
-
-   !> Right-justified text.
-   pure function right(text, width) result(cell)
-      character(len=*), intent(in) :: text
-      !> Width of the cell; longer text keeps its length.
-      integer, intent(in) :: width
-      character(len=:), allocatable :: cell
-
-      cell = repeat(' ', max(width - len(text), 0))//text
-   end function right
 
 end module thud_table

@@ -1,5 +1,4 @@
-!> Unstructured grids as ParaView and VTK read them: VTU files with data in base 64, and the
-!> PVD files that put them in the order of time.
+!> Unstructured grids as ParaView and VTK read them: VTU files with data in base 64.
 module thud_vtu
    use, intrinsic :: iso_c_binding, only: c_int64_t, c_int8_t
    use thud_kinds, only: wp
@@ -7,15 +6,15 @@ module thud_vtu
    implicit none (type, external)
    private
 
-   public :: biquadratic_quadrilateral, get_pvd, get_vtu, quadrilateral
+   public :: biquadratic_quadrilateral, get_vtu
 
-   !> Types of cells: four and nine nodes.
-   integer, parameter :: quadrilateral = 9, biquadratic_quadrilateral = 28
+   !> Type of cells with nine nodes.
+   integer, parameter :: biquadratic_quadrilateral = 28
 
 contains
 
-   !> A grid with vectors and scalars at its points. The plane of r and z is that of x and y.
-   subroutine get_vtu(point, cell, cell_type, vector_name, vector, scalar_name, scalar, text)
+   !> A grid with vectors at its points. The plane of r and z is that of x and y.
+   subroutine get_vtu(point, cell, cell_type, vector_name, vector, text)
       !> Positions r and z of the points, m: [2, n_point].
       real(wp), intent(in) :: point(:, :)
       !> Points of each cell, from 1: [n_corner, n_cell].
@@ -25,10 +24,6 @@ contains
       character(len=*), intent(in) :: vector_name(:)
       !> Components r and z of the vectors: [2, n_point, n_vector].
       real(wp), intent(in) :: vector(:, :, :)
-      !> Names of the scalars: [n_scalar].
-      character(len=*), intent(in) :: scalar_name(:)
-      !> The scalars: [n_point, n_scalar].
-      real(wp), intent(in) :: scalar(:, :)
       character(len=:), allocatable, intent(out) :: text
       integer :: i, n_cell
 
@@ -45,9 +40,6 @@ contains
       text = text//'</Cells>'//newline//'<PointData>'//newline
       do i = 1, size(vector_name)
          call add_array(trim(vector_name(i)), 'Float64', 3, get_bytes(in_space(vector(:, :, i))), text)
-      end do
-      do i = 1, size(scalar_name)
-         call add_array(trim(scalar_name(i)), 'Float64', 1, get_bytes(scalar(:, i)), text)
       end do
       text = text//'</PointData>'//newline//'</Piece></UnstructuredGrid>'//newline//'</VTKFile>'//newline
    end subroutine get_vtu
@@ -112,21 +104,5 @@ contains
       space(1::3) = plane(1, :)
       space(2::3) = plane(2, :)
    end function in_space
-
-   !> A list of files in the order of time.
-   subroutine get_pvd(name, time, text)
-      !> Names of the files: [n].
-      character(len=*), intent(in) :: name(:)
-      !> Their times, s: [n].
-      real(wp), intent(in) :: time(:)
-      character(len=:), allocatable, intent(out) :: text
-      integer :: i
-
-      text = '<?xml version="1.0"?>'//newline//'<VTKFile type="Collection" version="1.0">'//newline//'<Collection>'//newline
-      do i = 1, size(name)
-         text = text//'<DataSet timestep="'//to_text(time(i))//'" file="'//trim(name(i))//'"/>'//newline
-      end do
-      text = text//'</Collection>'//newline//'</VTKFile>'//newline
-   end subroutine get_pvd
 
 end module thud_vtu

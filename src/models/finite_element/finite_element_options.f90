@@ -36,7 +36,7 @@ module thud_finite_element_options
       !> Time step over stability limit.
       real(wp) :: step_safety = 0.85_wp
       !> Time between snapshots of the deformed ball, s; 0 for none.
-      real(wp) :: snapshot_interval = 1.0e-3_wp
+      real(wp) :: snapshot_interval = 0.0_wp
       type(mesh_options_type) :: mesh
       type(material_options_type) :: material
       type(contact_options_type) :: contact

@@ -1,4 +1,4 @@
-// What is shown of the answers: verdict, plots, criteria, floor, room, remarks.
+// What is shown of the answers: verdict, plots, criteria, floor, room, warnings.
 import { begun, byId, element, minus, rounded, signed } from "./page.js";
 import { showBall } from "./ball.js";
 import { plot, swatch } from "./plot.js";
@@ -40,9 +40,9 @@ export function show(variants, remove) {
   showCriteria(variants);
   showVariants(variants, remove);
   showBall(first.answer.motion);
-  const remarks = variants.flatMap((one) => one.answer.remarks.map((remark) => [one, remark]));
-  byId("remarks_section").hidden = !remarks.length;
-  byId("remarks").replaceChildren(...remarks.map(([one, remark]) => element("li", {}, key(variants, one), remark)));
+  const warnings = variants.flatMap((one) => one.answer.warnings.map((warning) => [one, warning]));
+  byId("warnings_section").hidden = !warnings.length;
+  byId("warnings").replaceChildren(...warnings.map(([one, warning]) => element("li", {}, key(variants, one), warning)));
 }
 
 /** Return the swatch and name of a variant where there are several. */

@@ -61,7 +61,8 @@ FORMATS = (
     Format("HDF5", "hdf5", (".h5", ".hdf5", ".hdf", ".nc", ".nc4"),
            lambda head: any(head[at : at + 8] == HDF5 for at in (0, 512, 1024, 2048)),
            looks=True),
-    Format("MATLAB", "matlab", (".mat",), lambda head: head[124:128] in {b"\0\1IM", b"\1\0MI"}),
+    Format("MATLAB", "matlab", (".mat",),
+           lambda head: head[124:128] in {b"\0\1IM", b"\1\0MI"}, looks=True),
     Format("universal", "universal", (".uff", ".unv", ".uf"), _is_uff),
     Format("text", "text", (".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm", ".prn"), _is_text),
 )  # fmt: skip

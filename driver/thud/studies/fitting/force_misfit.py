@@ -53,7 +53,9 @@ class ForceMisfit(Misfit):
         self.target, self.below = target, target.below
         given = target.record
         self.exact = isinstance(given, Impact)
-        self.kind = target.force or (given.judged() if isinstance(given, Impact) else "floor")
+        self.kind = target.force or (
+            given.assessed_force() if isinstance(given, Impact) else "floor"
+        )
         self.period = len(self.time) / self.sample_rate
         count = int(self.below * self.period * (1 + SAME)) + 1
         self.frequency = freeze(np.arange(count) / self.period)

@@ -149,7 +149,7 @@ class ForceTarget(Immutable):
         if isinstance(given, Recording):
             drop = given.drops[self.drop - 1]
             # With what was removed: the fit weighs it itself.
-            return Record(drop.time, drop.force + drop.contact.under, drop.sample_rate)
+            return Record(drop.time, drop.force + drop.contact.removed, drop.sample_rate)
         if isinstance(given, Impact):
             return Record(given.time, given.force(self.force), given.sample_rate)
         try:

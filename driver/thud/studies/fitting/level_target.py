@@ -44,7 +44,7 @@ class LevelTarget(Plain):
         Value and standard deviation, s and 1.
     force : str or None
         ``"floor"`` or ``"elastic"``: the force of the model whose levels are compared; None: that
-        which its case judges.
+        which its case assesses.
     """
 
     levels: Sequence[float]

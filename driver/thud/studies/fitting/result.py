@@ -218,7 +218,7 @@ class Fit(Displayed):
 
     def table(self, units: Units | None = None) -> str:
         """Return the fit as text; `units` as in `shown_units`."""
-        return "\n".join([format_rows(self.rows(units)), "", *self._remarks()])
+        return "\n".join([format_rows(self.rows(units)), "", *self._warning_lines()])
 
     def rows(self, units: Units | None = None) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
@@ -241,7 +241,7 @@ class Fit(Displayed):
         }
         return {**handy, **(units or {})}
 
-    def _remarks(self) -> list[str]:
+    def _warning_lines(self) -> list[str]:
         """Return the quality of the fit, one sentence per line."""
         freedom = self.degrees_of_freedom
         quality = f", reduced chi-square {self.reduced_chi_square:.3g}" if freedom else ""
@@ -358,9 +358,9 @@ class Fit(Displayed):
         contents = self.files()
         if figures:
             with left_out("the figure of the fit"):
-                from thud.plot import picture_files
+                from thud.plot import figure_files
 
-                contents |= picture_files(self.figures(units))
+                contents |= figure_files(self.figures(units))
         return Results(Path(directory), "fit", replace=replace).write(contents)
 
 

@@ -1,0 +1,244 @@
+"""Assessment of a source by the criteria of the standards, computed or measured."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.special import stdtr
+
+from thud.base._schema import LIMITS
+from thud.base.checks import refuse, refuse_value, require_choice
+from thud.base.display import Displayed
+from thud.level.estimate import Estimate
+from thud.level.levels import BANDWIDTHS, SOURCES, get_bands, to_float
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from numpy.typing import NDArray
+
+    from thud.base._schema import LimitsSource
+
+RESULTS = ("conforms", "does not conform", "inconclusive")
+_MAX_PEAKS = 2**31
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Criterion(Displayed):
+    """One quantity and the range that the standards require.
+
+    Attributes
+    ----------
+    name : str
+        Name of the quantity.
+    estimate : Estimate
+        Value of the source with its uncertainty; levels in dB re 1 N.
+    lower, upper : float
+        Limits, which are allowed values.
+    """
+
+    name: str
+    estimate: Estimate
+    lower: float
+    upper: float
+
+    @property
+    def value(self) -> float:
+        """Value of the source."""
+        return self.estimate.value
+
+    @property
+    def unit(self) -> str:
+        """Unit of value and limits."""
+        return self.estimate.unit
+
+    @property
+    def result(self) -> str:
+        """``"conforms"``, ``"does not conform"`` or ``"inconclusive"`` at 95 %.
+
+        The guard band is the expanded uncertainty (JCGM 106). An upper bound can only fail.
+        """
+        value, expanded = self.value, self.estimate.expanded
+        conforms, fails, inconclusive = RESULTS
+        if math.isnan(value) or not math.isfinite(expanded):
+            return inconclusive
+        below, above = value + expanded < self.lower, value - expanded > self.upper
+        if self.estimate.upper_bound:
+            return fails if below else inconclusive
+        if below or above:
+            return fails
+        inside = value - expanded >= self.lower and value + expanded <= self.upper
+        return conforms if inside else inconclusive
+
+    @property
+    def conforms(self) -> bool:
+        """Whether the criterion is met."""
+        return self.result == RESULTS[0]
+
+    @property
+    def margin(self) -> float:
+        """Distance of the value to the nearer limit; negative outside."""
+        return min(self.value - self.lower, self.upper - self.value)
+
+    @property
+    def probability(self) -> float:
+        """Probability that the true value lies within the limits (JCGM 106, 7.2)."""
+        estimate = self.estimate
+        if estimate.upper_bound:
+            return math.nan
+        if estimate.uncertainty == 0:
+            return float(self.lower <= self.value <= self.upper)
+        limits = np.array([self.lower, self.upper])
+        low, high = stdtr(estimate.freedom, (limits - self.value) / estimate.uncertainty)
+        return float(high - low)
+
+    def __repr__(self) -> str:
+        """Return value, limits and result."""
+        name, value, _, limits, result = self._row()
+        return f"<Criterion, {name}: {f'{value} {result}'.strip()}, allowed {limits}>"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        return [("criterion", "value", "uncertainty (95 %)", "limits", "result"), self._row()]
+
+    def _row(self) -> tuple[str, ...]:
+        name = re.sub(r"(\d)_(\d)", r"\1.\2", self.name).replace("_", " ")
+        limits = f"{self.lower:g} to {self.upper:g}"
+        if math.isnan(self.value):
+            return name, "", "", limits, "not known"
+        value = f"{self.value:.4g} {self.unit}".strip()
+        expanded = f"{self.estimate.expanded:.2g}" if self.estimate.uncertainty else ""
+        result = self.result
+        if result == RESULTS[1]:
+            result = "too low" if self.value < self.lower else "too high"
+        return name, value, expanded, limits, result
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Verdict(Displayed):
+    """Result of an assessment.
+
+    Attributes
+    ----------
+    source : str
+        Source whose limits apply.
+    criteria : tuple of Criterion
+        Octave levels, contact time, restitution, number of peaks, mass, drop height.
+    """
+
+    source: LimitsSource
+    criteria: tuple[Criterion, ...]
+
+    @property
+    def result(self) -> str:
+        """``"does not conform"`` if any criterion fails, else ``"inconclusive"`` if any is."""
+        results = {criterion.result for criterion in self.criteria}
+        return next(one for one in (RESULTS[1], RESULTS[2], RESULTS[0]) if one in results)
+
+    @property
+    def conforms(self) -> bool:
+        """Whether all criteria are met."""
+        return self.result == RESULTS[0]
+
+    def __bool__(self) -> bool:
+        """Return whether all criteria are met."""
+        return self.conforms
+
+    def __repr__(self) -> str:
+        """Return the result and the criteria that cause it."""
+        names = [criterion.name for criterion in self.criteria if criterion.result == self.result]
+        where = "" if self.conforms else f" in {', '.join(names)}"
+        return f"<Verdict, {self.source}: {self.result}{where}>"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        header, *_ = self.criteria[0].rows()
+        rows = [criterion.rows()[1] for criterion in self.criteria]
+        return [header, *rows, ("all criteria", "", "", "", self.result)]
+
+
+def assess(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
+    levels: Iterable[Estimate | float],
+    contact_time: Estimate | float = math.nan,
+    restitution: Estimate | float = math.nan,
+    peaks: Estimate | float = math.nan,
+    mass: Estimate | float = math.nan,
+    drop_height: Estimate | float = math.nan,
+    source: LimitsSource = SOURCES[0],
+    *,
+    limits: Mapping[str, tuple[float, float]] | None = None,
+) -> Verdict:
+    """Assess a source by the criteria of the standards, at 95 % if there are uncertainties.
+
+    A criterion conforms if the value and its expanded uncertainty lie within the limits, does not
+    conform if they lie outside, and is inconclusive otherwise (guard band, JCGM 106) or if value or
+    uncertainty are unknown, NaN. Plain numbers are exact.
+
+    Parameters
+    ----------
+    levels : iterable of 5
+        Force exposure levels of the octaves 31.5 to 500 Hz, dB.
+    contact_time
+        Contact time, s.
+    restitution
+        Coefficient of restitution.
+    peaks
+        Number of peaks of the force.
+    mass
+        Mass of the source, kg.
+    drop_height
+        Drop height, m.
+    source
+        ``"rubber_ball"`` or ``"tyre"``.
+    limits
+        Minimum and maximum by criterion that replace those of the standards.
+
+    Raises
+    ------
+    InputError
+        Where the source is not known, `levels` are not five, or a value is not a number.
+    """
+    standard = get_criteria(source)
+    octaves = [_estimate("levels", level) for level in levels]
+    nominal = get_bands(BANDWIDTHS[0]).nominal
+    if len(octaves) != len(nominal):
+        allowed = f"{len(nominal)}, the octaves {nominal[0]:g} to {nominal[-1]:g} Hz"
+        refuse(f"levels: {len(octaves)} values", allowed)
+    others = {
+        "contact_time": contact_time, "restitution": restitution, "peaks": peaks, "mass": mass,
+        "drop_height": drop_height,
+    }  # fmt: skip
+    estimates = [*octaves, *(_estimate(name, value) for name, value in others.items())]
+    count = estimates[len(nominal) + list(others).index("peaks")].value
+    if not (math.isnan(count) or (0 <= count < _MAX_PEAKS and count.is_integer())):
+        refuse_value("peaks", peaks, f"0 <= peaks < {_MAX_PEAKS}, whole")
+    criteria = []
+    for one, estimate in zip(standard, estimates, strict=True):
+        lower, upper = (limits or {}).get(one.name, (one.lower, one.upper))
+        criteria.append(Criterion(one.name, replace(estimate, unit=one.unit), lower, upper))
+    return Verdict(source, tuple(criteria))
+
+
+def get_criteria(source: LimitsSource) -> tuple[Criterion, ...]:
+    """Return the criteria of the standards for a source, their values unknown."""
+    require_choice("source", source, SOURCES)
+    unknown = Estimate.unknown()
+    return tuple(
+        Criterion(name, replace(unknown, unit=unit), lower, upper)
+        for name, unit, lower, upper in LIMITS[source]
+    )
+
+
+def octave_limits(source: LimitsSource) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the minimum and maximum conforming octave levels of a source, dB, shape (5,)."""
+    octaves = get_criteria(source)[: len(get_bands(BANDWIDTHS[0]).nominal)]
+    return np.array([o.lower for o in octaves]), np.array([o.upper for o in octaves])
+
+
+def _estimate(name: str, value: Any) -> Estimate:  # noqa: ANN401 - of a user
+    """Return a value as an estimate; raise InputError where it is no number."""
+    return value if isinstance(value, Estimate) else Estimate(to_float(name, value))

@@ -1,0 +1,337 @@
+"""The ball itself: its motion, free modes, material and quasi-static compression."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.animation import FuncAnimation, PillowWriter
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.patheffects import withStroke
+
+from thud.base.checks import require_kind, require_whole
+from thud.base.errors import InputError
+from thud.base.files import replace_file
+from thud.impact.compression import CompressionCurve
+from thud.impact.free_modes import FreeModes, loss_factors
+from thud.impact.impact import Impact
+from thud.plot.style import WIDTH, add_curves, empty_axes, legend_above, new_figure, own_style
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterable
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.quiver import Quiver
+    from numpy.typing import NDArray
+
+    from thud.base._schema import FiniteElement
+    from thud.impact.motion import Motion
+
+# More are not readable at column width.
+MAX_PANELS = 30
+# Instants of the paper's figure 5.
+INSTANTS = 9
+# Nodes between two arrows, from pole to pole and through the wall.
+ARROWS = (6, 4)
+FRAMES_PER_SECOND = 12
+DISPLACEMENT = "Displacement of the material, mm"
+# Drawn maximum displacement of a mode, as fraction of the radius.
+AMPLITUDE = 0.3
+
+
+def _draw_section(
+    axes: Axes, position: NDArray[np.float64], value: NDArray[np.float64], scale: Normalize
+) -> None:
+    """Draw a half section in colors, with the mesh lines of its surfaces and poles."""
+    axes.pcolormesh(
+        *np.moveaxis(position, -1, 0), value, shading="gouraud", norm=scale, rasterized=True
+    )
+    edge = np.concatenate([position[:, 0], position[::-1, -1], position[:1, 0]])
+    axes.plot(*edge.T, color="0.1", linewidth=0.6)
+
+
+def _add_colorbar(figure: Figure, panels: Iterable[Axes], scale: Normalize, label: str) -> None:
+    """Add the color bar below the panels."""
+    figure.colorbar(
+        ScalarMappable(scale), ax=[*panels], location="bottom", shrink=0.7, aspect=30, pad=0.02,
+        label=label,
+    )  # fmt: skip
+
+
+@own_style()
+def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
+    """Draw instants of the impact: displacement by color, velocity by arrows (paper, figure 5).
+
+    Parameters
+    ----------
+    impact
+        An impact with snapshots.
+    instants
+        Number of instants, at even times from first touch to release.
+
+    Returns
+    -------
+    Figure
+        Half sections on the floor where it is; displacement since first touch in mm, time in ms.
+
+    Raises
+    ------
+    InputError
+        If the impact has no snapshots, or there are too many instants.
+    """
+    shown = _snapshots(impact)
+    require_whole("instants", instants, 1, MAX_PANELS)
+    wanted = impact.touch_time + np.linspace(0, impact.contact_time, instants)
+    # Fewer panels where there are fewer snapshots.
+    chosen = sorted({int(np.argmin(np.abs(shown.time - time))) for time in wanted})
+    rows = -(-len(chosen) // 3)
+    figure = new_figure(0.6 + 1.6 * rows)
+    panels = figure.subplots(rows, 3, squeeze=False).ravel()
+    scale = _scale(shown, chosen)
+    depth = shown.floor_displacement[chosen].max()
+    for axes, i in zip(panels, chosen, strict=False):
+        arrows = _draw_instant(axes, impact, i, scale, depth)
+    for axes in panels:
+        axes.set_axis_off()
+    _add_colorbar(figure, panels, scale, DISPLACEMENT)
+    _add_key(panels[0], arrows, impact)
+    return figure
+
+
+@own_style()
+def animate(impact: Impact, path: str | os.PathLike[str]) -> None:
+    """Save the motion of the ball as an animated GIF, one picture for each snapshot.
+
+    Parameters
+    ----------
+    impact
+        An impact with snapshots.
+    path
+        Path of the file, which ends with ``.gif``.
+
+    Raises
+    ------
+    InputError
+        If the impact has no snapshots or the path another ending.
+    OSError
+        If the file cannot be written.
+    """
+    if Path(path).suffix.lower() != ".gif":
+        message = f"{path}: this ending is not known; allowed: .gif"
+        raise InputError(message)
+    shown = _snapshots(impact)
+    figure, axes = empty_axes(WIDTH)
+    count = len(shown.time)
+    scale = _scale(shown, range(count))
+    _add_colorbar(figure, [axes], scale, DISPLACEMENT)
+
+    def draw(i: int) -> list[Any]:
+        axes.clear()
+        depth = shown.floor_displacement.max()
+        _add_key(axes, _draw_instant(axes, impact, i, scale, depth), impact)
+        axes.set_axis_off()
+        return []
+
+    animation = FuncAnimation(figure, draw, frames=count, blit=False)
+    with TemporaryDirectory() as folder:
+        whole = Path(folder, "motion.gif")
+        animation.save(whole, dpi=120, writer=PillowWriter(fps=FRAMES_PER_SECOND))
+        replace_file(path, whole.read_bytes())
+
+
+def _snapshots(impact: Impact) -> Motion:
+    """Return the snapshots of an impact; raise InputError where it has none."""
+    require_kind("impact", impact, Impact)
+    if impact.motion is None:
+        message = (
+            "the impact has no snapshots; allowed: a model with snapshots, snapshot_interval > 0"
+        )
+        raise InputError(message)
+    return impact.motion
+
+
+def _scale(shown: Motion, chosen: list[int] | range) -> Normalize:
+    """Return the scale of the colors of some snapshots, mm."""
+    return Normalize(0, 1e3 * max(_displacement(shown, i).max() for i in chosen))
+
+
+def _displacement(shown: Motion, i: int) -> NDArray[np.float64]:
+    """Return the displacements since first touch, m, shape (n_line, n_ring)."""
+    touching = shown.start - [0, shown.start[..., 1].min()]
+    length: NDArray[np.float64] = np.hypot(*(shown.position[i] - touching).T).T
+    return length
+
+
+def _draw_instant(axes: Axes, impact: Impact, i: int, scale: Normalize, depth: float) -> Quiver:
+    """Draw the ball, its velocities and the floor at one instant; return the arrows.
+
+    The floor is shown down to a depth in m, and a little further.
+    """
+    radius = impact.case.ball.outer_radius
+    shown = _snapshots(impact)
+    position = shown.position[i]
+    floor = -shown.floor_displacement[i]
+    _draw_section(axes, position, 1e3 * _displacement(shown, i), scale)
+    some = (slice(None, None, ARROWS[0]), slice(None, None, ARROWS[1]))
+    start, velocity = (field[some].reshape(-1, 2) for field in (position, shown.velocity[i]))
+    # At first touch an arrow is as long as a third of the radius.
+    unit = 3 * impact.impact_velocity / radius
+    above = start[:, 1] + velocity[:, 1] / unit >= floor
+    arrows = axes.quiver(
+        *start[above].T,
+        *velocity[above].T,
+        angles="xy",
+        scale_units="xy",
+        scale=unit,
+        width=0.014,
+        color="0.1",
+        # A light edge shows arrows on dark colors.
+        path_effects=[withStroke(linewidth=1, foreground="white")],
+    )
+    lowest = -depth - 0.12 * radius
+    axes.fill_between([-0.05 * radius, 1.4 * radius], lowest, floor, color="0.6", linewidth=0)
+    since = 1e3 * (shown.time[i] - impact.touch_time)
+    axes.set_title(f"{since:.1f} ms")
+    axes.set_xlim(-0.05 * radius, 1.4 * radius)
+    axes.set_ylim(lowest - 0.03 * radius, 2.4 * radius)
+    axes.set_aspect("equal")
+    return arrows
+
+
+def _add_key(axes: Axes, arrows: Quiver, impact: Impact) -> None:
+    """Show the size of a round velocity beside the label of the colors."""
+    velocity = float(f"{impact.impact_velocity:.1g}")
+    figure = axes.get_figure(root=True)
+    assert figure is not None  # noqa: S101 - the axes are new
+    # In fractions of the figure: a key in inches would be lost where notebooks crop the figure.
+    x, y = (WIDTH - 0.52, 0.11) / figure.get_size_inches()
+    axes.quiverkey(
+        arrows, x, y, velocity, f"{velocity:g} m/s", labelpos="E", coordinates="figure",
+        fontproperties={"size": "medium"},
+    )  # fmt: skip
+
+
+@own_style()
+def mode_shapes(modes: FreeModes, columns: int = 3) -> Figure:
+    """Draw mode shapes as half sections over the outline of the ball at rest (paper, figure 4).
+
+    Parameters
+    ----------
+    modes
+        The modes.
+    columns
+        Shapes side by side.
+
+    Returns
+    -------
+    Figure
+        One half section for each mode; the color is the displacement over its maximum.
+    """
+    require_kind("modes", modes, FreeModes)
+    require_whole("columns", columns, 1, MAX_PANELS)
+    rows = -(-len(modes.frequency) // columns)
+    # More than three side by side need more than a column.
+    figure = new_figure(0.45 + 1.75 * rows, WIDTH * max(1, columns / 3))
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    radius = modes.ball.outer_radius
+    scale = Normalize(0, 1)
+    for axes, frequency, harmonic, shape in zip(
+        panels, modes.frequency, modes.harmonic, modes.shape, strict=False
+    ):
+        _draw_section(axes, modes.start + AMPLITUDE * radius * shape, np.hypot(*shape.T).T, scale)
+        for surface in (0, -1):
+            axes.plot(*modes.start[:, surface].T, color="0.35", linestyle="--", linewidth=0.6)
+        axes.set_title(f"{frequency:.1f} Hz, n = {harmonic}")
+        axes.set_xlim(-0.05 * radius, 1.35 * radius)
+        axes.set_ylim(-1.35 * radius, 1.35 * radius)
+    for axes in panels:
+        axes.set_axis_off()
+        axes.set_aspect("equal")
+    _add_colorbar(figure, panels, scale, "Displacement relative to its maximum")
+    return figure
+
+
+@own_style()
+def loss_factor(models: Mapping[str, FiniteElement]) -> Figure:
+    """Draw the loss factor of materials against frequency.
+
+    Parameters
+    ----------
+    models
+        Models with a material by their names in the legend.
+
+    Returns
+    -------
+    Figure
+        Frequency in Hz and loss factor, both logarithmic.
+
+    Raises
+    ------
+    InputError
+        If `models` is not a mapping of names to such models, or empty.
+    """
+    if not isinstance(models, Mapping) or not models:
+        message = "models are not given; allowed: a mapping of names to models, at least one"
+        raise InputError(message)
+    figure, axes = empty_axes(2.5)
+    frequency = np.geomspace(10, 1000, 200)
+    add_curves(axes, {name: (frequency, loss_factors(m, frequency)) for name, m in models.items()})
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter("{x:g}")
+    axes.set_xlabel("Frequency, Hz")
+    axes.set_ylabel("Loss factor")
+    legend_above(axes)
+    return figure
+
+
+@own_style()
+def draw_material(impact: Impact) -> Figure | None:
+    """Draw the loss factor of a model that has a viscous material."""
+    viscosity = impact.case.to_namelist().get("material", {}).get("viscosity", "none")
+    if viscosity == "none":
+        return None
+    model: Any = impact.case.model
+    return loss_factor({str(viscosity).replace("_", " "): model})
+
+
+@own_style()
+def compression(curves: Mapping[str, CompressionCurve]) -> Figure:
+    """Draw forces against the approach of the plates.
+
+    Parameters
+    ----------
+    curves
+        Curves by their names in the legend.
+
+    Returns
+    -------
+    Figure
+        Approach of the plates in mm, force in N.
+
+    Raises
+    ------
+    InputError
+        If `curves` is not a mapping of names to curves, or empty.
+    """
+    if not isinstance(curves, Mapping) or not curves:
+        message = "curves are not given; allowed: a mapping of names to curves, at least one"
+        raise InputError(message)
+    for name, curve in curves.items():
+        require_kind(name, curve, CompressionCurve)
+    figure, axes = empty_axes(2.5)
+    add_curves(axes, {name: (1e3 * one.deflection, one.force) for name, one in curves.items()})
+    axes.set_xlim(left=0)
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel("Approach of the plates, mm")
+    axes.set_ylabel("Force, N")
+    if any(curves):
+        legend_above(axes)
+    return figure

@@ -1,0 +1,206 @@
+"""Figures of the paper and of the documentation, computed and drawn by `thud-driver figures`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache, lru_cache
+from typing import TYPE_CHECKING
+
+from thud.base._schema import (
+    Ball,
+    Drop,
+    FiniteElement,
+    FloatingFloor,
+    InfinitePlate,
+    JoistFloor,
+    Levels,
+    ModalBall,
+    Plate,
+)
+from thud.floors.impedance import ball_impedance
+from thud.impact.compression import compress
+from thud.impact.free_modes import free_modes
+from thud.impact.solve import solve
+from thud.plot.ball import compression, loss_factor, mode_shapes, motion
+from thud.plot.floors import ball_impedances, draw_floor, floor_mobilities
+from thud.plot.impacts import force_history, level_changes, levels
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from thud.base._schema import (
+        FiniteElementViscosity,
+        FloorOptions,
+        HollowSphereMomentumFlux,
+        ModelName,
+    )
+    from thud.impact.floor_impact import FloorImpact
+    from thud.impact.impact import Impact
+
+
+@lru_cache(maxsize=4)
+def _solve_published(viscosity: FiniteElementViscosity = "fractional") -> Impact:
+    """Return the impact of the ball of the published modes by finite elements."""
+    return solve(
+        Ball.standard(), model="finite_element", viscosity=viscosity, snapshot_interval=1e-3
+    )
+
+
+@cache
+def _solve_chipboard() -> FloorImpact:
+    """Return the same impact on chipboard of 22 mm, far from its joists: 1600 N s/m."""
+    model = FiniteElement(snapshot_interval=1e-3)
+    impact = solve(Ball.standard(), model=model, floor=InfinitePlate(resistance=1600.0)).on_floor
+    assert impact is not None  # noqa: S101 - the floor is mobile
+    return impact
+
+
+def _draw_heights() -> Figure:
+    """Draw the three heights of the paper."""
+    impacts = {f"{height:.2f} m": solve(drop=Drop(height)) for height in (0.1, 1, 1.6)}
+    return force_history(impacts, "elastic")
+
+
+def _draw_viscosity() -> Figure:
+    """Draw the effect of the viscosity of the rubber on the force."""
+    return force_history({"viscous": _solve_published(), "elastic": _solve_published("none")})
+
+
+def _draw_shell() -> Figure:
+    """Draw both forces of the model of the paper."""
+    floor = solve()
+    elastic = replace(floor, case=replace(floor.case, levels=Levels(force="elastic")))
+    return levels({"paper": elastic, "force plate": floor})
+
+
+def _draw_models() -> Figure:
+    """Draw the model of the paper, its improvement, and the finite elements."""
+    # The ends of the band of inputs/studies/law_of_loss.toml.
+    ends = {
+        f"finite elements, order {order:g}": FiniteElement(
+            viscosity="fractional", fractional_order=order, loss_factor=loss_factor
+        )
+        for order, loss_factor in ((0.15, 0.1305), (1.0, 0.2041))
+    }
+    elements = {name: solve(Ball.standard(), model=model) for name, model in ends.items()}
+    return levels({"hollow sphere": solve(), "modal ball": solve(model="modal_ball"), **elements})
+
+
+def _draw_tires() -> Figure:
+    """Draw the tire as one mass and as belt and rim."""
+    tire, drop = Ball(mass=7.3), Drop(0.85)
+    impacts = {
+        "one mass": solve(tire, drop, "hunt_crossley", contact_time=0.02, restitution=0.8),
+        "two masses": solve(tire, drop, "two_mass"),
+    }
+    return levels(impacts, source="tyre")
+
+
+def _draw_fluxes() -> Figure:
+    """Draw the interpretations of the flux term of the paper."""
+    choices: tuple[HollowSphereMomentumFlux, ...] = (
+        "momentum_balance", "retarding", "conservative", "none",
+    )  # fmt: skip
+    impacts = {choice.replace("_", " "): solve(momentum_flux=choice) for choice in choices}
+    return levels(impacts, "elastic")
+
+
+def _draw_families() -> Figure:
+    """Draw which modes carry which octave: quasi-static families, one at a time."""
+    static = {f"n = {n} static": [n] for n in range(2, 7)}
+    static["all static"] = list(range(ModalBall.harmonics + 1))
+    impacts = {
+        name: solve(model="modal_ball", static_families=families)
+        for name, families in static.items()
+    }
+    return level_changes(solve(model="modal_ball"), impacts)
+
+
+def _draw_laws() -> Figure:
+    """Draw the damping laws."""
+    laws = {
+        f"Fractional, order {order:g}": FiniteElement(
+            viscosity="fractional", fractional_order=order, loss_factor=loss
+        )
+        for order, loss in ((0.15, 0.1305), (0.3, 0.1434), (0.5, 0.1613))
+    }
+    laws |= {
+        "Kelvin–Voigt": FiniteElement(viscosity="kelvin_voigt", loss_factor=0.2),
+        "Constant": FiniteElement(viscosity="constant_loss", loss_factor=0.13),
+        "Prony series, one term": FiniteElement(
+            viscosity="prony", prony_share=(0.5,), prony_time=(1.5e-3,)
+        ),
+    }
+    return loss_factor(laws)
+
+
+def _draw_compressions() -> Figure:
+    """Draw the ball of the paper by each model, at one modulus, without viscosity."""
+    ball = Ball(poisson_ratio=0.49)
+    models: dict[str, ModelName] = {"shell": "hollow_sphere", "modal ball": "modal_ball"}
+    curves = {name: compress(ball, model) for name, model in models.items()}
+    for gas in ("vented", "adiabatic"):
+        elements = FiniteElement(viscosity="none")
+        curves[f"finite elements, {gas}"] = compress(ball, elements, gas=gas)
+    return compression(curves)
+
+
+def _draw_floors() -> Figure:
+    """Draw floors of the folder inputs/floors."""
+    concrete = Plate(source_x=0.4, source_y=0.35)
+    timber = replace(concrete, edges="absorption")
+    return floor_mobilities(
+        {
+            "180 mm of concrete": concrete,
+            "screed on a soft layer on it": FloatingFloor(
+                layer_stiffness=8e6, layer_loss_factor=0.15, screed_loss_factor=0.02,
+                source_x=0.4, source_y=0.35,
+            ),
+            "200 mm of cross-laminated timber": replace(
+                timber, thickness=0.2, density=470, wave_speed=3180, stiffness_ratio=0.293,
+                torsion_ratio=0.25, loss_factor=0.03,
+            ),
+            "timber joists, between two": JoistFloor(
+                sheathing_modulus=3.1e9, source_x=0.4, source_y=0.35
+            ),
+            "22 mm of chipboard": replace(
+                timber, length=2.4, width=1.8, thickness=0.022, density=650, wave_speed=2200,
+                loss_factor=0.02,
+            ),
+        }
+    )  # fmt: skip
+
+
+def _draw_impedances() -> Figure:
+    """Draw three models of the ball, and floors from chipboard to concrete."""
+    resistance = [560.0, 1e3, 2e3, 5e3, 1e5]
+    sources = {
+        "shell": ball_impedance(solve(), resistance),
+        "modes": ball_impedance(solve(model="modal_ball"), resistance),
+        "elements": ball_impedance(_solve_published(), resistance[1:]),
+    }
+    floors: dict[str, FloorOptions] = {
+        "chipboard on joists": JoistFloor(),
+        "floating screed": FloatingFloor(),
+        "180 mm concrete": Plate(),
+    }
+    return ball_impedances(sources, floors)
+
+
+FIGURES = {
+    "figure2_force_history": _draw_heights,
+    "figure3_levels": _draw_shell,
+    "figure4_free_modes": lambda: mode_shapes(free_modes(Ball.standard())),
+    "figure5_motion": lambda: motion(_solve_published()),
+    "ball_impedance": _draw_impedances,
+    "compression": _draw_compressions,
+    "finite_element_force": _draw_viscosity,
+    "finite_element_levels": _draw_models,
+    "floor_chipboard": lambda: draw_floor(_solve_chipboard()),
+    "floor_mobilities": _draw_floors,
+    "floor_motion": lambda: motion(_solve_chipboard()),
+    "loss_factor": _draw_laws,
+    "modal_families": _draw_families,
+    "momentum_flux": _draw_fluxes,
+    "tyre_levels": _draw_tires,
+}

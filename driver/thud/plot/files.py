@@ -1,0 +1,112 @@
+"""Save figures."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from thud.base.checks import require_choice, shown
+from thud.base.display import draw_all, left_out
+from thud.base.errors import InputError
+from thud.base.files import Results, replace_file
+from thud.plot.style import own_style
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Callable, Mapping
+
+    from matplotlib.figure import Figure
+
+# The first is the default: the smallest and the fastest to write.
+FORMATS = ("svg", "png", "pdf")
+
+
+def save(figure: Figure, path: str | os.PathLike[str]) -> None:
+    """Save a figure atomically, in the format of the ending of its path.
+
+    Parameters
+    ----------
+    figure
+        The figure.
+    path
+        Path of the file; an existing one is replaced.
+
+    Raises
+    ------
+    InputError
+        If the ending is not one of svg, png and pdf.
+    OSError
+        If the file cannot be written.
+    """
+    kind = Path(path).suffix[1:].lower()
+    if kind not in FORMATS:
+        message = f"{path}: ending {shown(kind)} is not known; allowed: {', '.join(FORMATS)}"
+        raise InputError(message)
+    replace_file(path, _content(figure, Path(path).stem, kind))
+
+
+@own_style()
+def _content(figure: Figure, name: str, kind: str) -> bytes:
+    """Return the content of the file of a figure."""
+    content = io.BytesIO()
+    # Without a date, the same figure gives the same bytes.
+    date = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind, {})
+    title = name.replace("_", " ").capitalize()
+    figure.savefig(content, format=kind, metadata={"Title": title, **date})
+    return content.getvalue()
+
+
+def figure_files(figures: Mapping[str, Figure], kind: str = FORMATS[0]) -> dict[str, bytes]:
+    """Return the contents of figures by the names of their files.
+
+    Those that cannot be drawn are left out, with a `ReportWarning`.
+    """
+    contents = {}
+    for name, figure in figures.items():
+        with left_out(f"{name}.{kind}"):
+            contents[f"{name}.{kind}"] = _content(figure, name, kind)
+    return contents
+
+
+def save_all(
+    figures: Mapping[str, Figure],
+    directory: str | os.PathLike[str],
+    *,
+    kind: str = FORMATS[0],
+    replace: bool = False,
+) -> list[Path]:
+    """Save figures under their names and return the paths of the files.
+
+    Parameters
+    ----------
+    figures
+        Figures by name.
+    directory
+        Directory of the files; created if missing.
+    kind
+        Format: ``"svg"``, ``"png"`` or ``"pdf"``.
+    replace
+        Replace also files that thud has not written.
+
+    Raises
+    ------
+    InputError
+        If a file is in the way.
+    OSError
+        If a file cannot be written.
+
+    Warns
+    -----
+    ReportWarning
+        If a figure cannot be drawn.
+    """
+    require_choice("kind", kind, FORMATS)
+    return Results(Path(directory), "plot", replace=replace).write(figure_files(figures, kind))
+
+
+def page_files(
+    name: str, draw: Callable[[], Figure], html: str, kind: str = FORMATS[0]
+) -> dict[str, bytes]:
+    """Return the contents of a figure and of the page of the same name by the names of files."""
+    return {**figure_files(draw_all({name: draw}), kind), f"{name}.html": html.encode()}

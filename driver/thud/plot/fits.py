@@ -1,0 +1,270 @@
+"""Figures of a fit: target and model with their difference, and confidence regions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from matplotlib.ticker import MaxNLocator, NullLocator
+
+from thud.case.keys import humanize
+from thud.plot.style import (
+    BAND_WORDS,
+    COLORS,
+    FORCE_WORDS,
+    GREY,
+    LEVEL,
+    WIDTH,
+    legend_above,
+    new_figure,
+    own_style,
+)
+from thud.studies.fitting.misfit import SHIFT
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from thud.studies.fitting.force_misfit import ForceMisfit
+    from thud.studies.fitting.level_target import LevelMisfit
+    from thud.studies.fitting.result import Fit, FittedTarget
+
+
+# More names of bands are rotated.
+MAX_UPRIGHT = 5
+# Names that are too long for the axis.
+BROKEN = {"contact time": "contact\ntime", "restitution": "resti-\ntution"}
+# Median difference, relative to the maximum force, above which the unfiltered record is drawn too.
+VISIBLE = 0.003
+# Time that is drawn before and after the contact, as fraction of it.
+BEFORE, AFTER = 0.15, 0.4
+
+
+@own_style()
+def draw_fit(fit: Fit, units: Mapping[str, tuple[str, float]]) -> dict[str, Figure]:
+    """Draw a fit: ``"fit"``, or ``"fit_1"`` and so on, and of several parameters ``"confidence"``.
+
+    Units are given by name and size in SI units.
+    """
+    figures = {
+        f"fit{end}": target_and_fit(fit, number) for number, end in enumerate(fit.ends, start=1)
+    }
+    if len(fit.names) > 1:
+        figures["confidence"] = confidence(fit, units)
+    return figures
+
+
+@own_style()
+def target_and_fit(fit: Fit, number: int = 1) -> Figure:
+    """Draw a target and the model, in kN against ms or in dB, and below it their difference."""
+    target = fit.targets[number - 1]
+    deviation = fit.deviation_of(target)
+    figure = new_figure(3.6)
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2.2, 1])
+    below.axhline(0, color="0.45", linewidth=0.8)
+    if target.misfit.deviation_unit == "N":
+        _draw_force(target, deviation, above, below)
+    else:
+        _draw_levels(target, deviation, above, below)
+    above.tick_params(axis="x", labelbottom=False)
+    figure.align_ylabels()
+    return figure
+
+
+def _draw_force(fitted: FittedTarget, deviation: float, above: Axes, below: Axes) -> None:
+    """Draw record, fit with its background, and residual."""
+    misfit = cast("ForceMisfit", fitted.misfit)
+    column = misfit.history_columns(fitted.impact, fitted.own)
+    time = 1e3 * column["time_s"]
+    record, target = column["record_N"], column["target_N"]
+    band = f"below {misfit.below / 1e3:.3g} kHz"
+    if np.median(np.abs(record - target)) > VISIBLE * target.max():
+        above.plot(time, record / 1e3, color="0.6", linewidth=0.5, label="Record")
+    above.plot(
+        time, target / 1e3, color=COLORS[5], linewidth=2.8, alpha=0.6, label=f"Record {band}"
+    )
+    fit = column["model_N"] + column["background_N"]
+    above.plot(time, fit / 1e3, color=COLORS[1], linestyle="--", linewidth=1.1, label="Fit")
+    width = 2 * misfit.band_share * deviation
+    below.axhspan(-width, width, color=GREY, linewidth=0)
+    below.plot(time, column["residual_N"], color=COLORS[6], linewidth=0.7)
+    contact, touch = fitted.impact.contact_time, fitted.own_value(SHIFT, 0.0)
+    begin, end = touch - BEFORE * contact, touch + (1 + AFTER) * contact
+    below.set_xlim(1e3 * max(begin, misfit.time[0]), 1e3 * min(end, misfit.time[-1]))
+    below.set_xlabel("Time, ms")
+    above.set_ylabel(f"{FORCE_WORDS[misfit.kind].capitalize()}, kN")
+    below.set_ylabel("Fit − target, N")
+    limit = 1.1 * max(np.abs(column["residual_N"]).max(), width)
+    below.set_ylim(-limit, limit)
+    # Below, it would cover the curve.
+    above.fill_between([], [], color=GREY, linewidth=0, label=f"Noise {band}, ±2σ")
+    legend_above(above)
+
+
+def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: Axes) -> None:
+    """Draw levels with their uncertainty times a scale, and the residuals of all quantities."""
+    misfit = cast("LevelMisfit", fitted.misfit)
+    column = misfit.columns(fitted.impact, fitted.own)
+    residuals = misfit.residual(fitted.impact, fitted.own) / scale
+    names = [str(name).removesuffix(" Hz") for name in column["quantity"]]
+    values = {
+        name: np.array(column[name], dtype=np.float64)
+        for name in ("target", "uncertainty", "model")
+    }
+    x = np.arange(len(names))
+    count = sum(str(name).endswith(" Hz") for name in column["quantity"])
+    for i in range(count):
+        edge = values["target"][i] + scale * np.array([-1, 1]) * values["uncertainty"][i]
+        name = "Target" if i == 0 else None
+        band = "Standard deviation of the target" if i == 0 else None
+        above.fill_between([i - 0.35, i + 0.35], *edge, color="0.75", linewidth=0, label=band)
+        above.plot(
+            [i - 0.35, i + 0.35], 2 * [values["target"][i]], color=COLORS[0],
+            label=name,
+        )  # fmt: skip
+    above.plot(
+        x[:count], values["model"][:count], color=COLORS[1], linestyle="--", linewidth=1,
+        marker="o", markersize=4, label="Fit",
+    )  # fmt: skip
+    below.axhspan(-1, 1, color=GREY, linewidth=0)
+    below.plot(x, residuals, color=COLORS[1], marker="o", markersize=4, linestyle="none")
+    limit = 1.2 * max(1.2, np.abs(residuals).max())
+    below.set_ylim(-limit, limit)
+    below.set_xticks(x, [BROKEN.get(name, name) for name in names], fontsize="small")
+    below.xaxis.set_minor_locator(NullLocator())
+    below.set_xlim(-0.6, len(names) - 0.4)
+    if count > MAX_UPRIGHT:
+        below.tick_params(axis="x", labelrotation=90)
+    below.set_xlabel(f"{BAND_WORDS[misfit.bands]}, Hz")
+    above.set_ylabel(f"{LEVEL}\n({FORCE_WORDS[fitted.impact.assessed_force(misfit.kind)]})")
+    below.set_ylabel("(Fit − target)\n/ uncertainty")
+    legend_above(above)
+
+
+# More parameters have a table of correlations.
+MAX_PARAMETERS = 5
+# Characters of a label along all panels.
+LINE = 44
+
+
+@own_style()
+def confidence(fit: Fit, units: Mapping[str, tuple[str, float]]) -> Figure:
+    """Draw joint confidence regions of two or more parameters, or their correlations.
+
+    There is one panel for each pair; more than five parameters have a table of correlations. Units
+    are given by name and size in SI units.
+    """
+    count = len(fit.names)
+    known = np.isfinite(np.diag(fit.covariance)).all()
+    if count > MAX_PARAMETERS or not known:
+        return _draw_correlation(fit)
+    side = max(2.6, 0.95 * count + 0.6) if count > 2 else 2.6  # noqa: PLR2004 - a single pair
+    figure = new_figure(side)
+    panels = figure.subplots(count - 1, count - 1, sharex="col", sharey="row", squeeze=False)
+    for row in range(1, count):
+        for column in range(count - 1):
+            axes = panels[row - 1, column]
+            if column >= row:
+                axes.remove()
+                continue
+            _draw_pair(fit, axes, (column, row), units)
+    letters = LINE / (count - 1)
+    for row in range(1, count):
+        panels[row - 1, 0].set_ylabel(_label(fit.names[row], units, letters))
+    for column in range(count - 1):
+        panels[-1, column].set_xlabel(_label(fit.names[column], units, letters))
+    legend_above(panels[0, 0])
+    figure.align_labels()
+    return figure
+
+
+def _draw_pair(
+    fit: Fit, axes: Axes, pair: tuple[int, int], units: Mapping[str, tuple[str, float]]
+) -> None:
+    """Draw the joint confidence region of two parameters around their values."""
+    factor = np.array([units[fit.names[i]][1] for i in pair])
+    center = fit.estimate[list(pair)] / factor
+    block = fit.covariance[np.ix_(pair, pair)] / np.outer(factor, factor)
+    square = _squared_radius(fit)
+    _add_ellipse(axes, center, square * block, f"{100 * fit.confidence:g} % region of both")
+    axes.plot(
+        *center, color=COLORS[1], marker="+", markersize=6, linestyle="none", label="Estimate"
+    )
+    intervals = fit.intervals()
+    x, y = (
+        np.array(intervals[fit.names[i]]) / scale for i, scale in zip(pair, factor, strict=True)
+    )
+    look: dict[str, Any] = {"color": GREY, "alpha": 0.5, "linewidth": 0, "zorder": 0}
+    axes.axvspan(*x, label=f"{100 * fit.confidence:g} % interval of each", **look)
+    axes.axhspan(*y, **look)
+    half = 1.25 * np.sqrt(square * np.diag(block))
+    axes.set_xlim(center[0] - half[0], center[0] + half[0])
+    axes.set_ylim(center[1] - half[1], center[1] + half[1])
+    ticks = 4 if len(fit.names) == len(pair) else 2
+    axes.xaxis.set_major_locator(MaxNLocator(ticks))
+    axes.yaxis.set_major_locator(MaxNLocator(ticks + 1))
+    axes.ticklabel_format(useOffset=False)
+    share = fit.correlation[pair]
+    digits = 2 if abs(share) < 0.99 else 4  # noqa: PLR2004 - 1.00 would hide a difference
+    axes.set_title(f"Correlation {share:z.{digits}f}".replace("-", "−"))
+
+
+def _squared_radius(fit: Fit) -> float:
+    """Return the quantile of chi-square with 2 degrees of freedom, or twice that of Fisher's F."""
+    logarithm = np.log1p(-fit.confidence)
+    if fit.known_noise:
+        return float(-2 * logarithm)
+    freedom = fit.degrees_of_freedom
+    return float(freedom * np.expm1(-2 * logarithm / freedom))
+
+
+def _add_ellipse(
+    axes: Axes, center: NDArray[np.float64], block: NDArray[np.float64], label: str
+) -> None:
+    """Draw the ellipse (x - center) block^-1 (x - center) = 1."""
+    # In units of its deviations an ellipse has its axes on the diagonals: no loss of digits.
+    x, y = np.sqrt(np.diag(block))
+    angle = np.linspace(0, 2 * np.pi, 181)
+    share = block[0, 1] / (x * y)
+    axes.fill(
+        center[0] + x * np.cos(angle),
+        center[1] + y * (share * np.cos(angle) + np.sqrt(max(0, 1 - share**2)) * np.sin(angle)),
+        facecolor="none",
+        edgecolor=COLORS[0],
+        linewidth=1.2,
+        label=label,
+    )
+
+
+def _draw_correlation(fit: Fit) -> Figure:
+    """Draw the correlations of all parameters as a table of colors."""
+    figure = new_figure(WIDTH)
+    axes = figure.add_subplot()
+    shown = np.ma.masked_invalid(fit.correlation)
+    axes.set_facecolor(GREY)
+    axes.imshow(shown, cmap="RdBu_r", vmin=-1, vmax=1)
+    names = [name.replace("_", "\n") for name in fit.names]
+    axes.set_xticks(range(len(names)), names, fontsize="small", rotation=90)
+    axes.set_yticks(range(len(names)), names, fontsize="small")
+    for (row, column), value in np.ndenumerate(fit.correlation):
+        text = f"{value:z.2f}".replace("-", "−") if np.isfinite(value) else "not\nknown"
+        dark = np.isfinite(value) and abs(value) > 0.6  # noqa: PLR2004 - colors
+        axes.text(
+            column, row, text, ha="center", va="center", fontsize="small",
+            color="white" if dark else "black",
+        )  # fmt: skip
+    axes.set_title("Correlation")
+    return figure
+
+
+def _label(name: str, units: Mapping[str, tuple[str, float]], letters: float) -> str:
+    """Return a parameter with its unit, on two lines where it does not fit on one."""
+    unit = units[name][0]
+    text = humanize(name).capitalize()
+    if not unit:
+        return text
+    line = f"{text}, {unit}"
+    return line if len(line) <= letters else f"{text},\n{unit}"

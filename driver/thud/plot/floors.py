@@ -1,0 +1,235 @@
+"""Drops on mobile floors, mobilities and impedances of floors, modes of plates."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.ticker import FixedLocator, NullLocator
+
+from thud.base._schema import FloorOptions, Plate
+from thud.base.checks import refuse_value, require_kind, require_whole
+from thud.impact.mobility import mobility
+from thud.level.levels import BANDWIDTHS, get_bands, record_force
+from thud.plot.impacts import TIME_LABEL
+from thud.plot.style import (
+    COLORS,
+    LINES,
+    WIDTH,
+    add_curves,
+    band_axis,
+    empty_axes,
+    legend_above,
+    line_style,
+    marker_style,
+    new_figure,
+    own_style,
+    styled,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from thud.floors.impedance import BallImpedance
+    from thud.floors.mobility_fit import MobilityFit
+    from thud.impact.floor_impact import FloorImpact
+
+
+THIRDS = BANDWIDTHS[1]
+# Contact times that are drawn.
+_SHOWN = 1.5
+# Maximum number of mode shapes, and points along a side of the plate.
+MAX_SHAPES, POINTS = 30, 60
+# Frequencies per octave of the mobility: peaks of lightly damped floors are narrow.
+_DENSITY = 400
+
+
+@own_style()
+def draw_floor(impact: FloorImpact) -> Figure:
+    """Draw force and floor velocity, the change of the levels, the energy, and the mobility."""
+    figure = new_figure(6.4)
+    history, motion, change, energy, mobility = figure.subplots(5, 1)
+    _draw_histories(history, motion, impact)
+    x = np.arange(len(get_bands(THIRDS).nominal))
+    change.bar(x, impact.difference(THIRDS), color=COLORS[0], width=0.7)
+    change.axhline(0, color="black", linewidth=0.6)
+    change.set_ylabel("Contact −\nblocked, dB")
+    found = impact.injected_energy(THIRDS)
+    energy.set_yscale("log")
+    energy.plot(x, 1e3 * found.by_mobility, label="energy by the mobility", **line_style(0))
+    energy.plot(
+        x, 1e3 * found.by_motion, label="energy by the velocity", color=COLORS[1], marker="o",
+        markersize=3.5, linestyle="none",
+    )  # fmt: skip
+    energy.set_ylabel("Energy into\nthe floor, mJ")
+    energy.sharex(change)
+    change.tick_params(labelbottom=False)
+    band_axis(energy, found.frequency, THIRDS)
+    _draw_mobility(mobility, impact)
+    figure.align_ylabels()
+    legend_above(history, motion, energy, mobility)
+    return figure
+
+
+def _draw_histories(history: Axes, motion: Axes, impact: FloorImpact) -> None:
+    time = 1e3 * (impact.time - impact.touch_time)
+    shown = (time >= 0) & (time <= 1e3 * _SHOWN * impact.contact_time)
+    forces = {"blocked force": impact.blocked_force, "contact force": impact.floor_force}
+    for i, (name, force) in enumerate(forces.items()):
+        recorded = 1e-3 * record_force(force, impact.sample_rate)
+        history.plot(time[shown], recorded[shown], label=name, **line_style(i))
+    history.set_ylabel("Force, low-passed\nat 1.25 kHz, kN")
+    motion.plot(time[shown], 1e3 * impact.floor_velocity[shown], color=COLORS[2], linewidth=1)
+    motion.set_ylabel("Velocity of\nthe floor, mm/s")
+    motion.set_xlabel(TIME_LABEL)
+    motion.sharex(history)
+    history.tick_params(labelbottom=False)
+    history.margins(x=0)
+
+
+def _draw_mobility(axes: Axes, impact: FloorImpact) -> None:
+    bands = get_bands(THIRDS)
+    low, high = bands.lower[0], bands.upper[-1]
+    frequency = np.geomspace(low, high, int(_DENSITY * np.log2(high / low)))
+    found = impact.mobility(frequency)
+    axes.loglog(frequency, abs(found), label="|Y|", color="0.6", linewidth=0.8)
+    axes.loglog(frequency, found.real, label="Re Y", color=COLORS[3], linewidth=0.8)
+    axes.set_ylabel("Mobility Y,\nm/(N s)")
+    axes.set_xlabel("Frequency, Hz")
+    axes.set_xlim(low, high)
+    octaves = get_bands(BANDWIDTHS[0]).nominal
+    axes.set_xticks(octaves, [f"{octave:g}" for octave in octaves])
+    axes.xaxis.set_minor_locator(NullLocator())
+
+
+@own_style()
+def plate_modes(floor: Plate, count: int = 6, columns: int = 3) -> Figure:
+    """Draw the lowest mode shapes of a simply supported plate.
+
+    Parameters
+    ----------
+    floor
+        The plate.
+    count
+        Number of shapes.
+    columns
+        Shapes side by side.
+    """
+    # SciPy takes its time.
+    from thud.floors.modal_room import plate_frequencies
+
+    require_kind("floor", floor, Plate)
+    require_whole("count", count, 1, MAX_SHAPES)
+    require_whole("columns", columns, 1, MAX_SHAPES)
+    numbers = np.array([(m, n) for m in range(1, count + 1) for n in range(1, count + 1)])
+    frequency = plate_frequencies(floor, numbers)
+    lowest = np.argsort(frequency, kind="stable")[:count]
+    columns = min(columns, count)
+    rows = -(-count // columns)
+    side = WIDTH / columns
+    ratio = floor.width / floor.length
+    figure = new_figure(0.5 + rows * (side * ratio + 0.25), WIDTH)
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    x, y = np.linspace(0, floor.length, POINTS), np.linspace(0, floor.width, POINTS)
+    for axes in panels:
+        axes.set_axis_off()
+    for axes, mode in zip(panels, lowest, strict=False):
+        m, n = numbers[mode]
+        shape = np.outer(np.sin(n * np.pi * y / floor.width), np.sin(m * np.pi * x / floor.length))
+        drawn = axes.pcolormesh(x, y, shape, cmap="RdBu_r", vmin=-1, vmax=1, rasterized=True)
+        axes.set_aspect("equal")
+        axes.set_title(f"{frequency[mode]:.1f} Hz ({m}, {n})")
+    figure.colorbar(
+        drawn, ax=panels.tolist(), location="bottom", shrink=0.7, aspect=30,
+        label="Displacement relative to its maximum",
+    )  # fmt: skip
+    return figure
+
+
+@own_style()
+def floor_mobilities(floors: Mapping[str, FloorOptions]) -> Figure:
+    """Draw the magnitudes of the mobilities of floors, by name, against frequency."""
+    if not floors:
+        refuse_value("floors", floors, "a mapping of names to floors")
+    for name, floor in floors.items():
+        require_kind(name, floor, FloorOptions)
+    figure, axes = empty_axes(3.0)
+    frequency = np.geomspace(11.0, 1400.0, 1500)
+    add_curves(
+        axes,
+        {name: (frequency, np.abs(mobility(floor, frequency))) for name, floor in floors.items()},
+    )
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    marks = [16, 31.5, 63, 125, 250, 500, 1000]
+    axes.set_xticks(marks, [f"{mark:g}" for mark in marks])
+    axes.minorticks_off()
+    axes.set_xlabel("Frequency, Hz")
+    axes.set_ylabel("Mobility, m/(N s)")
+    legend_above(axes)
+    return figure
+
+
+@own_style()
+def mobility_fit(found: MobilityFit) -> Figure:
+    """Draw magnitude and phase of measurement and fit against frequency."""
+    figure = new_figure(3.6)
+    upper, lower = figure.subplots(2, sharex=True)
+    lines = np.geomspace(found.frequency[0], found.frequency[-1], 2000)
+    fitted = found.mobility(lines)
+    upper.loglog(
+        found.frequency, abs(found.measured), ".", color="0.55", markersize=2.5, label="measured"
+    )
+    upper.loglog(
+        lines, abs(fitted), color=COLORS[0],
+        label=f"fitted: relative error {100 * found.error:.2g} %",
+    )  # fmt: skip
+    lower.semilogx(
+        found.frequency, np.degrees(np.angle(found.measured)), ".", color="0.55", markersize=2.5
+    )
+    lower.semilogx(lines, np.degrees(np.angle(fitted)), color=COLORS[0])
+    upper.set_ylabel("Mobility, m/(N s)")
+    lower.set_ylabel("Phase, degrees")
+    lower.set_yticks([-90, 0, 90])
+    lower.set_xlabel("Frequency, Hz")
+    legend_above(upper)
+    return figure
+
+
+# Frequencies of the impedances of the floors, Hz.
+_FREQUENCIES = np.geomspace(22.0, 720.0, 1000)
+
+
+@own_style()
+def ball_impedances(
+    sources: Mapping[str, BallImpedance], floors: Mapping[str, FloorOptions]
+) -> Figure:
+    """Draw the impedances of sources, filled markers, and of floors, lines.
+
+    Floors below the open markers change the level of the force by more than 1 dB.
+    """
+    figure, axes = empty_axes(3.0)
+    for i, (name, floor) in enumerate(floors.items()):
+        axes.loglog(
+            _FREQUENCIES, 1 / np.abs(mobility(floor, _FREQUENCIES)), label=name, linewidth=0.8,
+            color=COLORS[i % len(COLORS)], linestyle=styled(i, LINES),
+        )  # fmt: skip
+    frequency = np.array([])
+    for i, (name, source) in enumerate(sources.items()):
+        frequency = source.frequency
+        # Markers side by side where sources agree.
+        x = frequency * 1.05 ** (i - (len(sources) - 1) / 2)
+        style = {"color": "black", "linestyle": "none", **marker_style(i)}
+        words = f", {name}" if name else ""
+        axes.loglog(x, np.abs(source.impedance), label=f"source{words}", **style)
+        axes.loglog(x, source.limit(), fillstyle="none", label=f"limit of 1 dB{words}", **style)
+    axes.xaxis.set_major_locator(FixedLocator(frequency.tolist()))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.set_xticklabels([f"{f:g}" for f in frequency])
+    axes.set_xlabel("Frequency, Hz")
+    axes.set_ylabel("Impedance, N s/m")
+    legend_above(axes)
+    return figure

@@ -1,0 +1,233 @@
+"""Forces and levels of impacts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.base._schema import (
+    BandSet,
+    LevelsForce,
+    LevelsMethod,
+    Limits,
+    LimitsSource,
+)
+from thud.base.checks import refuse
+from thud.level.assessment import octave_limits
+from thud.level.levels import record_force
+from thud.plot.style import (
+    empty_axes,
+    escape_label,
+    force_words,
+    iterate_curves,
+    legend_above,
+    level_label,
+    line_style,
+    marker_style,
+    new_figure,
+    octave_axis,
+    octave_boxes,
+    own_style,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from thud.impact.impact import Impact
+    from thud.plot.style import Curve
+
+# Fraction of the maximum force that a contact exceeds.
+NOISE = 0.01
+# Time that is drawn before and after the contact, as fraction of it.
+MARGIN = 0.04
+TIME_LABEL = "Time since first touch, ms"
+
+
+@own_style()
+def force_history(impacts: Mapping[str, Impact], force: LevelsForce | None = None) -> Figure:
+    """Draw forces against time, low-passed at 1.25 kHz like a force plate (paper, figure 2).
+
+    Parameters
+    ----------
+    impacts
+        Impacts by their names in the legend.
+    force
+        ``"floor"`` or ``"elastic"`` (the paper's ball force); by default that of each case.
+
+    Returns
+    -------
+    Figure
+        Time from first touch to last release in ms, force in kN.
+    """
+    figure, axes = empty_axes(2.6)
+    draw_forces(axes, impacts, force)
+    legend_above(axes)
+    return figure
+
+
+def draw_forces(axes: Axes, impacts: Mapping[str, Curve], force: LevelsForce | None) -> None:
+    """Draw forces against time."""
+    for i, (name, impact, kind) in enumerate(iterate_curves(impacts, force)):
+        axes.plot(*contact_force(impact, kind), label=escape_label(name), **line_style(i))
+    axes.margins(x=0)
+    # A number of ticks that depends on the layout would change it in turn.
+    axes.locator_params(axis="y", nbins=8)
+    axes.set_xlabel(TIME_LABEL)
+    axes.set_ylabel(force_label(impacts, force))
+
+
+def contact_force(
+    impact: Curve, kind: LevelsForce
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return time since first touch, ms, and low-passed force, kN, during contact.
+
+    Force plates record no more (paper, section 3); above it, meshes and modes ring.
+    """
+    time = impact.time - impact.touch_time
+    recorded = record_force(impact.force(kind), impact.sample_rate)
+    end = time[recorded > NOISE * recorded.max()][-1]
+    shown = (time >= -MARGIN * end) & (time <= (1 + MARGIN) * end)
+    return 1e3 * time[shown], 1e-3 * recorded[shown]
+
+
+def force_label(impacts: Mapping[str, Curve], force: LevelsForce | None) -> str:
+    """Return the label of an axis of forces."""
+    return f"{force_words(impacts, force).capitalize()},\nlow-passed at 1.25 kHz, kN"
+
+
+@own_style()
+def levels(
+    impacts: Mapping[str, Impact],
+    force: LevelsForce | None = None,
+    source: LimitsSource | None = None,
+    method: LevelsMethod | None = None,
+) -> Figure:
+    """Draw octave levels over the tolerance band of the standards (paper, figure 3).
+
+    One-third-octave bands, which have no limits, are drawn below if a case asks for them.
+
+    Parameters
+    ----------
+    impacts
+        Impacts by their names in the legend.
+    force
+        ``"floor"`` or ``"elastic"`` (the paper's ball force); by default that of each case.
+    source
+        ``"rubber_ball"`` or ``"tyre"``: of the tolerance band; by default that of the cases.
+    method
+        ``"exact"`` or ``"fft"``; by default that of each case.
+
+    Returns
+    -------
+    Figure
+        Bands in Hz, force exposure level in dB re 1 N.
+    """
+    curves = list(iterate_curves(impacts, force))
+    asked = {impact.case.levels.bands for _, impact, _ in curves}
+    bands: list[BandSet] = ["octave"] if asked == {"octave"} else ["octave", "third"]
+    figure = new_figure(0.4 + 2.5 * len(bands))
+    panels = dict(zip(bands, figure.subplots(len(bands), 1, squeeze=False)[:, 0], strict=True))
+    draw_levels(panels, impacts, force, common_source(impacts, source), method)
+    for axes in panels.values():
+        axes.set_ylabel(level_label(impacts, force))
+    legend_above(panels["octave"])
+    return figure
+
+
+def draw_levels(
+    panels: Mapping[BandSet, Axes],
+    impacts: Mapping[str, Curve],
+    force: LevelsForce | None,
+    source: LimitsSource,
+    method: LevelsMethod | None = None,
+) -> None:
+    """Draw levels in the axes of their bands; those of the octaves have the tolerance band."""
+    draw_tolerance(panels["octave"], *octave_limits(source), source.replace("_", " "))
+    # Markers side by side: equal levels stay distinguishable.
+    step = min(0.1, 0.6 / len(impacts))
+    for bands, axes in panels.items():
+        for i, (name, impact, kind) in enumerate(iterate_curves(impacts, force)):
+            values = impact.levels(bands, method, kind)
+            x = np.arange(len(values)) + step * (i - (len(impacts) - 1) / 2)
+            axes.plot(x, values, label=escape_label(name), **line_style(i), **marker_style(i))
+        octave_axis(axes, bands)
+
+
+def common_source(impacts: Mapping[str, Curve], source: LimitsSource | None = None) -> LimitsSource:
+    """Return a source of limits, or without it that of the cases and recordings.
+
+    The default source of a recording was not stated: it counts only if no other does.
+
+    Raises
+    ------
+    InputError
+        Where they differ in it.
+    """
+    if source is not None:
+        return source
+    stated = (impact.limits_source for impact in impacts.values())
+    sources = {one for one in stated if one}
+    if len(sources) > 1:
+        what = f"&limits: source differs ({', '.join(sorted(sources))})"
+        refuse(what, "cases and recordings with one source, or the choice of one")
+    return sources.pop() if sources else Limits.source
+
+
+def draw_tolerance(
+    axes: Axes, lower: NDArray[np.float64], upper: NDArray[np.float64], name: str
+) -> None:
+    """Draw the range of each octave as a grey box with its nominal value."""
+    octave_boxes(axes, lower, upper, f"Tolerance, {name}")
+    i = np.arange(len(lower))
+    axes.hlines((lower + upper) / 2, i - 0.4, i + 0.4, color="0.45", linewidth=0.8, label="Nominal")
+
+
+@own_style()
+def level_changes(
+    reference: Impact, impacts: Mapping[str, Impact], force: LevelsForce | None = None
+) -> Figure:
+    """Draw how octave levels change against a reference.
+
+    Parameters
+    ----------
+    reference
+        The impact that the others are compared with.
+    impacts
+        Impacts by their names in the legend.
+    force
+        ``"floor"`` or ``"elastic"``; by default that of each case.
+
+    Returns
+    -------
+    Figure
+        Octave bands in Hz, change of the force exposure level in dB.
+    """
+    figure, axes = empty_axes(2.8)
+    axes.axhline(0, color="0.45", linewidth=0.8)
+    for i, (name, impact, kind) in enumerate(iterate_curves(impacts, force)):
+        change = impact.levels(force=kind) - reference.levels(force=kind)
+        x = np.arange(len(change))
+        axes.plot(x, change, label=escape_label(name), **line_style(i), **marker_style(i))
+    octave_axis(axes)
+    axes.set_ylabel(level_label(impacts, force, "Change of the level, dB"))
+    legend_above(axes)
+    return figure
+
+
+@own_style()
+def overview(impact: Impact) -> Figure:
+    """Draw the assessed force and its octave levels."""
+    name = impact.case.model.name.replace("_", " ") if impact.case.model else ""
+    named = {name: impact}
+    figure = new_figure(5)
+    history, octaves = figure.subplots(2, 1)
+    draw_forces(history, named, None)
+    draw_levels({"octave": octaves}, named, None, impact.limits_source)
+    octaves.set_ylabel(level_label(named, None))
+    legend_above(octaves)
+    return figure

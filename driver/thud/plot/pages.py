@@ -1,0 +1,375 @@
+"""Pages of comparisons: a figure with a table, and the same as an interactive HTML file."""
+
+from __future__ import annotations
+
+import html
+import json
+from string import Template
+from textwrap import fill, wrap
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
+from plotly.offline import get_plotlyjs
+
+from thud.base._schema import CLASS_LIMITS
+from thud.level.assessment import octave_limits
+from thud.level.levels import get_bands
+from thud.plot.impacts import TIME_LABEL, contact_force, draw_forces, draw_levels, force_label
+from thud.plot.style import (
+    BAND_WORDS,
+    COLORS,
+    LEVEL,
+    WIDTH,
+    band_axis,
+    escape_label,
+    iterate_curves,
+    legend_above,
+    level_label,
+    line_style,
+    marker_style,
+    new_figure,
+    own_style,
+    styled,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.gridspec import GridSpec
+    from numpy.typing import NDArray
+
+    from thud.base._schema import BandSet, LevelsForce, LimitsSource
+    from thud.floors.floor_comparison import FloorComparison
+    from thud.floors.prediction import RoomPrediction
+    from thud.level.impact_result import ImpactResult
+
+
+# Line styles and markers of `thud.plot.style` by the names of plotly.
+_DASHES = ("solid", "dash", "dashdot", "dot", "longdashdot", "2px,2px", "longdash")
+_SYMBOLS = ("circle", "square", "triangle-up", "diamond", "triangle-down", "cross", "x")
+# Maximum number of letters of a line of a legend.
+_LINE = 30
+
+
+def html_page(
+    title: str, text: str, table: Sequence[Sequence[str]], plots: Sequence[dict[str, Any]]
+) -> str:
+    """Return a page: title, text, table (its head first), and plots, the first of full width.
+
+    A click on the legend of the first plot hides the curve of the same number in all of them.
+    """
+    head, *body = table
+    return _PAGE.substitute(
+        title=html.escape(title),
+        text=html.escape(text),
+        head=_row(head, "th"),
+        rows="\n".join(_row(row, "td") for row in body),
+        places="".join(f'<div id="plot{i}"></div>' for i in range(len(plots))),
+        count=len(plots[0]["data"]),
+        plots=json.dumps(plots),
+        plotly=get_plotlyjs(),
+    )
+
+
+def curve_look(i: int, label: str) -> dict[str, Any]:
+    """Return name, line and marker of a curve by its number."""
+    return {
+        "name": "<br>".join(html.escape(line) for line in wrap(label, _LINE)),
+        "line": {"color": COLORS[i % len(COLORS)], "dash": styled(i, _DASHES)},
+        "marker": {"symbol": styled(i, _SYMBOLS), "size": 8},
+    }
+
+
+def curve_points(x: Iterable[Any], y: Iterable[float]) -> dict[str, list[Any]]:
+    """Return a curve, its values with as many digits as can be seen."""
+    return {"x": list(x), "y": [float(f"{value:.6g}") + 0.0 for value in y]}
+
+
+def plot_layout(x: str, y: str, kind: str = "linear", scale: str = "linear") -> dict[str, Any]:
+    """Return labels and x of the axes; the page has the colors."""
+    return {
+        "xaxis": {"title": {"text": x}, "type": kind, "zeroline": False, "automargin": True},
+        "yaxis": {
+            "title": {"text": y.replace("\n", "<br>")},
+            "type": scale,
+            "zeroline": False,
+            "automargin": True,
+        },
+        "legend": {"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom"},
+        "margin": {"l": 10, "r": 10, "t": 30, "b": 10},
+        "font": {"family": "sans-serif", "size": 14},
+        "paper_bgcolor": "rgba(0,0,0,0)",
+        "plot_bgcolor": "rgba(0,0,0,0)",
+    }
+
+
+def _row(cells: Sequence[str], tag: str) -> str:
+    """Return a row of the table."""
+    return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
+
+
+# Styles that plotly writes into the plots give way to the colors of the page.
+_PAGE = Template("""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>thud: $title</title>
+<style>
+:root { color-scheme: light dark; --text: #1a1a1a; --page: #ffffff; --line: #dddddd;
+  --band: #cccccc; }
+@media (prefers-color-scheme: dark) {
+  :root { --text: #e8e8e8; --page: #17191c; --line: #3a3d42;
+    --band: #55595f; }
+}
+body { font-family: sans-serif; margin: 1.5em auto; max-width: 80em; padding: 0 0.8em;
+  color: var(--text); background: var(--page); }
+h1 { font-size: 1.5em; }
+.table { overflow-x: auto; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
+th, td { padding: 0.3em 0.8em; text-align: right; border-bottom: 1px solid var(--line); }
+th { vertical-align: bottom; max-width: 12em; overflow-wrap: break-word; }
+td { white-space: nowrap; }
+th:first-child, td:first-child { text-align: left; position: sticky; left: 0;
+  background: var(--page); padding-left: 0; }
+.plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 28em), 1fr));
+  gap: 1em; margin-top: 1.5em; }
+.plots div:first-child { grid-column: 1 / -1; }
+.plots > div { height: 27em; min-width: 0; }
+@media (max-width: 60em) {
+  .plots > div:first-child { height: calc(24em + 2em * $count); }
+}
+.plots text:not(.hoverlayer *) { fill: var(--text) !important; }
+.plots .gridlayer path { stroke: var(--line) !important; }
+.plots [style*="fill: rgb(187, 187, 187)"] { fill: var(--band) !important; }
+.plots [style*="stroke: rgb(0, 0, 0)"] { stroke: var(--text) !important; }
+.plots .points [style*="fill: rgb(0, 0, 0)"] { fill: var(--text) !important; }
+</style>
+<script>$plotly</script>
+</head>
+<body>
+<h1>$title</h1>
+<p>$text</p>
+<div class="table"><table>
+<thead>$head</thead>
+<tbody>
+$rows
+</tbody>
+</table></div>
+<div class="plots">$places</div>
+<script>
+const options = {responsive: true, displayModeBar: false};
+$plots.forEach((plot, i) => Plotly.newPlot(`plot$${i}`, plot.data, plot.layout, options));
+document.getElementById("plot0").on("plotly_restyle", ([change, curves]) => {
+  for (const other of document.querySelectorAll(".plots > div:not(#plot0)")) {
+    Plotly.restyle(other, change, curves);
+  }
+});
+</script>
+</body>
+</html>
+""")
+
+
+# Maximum number of characters of a name in one line of a table.
+_COLUMN = 20
+# Space around the text of a cell, and left of all axes, inch.
+_CELL_MARGIN = (0.12, 0.08)
+_AXIS = 0.8
+
+
+@own_style()
+def comparison_page(
+    impacts: Mapping[str, ImpactResult],
+    force: LevelsForce | None,
+    source: LimitsSource,
+    table: Sequence[Sequence[str]],
+) -> Figure:
+    """Draw forces, octave and third-octave levels of several impacts, and a table, on one page.
+
+    The table is rows of text, first the head; the tolerance band is that of the source. Other
+    arguments are those of `thud.compare`.
+    """
+    figure = new_figure(5.8, 2 * WIDTH)
+    grid = figure.add_gridspec(3, 2)
+    draw_forces(figure.add_subplot(grid[0, :]), impacts, force)
+    octaves = figure.add_subplot(grid[1, 0])
+    thirds = figure.add_subplot(grid[1, 1], sharey=octaves)
+    draw_levels({"octave": octaves, "third": thirds}, impacts, force, source)
+    octaves.set_ylabel(level_label(impacts, force))
+    legend_above(octaves)
+    head, *body = table
+    _add_table(figure, grid, [[fill(name, _COLUMN) for name in head], *body])
+    return figure
+
+
+def _add_table(figure: Figure, grid: GridSpec, rows: Sequence[Sequence[str]]) -> None:
+    """Add a table in the last row of a figure, which becomes as wide and high as it needs."""
+    axes = figure.add_subplot(grid[-1, :])
+    axes.set_axis_off()
+    cells = [[escape_label(cell) for cell in row] for row in rows]
+    table = axes.table(cells, bbox=Bbox.unit(), edges="horizontal")
+    table.auto_set_font_size(value=False)
+    table.set_fontsize(mpl.rcParams["legend.fontsize"])
+    widths, heights = np.zeros(len(cells[0])), np.zeros(len(cells))
+    for (row, column), cell in table.get_celld().items():
+        size = np.array(cell.get_text().get_window_extent().size) / figure.dpi + _CELL_MARGIN
+        widths[column], heights[row] = np.maximum((widths[column], heights[row]), size)
+    for (row, column), cell in table.get_celld().items():
+        cell.set(width=widths[column], height=heights[row], linewidth=0.5)
+        cell.set_text_props(ha="right" if column else "left")
+    above, rest = figure.get_figheight(), grid.nrows - 1
+    grid.set_height_ratios([*([above / rest] * rest), heights.sum()])
+    width = widths.sum() + _AXIS
+    figure.set_size_inches(max(figure.get_figwidth(), width), above + heights.sum())
+
+
+def comparison_html(
+    impacts: Mapping[str, ImpactResult],
+    force: LevelsForce | None,
+    source: LimitsSource,
+    table: Sequence[Sequence[str]],
+) -> str:
+    """Return the page of `comparison_page` with interactive plots, readable on any screen."""
+    forces: list[dict[str, Any]] = []
+    levels: dict[BandSet, list[dict[str, Any]]] = {"octave": [], "third": []}
+    for i, (label, impact, kind) in enumerate(iterate_curves(impacts, force)):
+        look = curve_look(i, label)
+        time, newton = contact_force(impact, kind)
+        forces.append({**look, "mode": "lines", **curve_points(time, newton), "showlegend": True})
+        for bands, traces in levels.items():
+            found = curve_points(_names(bands), impact.levels(bands, force=kind))
+            traces.append({**look, "mode": "lines+markers", **found, "showlegend": False})
+    levels["octave"].append(_tolerance(source))
+    level = level_label(impacts, force)
+    plots = [
+        {"data": forces, "layout": plot_layout(TIME_LABEL, force_label(impacts, force))},
+        *(
+            {"data": traces, "layout": plot_layout(f"{BAND_WORDS[bands]}, Hz", level, "category")}
+            for bands, traces in levels.items()
+        ),
+    ]
+    return html_page(
+        "Comparison of models and recordings",
+        "Forces as force plates record them, low-passed at 1.25 kHz, and their levels; grey boxes "
+        "are the tolerances of the standards, which one-third-octave bands do not have.",
+        table,
+        plots,
+    )
+
+
+def _names(bands: BandSet) -> list[str]:
+    return [f"{frequency:g}" for frequency in get_bands(bands).nominal]
+
+
+def _tolerance(source: LimitsSource) -> dict[str, Any]:
+    """Return the range of each octave as a grey box."""
+    lower, upper = octave_limits(source)
+    return {
+        "type": "bar",
+        "name": f"Tolerance, {source.replace('_', ' ')}",
+        "x": _names("octave"),
+        "y": (upper - lower).tolist(),
+        "base": lower.tolist(),
+        "hovertext": [f"{low:g} to {high:g} dB" for low, high in zip(lower, upper, strict=True)],
+        "hoverinfo": "name+text",
+        "marker": {"color": "#bbbbbb"},
+        "showlegend": True,
+    }
+
+
+# Labels of the steps of the chain, and whether their axes are logarithmic.
+_STEPS = {
+    LEVEL: False,
+    "Energy into the floor, J": True,
+    "Radiated share of the losses, %": False,
+    "Maximum Fast level, dB re 20 µPa": False,
+}
+
+
+@own_style()
+def draw_floors(found: FloorComparison) -> Figure:
+    """Draw the chain of each floor as spectra, its levels beside the classes, and the table."""
+    figure = new_figure(7.2, 2 * WIDTH)
+    grid = figure.add_gridspec(4, 2)
+    panels = [figure.add_subplot(grid[i, j]) for i in range(2) for j in range(2)]
+    for number, (name, one) in enumerate(found.predictions.items()):
+        for axes, values in zip(panels, _chain(one), strict=True):
+            axes.plot(
+                np.arange(len(values)), values, label=escape_label(name), **line_style(number),
+                **marker_style(number, 3.5),
+            )  # fmt: skip
+    nominal = next(iter(found.predictions.values())).frequency
+    for axes, (label, logarithmic) in zip(panels, _STEPS.items(), strict=True):
+        band_axis(axes, nominal, "third")
+        axes.set_ylabel(label)
+        if logarithmic:
+            axes.set_yscale("log")
+    _draw_classes(figure.add_subplot(grid[2, :]), found)
+    legend_above(panels[0])
+    _add_table(figure, grid, found.rows())
+    return figure
+
+
+def floors_html(found: FloorComparison) -> str:
+    """Return the page of `draw_floors` with interactive plots."""
+    traces: list[list[dict[str, Any]]] = [[] for _ in _STEPS]
+    for number, (name, one) in enumerate(found.predictions.items()):
+        look = curve_look(number, name)
+        names = [f"{frequency:g}" for frequency in one.frequency]
+        for step, values in zip(traces, _chain(one), strict=True):
+            points = curve_points(names, values)
+            step.append(
+                {**look, "mode": "lines+markers", **points, "showlegend": step is traces[-1]}
+            )
+    plots = [
+        {
+            "data": data,
+            "layout": plot_layout(
+                f"{BAND_WORDS['third']}, Hz", label, "category", "log" if logarithmic else "linear"
+            ),
+        }
+        for data, (label, logarithmic) in zip(traces, _STEPS.items(), strict=True)
+    ]
+    text = (
+        "Levels in the room below, and the chain that leads to them: force, energy, floor, room. "
+        "Statistical means over positions, floors and rooms: see the warnings of each prediction."
+    )
+    # The level in the room, of full width, comes first.
+    return html_page("Comparison of floors", text, found.rows(), [plots[-1], *plots[:-1]])
+
+
+def _chain(one: RoomPrediction) -> tuple[NDArray[np.float64], ...]:
+    """Return what is drawn of a prediction, in the order of the steps."""
+    force = 10 * np.log10(one.energy / one.conductance)
+    return force, one.energy, 100 * one.radiated_share, one.level
+
+
+def _draw_classes(axes: Axes, found: FloorComparison) -> None:
+    """Draw the single numbers beside the maximum levels of the Korean classes."""
+    x = np.arange(len(found.predictions))
+    room = [one.octave_rating.a_weighted for one in found.predictions.values()]
+    after = [one.standardised_rating.a_weighted for one in found.predictions.values()]
+    axes.bar(
+        x - 0.2, room, 0.36, color=COLORS[5], edgecolor="black", linewidth=0.5,
+        label="in the room, of octaves",
+    )  # fmt: skip
+    axes.bar(
+        x + 0.2, after, 0.36, color="white", edgecolor="black", linewidth=0.5,
+        hatch="//////", label="standardized, of one-third-octave bands",
+    )  # fmt: skip
+    for number, limit in enumerate(CLASS_LIMITS, 1):
+        axes.axhline(limit, color=COLORS[1], linewidth=0.8, linestyle="--")
+        axes.annotate(
+            f"class {number}", (1, limit), xycoords=("axes fraction", "data"), ha="left",
+            va="center", fontsize="x-small", color=COLORS[1],
+        )  # fmt: skip
+    axes.set_xticks(x, [escape_label(name) for name in found.predictions], rotation=20)
+    axes.set_ylabel("L_iA,Fmax, dB")
+    axes.set_ylim(bottom=min([CLASS_LIMITS[0], *room, *after]) - 5)
+    axes.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))

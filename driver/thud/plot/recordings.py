@@ -1,0 +1,169 @@
+"""Forces and levels of a recording: every drop, their average, limits (paper, figures 2 and 3)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from thud.base.checks import require_choice
+from thud.level.levels import BANDWIDTHS, record_force
+from thud.plot.impacts import MARGIN, TIME_LABEL, draw_tolerance
+from thud.plot.style import COLORS, GREY, empty_axes, legend_above, octave_axis, own_style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from thud.base._schema import BandSet
+    from thud.recordings.measured_drop import Drop
+    from thud.recordings.recording import Recording
+
+
+# Height without the legend, inch: two of them stand side by side on a report.
+HEIGHT = 2.15
+# Maximum number of drops that have a line each; of more, their range is filled.
+MAX_LINES = 40
+# Force on both sides of the times that are drawn, s: more than its low-pass spreads.
+ROOM = 2e-2
+# Points of a force.
+POINTS = 400
+# Backgrounds further below the lowest level than this, dB, are not drawn: they change nothing.
+DEEPEST = 20.0
+THIN: dict[str, Any] = {"color": "0.55", "linewidth": 0.5}
+DEVIANT: dict[str, Any] = {"color": COLORS[1], "linewidth": 0.7, "linestyle": (0, (3, 1))}
+AVERAGE: dict[str, Any] = {"color": COLORS[0], "linewidth": 1.4}
+BARS: dict[str, Any] = {
+    "color": COLORS[0], "linestyle": "none", "capsize": 2.5, "elinewidth": 0.9, "capthick": 0.9,
+}  # fmt: skip
+
+
+@own_style()
+def recording_forces(recording: Recording) -> Figure:
+    """Draw the force of every drop, low-passed at 1.25 kHz, and their average, against time.
+
+    The contact time has its limits and the bar of its expanded uncertainty (95 %).
+    """
+    figure, axes = empty_axes(HEIGHT)
+    limits = next(d for d in recording.assess().criteria if d.name == "contact_time")
+    longest = max(drop.contact_time.value for drop in recording.drops)
+    longest = max(longest, recording.contact_time, limits.upper if limits.upper < 1 else 0)
+    time = longest * np.linspace(-MARGIN, 1 + MARGIN, POINTS)
+    forces = 1e-3 * np.array([_recorded(drop, time) for drop in recording.drops])
+    allowed = f"permitted contact time, {1e3 * limits.lower:g} to {1e3 * limits.upper:g} ms"
+    axes.axvspan(1e3 * limits.lower, 1e3 * limits.upper, color=GREY, linewidth=0, label=allowed)
+    _draw_drops(axes, 1e3 * time, forces, recording)
+    if len(forces) > 1:
+        axes.plot(1e3 * time, forces.mean(axis=0), label="average", **AVERAGE)
+    axes.errorbar(
+        1e3 * limits.value, 0, xerr=_bar(limits.estimate.expanded, 1e3), label="contact time",
+        marker="o", markersize=2.5, **BARS,
+    )  # fmt: skip
+    axes.set_xlim(1e3 * time[0], 1e3 * time[-1])
+    axes.set_xlabel(TIME_LABEL)
+    axes.set_ylabel("Force on the floor,\nlow-passed at 1.25 kHz, kN")
+    legend_above(axes)
+    return figure
+
+
+def _recorded(drop: Drop, time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the force of a drop, low-passed at 1.25 kHz, N, at times since first touch, s."""
+    ends = ((np.array([time[0] - ROOM, time[-1] + ROOM]) - drop.begin) * drop.sample_rate).astype(
+        int
+    )
+    first, stop = np.clip(ends, 0, len(drop.force))
+    force = record_force(drop.force[first:stop], drop.sample_rate)
+    return np.interp(time, drop.time[first:stop], force)
+
+
+@own_style()
+def recording_figure(recording: Recording, what: str = "levels") -> Figure:
+    """Draw the ``"levels"`` or the ``"force"`` of a recording."""
+    require_choice("what", what, ("levels", "force"))
+    return recording_levels(recording) if what == "levels" else recording_forces(recording)
+
+
+@own_style()
+def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
+    """Draw the levels of every drop, their average with its expanded uncertainty, the background.
+
+    Octaves have the tolerances of the verdict.
+
+    Parameters
+    ----------
+    recording
+        The recording.
+    bands
+        ``"octave"`` or ``"third"``.
+    """
+    average = recording.average(bands)
+    figure, axes = empty_axes(HEIGHT)
+    if bands == BANDWIDTHS[0]:
+        verdict = recording.assess()
+        octaves = verdict.criteria[: len(average.level)]
+        own = any(one.name in recording.config.limits for one in octaves)
+        draw_tolerance(
+            axes,
+            np.array([one.lower for one in octaves]),
+            np.array([one.upper for one in octaves]),
+            verdict.source.replace("_", " ") + ", own limits" * own,
+        )
+    x = np.arange(len(average.level), dtype=float)
+    _draw_drops(axes, x, average.drops, recording)
+    expanded = np.array([one.expanded for one in recording.level_estimates(bands)])
+    mark = "average, 95 %" if len(average.drops) > 1 else "drop, 95 %"
+    axes.errorbar(
+        x, average.level, yerr=_bar(expanded), label=mark, marker="o", markersize=3, **BARS,
+    )  # fmt: skip
+    bounds = average.flag == "background"
+    if bounds.any():
+        axes.plot(
+            x[bounds], average.level[bounds], label="upper bound", linestyle="none", marker="v",
+            markersize=6, markerfacecolor="white", color=COLORS[0], zorder=3,
+        )  # fmt: skip
+    lowest = np.nanmin(average.level) if np.isfinite(average.level).any() else 0.0
+    near = np.where(average.background > lowest - DEEPEST, average.background, np.nan)
+    axes.plot(
+        x, near, label=_background_label(average.background, near), color="black",
+        linewidth=0.8, linestyle=":", marker="_", markersize=7,
+    )  # fmt: skip
+    octave_axis(axes, bands)
+    axes.set_ylabel("Force exposure level\n(force on the floor), dB")
+    legend_above(axes)
+    return figure
+
+
+def _background_label(background: NDArray[np.float64], drawn: NDArray[np.float64]) -> str:
+    """Return the label of the background, which says how high it is where it is not drawn."""
+    if np.isfinite(drawn).any() or not np.isfinite(background).any():
+        return "background"
+    return f"background, up to {np.nanmax(background):.0f} dB".replace("-", "−")
+
+
+def _draw_drops(
+    axes: Axes, x: NDArray[np.float64], curves: NDArray[np.float64], recording: Recording
+) -> None:
+    """Draw the curves of the drops, shape (n_drop, n), or their range; outliers in their style."""
+    deviant = {outlier.name for outlier in recording.outliers}
+    marked = np.array([drop.name in deviant for drop in recording.drops])
+    count = len(curves)
+    if count > MAX_LINES:
+        # A band without a level is NaN in all drops.
+        axes.fill_between(
+            x, curves.min(axis=0), curves.max(axis=0), color="0.6", linewidth=0,
+            label=f"range of {count} drops",
+        )  # fmt: skip
+    else:
+        name = f"{count} drops" if count > 1 else "drop"
+        for i, curve in enumerate(curves[~marked]):
+            axes.plot(x, curve, label=name if i == 0 else None, **THIN)
+    for i, curve in enumerate(curves[marked]):
+        number = int(marked.sum())
+        name = "outlier" if number == 1 else f"{number} outliers"
+        axes.plot(x, curve, label=name if i == 0 else None, **DEVIANT)
+
+
+def _bar(expanded: NDArray[np.float64] | float, unit: float = 1.0) -> NDArray[np.float64]:
+    """Return the length of an error bar; none where the uncertainty is not known."""
+    return np.nan_to_num(unit * np.asarray(expanded, dtype=np.float64))

@@ -1,0 +1,168 @@
+"""Levels in the room below: measured, predicted, at single positions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.base._schema import Plate
+from thud.plot.style import (
+    COLORS,
+    GREY,
+    WIDTH,
+    band_axis,
+    empty_axes,
+    legend_above,
+    line_style,
+    new_figure,
+    own_style,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from thud.floors.modal_room import ModalRoom
+    from thud.floors.prediction import RoomPrediction
+    from thud.floors.survey import RoomLevels
+
+# Range of a decay below the lowest maximum, dB.
+DECAY = 30
+
+
+@own_style()
+def room_levels(found: RoomLevels) -> Figure:
+    """Draw levels in a room against their bands."""
+    figure, axes = empty_axes(2.6)
+    x = np.arange(len(found.frequency))
+    if len(found.positions) > 1:
+        for i, levels in enumerate(found.positions):
+            label = "positions" if i == 0 else None
+            axes.plot(x, levels, color="0.65", linewidth=0.6, label=label)
+    number = found.rating.rounded
+    axes.plot(
+        x, found.level, color=COLORS[0], marker="o", markersize=3.5,
+        label=f"in the room: L_iA,Fmax {number} dB",
+    )  # fmt: skip
+    after, standardised = found.standardised, found.standardised_rating
+    if after is not None and standardised is not None:
+        axes.plot(
+            x, after, color=COLORS[1], marker="s", markersize=3.5,
+            linestyle="--", label=f"standardized: {standardised.rounded} dB",
+        )  # fmt: skip
+    if found.background is not None:
+        axes.plot(
+            x, found.background, color=COLORS[6], linewidth=0.9, linestyle=":",
+            label="background",
+        )  # fmt: skip
+    band_axis(axes, found.frequency, found.bands)
+    axes.set_ylabel("Maximum Fast level,\ndB re 20 µPa")
+    legend_above(axes)
+    return figure
+
+
+@own_style()
+def draw_prediction(found: RoomPrediction, measured: RoomLevels | None = None) -> Figure:
+    """Draw what a level in the room below is made of, in thirds, and measured levels beside it.
+
+    Hollow marks are thirds of few modes, where the statistical answer is doubtful.
+    """
+    figure = new_figure(4.2, WIDTH)
+    above, middle, below = figure.subplots(3, 1, sharex=True, height_ratios=(1, 1, 1.6))
+    x = np.arange(len(found.frequency))
+    few = found.has_few_modes
+    above.semilogy(x, 1e3 * found.energy, color="black", marker=".", linewidth=1)
+    above.set_ylabel("Energy into\nthe floor, mJ")
+    middle.plot(
+        x, found.radiation_factor, color=COLORS[2], marker="^", markersize=3, linewidth=1,
+        label="radiation factor",
+    )  # fmt: skip
+    middle.plot(
+        x, 10 * found.loss_factor, color=COLORS[3], marker="v", markersize=3, linewidth=1,
+        linestyle="-.", label="loss factor times 10",
+    )  # fmt: skip
+    middle.set_ylim(bottom=0)
+    middle.set_ylabel("Floor")
+    low, high = found.level - found.spread, found.level + found.spread
+    below.fill_between(x, low, high, color=GREY, linewidth=0, label="± expected spread")
+    below.plot(x, found.level, color=COLORS[0])
+    for marks, face in ((few, "white"), (~few, COLORS[0])):
+        below.plot(
+            x[marks], found.level[marks], color=COLORS[0], marker="o", markersize=4,
+            markerfacecolor=face, linestyle="none",
+        )  # fmt: skip
+    label = f"in the room: L_iA,Fmax {found.rating.rounded} dB"
+    below.plot([], [], color=COLORS[0], marker="o", markersize=4, label=label)
+    below.plot(
+        x, found.standardised, color=COLORS[1], marker="s", markersize=3, linewidth=1,
+        linestyle="--", label=f"standardized: {found.standardised_rating.rounded} dB",
+    )  # fmt: skip
+    if measured is not None:
+        level = found.level + found.difference(measured)
+        label = f"measured: {measured.rating.rounded} dB"
+        below.plot(x, level, color="black", marker="x", linewidth=1, linestyle=":", label=label)
+    below.set_ylabel("Maximum Fast level,\ndB re 20 µPa")
+    band_axis(below, found.frequency, "third")
+    figure.align_ylabels()
+    legend_above(below, middle)
+    return figure
+
+
+@own_style()
+def draw_decay(found: RoomPrediction) -> Figure:
+    """Draw what the Fast detector shows against time, in a third of each octave."""
+    figure, axes = empty_axes(2.6)
+    for i, band in enumerate(range(1, len(found.frequency), 3)):
+        label = f"{found.frequency[band]:g} Hz"
+        axes.plot(1e3 * found.history_time, found.history[:, band], label=label, **line_style(i))
+        axes.plot(
+            1e3 * found.time_of_maximum[band], found.level[band], color=COLORS[i], marker="o",
+            markersize=4, linestyle="none",
+        )  # fmt: skip
+    top = found.level[1::3].max()
+    axes.set_ylim(found.level[1::3].min() - DECAY, top + 3)
+    axes.set_xlim(left=0)
+    axes.set_xlabel("Time after the impact, ms")
+    axes.set_ylabel("Fast level, dB re 20 µPa")
+    axes.plot([], [], color="black", marker="o", markersize=4, linestyle="none", label="maximum")
+    legend_above(axes)
+    return figure
+
+
+@own_style()
+def draw_modal_room(found: ModalRoom) -> Figure:
+    """Draw the levels of all pairs of positions, their energy mean, and the statistical level."""
+    figure, axes = empty_axes(2.6)
+    x = np.arange(len(found.frequency))
+    levels = found.level.reshape(-1, len(x))
+    low, first, third, high = np.percentile(levels, (5, 25, 75, 95), axis=0)
+    axes.vlines(x, low, high, color="0.6", linewidth=1, label="90 % of the positions")
+    axes.vlines(x, first, third, color="0.6", linewidth=6, label="half of them")
+    axes.plot(
+        x, found.mean, color=COLORS[0], marker="o", markersize=3.5,
+        label="energy mean of the positions",
+    )  # fmt: skip
+    mean, spread = found.statistical
+    axes.fill_between(x, mean - spread, mean + spread, color=GREY, linewidth=0, zorder=0)
+    axes.plot(
+        x, mean, color=COLORS[1], marker="s", markersize=3.5, linestyle="--",
+        label="statistical, ± expected spread",
+    )  # fmt: skip
+    band_axis(axes, found.frequency, "third")
+    axes.set_ylabel("Maximum Fast level,\ndB re 20 µPa")
+    legend_above(axes)
+    return figure
+
+
+@own_style()
+def draw_positions(found: RoomPrediction) -> Figure | None:
+    """Draw the levels of positions below a plate, if its modes can be counted."""
+    # SciPy takes its time.
+    from thud.floors.modal_room import ModeCountError, positions_below
+
+    if not isinstance(found.floor, Plate):
+        return None
+    try:
+        return draw_modal_room(positions_below(found, balls=8, microphones=16))
+    except ModeCountError:  # the statistical answer stands alone
+        return None

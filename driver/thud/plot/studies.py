@@ -1,0 +1,442 @@
+"""Figures of studies: sweep, design map, sensitivity, uncertainty, surrogate."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
+
+import numpy as np
+from matplotlib.colors import TwoSlopeNorm
+from matplotlib.ticker import (
+    FormatStrFormatter,
+    LogLocator,
+    MaxNLocator,
+    NullFormatter,
+    StrMethodFormatter,
+)
+
+from thud.base.units import display_unit
+from thud.case.keys import humanize
+from thud.impact.quantities import RATING
+from thud.level.assessment import octave_limits
+from thud.level.levels import BANDWIDTHS, FORCES, get_bands
+from thud.plot.style import (
+    COLORS,
+    FORCE_WORDS,
+    empty_axes,
+    legend_above,
+    line_style,
+    marker_style,
+    new_figure,
+    octave_axis,
+    octave_boxes,
+    own_style,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colorbar import Colorbar
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from thud.studies.design import Design
+    from thud.studies.sensitivity import Sensitivity
+    from thud.studies.trained_surrogate import Surrogate
+    from thud.studies.uncertainty import Uncertainty
+
+    Values = NDArray[np.float64]
+    Columns = dict[str, NDArray[Any]]
+
+
+Which = Literal["x", "y"]
+# Of bars; in print they tell colors apart.
+HATCHES = (None, "//////", "......", "\\\\\\\\\\\\", "xxxxxx", "------", "||||||", "++++++")
+# Outside of these, numbers in the unit of the key are shown in a handier unit.
+_PLAIN = (1e-2, 1e4)
+# Maximum over minimum from which logarithmic ticks are 1, 2, 5, and powers of ten.
+_HALF_DECADE, _DECADES = 5.0, 200.0
+
+
+def show_parameter(axes: Axes, which: Which, parameter: xr.DataArray) -> float:
+    """Give an axis the name, unit and scale of a numeric parameter.
+
+    The parameter has the attributes of the dataset. Return the factor of its values on the axis.
+    """
+    unit, factor = parameter.attrs["shown_unit"], 10.0 ** int(parameter.attrs["shown_power"])
+    values = parameter.values
+    maximum = float(np.abs(values).max())
+    if unit == parameter.attrs["units"] and not _PLAIN[0] <= maximum < _PLAIN[1]:
+        unit, size = display_unit(unit, maximum)
+        factor = 1 / size
+    shown = unit.replace("degC", "°C")
+    label = words(parameter) if unit == "1" else f"{words(parameter)}, {shown}"
+    axes.set(**{f"{which}label": label})
+    axis: Axis = getattr(axes, f"{which}axis")
+    if parameter.attrs.get("scale") == "log":
+        axes.set(**{f"{which}scale": "log"})
+        _mark_decades(axis, values * factor)
+    else:
+        axes.ticklabel_format(axis=which, useOffset=False)
+    return factor
+
+
+def _mark_decades(axis: Axis, values: NDArray[np.float64]) -> None:
+    """Give a logarithmic axis ticks with plain numbers."""
+    ratio = values.max() / values.min()
+    if ratio < _HALF_DECADE:
+        axis.set_major_locator(MaxNLocator(5))
+    else:
+        axis.set_major_locator(
+            LogLocator(subs=(1, 2, 5) if ratio < _DECADES else (1,), numticks=12)
+        )
+    axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def words(parameter: xr.DataArray) -> str:
+    """Return the name of a parameter in words, as a label begins."""
+    return humanize(str(parameter.name)).capitalize()
+
+
+# More values of a parameter are grouped in classes.
+_MAX_VALUES = 32
+_CLASSES = 16
+# Maximum number of markers of a line; half of it in half the width.
+_MAX_MARKS = 16
+# Maximum number of values of a text parameter that have a panel each.
+_MAX_PANELS = 6
+_TINY = 0.05
+
+
+class _Excess(NamedTuple):
+    """Levels minus nominal levels of each sample, minimum and maximum tolerance, dB."""
+
+    level: NDArray[np.float64]
+    tolerance: tuple[float, float]
+
+
+@own_style()
+def draw_sweep(dataset: xr.Dataset) -> Figure:
+    """Draw octave levels against the first numeric parameter that has several values.
+
+    Levels are those of the assessed force relative to the nominal ones, dB. Each value of the first
+    text parameter, up to six of them, has its panel. Lines are medians over the other parameters,
+    shades extend from the minimum to the maximum.
+    """
+    columns = _columns(dataset)
+    varied = [name for name, values in columns.items() if len(np.unique(values)) > 1]
+    numeric = [name for name in varied if columns[name].dtype.kind in "iuf"]
+    name = (numeric or varied or list(columns))[0]
+    texts = [n for n in varied if n not in numeric and n != name]
+    split = next((n for n in texts if len(np.unique(columns[n])) <= _MAX_PANELS), None)
+    excess = _excess(dataset, columns)
+    parts = {"": np.ones(len(columns[name]), dtype=bool)}
+    if split:
+        parts = {str(value): columns[split] == value for value in np.unique(columns[split])}
+    across = 1 if len(parts) == 1 else 2
+    down = -(-len(parts) // across)
+    figure = new_figure(1.1 + (1.9 if across == 1 else 1.6) * down)
+    panels = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False).ravel()
+    for i, (axes, (title, panel)) in enumerate(zip(panels, parts.items(), strict=False)):
+        _draw_tolerance(axes, excess.tolerance)
+        levels = np.where(panel[:, np.newaxis], excess.level, np.nan)
+        _draw_octaves(axes, dataset[name], columns[name], levels, _MAX_MARKS // across)
+        axes.set_title(title.replace("_", " "))
+        lowest = i + across >= len(parts)
+        axes.tick_params(axis="x", labelbottom=lowest)
+        axes.xaxis.label.set_visible(lowest)
+    for axes in panels[len(parts) :]:
+        axes.remove()
+    words = "assessed force" if "force" in columns else FORCE_WORDS[dataset.attrs["assessed_force"]]
+    figure.supylabel(f"Level − nominal, dB\n({words})")
+    others = [n for n in varied if n not in {name, split}]
+    legend_above(panels[0], title=_meaning(excess, split, others))
+    return figure
+
+
+def _columns(dataset: xr.Dataset) -> Columns:
+    """Return the parameters of each sample."""
+    names = [str(name) for name in dataset.coords if name not in BANDWIDTHS]
+    whole = dataset["status"]
+    return {name: dataset[name].broadcast_like(whole).values.ravel() for name in names}
+
+
+def _excess(dataset: xr.Dataset, columns: Columns) -> _Excess:
+    """Return the levels of the assessed force relative to the nominal levels of the source."""
+    levels = {
+        force: dataset[f"{force}_level"].values.reshape(-1, len(dataset["octave"]))
+        for force in FORCES
+    }
+    count = len(dataset["status"].values.ravel())
+    forces = columns.get("force", np.full(count, dataset.attrs["assessed_force"]))
+    sources = columns.get("source", np.full(count, dataset.attrs["limits"]))
+    found = np.where((forces == "floor")[:, np.newaxis], levels["floor"], levels["elastic"])
+    tolerances: list[float] = []
+    for source in np.unique(sources):
+        lower, upper = octave_limits(source)
+        found[sources == source] -= (lower + upper) / 2
+        tolerances.extend((upper - lower) / 2)
+    return _Excess(found, (min(tolerances), max(tolerances)))
+
+
+def _draw_tolerance(axes: Axes, tolerance: tuple[float, float]) -> None:
+    """Draw the maximum tolerance of an octave, and the minimum on it, around the nominal level."""
+    for width, color in zip(reversed(tolerance), ("0.92", "0.84"), strict=True):
+        axes.axhspan(-width, width, color=color, linewidth=0, zorder=0)
+    axes.axhline(0, color="0.45", linewidth=0.8)
+
+
+def _draw_octaves(
+    axes: Axes,
+    parameter: xr.DataArray,
+    values: NDArray[Any],
+    levels: NDArray[np.float64],
+    max_marks: int,
+) -> None:
+    """Draw the octave levels of samples, those that are not NaN, against a parameter."""
+    places, members, names = _classes(values)
+    if names is None:
+        places = places * show_parameter(axes, "x", parameter)
+    else:
+        axes.set_xticks(places, names)
+        axes.tick_params(axis="x", labelrotation=20)
+        axes.set_xlabel(words(parameter))
+    for i, band in enumerate(get_bands().nominal):
+        found = [levels[chosen, i] for chosen in members]
+        middle, lower, upper = (
+            np.array([_of(part, f) for part in found]) for f in (np.median, np.min, np.max)
+        )
+        marks = marker_style(i, 3) if len(places) <= max_marks else {}
+        axes.plot(places, middle, label=f"{band:g} Hz", **line_style(i), **marks)
+        if np.nanmax(upper - lower, initial=0) > _TINY:
+            axes.fill_between(places, lower, upper, color=COLORS[i], alpha=0.15, linewidth=0)
+
+
+def _classes(
+    values: NDArray[Any],
+) -> tuple[NDArray[np.float64], list[NDArray[np.bool_]], list[str] | None]:
+    """Return places on an axis, the samples of each, and the names of texts."""
+    found = np.unique(values)
+    if values.dtype.kind not in "iuf":
+        members = [values == value for value in found]
+        return np.arange(len(found), dtype=float), members, [str(value) for value in found]
+    if len(found) <= _MAX_VALUES:
+        return found.astype(float), [values == value for value in found], None
+    edges = np.quantile(values, np.linspace(0, 1, _CLASSES + 1))
+    place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _CLASSES - 1)
+    members = [place == i for i in range(_CLASSES) if (place == i).any()]
+    return np.array([np.median(values[chosen]) for chosen in members]), members, None
+
+
+def _of(part: NDArray[np.float64], function: Any) -> float:  # noqa: ANN401 - of NumPy
+    """Return a function of the finite numbers; NaN where there are none."""
+    known = part[np.isfinite(part)]
+    return float(function(known)) if known.size else np.nan
+
+
+def _meaning(excess: _Excess, split: str | None, others: list[str]) -> str:
+    """Return what panels, lines, shades and grey mean."""
+    minimum, maximum = excess.tolerance
+    lines = [f"Grey: tolerances of the octaves, ±{minimum:g} to ±{maximum:g} dB"]
+    if others:
+        over = humanize(others[0]) if len(others) == 1 else f"{len(others)} other parameters"
+        lines.insert(0, f"Lines: median over {over}; shades: range")
+    if split:
+        lines.insert(0, f"Panels: {humanize(split)}")
+    return "\n".join(lines)
+
+
+_TINY = 0.05
+
+
+@own_style()
+def draw_design(result: Design) -> Figure:
+    """Draw the margin of a design map, dB, its zero as a line, and the samples that conform.
+
+    The margin is positive where all octave levels lie within their limits. Of a case with a room
+    draw the rating of the standardised levels there.
+    """
+    dataset = result.dataset
+    figure, axes = empty_axes(2.9)
+    which: tuple[Which, Which] = ("x", "y")
+    scales = [
+        show_parameter(axes, w, dataset[name]) for w, name in zip(which, result.axes, strict=True)
+    ]
+    x, y = (dataset[name].values * scale for name, scale in zip(result.axes, scales, strict=True))
+    if RATING in dataset:
+        rating = np.ma.masked_invalid(dataset[RATING].transpose(*result.axes).values.T)
+        _draw_rating(figure, axes, (x, y), rating)
+        axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+        axes.grid(visible=False)
+        return figure
+    margin = np.ma.masked_invalid(dataset["margin"].transpose(*result.axes).values.T)
+    conforms = dataset["conforms"].transpose(*result.axes).values.T
+    if margin.count():
+        bar = _draw_margin(figure, axes, (x, y), margin)
+        bar.set_label(f"Margin ({FORCE_WORDS[dataset.attrs['assessed_force']]}), dB")
+    doubtful = np.zeros_like(conforms)
+    if "doubtful" in dataset:
+        doubtful = dataset["doubtful"].transpose(*result.axes).values.T
+    marks = {
+        "All criteria met": (conforms & ~doubtful, "."),
+        "In doubt by surrogate": (doubtful, "x"),
+    }
+    for label, (chosen, marker) in marks.items():
+        row, column = np.nonzero(chosen)
+        if row.size:
+            axes.plot(
+                x[column], y[row], marker, markersize=2, markeredgewidth=0.5, color="black",
+                label=label,
+            )  # fmt: skip
+    if result.mark:
+        place = [value * scale for value, scale in zip(result.mark, scales, strict=True)]
+        axes.plot(
+            *place, "*", markersize=9, markerfacecolor="white", markeredgecolor="black",
+            linestyle="none", label=result.mark_name.capitalize(), clip_on=False, zorder=3,
+        )  # fmt: skip
+    axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+    axes.grid(visible=False)
+    if axes.get_legend_handles_labels()[0]:
+        legend_above(axes)
+    return figure
+
+
+def _draw_rating(
+    figure: Figure, axes: Axes, place: tuple[Values, Values], rating: np.ma.MaskedArray[Any, Any]
+) -> None:
+    """Draw the rating as colors, with lines at round values."""
+    steps = np.asarray(MaxNLocator(8).tick_values(float(rating.min()), float(rating.max())))
+    fine = np.linspace(steps[0], steps[-1], 5 * (len(steps) - 1) + 1)
+    filled = axes.contourf(*place, rating, levels=fine, cmap="cividis_r")
+    inside = steps[(steps > rating.min()) & (steps < rating.max())]
+    if inside.size:
+        lines = axes.contour(*place, rating, inside, colors="black", linewidths=0.5)
+        axes.clabel(lines, fontsize="x-small", fmt=StrMethodFormatter("{x:g}"))
+    figure.colorbar(filled, ax=axes, ticks=steps, label="Standardized L_iA,Fmax, dB re 20 µPa")
+
+
+def _draw_margin(
+    figure: Figure, axes: Axes, place: tuple[Values, Values], margin: np.ma.MaskedArray[Any, Any]
+) -> Colorbar:
+    """Draw the margin as colors, white at 0, with lines at 0 and at round values."""
+    lower, upper = min(float(margin.min()), 0.0), max(float(margin.max()), 0.0)
+    # The colors of the smaller side, usually of what conforms, change up to four times faster.
+    norm = TwoSlopeNorm(0, min(lower, -upper / 4, -_TINY), max(upper, -lower / 4, _TINY))
+    steps = np.asarray(MaxNLocator(7).tick_values(lower, max(upper, lower + _TINY)))
+    # Five colors from one line to the next.
+    fine = np.linspace(steps[0], steps[-1], 5 * (len(steps) - 1) + 1)
+    filled = axes.contourf(*place, margin, levels=fine, cmap="PuOr", norm=norm)
+    inside = steps[(steps > margin.min()) & (steps < margin.max()) & (steps != 0)]
+    if inside.size:
+        lines = axes.contour(*place, margin, inside, colors="0.25", linewidths=0.4, linestyles="-")
+        axes.clabel(lines, fontsize="x-small", fmt=StrMethodFormatter("{x:g}"))
+    if margin.min() < 0 < margin.max():
+        axes.contour(*place, margin, levels=[0.0], colors="black", linewidths=1.2)
+        axes.plot([], [], color="black", label="Octave limits")
+    return figure.colorbar(filled, ax=axes, ticks=steps)
+
+
+@own_style()
+def draw_sensitivity(result: Sensitivity) -> Figure:
+    """Draw total Sobol indices as bars, first orders as marks on them, both with intervals.
+
+    There is one group of bars for each output.
+    """
+    indices = result.indices
+    parameters = [str(name) for name in indices["parameter"].values]
+    outputs = [str(name) for name in indices["output"].values]
+    thickness = 0.84 / len(parameters)
+    figure, axes = empty_axes(0.8 + 0.075 * len(outputs) * (len(parameters) + 1))
+    place = np.arange(len(outputs), dtype=float)
+    for i, name in enumerate(parameters):
+        row = indices.sel(parameter=name)
+        at = place + (i - (len(parameters) - 1) / 2) * thickness
+        axes.barh(
+            at, row["total"], 0.9 * thickness, color=COLORS[i % len(COLORS)],
+            hatch=HATCHES[i % len(HATCHES)], edgecolor="white", linewidth=0,
+            label=humanize(name),
+        )  # fmt: skip
+        look: dict[str, Any] = {"color": "black", "linestyle": "none", "elinewidth": 0.6}
+        axes.errorbar(
+            row["total"], at - thickness / 5, xerr=row["total_interval"], marker="|", markersize=3,
+            label="total index" if i == len(parameters) - 1 else None, **look,
+        )  # fmt: skip
+        axes.errorbar(
+            row["first_order"], at + thickness / 5, xerr=row["first_order_interval"], marker="D",
+            markersize=2, markerfacecolor="white", markeredgewidth=0.5,
+            label="first order" if i == len(parameters) - 1 else None, **look,
+        )  # fmt: skip
+    axes.set_yticks(place, outputs)
+    axes.set_ylim(len(outputs) - 0.5, -0.5)
+    axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
+    words = FORCE_WORDS[result.dataset.attrs["assessed_force"]]
+    axes.set_xlabel(f"Sobol index, with its interval of 95 %\n({words})")
+    legend_above(axes)
+    return figure
+
+
+@own_style()
+def draw_surrogate(result: Surrogate) -> Figure:
+    """Draw the error of each assessed quantity in held-out drops, dB, and the bound.
+
+    Quantities that are not levels have errors in 20 lg of their ratio.
+    """
+    labels = [name for name, judged in zip(result.labels, result.judged, strict=True) if judged]
+    residuals = result.residuals[:, result.judged]
+    figure, axes = empty_axes(0.9 + 0.2 * len(labels))
+    bound = result.bound
+    axes.axvspan(-bound, bound, color="0.85", linewidth=0, label=f"Bound of 95 %, {bound:g} dB")
+    place = np.arange(len(labels), dtype=float)
+    for i, values in enumerate(residuals.T):
+        axes.plot(
+            values, np.full(len(values), place[i]), "|", color=COLORS[5], markersize=5,
+            markeredgewidth=0.5, label=None if i else f"Each of {len(values)} held-out drops",
+        )  # fmt: skip
+    axes.errorbar(
+        np.zeros(len(labels)), place, xerr=result.errors[result.judged], fmt="none", color="black",
+        elinewidth=0.8, capsize=3, label="95 % of drops",
+    )  # fmt: skip
+    words = [label.replace("floor ", "").replace("elastic ", "") for label in labels]
+    axes.set_yticks(place, [word[0].upper() + word[1:] for word in words])
+    axes.set_ylim(len(labels) - 0.5, -0.5)
+    axes.set_xlabel("Surrogate − model, dB")
+    legend_above(axes)
+    return figure
+
+
+@own_style()
+def draw_uncertainty(result: Uncertainty) -> Figure:
+    """Draw the distribution of octave levels over the tolerances of the standards.
+
+    Levels are relative to the nominal ones, dB; bars cover 95 % of the samples.
+    """
+    lower, upper = octave_limits(result.source)
+    nominal = (lower + upper) / 2
+    figure, axes = empty_axes(2.8)
+    label = f"Tolerance, {result.source.replace('_', ' ')}"
+    octave_boxes(axes, lower - nominal, upper - nominal, label)
+    levels = result.levels - nominal
+    place = np.arange(len(nominal))
+    shapes = axes.violinplot(levels, place, widths=0.6, showextrema=False)
+    for i, shape in enumerate(cast("list[PolyCollection]", shapes["bodies"])):
+        shape.set(
+            facecolor=COLORS[5], alpha=1, edgecolor="none", label=None if i else "Distribution"
+        )
+    low, middle, high = np.quantile(levels, [0.025, 0.5, 0.975], axis=0)
+    axes.errorbar(
+        place, middle, (middle - low, high - middle), fmt="o", color="black", markersize=2.5,
+        elinewidth=0.8, capsize=2, label="Median, 95 % of samples",
+    )  # fmt: skip
+    octave_axis(axes)
+    words = FORCE_WORDS[result.dataset.attrs["assessed_force"]]
+    axes.set_ylabel(f"Level − nominal, dB\n({words})")
+    low, high = result.interval
+    share = f"{100 * result.probability:.1f} % ({100 * low:.1f} to {100 * high:.1f} %)"
+    title = f"All criteria met: {share}"
+    if result.surrogate_range:
+        low, high = result.surrogate_range
+        title += f"\nby errors of the surrogate {100 * low:.1f} to {100 * high:.1f} %"
+    legend_above(axes, title=title)
+    return figure

@@ -1,0 +1,290 @@
+"""Contact time, restitution, peak, impulse and noise of a drop, with their uncertainties.
+
+Derivations: docs/recordings_theory.md.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.base.checks import refuse
+from thud.base.immutable import Immutable
+from thud.level.estimate import Estimate
+from thud.level.levels import RECORDED_BAND, record_force
+from thud.recordings.contact import Contact, find_contact, find_edges
+from thud.recordings.faults import min_background, repair
+from thud.recordings.noise import Noise
+from thud.recordings.recorded_levels import measure_levels
+from thud.recordings.restitution import BOUNCES, GRAVITY, DropConditions
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from thud.base._schema import BandSet
+    from thud.recordings.drops import Window
+
+# Draws of noise for its effect on the maximum.
+PEAK_DRAWS = 32
+# Length of the background that raises a warning, s.
+SHORT_BACKGROUND = 0.005
+# Edges of the octave of 500 Hz, Hz; the fraction of the rate above which content folds back, and
+# the error that raises a warning, dB.
+OCTAVE_500 = (354.8, 707.9)
+TOP = 0.4
+NOTABLE_ERROR = 0.1
+# Minimum contact time over its uncertainty.
+MIN_CONTACT_RATIO = 4.0
+# Ratio of flight and peak, each over that of the drop, beyond which a pulse is no bounce: the force
+# follows the velocity.
+MAX_BOUNCE_RATIO = 3.0
+# Standard deviations of a difference that is noted.
+NOTABLE = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Drop(Immutable):
+    """One measured drop.
+
+    Attributes
+    ----------
+    name : str
+        Name of the drop, as ``"file.wav, drop 3"``.
+    begin : float
+        Time of the first sample since first touch, s.
+    force : ndarray, shape (n,)
+        Force without offset, drift, hum and slow noise, N.
+    sample_rate : float
+        Samples per second, Hz.
+    onset : float
+        Time of first touch in the file, s.
+    gate : tuple of int
+        First and stop index of the contact with its margins, over which levels are measured.
+    contact_time, restitution, peak_force, impulse, effective_mass : Estimate
+        In s (`thud.impact.contact_time`), 1, N (below 1.25 kHz), N s and kg; NaN if unknown.
+    restitution_shared : dict of str to float
+        Signed effects of calibration, mass and drop height on the restitution of all drops, which
+        its uncertainty excludes.
+    restitution_method : str
+        ``"impulse"``, ``"bounces"``, ``"impulse and bounces"`` or ``""``.
+    restitutions : dict of str to Estimate
+        Restitution by each method.
+    noise : Noise
+        Noise of the background.
+    bounces : tuple of float
+        Times since the onset at which the measured bounces begin, s: one if the drop height is
+        known, else up to two.
+    steps, warnings : tuple of str
+        Processing of the signal, and what may be wrong, a sentence each.
+    contact : Contact
+        Times, background and gate of the contact.
+    """
+
+    name: str
+    begin: float
+    force: NDArray[np.float64]
+    sample_rate: float
+    onset: float
+    gate: tuple[int, int]
+    contact_time: Estimate
+    restitution: Estimate
+    restitution_shared: dict[str, float]
+    restitution_method: str
+    restitutions: dict[str, Estimate]
+    peak_force: Estimate
+    impulse: Estimate
+    effective_mass: Estimate
+    noise: Noise
+    bounces: tuple[float, ...]
+    steps: tuple[str, ...]
+    warnings: tuple[str, ...]
+    contact: Contact
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Time since first touch, s, shape (n,)."""
+        time: NDArray[np.float64] = self.begin + np.arange(len(self.force)) / self.sample_rate
+        return time
+
+    def levels(
+        self, bands: BandSet = "octave", method: str = "exact", *, low_pass: bool = False
+    ) -> NDArray[np.float64]:
+        """Return the force exposure levels, corrected for the background, dB, shape (n_band,).
+
+        The arguments are those of `thud.recordings.recorded_levels.measure_levels`, which has their
+        uncertainties too.
+        """
+        return measure_levels([self], bands, method, low_pass=low_pass)[0].level.copy()
+
+
+def measure_drop(window: Window, conditions: DropConditions) -> Drop:
+    """Measure one drop in the window around it.
+
+    Raises
+    ------
+    InputError
+        Where the pulse is clipped, cut, doubled or full of dropouts.
+    """
+    force, steps, warnings = repair(window)
+    try:
+        contact = find_contact(window, force)
+    except np.linalg.LinAlgError as error:
+        refuse(f"{window.name}: the background is not noise", "noise, drift and hum", error)
+    for side, length in zip(("before", "after"), contact.background_lengths, strict=True):
+        if length < SHORT_BACKGROUND:
+            warnings += (f"there are {1e3 * length:.1f} ms of background {side} the contact",)
+    contact_time = _between(contact.begin, contact.end)
+    if not contact_time.value > MIN_CONTACT_RATIO * contact_time.uncertainty:
+        refuse(
+            f"{window.name}: the contact cannot be distinguished from the noise: "
+            f"{1e3 * contact_time.value:.3g} ms with a standard uncertainty of "
+            f"{1e3 * contact_time.uncertainty:.2g} ms",
+            f"an uncertainty up to 1/{MIN_CONTACT_RATIO:g} of it",
+        )
+    impulse = _impulse(contact)
+    # The flight after the drop gives the restitution; without the height two flights are compared.
+    landings = _landings(window, contact, 1 if conditions.height else 2)
+    if conditions.height and landings:
+        flight = _between(contact.end, landings[0][0]).value
+        peak = _peak_above_background(window.bounces[0]) / contact.peak
+        expected = GRAVITY * flight / (2 * conditions.speed)
+        if not peak / MAX_BOUNCE_RATIO < expected < peak * MAX_BOUNCE_RATIO:
+            landings = []
+            no_bounce = (
+                f"the pulse {1e3 * flight:.0f} ms after the contact has {peak:.2g} of its peak: "
+                f"it is no bounce from {conditions.height:g} m"
+            )
+            warnings += (no_bounce,)
+    ends = [contact.end, *(end for _, end in landings)]
+    flights = [_between(end, begin) for end, (begin, _) in zip(ends, landings, strict=False)]
+    methods, unknown = conditions.restitutions(impulse, contact_time, flights)
+    restitution, shared = conditions.mean(methods, impulse)
+    rate, first = window.sample_rate, contact.span[0]
+    return Drop(
+        name=window.name,
+        begin=first / rate - contact.touch.value,
+        force=contact.force,
+        sample_rate=rate,
+        onset=window.start / rate + contact.touch.value,
+        gate=(contact.gate[0] - first, contact.gate[1] - first),
+        contact_time=contact_time,
+        restitution=restitution,
+        restitution_shared=shared,
+        restitution_method=" and ".join(methods),
+        restitutions=methods,
+        peak_force=_peak(contact),
+        impulse=impulse,
+        effective_mass=conditions.effective_mass(impulse, contact_time, methods.get(BOUNCES)),
+        noise=_noise(contact),
+        bounces=tuple(begin.value - contact.touch.value for begin, _ in landings),
+        steps=(*steps, *_removed(contact)),
+        warnings=(*window.warnings, *warnings, *_check_aliasing(contact), *unknown),
+        contact=contact,
+    )
+
+
+def _between(first: Estimate, last: Estimate) -> Estimate:
+    """Return the time between two times, s."""
+    return Estimate(last.value - first.value, math.hypot(last.uncertainty, first.uncertainty))
+
+
+def _landings(window: Window, drop: Contact, count: int) -> list[tuple[Estimate, Estimate]]:
+    """Return begin and end of the first bounces, s from the start of the window."""
+    landings = []
+    for bounce in window.bounces[:count]:
+        first, stop = bounce.contact
+        minimum = min_background(bounce.sample_rate)
+        if first < minimum or len(bounce.force) - stop < minimum:
+            break
+        delay = (bounce.start - window.start) / window.sample_rate
+        begin, end = (
+            Estimate(delay + edge.value, edge.uncertainty)
+            for edge in find_edges(bounce, drop.background)
+        )
+        landings.append((begin, end))
+    return landings
+
+
+def _peak_above_background(window: Window) -> float:
+    """Return the maximum of a pulse above its background, N."""
+    first, stop = window.contact
+    force = window.force
+    background = np.concatenate([force[:first], force[stop:]])
+    return float(force[first:stop].max() - np.median(background))
+
+
+def _impulse(contact: Contact) -> Estimate:
+    """Return the time integral of the force, N s: the sum over the gate."""
+    ones = np.full((1, len(contact.gated)), 1 / contact.sample_rate)
+    variance = contact.covariance_of(ones)[0, 0]
+    return Estimate(float((ones @ contact.gated)[0]), math.sqrt(variance))
+
+
+def _peak(contact: Contact) -> Estimate:
+    """Return the maximum of the force below 1.25 kHz without the bias due to noise, N.
+
+    The bias is what further noise of the same density adds (bootstrap), which underestimates it for
+    strong noise; it also counts as standard uncertainty.
+    """
+    force = np.pad(contact.gated, 2)
+    low = record_force(force, contact.sample_rate)
+    cell = int(np.argmax(low)) * len(contact.covariance) // len(low)
+    density, _ = contact.background.density(RECORDED_BAND)
+    deviation = math.sqrt(density * contact.sample_rate / 2)
+    draws = np.random.default_rng(0).normal(scale=deviation, size=(PEAK_DRAWS, len(force)))
+    maxima = [record_force(force + noise, contact.sample_rate).max() for noise in draws]
+    bias = max(float(np.mean(maxima) - low.max()), 0.0)
+    variance = density * min(RECORDED_BAND, contact.sample_rate / 2) + bias**2
+    variance += contact.covariance[cell, cell]
+    return Estimate(float(low.max()) - bias, math.sqrt(variance))
+
+
+def _noise(contact: Contact) -> Noise:
+    """Return the noise of the background."""
+    first, stop = (index - contact.span[0] for index in contact.gate)
+    force = np.concatenate([contact.force[:first], contact.force[stop:]])
+    deviation = 1.4826 * float(np.median(np.abs(force - np.median(force))))
+    white, pink, brown = map(float, contact.background.variances[:3])
+    return Noise(deviation, "before and after", white, pink, brown)
+
+
+def _removed(contact: Contact) -> tuple[str, ...]:
+    """Return which background was removed, a sentence each."""
+    first, stop = (index - contact.span[0] for index in contact.gate)
+    offset = float(contact.removed[first:stop].mean())
+    steps = [f"an offset of {offset:.3g} N was removed"]
+    drift, deviation = contact.background.drift
+    if abs(drift) > NOTABLE * deviation:
+        steps.append(f"a drift of {drift:.3g} N/s was removed")
+    frequency, amplitude, deviation = contact.background.hum
+    if amplitude > NOTABLE * deviation:
+        steps.append(f"hum of {frequency:g} Hz with an amplitude of {amplitude:.3g} N was removed")
+    return tuple(steps)
+
+
+def _check_aliasing(contact: Contact) -> tuple[str, ...]:
+    """Return a warning if content at half the rate folds back into the octave of 500 Hz.
+
+    Beyond half the rate the amplitude of a pulse with kinks falls as 1/f2.
+    """
+    rate = contact.sample_rate
+    lower, upper = OCTAVE_500
+    # Long enough for several frequencies in the octave.
+    force = np.pad(contact.gated, (0, int(rate / 20) + 3 * len(contact.gated)))
+    frequency = np.fft.rfftfreq(len(force), 1 / rate)
+    power = np.abs(np.fft.rfft(force)) ** 2
+    noise = contact.background.variances[0] * rate / 2 * len(contact.gated)
+    own = power[(frequency > lower) & (frequency < upper)].mean()
+    top = max(power[frequency > TOP * rate].mean() - 3 * noise, 0.0)
+    folded = top * (0.45 * rate / (rate - upper)) ** 4
+    error = 20 * math.log10(1 + math.sqrt(folded / own))
+    if error < NOTABLE_ERROR:
+        return ()
+    warning = (
+        f"the force has content up to half the rate, {rate / 2:g} Hz: without a filter before "
+        f"sampling, the octave of 500 Hz may be off by {error:.1f} dB"
+    )
+    return (warning,)

@@ -1,0 +1,168 @@
+"""Which balls conform to the standards: the margin over two parameters."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Unpack
+
+from thud.base.checks import refuse
+from thud.base.display import Displayed
+from thud.case.case import Case
+from thud.case.keys import DENSITY
+from thud.impact.quantities import RATING
+from thud.studies.sample_kind import SampleKind
+from thud.studies.study import value_in, wall_volume
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from thud.studies.kind import RunOptions
+    from thud.studies.parameter import Parameter
+    from thud.studies.samples import SampleStudy
+    from thud.studies.study import Source, Study
+
+_AXES = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Design(Displayed):
+    """Margin and verdict over two parameters.
+
+    Attributes
+    ----------
+    dataset : Dataset
+        Every sample, on a grid of the two parameters in ascending order; ``margin`` is the minimum
+        distance of an octave level to its limits, dB, and ``conforms`` the whole verdict; of a case
+        with a room ``standardised_rating`` is drawn, dB.
+    axes : tuple of str
+        The two parameters.
+    mark : tuple of float or None
+        Where the ball of the paper, or else the case, lies; None where it has no such place.
+    mark_name : str
+        ``"paper's ball"`` or ``"case"``.
+    """
+
+    dataset: xr.Dataset
+    axes: tuple[str, str]
+    mark: tuple[float, float] | None
+    mark_name: str
+
+    def __repr__(self) -> str:
+        """Return the axes, and how much conforms."""
+        conforms = self.dataset["conforms"]
+        count = f"{int(conforms.sum())} of {conforms.size} samples conform"
+        return f"<Design, {' and '.join(self.axes)}: {count}>"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        return [("", ""), *self.table()]
+
+    def table(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text: the best place, and how much conforms."""
+        margin = self.dataset["margin"]
+        rows: list[tuple[str, ...]] = [("samples", f"{margin.size}")]
+        rows.append(("octave levels conform", f"{int((margin >= 0).sum())}"))
+        rows.append(("all criteria conform", f"{int(self.dataset['conforms'].sum())}"))
+        if "doubtful" in self.dataset:
+            rows.append(("in doubt by the surrogate", f"{int(self.dataset['doubtful'].sum())}"))
+        words, sign, quantity = "largest margin, dB", 1, margin
+        if RATING in self.dataset:
+            words, sign, quantity = "lowest standardised rating, dB", -1, self.dataset[RATING]
+        if quantity.notnull().any():
+            best = quantity.isel((sign * quantity).argmax(...))
+            rows.append((words, f"{float(best):z.2f}"))
+            for name in self.axes:
+                power = self.dataset[name].attrs["shown_power"]
+                unit = self.dataset[name].attrs["shown_unit"]
+                rows.append((f"  at {name}, {unit}", f"{float(best[name]) * 10.0**power:.4g}"))
+        return rows
+
+
+class DesignKind(SampleKind[Design]):
+    """Maps of a design as a kind of study."""
+
+    name = "design"
+    designs = ("grid",)
+
+    def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SampleStudy:
+        """Return a study of two numeric parameters."""
+        found = super().complete(study, given, folder)
+        if len(found.parameters) != _AXES or not all(map(_is_axis, found.parameters)):
+            refuse("[parameters] do not make a map", "two numeric ones of two values or more")
+        return found
+
+    def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> Design:
+        """Return the map of all samples."""
+        first, second = (parameter.coordinate for parameter in study.parameters)
+        return Design(dataset.load().sortby([first, second]), (first, second), *_mark(study))
+
+    def draw(self, result: Design) -> Figure:
+        """Return the margin over both parameters."""
+        from thud.plot import draw_design
+
+        return draw_design(result)
+
+
+KIND = DesignKind()
+
+
+def design(
+    study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[RunOptions]
+) -> Design:
+    """Compute which geometry and material conform to the standards.
+
+    Parameters
+    ----------
+    study
+        Path of a TOML file, or what would stand in it; it has two numeric parameters.
+    output, **how
+        See `sweep`.
+
+    Returns
+    -------
+        Design
+        Margin and verdict of the force that the case assesses.
+
+    Raises
+    ------
+    InputError
+        As `sweep`; also where there are not two numeric parameters with two values or more.
+    """
+    return KIND.run(study, output, **how)
+
+
+def _is_axis(parameter: Parameter) -> bool:
+    return parameter.numeric and (parameter.values is None or len(set(parameter.values)) > 1)
+
+
+def _mark(study: SampleStudy) -> tuple[tuple[float, float] | None, str]:
+    """Return the place of the paper's ball if all else is as in the paper, else of the case."""
+    names = [parameter.name for parameter in study.parameters]
+    paper, ours = _ball_and_drop(Case(), None), _ball_and_drop(study.case, study.density)
+    by_density = study.density is not None or DENSITY.name in names
+    rest = set(paper) - set(names) - {"mass" if by_density else DENSITY.name}
+    of_paper = set(names) <= set(paper) and all(math.isclose(ours[n], paper[n]) for n in rest)
+    values = paper if of_paper else ours
+    places: list[Any] = [values.get(name, value_in(study.case, name)) for name in names]
+    ends = [(min(grid), max(grid)) for grid in (p.grid() for p in study.parameters)]
+    inside = all(
+        place is not None and low <= float(place) <= high
+        for place, (low, high) in zip(places, ends, strict=True)
+    )
+    x, y = places
+    return (float(x), float(y)) if inside else None, "paper's ball" if of_paper else "case"
+
+
+def _ball_and_drop(case: Case, density: float | None) -> dict[str, float]:
+    """Return the numbers of ball, drop and density of the wall."""
+    ball = case.ball
+    volume = wall_volume(ball.outer_radius, ball.wall_thickness)
+    if density is None:
+        density = ball.mass / volume if volume else math.nan
+    return vars(ball) | vars(case.drop) | {DENSITY.name: density}

@@ -1,1 +1,0 @@
-"""Surrogates: how they are trained, and what they answer."""

@@ -1,0 +1,186 @@
+"""Kinds of studies that compute samples of drops: design, blocks, backend, dataset."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections import Counter
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, Unpack
+
+from thud.base._schema import KEYS
+from thud.base.checks import refuse, require_choice
+from thud.base.tables import format_rows
+from thud.case.keys import OF_FILES, users
+from thud.studies.backends import checked_backend
+from thud.studies.blocks import read_identity, result_names
+from thud.studies.computing import compute_samples
+from thud.studies.dataset import disk_space
+from thud.studies.directory import FORMATS
+from thud.studies.kind import Kind
+from thud.studies.parameter import varied
+from thud.studies.samples import SampleStudy
+from thud.studies.sampling import read_design
+from thud.studies.study import table_of
+from thud.studies.surrogate_plan import read_plan
+from thud.studies.surrogate_training import surrogate_name, train
+from thud.studies.temperature import read_temperature
+from thud.studies.trained_surrogate import Surrogate, read_surrogate
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from thud.base.files import Results
+    from thud.case.case import Case
+    from thud.case.keys import Value
+    from thud.studies.kind import RunOptions
+    from thud.studies.parameter import Parameter
+    from thud.studies.study import Study
+
+R = TypeVar("R")
+
+# More samples than this have to be confirmed.
+MAX_SAMPLES = 100_000
+_FILE_FORMATS = ("auto", "netcdf", "zarr")
+
+
+def _require_no_floor(case: Case) -> None:
+    """Raise InputError where a surrogate would have to know a floor."""
+    if case.floor:
+        refuse("[surrogate] knows no floors", "a case without &floor")
+
+
+class DropsKind(Kind[SampleStudy, R]):
+    """A kind of study that needs drops around its case."""
+
+    words: ClassVar[tuple[str, ...]] = ("format", "design", "temperature", "surrogate")
+    # The designs that it takes, the default first.
+    designs: ClassVar[tuple[str, ...]]
+
+    def new_parameter(
+        self, name: str, given: object, case: Case, centre: Value | None
+    ) -> Parameter:
+        """Return a parameter that varies."""
+        if name == "bands":
+            refuse(
+                "[parameters] bands is not allowed", "bands in [fixed], the same for all samples"
+            )
+        return varied(name, given, users(case), centre)
+
+    def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SampleStudy:
+        """Return a study with its design."""
+        written = given.get("format", _FILE_FORMATS[0])
+        require_choice("format", written, _FILE_FORMATS)
+        law = table_of(given, "temperature") if "temperature" in given else None
+        temperature = read_temperature(law, study.case, study.parameters)
+        design = read_design(table_of(given, "design"), self.designs, study.parameters)
+        # Samples need neither snapshots nor free modes nor a compression.
+        case = replace(study.case, modes=None, compression=None)
+        owned = (key for key in KEYS if key.owner == study.model)
+        files = {key.name: 0.0 for key in owned if key.group == OF_FILES}
+        if case.model and files:
+            case = replace(case, model=replace(case.model, **files))  # type: ignore[arg-type]
+        head = {**vars(study), "case": case}
+        found = SampleStudy(**head, **design, temperature=temperature, format=written)
+        if "surrogate" not in given:
+            return found
+        _require_no_floor(case)
+        plan = read_plan(table_of(given, "surrogate"), folder)
+        if isinstance(plan, Surrogate):
+            return self.with_surrogate(found, plan)
+        return replace(found, plan=plan)
+
+    def with_surrogate(
+        self, study: SampleStudy, given: Surrogate | str | os.PathLike[str]
+    ) -> SampleStudy:
+        """Return a study whose samples a surrogate answers. Raises InputError where it cannot."""
+        _require_no_floor(study.case)
+        surrogate = given if isinstance(given, Surrogate) else read_surrogate(given)
+        surrogate.require(study.case, study.key_columns(study.parameter_columns(0, 1)))
+        return replace(study, plan=None, surrogate=surrogate)
+
+    def require(self, study: SampleStudy, **how: Unpack[RunOptions]) -> None:
+        """Raise InputError where there are too many samples, or no such backend."""
+        if study.count > MAX_SAMPLES and not how.get("yes"):
+            refuse(self.describe(study), f"up to {MAX_SAMPLES} samples, more with yes=True (--yes)")
+        checked_backend(how.get("backend"), how.get("workers"), how.get("scheduler"))
+
+    @abstractmethod
+    def draw(self, result: R) -> Figure:
+        """Return the figure of a result."""
+
+    def listed_files(self, study: SampleStudy) -> list[str]:
+        """Return the names of the figures, and of the surrogate that is trained."""
+        trained = [surrogate_name(study)] if study.plan else []
+        return [*trained, *(f"{study.name}{ending}" for ending in FORMATS)]
+
+    def table(self, result: R, study: SampleStudy) -> str:  # noqa: ARG002 - samples know their units
+        """Return the result as text."""
+        return format_rows(result.table())  # type: ignore[attr-defined]
+
+    def figures(self, result: R, study: SampleStudy) -> dict[str, Figure]:
+        """Return the figure by the name of the study."""
+        return {study.name: self.draw(result)} if self.succeeded(result) else {}
+
+
+class SampleKind(DropsKind[R]):
+    """A kind of study that computes samples of drops."""
+
+    def describe(self, study: SampleStudy) -> str:
+        """Return how many samples a study has and how much disk it needs."""
+        space = disk_space(study) / 1e6
+        amount = f"{space / 1e3:.3g} GB" if space > 1e3 else f"{space:.2g} MB"  # noqa: PLR2004
+        by = ""
+        if study.plan:
+            by = f" by a surrogate, which is trained on up to {study.plan.size} drops"
+        elif study.surrogate:
+            by = f" by a surrogate of {len(study.surrogate.points)} drops"
+        return f"{study.name}: {study.count} samples of {study.model}{by}, about {amount} on disk"
+
+    def compute(self, study: SampleStudy, results: Results | None, **how: Unpack[RunOptions]) -> R:
+        """Return the result of all samples, computed or continued."""
+        try:
+            if study.plan:
+                study = replace(study, surrogate=train(study, results, how))
+            folder = results.folder if results else None
+            return self.conclude(study, compute_samples(study, folder, how))
+        except MemoryError as error:
+            refuse(f"{study.count} samples do not fit in memory", "fewer samples", error)
+
+    @abstractmethod
+    def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> R:
+        """Return the result of all samples."""
+
+    def identity_files(self, study: SampleStudy) -> list[str]:
+        """Return the names of the dataset and of the directory of blocks."""
+        return result_names(study)
+
+    def identity_in(self, path: Path) -> dict[str, str] | None:
+        """Return the identity of results."""
+        return read_identity(path)
+
+    def warnings(self, result: R) -> list[str]:
+        """Return how many samples have no results, and why."""
+        dataset = _samples(result)
+        failed = dataset["status"].values != 0
+        found = []
+        if failed.any():
+            ((reason, _),) = Counter(dataset["reason"].values[failed]).most_common(1)
+            found = [f"{failed.sum()} of {failed.size} samples have no results, such as: {reason}"]
+        if "surrogate" in dataset.attrs:
+            doubtful = int(dataset["doubtful"].sum())
+            share = f"it leaves {doubtful} of {failed.size} verdicts in doubt"
+            found.append(f"{dataset.attrs['surrogate']}; {share}")
+        return found
+
+    def succeeded(self, result: R) -> bool:
+        """Return whether any sample has results."""
+        return bool((_samples(result)["status"] == 0).any())
+
+
+def _samples(result: Any) -> xr.Dataset:  # noqa: ANN401 - a dataset, or what has one
+    return getattr(result, "dataset", result)  # type: ignore[no-any-return]

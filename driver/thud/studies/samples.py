@@ -1,0 +1,126 @@
+"""Studies of many samples: designs, and the values of keys in their samples."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from thud.case.keys import DENSITY
+from thud.impact.ensemble import get_cost
+from thud.studies.sampling import sampler_versions, unit_samples
+from thud.studies.study import Study, wall_volume
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from thud.studies.surrogate_plan import Plan
+    from thud.studies.temperature import Temperature
+    from thud.studies.trained_surrogate import Surrogate
+
+    Columns = dict[str, NDArray[Any]]
+
+
+# A block of samples should take about this time, s.
+_BLOCK_TIME = 0.5
+# Samples of a block that a surrogate answers, in about this time.
+_ANSWERED = 2**16
+
+
+@dataclass(frozen=True)
+class SampleStudy(Study):
+    """A study whose samples differ from its case in the values of its parameters.
+
+    Attributes
+    ----------
+    design : str
+        ``"grid"``, ``"list"``, ``"random"``, ``"latin_hypercube"``, ``"sobol"`` or ``"saltelli"``.
+    size, seed : int
+        Number of samples that are drawn (of base samples for ``"saltelli"``), and the seed.
+    temperature : Temperature or None
+        Law of the material where the temperature varies.
+    format : str
+        ``"netcdf"``, ``"zarr"``, or ``"auto"``: Zarr for what is large.
+    plan : Plan or None
+        How a surrogate is trained for its samples.
+    surrogate : Surrogate or None
+        What answers its samples instead of the model.
+    """
+
+    design: str = "grid"
+    size: int = 0
+    seed: int = 0
+    temperature: Temperature | None = None
+    format: str = "auto"
+    plan: Plan | None = None
+    surrogate: Surrogate | None = None
+
+    # Whether the peaks of the judged force are counted in each sample.
+    counts_peaks: ClassVar[bool] = False
+
+    def own_identity(self) -> dict[str, str]:
+        """Return design and temperature law."""
+        found = sampler_versions(self.design) | {"[design] kind": self.design}
+        if self.size:
+            found |= {"[design] size": f"{self.size}", "[design] seed": f"{self.seed}"}
+        if self.temperature:
+            found |= {f"[temperature] {k}": f"{v!r}" for k, v in self.temperature.given.items()}
+        if self.plan:
+            found |= self.plan.identity
+        elif self.surrogate:
+            found["surrogate"] = self.surrogate.digest
+        return found
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values of each parameter of a grid, or the one number of all samples."""
+        if self.design == "grid":
+            return tuple(parameter.size for parameter in self.parameters)
+        if self.design == "list":
+            return (self.parameters[0].size,)
+        if self.design == "saltelli":
+            return (self.size * (len(self.parameters) + 2),)
+        return (self.size,)
+
+    @property
+    def count(self) -> int:
+        """Number of samples."""
+        return math.prod(self.shape)
+
+    @property
+    def block_size(self) -> int:
+        """Number of samples that are computed together, the same for all backends."""
+        if self.plan or self.surrogate:
+            return _ANSWERED
+        if self.design in {"grid", "list"}:
+            # A grid may be larger than the memory; its ends do.
+            first = {p.name: replace(p, count=min(p.count, 2)).grid()[:1] for p in self.parameters}
+        else:
+            first = self.parameter_columns(0, 1)
+        keys = self.key_columns(first)
+        return max(1, round(_BLOCK_TIME / get_cost(self.case, keys)))
+
+    def parameter_columns(self, start: int, stop: int) -> Columns:
+        """Return values of samples `start` to `stop` - 1 by parameter, shape (n_sample,)."""
+        if self.design == "grid":
+            places = np.unravel_index(np.arange(start, stop), self.shape)
+            return {p.name: p.grid()[i] for p, i in zip(self.parameters, places, strict=True)}
+        if self.design == "list":
+            return {p.name: p.grid()[start:stop] for p in self.parameters}
+        shares = unit_samples(self.design, len(self.parameters), self.size, self.seed, start, stop)
+        return {p.name: p.quantile(shares[:, i]) for i, p in enumerate(self.parameters)}
+
+    def key_columns(self, columns: Columns) -> Columns:
+        """Return samples of `parameter_columns` as values of keys, shape (n_sample,).
+
+        The density determines the mass, the temperature modulus and loss factor.
+        """
+        found = dict(columns)
+        density = found.pop(DENSITY.name, self.density)
+        if density is not None:
+            ball = vars(self.case.ball) | found
+            volume = wall_volume(ball["outer_radius"], ball["wall_thickness"])
+            found["mass"] = density * volume * np.ones(len(next(iter(columns.values()))))
+        return self.temperature.act(self.case, found) if self.temperature else found

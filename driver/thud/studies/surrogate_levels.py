@@ -1,0 +1,130 @@
+"""Levels as the target of a fit whose impacts a surrogate answers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from thud.base.checks import refuse
+from thud.base.errors import NumericalError
+from thud.base.immutable import freeze
+from thud.impact.compute import compute
+from thud.level.levels import BANDWIDTHS
+from thud.studies.fitting.level_target import LevelMisfit
+from thud.studies.study import value_in
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from thud.case.case import Case
+    from thud.impact.impact import Impact
+    from thud.studies.fitting.misfit import Misfit
+    from thud.studies.fitting.ranges import Range
+    from thud.studies.fitting.result import Fit
+    from thud.studies.trained_surrogate import Surrogate
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What a surrogate says of one drop, in the units of a target, shape (size,)."""
+
+    values: NDArray[np.float64]
+
+
+class SurrogateLevels(LevelMisfit):
+    """How far a surrogate's levels are from a target.
+
+    Where the uncertainties of the target are given, the mean square of the surrogate's held-out
+    errors is added to their variances.
+    """
+
+    def __init__(self, misfit: LevelMisfit, surrogate: Surrogate, case: Case) -> None:
+        vars(self).update(vars(misfit))
+        self.surrogate = surrogate
+        self.name = f"{self.kind or case.levels.force}_level"
+        if self.bands != BANDWIDTHS[0]:
+            self.name = self.name.replace("_", f"_{self.bands}_")
+        if self.name not in surrogate.outputs:
+            refuse(f"the surrogate has no {self.name}", f"{', '.join(surrogate.outputs)}")
+        missed = np.sqrt(surrogate.mean_square(self.name))[self.places]
+        ratios = [np.sqrt(surrogate.mean_square(n)[0]) * np.log(10) / 20 for n in self.extra]
+        sizes = self.target[len(missed) :]
+        own = [np.array([r * s]) for r, s in zip(ratios, sizes, strict=True)]
+        for i, quantity in enumerate(self.extra):
+            if quantity == "contact_time":
+                # Many drops have it to the next sample.
+                own[i] = np.hypot(own[i], 1 / case.sampling.sample_rate)
+        self.model_error = freeze(np.concatenate([missed, *own]))
+        if self.known_noise:
+            self.deviation = freeze(np.hypot(self.deviation, self.model_error))
+
+    def solve(self, case: Case) -> Impact:
+        """Return the answer for a case, which only `values` reads."""
+        columns: dict[str, Any] = {
+            name: np.array([value_in(case, name)]) for name in self.surrogate.keys
+        }
+        found = self.surrogate.predict(case, columns)
+        if found["status"][0]:
+            raise NumericalError(found["reason"][0])
+        levels = found[self.name][0][self.places]
+        values = np.concatenate([levels, *(found[name] for name in self.extra)])
+        if not np.isfinite(values).all():
+            refuse("the surrogate does not answer all quantities of the target", "others")
+        return cast("Impact", Answer(values))
+
+    def values(self, impact: Impact) -> NDArray[np.float64]:
+        """Return what is compared, dB, s and 1, of an answer or an impact, shape (size,)."""
+        return impact.values if isinstance(impact, Answer) else super().values(impact)
+
+
+def answered(misfit: Misfit, surrogate: Surrogate, case: Case, names: list[str]) -> SurrogateLevels:
+    """Return the comparison of a target with answers of a surrogate."""
+    if not isinstance(misfit, LevelMisfit):
+        refuse("surrogate is not allowed for a force", "levels as target: it knows no histories")
+    surrogate.require(case, names)
+    return SurrogateLevels(misfit, surrogate, case)
+
+
+def within_region(entry: Range, surrogate: Surrogate) -> Range:
+    """Return the range of a parameter inside the region of a surrogate."""
+    low, high = surrogate.region[surrogate.keys.index(entry.name)].tolist()
+    low, high = max(low, entry.low), min(high, entry.high)
+    if not low < entry.start < high:
+        refuse(
+            f"[parameters] {entry.name}: start = {entry.start:g} is outside the region of the "
+            "surrogate",
+            f"{low:g} < start < {high:g} {entry.unit}".rstrip(),
+        )
+    spread = max(low, entry.spread[0]), min(high, entry.spread[1])
+    return replace(entry, low=low, high=high, spread=spread)
+
+
+def confirmed(found: Fit) -> Fit:
+    """Return a fit with the impacts of the model itself, and what these say of the surrogate."""
+    targets = []
+    missed = share = 0.0
+    for target in found.targets:
+        misfit = cast("SurrogateLevels", target.misfit)
+        impact = compute(target.case)
+        off = np.abs(misfit.values(impact) - misfit.values(target.impact))
+        # What all training drops share has no error.
+        known = misfit.model_error > 0
+        missed = max(missed, float((off[known] / misfit.model_error[known]).max(initial=0.0)))
+        if misfit.known_noise:
+            share = max(share, float((misfit.model_error / misfit.deviation).max() ** 2))
+        targets.append(replace(target, impact=impact))
+    sentences = []
+    if share:
+        sentences.append(
+            f"the errors of the surrogate are up to {100 * share:.2g} % of the variances of the "
+            "residuals"
+        )
+    # One in 15 000 of a normal distribution; held-out errors have longer tails.
+    if missed > 4:  # noqa: PLR2004
+        sentences.append(
+            f"the model itself differs at the result from the surrogate by {missed:.2g} standard "
+            "deviations of the surrogate's errors"
+        )
+    return replace(found, targets=tuple(targets), warnings=(*found.warnings, *sentences))

@@ -1,0 +1,405 @@
+"""A surrogate: the results of a model by interpolation, with their errors."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.stats import binom
+
+from thud.base.bridge import version
+from thud.base.checks import refuse, require_kind
+from thud.base.display import Displayed
+from thud.base.extras import require_extra
+from thud.base.files import is_failure, read_input, replace_file
+from thud.case.case import Case, case_text
+from thud.case.keys import OF_FILES, put
+from thud.level.assessment import get_criteria
+from thud.level.levels import get_bands
+from thud.studies.study import value_in
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+    from thud.base._schema import LimitsSource
+
+    Columns = dict[str, NDArray[Any]]
+    Values = NDArray[np.float64]
+
+# Share of the held-out drops within the error that is stated, and the confidence of that.
+SHARE = 0.95
+# Samples that are computed together: their kernel stays in the cache.
+_TOGETHER = 250
+# Values beyond the region by this part of its width are rounding.
+_ROUNDING = 1e-9
+# Smoothness of the kernel of Matern: responses that can be differentiated twice.
+SMOOTHNESS = 2.5
+_ARRAYS = ("region", "points", "length", "weights", "mean", "scale", "residuals")
+
+
+@dataclass(frozen=True, eq=False)
+class Surrogate(Displayed):
+    """What has been learned from some drops of a model, for others of the same region.
+
+    A Gaussian process interpolates all quantities, in dB: levels, and 20 lg of what has another
+    unit. Each quantity has an error: 95 % of drops that it was not trained on lie within it, with a
+    confidence of 95 % (order statistic of the leave-one-out residuals).
+
+    Attributes
+    ----------
+    case : Case
+        The case of the drops.
+    keys : tuple of str
+        Keys in which they differ.
+    region : ndarray, shape (n_key, 2)
+        Minimum and maximum of each key.
+    outputs : dict of str to int
+        Quantities, and how many numbers each has: levels one per band.
+    bound : float
+        Maximum error of what is answered, dB; other quantities are NaN.
+    peaks : int
+        Number of peaks of the judged force, the same in all drops.
+    identity : dict of str to str
+        What the drops and their choice depend on.
+    points : ndarray, shape (n_drop, n_key)
+        The drops, in the unit cube.
+    length : ndarray, shape (n_key,)
+        Lengths of correlation there.
+    weights : ndarray, shape (n_drop, n_number)
+        Weights of the kernels of the drops.
+    mean, scale : ndarray, shape (n_number,)
+        Mean and standard deviation of each number over the drops, dB.
+    residuals : ndarray, shape (n_drop, n_number)
+        Prediction minus result of each drop without itself, dB.
+    """
+
+    case: Case
+    keys: tuple[str, ...]
+    region: Values
+    outputs: dict[str, int]
+    bound: float
+    peaks: int
+    identity: dict[str, str]
+    points: Values
+    length: Values
+    weights: Values
+    mean: Values
+    scale: Values
+    residuals: Values
+
+    def __repr__(self) -> str:
+        """Return the keys and the largest error of what is judged."""
+        error = float(self.errors[self.judged].max())
+        return (
+            f"<Surrogate of {len(self.points)} drops by {', '.join(self.keys)}: "
+            f"95 % within {error:.3f} dB>"
+        )
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text: the error of each quantity."""
+        rows: list[tuple[str, ...]] = [("held-out drops, dB", "95 %", "maximum", "spread", "")]
+        largest = np.abs(self.residuals).max(axis=0)
+        for name, *numbers in zip(self.labels, self.errors, largest, self.scale, strict=True):
+            if np.isfinite(numbers[0]):
+                note = "" if numbers[0] <= self.bound else "withheld"
+                rows.append((name, *(f"{number:.3f}" for number in numbers), note))
+        return rows
+
+    table = rows
+
+    @property
+    def labels(self) -> list[str]:
+        """Names of all numbers."""
+        found = []
+        for name, count in self.outputs.items():
+            words = name.replace("_", " ")
+            bands = get_bands("third" if "third" in name else "octave").nominal
+            found += [f"{words} {band:g} Hz" for band in bands] if count > 1 else [words]
+        return found
+
+    @property
+    def judged(self) -> NDArray[np.bool_]:
+        """Which numbers the verdict depends on, shape (n_number,)."""
+        names = {f"{self.case.levels.force}_level", "contact_time", "restitution"}
+        return np.repeat([name in names for name in self.outputs], list(self.outputs.values()))
+
+    @property
+    def errors(self) -> Values:
+        """Error of each number, dB, shape (n_number,); NaN where the model has no such result."""
+        count = len(self.points)
+        # With 58 drops or fewer there is no such order statistic.
+        place = int(binom.ppf(SHARE, count, SHARE))
+        found: Values = np.sort(np.abs(self.residuals), axis=0)[place]
+        return found
+
+    @property
+    def worst(self) -> tuple[str, float]:
+        """Name and error, dB, of the judged number with the largest error."""
+        errors = np.where(self.judged, self.errors, -np.inf)
+        return self.labels[int(np.nanargmax(errors))], float(np.nanmax(errors))
+
+    @property
+    def sentence(self) -> str:
+        """How it was trained, its largest error of what is judged, and what it does not answer."""
+        label, error = self.worst
+        found = (
+            f"surrogate of {len(self.points)} drops: 95 % of held-out drops within {error:.2g} dB "
+            f"({label}; the rest of the verdict closer)"
+        )
+        if self.withheld:
+            found += f"; not answered, with errors above {self.bound:g} dB: "
+            found += ", ".join(self.withheld)
+        return found
+
+    @property
+    def withheld(self) -> list[str]:
+        """Numbers that are not answered because their errors exceed the bound."""
+        pairs = zip(self.labels, self.errors, strict=True)
+        return [label for label, error in pairs if error > self.bound]
+
+    def error_of(self, name: str) -> Values:
+        """Return the errors of a quantity, dB, shape (count,)."""
+        found: Values = self._split(self.errors[np.newaxis])[name][0]
+        return found
+
+    def mean_square(self, name: str) -> Values:
+        """Return the mean squares of the held-out errors of a quantity, dB2, shape (count,)."""
+        found: Values = self._split(np.mean(self.residuals**2, axis=0)[np.newaxis])[name][0]
+        return found
+
+    def _split(self, numbers: Values) -> dict[str, Values]:
+        """Return columns of numbers by quantity, shape (n, count)."""
+        ends = np.cumsum(list(self.outputs.values()))[:-1]
+        return dict(zip(self.outputs, np.split(numbers, ends, axis=1), strict=True))
+
+    def require(self, case: Case, names: Iterable[str]) -> None:
+        """Raise InputError where a study of a case, with some parameters, needs another."""
+        require_kind("surrogate", self, Surrogate)
+        if (trained := self.identity["thud"]) != version():
+            refuse(f"the surrogate was trained by thud {trained}", f"training by thud {version()}")
+        if more := [name for name in names if name not in self.keys]:
+            refuse(
+                f"{', '.join(more)}: the surrogate was not trained on it",
+                f"parameters among {', '.join(self.keys)}",
+            )
+        middle = dict(zip(self.keys, self.region.mean(axis=1).tolist(), strict=True))
+        model = self.case.model.name  # type: ignore[union-attr]
+        if case.model is None or case.model.name != model:
+            refuse("the surrogate was trained on another model", f"model = {model!r}")
+        before, now = (keys_of(put(one, middle)) for one in (self.case, case))
+        if changed := [key for key in before if before[key] != now.get(key)]:
+            key = changed[0]
+            refuse(f"{key} = {now.get(key)}: the surrogate was trained with {before[key]}", "that")
+
+    def predict(self, case: Case, columns: Columns) -> Columns:
+        """Return the results of samples of a case that differ in some keys, shape (n_sample,) each.
+
+        They are those of `thud.studies.evaluation.evaluate`, and ``doubtful``: the verdict could
+        change by the errors. Samples outside the region have a status and a reason instead. Raises
+        InputError as `require`.
+        """
+        self.require(case, columns)
+        with require_extra("surrogate"):
+            from sklearn.gaussian_process.kernels import Matern
+
+        count = len(next(iter(columns.values())))
+        given = {n: np.asarray(columns.get(n, value_in(case, n))) for n in self.keys}
+        values = np.column_stack([np.broadcast_to(v, count) for v in given.values()]).astype(float)
+        low, high = self.region.T
+        width = high - low
+        edge = _ROUNDING * np.maximum(width, np.abs(high))
+        outside = ~((values >= low - edge) & (values <= high + edge))
+        places = (values - low) / np.where(width > 0, width, 1.0)
+        kernel = Matern(self.length, nu=SMOOTHNESS)
+        numbers = np.empty((count, len(self.mean)))
+        for start in range(0, count, _TOGETHER):
+            some = slice(start, start + _TOGETHER)
+            numbers[some] = kernel(places[some], self.points) @ self.weights
+        numbers = numbers * self.scale + self.mean
+        numbers[:, ~(self.errors <= self.bound)] = np.nan
+        failed = outside.any(axis=1)
+        numbers[failed] = np.nan
+        return self._answer(case, numbers, given, self._reasons(values, outside))
+
+    def _reasons(self, values: Values, outside: NDArray[np.bool_]) -> NDArray[np.object_]:
+        reasons = np.full(len(values), "", dtype=object)
+        for i in np.flatnonzero(outside.any(axis=1)):
+            j = int(np.argmax(outside[i]))
+            name, (low, high) = self.keys[j], self.region[j]
+            reasons[i] = (
+                f"{name} = {values[i, j]:g} is outside the region of the surrogate; "
+                f"allowed: {low:g} <= {name} <= {high:g}"
+            )
+        return reasons
+
+    def _answer(
+        self, case: Case, numbers: Values, given: Columns, reasons: NDArray[np.object_]
+    ) -> Columns:
+        parts = self._split(numbers)
+        levels = {name: part for name, part in parts.items() if self.outputs[name] > 1}
+        found: Columns = {n: 10 ** (part[:, 0] / 20) for n, part in parts.items()} | levels
+        names = ("contact_time", "restitution")
+        level = f"{case.levels.force}_level"
+        rest = [given.get(n, np.asarray(value_in(case, n))) for n in ("mass", "height")]
+        exact = [np.zeros(1)] * 3
+        verdicts = assess_many(
+            (found[level], *(found[n] for n in names), np.array([self.peaks]), *rest),
+            (
+                self.error_of(level)[np.newaxis],
+                *(found[n] * (10 ** (self.error_of(n) / 20) - 1) for n in names),
+                *exact,
+            ),
+            case.limits.source,
+        )
+        verdicts["doubtful"] &= reasons == ""
+        status = np.where(reasons == "", 0, 1).astype("int8")
+        return found | verdicts | {"status": status, "reason": reasons}
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether its parts fit together, and what is judged has numbers."""
+        drops, keys, numbers = len(self.points), len(self.keys), sum(self.outputs.values())
+        shapes = {
+            "region": (keys, 2), "points": (drops, keys), "length": (keys,),
+            "weights": (drops, numbers), "mean": (numbers,), "scale": (numbers,),
+            "residuals": (drops, numbers),
+        }  # fmt: skip
+        if any(getattr(self, name).shape != shape for name, shape in shapes.items()):
+            return False
+        low, high = self.region.T
+        known = (self.points, self.length, *(
+            getattr(self, name)[..., self.judged] for name in ("weights", "mean", "residuals")
+        ))  # fmt: skip
+        return bool(
+            drops > 0
+            and self.judged.any()
+            and (low <= high).all()
+            and (self.length > 0).all()
+            and all(np.isfinite(part).all() for part in known)
+            and self.bound > 0
+            and self.peaks == int(self.peaks)
+            and self.case.model
+            and "thud" in self.identity
+        )
+
+    @property
+    def _header(self) -> str:
+        return json.dumps(
+            {
+                "case": case_text(self.case).decode(),
+                "keys": self.keys,
+                "outputs": self.outputs,
+                "bound": self.bound,
+                "peaks": self.peaks,
+                "identity": self.identity,
+            }
+        )
+
+    @property
+    def digest(self) -> str:
+        """Checksum of its content."""
+        content = sha256(self._header.encode())
+        for name in _ARRAYS:
+            content.update(np.ascontiguousarray(getattr(self, name)).tobytes())
+        return content.hexdigest()
+
+    def to_bytes(self) -> bytes:
+        """Return the content of its file."""
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
+        file = io.BytesIO()
+        np.savez_compressed(file, header=self._header, digest=self.digest, **arrays)
+        return file.getvalue()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write it to a file ``.npz``, completely or not at all; `read_surrogate` reads it."""
+        replace_file(path, self.to_bytes())
+
+
+def assess_many(
+    values: tuple[Values, ...], errors: tuple[Values, ...], source: LimitsSource
+) -> dict[str, NDArray[Any]]:
+    """Return margin, verdict, and whether errors could change it, of many drops.
+
+    Parameters
+    ----------
+    values
+        Octave levels, dB, shape (n, 5); contact time, s; restitution; number of peaks; mass, kg;
+        height, m, as in `thud.assess`, shape (n,) or of one value.
+    errors
+        The same of their errors, in the same units.
+    source
+        Source whose limits apply.
+    """
+    count, bands = values[0].shape
+    judged, by = (_columns(part, count) for part in (values, errors))
+    criteria = get_criteria(source)
+    lower = np.array([one.lower for one in criteria])
+    upper = np.array([one.upper for one in criteria])
+    inside = np.minimum(judged - lower, upper - judged)
+    surely, perhaps = ((inside >= sign * by).all(axis=1) for sign in (1, -1))
+    return {
+        "margin": inside[:, :bands].min(axis=1),
+        "conforms": (inside >= 0).all(axis=1),
+        "doubtful": perhaps & ~surely,
+    }
+
+
+def _columns(parts: tuple[Values, ...], count: int) -> Values:
+    """Return the values of all criteria, shape (count, n_criterion)."""
+    levels = np.broadcast_to(parts[0], (count, parts[0].shape[-1]))
+    return np.column_stack([levels, *(np.broadcast_to(part, count) for part in parts[1:])])
+
+
+def keys_of(case: Case) -> dict[str, str]:
+    """Return what the results of a surrogate depend on in a case, as texts by place and key."""
+    groups = case.to_namelist()
+    return {
+        f"&{group}: {key}": f"{value!r}"
+        for group, keys in groups.items()
+        if group not in {"case", "limits", OF_FILES}
+        for key, value in keys.items()
+    }
+
+
+def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
+    """Read a surrogate that was saved. It holds numbers and text only, nothing that is executed.
+
+    Raises
+    ------
+    InputError
+        Where there is none, or the file is damaged.
+    OSError
+        Where it cannot be read for now.
+    """
+    require_kind("surrogate", path, str | Path)
+    try:
+        with np.load(io.BytesIO(read_input(Path(path))), allow_pickle=False) as file:
+            header = json.loads(str(file["header"]))
+            arrays: dict[str, Any] = {
+                name: np.asarray(file[name], dtype=np.float64) for name in _ARRAYS
+            }
+            digest = str(file["digest"])
+        header["case"] = Case.from_text(header["case"])
+        header["keys"] = tuple(header["keys"])
+        found = Surrogate(**header, **arrays)
+        intact = found.digest == digest and found.is_whole
+    except Exception as error:
+        if is_failure(error):
+            raise
+        # Zip, NumPy and JSON raise many kinds.
+        reason = getattr(error, "strerror", None) or "no surrogate"
+        refuse(f"{path} cannot be read: {reason}", "a file that Surrogate.save wrote", error)
+    if not intact:
+        refuse(
+            f"{path} is damaged: wrong checksum, shapes or numbers",
+            "a file that Surrogate.save wrote",
+        )
+    return found

@@ -1,0 +1,88 @@
+!> The questions that callers in other languages may ask, by name.
+module thud_answer
+   use thud_bundle, only: bundle_type
+   use thud_case, only: case_type
+   use thud_case_answers, only: answer_compression, answer_effective_case, answer_loss_factors, answer_modes, answer_run, &
+      answer_samples, answer_solve, describe_library
+   use thud_case_text, only: read_case
+   use thud_error, only: error_type, input_error
+   use thud_floor_answers, only: answer_floor_energy, answer_floor_impact, answer_mobility, answer_mobility_fit, &
+      answer_point_velocity, answer_radiator, answer_room_level
+   use thud_level_answers, only: answer_background, answer_levels, answer_peak_count, answer_rating, answer_recorded_force, &
+      answer_standardization
+   use thud_request, only: request_type
+   use thud_text, only: quoted
+   implicit none (type, external)
+   private
+
+   public :: get_answer
+
+contains
+
+   !> The answer to a question; where the request has the text `case`, that is read and checked first.
+   subroutine get_answer(question, request, bundle, error)
+      character(len=*), intent(in) :: question
+      type(request_type), intent(in) :: request
+      type(bundle_type), intent(inout) :: bundle
+      !> The case is invalid, or a computation failed.
+      type(error_type), allocatable, intent(out) :: error
+      type(case_type), target :: case
+      character(len=:), allocatable :: text
+
+      if (request%has('case')) then
+         call request%get_text('case', text)
+         ! Samples may make valid what is not in the case.
+         call read_case(text, 'python', case, error, unchecked=question == 'samples')
+         if (allocated(error)) return
+      end if
+      select case (question)
+      case ('check')
+         continue
+      case ('library')
+         call describe_library(bundle)
+      case ('effective_case')
+         call answer_effective_case(request, bundle, error)
+      case ('run')
+         call answer_run(request, bundle, error)
+      case ('solve')
+         call answer_solve(case, bundle, error)
+      case ('modes')
+         call answer_modes(case, bundle, error)
+      case ('compression')
+         call answer_compression(case, bundle, error)
+      case ('loss_factors')
+         call answer_loss_factors(case, request, bundle, error)
+      case ('samples')
+         call answer_samples(case, request, bundle, error)
+      case ('mobility')
+         call answer_mobility(case, request, bundle, error)
+      case ('floor_energy')
+         call answer_floor_energy(case, request, bundle, error)
+      case ('point_velocity')
+         call answer_point_velocity(case, request, bundle, error)
+      case ('floor_impact')
+         call answer_floor_impact(case, bundle, error)
+      case ('room_level')
+         call answer_room_level(case, request, bundle, error)
+      case ('radiator')
+         call answer_radiator(case, request, bundle, error)
+      case ('mobility_fit')
+         call answer_mobility_fit(request, bundle, error)
+      case ('levels')
+         call answer_levels(request, bundle, error)
+      case ('peak_count')
+         call answer_peak_count(request, bundle)
+      case ('recorded_force')
+         call answer_recorded_force(request, bundle)
+      case ('rating')
+         call answer_rating(request, bundle)
+      case ('standardization')
+         call answer_standardization(request, bundle)
+      case ('background')
+         call answer_background(request, bundle)
+      case default
+         error = input_error(quoted(question)//' is no question of the library')
+      end select
+   end subroutine get_answer
+
+end module thud_answer

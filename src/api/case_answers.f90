@@ -1,0 +1,188 @@
+!> Answers on cases: impact, free modes, compression, samples, whole runs; see `thud_answer`.
+module thud_case_answers
+   use thud_bundle, only: bundle_type
+   use thud_case, only: case_type, get_model_number
+   use thud_case_text, only: get_case_text
+   use thud_column, only: column_type, find_columns
+   use thud_compression, only: compression_type
+   use thud_compute, only: compress_case, compute, results_type, scope_type
+   use thud_constants, only: get_compiler, version
+   use thud_error, only: error_type
+   use thud_kinds, only: wp
+   use thud_progress_line, only: begin_progress, end_progress
+   use thud_request, only: request_type
+   use thud_result_bundle, only: add_compression, add_results
+   use thud_run, only: load_case, outcome_type, run_case
+   use thud_sampling, only: get_sample_count
+   use thud_sweep, only: acquire_sweep, new_sweep, release_sweep, solve_sweep, sweep_type
+   use thud_text, only: newline, split, to_text
+   use thud_text_buffer, only: text_buffer_type
+   implicit none (type, external)
+   private
+
+   public :: answer_compression, answer_effective_case, answer_loss_factors, answer_modes, answer_run, answer_samples
+   public :: answer_solve, describe_library
+
+contains
+
+   !> Version and compiler of the library.
+   subroutine describe_library(bundle)
+      type(bundle_type), intent(inout) :: bundle
+
+      call bundle%add_text('version', version)
+      call bundle%add_text('compiler', trim(get_compiler()))
+   end subroutine describe_library
+
+   !> The full input of the namelist file `path`.
+   subroutine answer_effective_case(request, bundle, error)
+      type(request_type), intent(in) :: request
+      type(bundle_type), intent(inout) :: bundle
+      !> The file is not a case.
+      type(error_type), allocatable, intent(out) :: error
+      type(case_type), target :: case
+      character(len=:), allocatable :: path, text
+
+      call request%get_text('path', path)
+      call load_case(path, case, error)
+      if (allocated(error)) return
+      call get_case_text(case, text)
+      call bundle%add_text('case', text)
+   end subroutine answer_effective_case
+
+   !> The run of the namelist file `path`, as by the executable, to the directory `output`; with the numbers `replace`,
+   !> `channels` and `progress` not 0 it replaces files of others, writes the channels of the histories, and shows progress
+   !> on a terminal.
+   subroutine answer_run(request, bundle, error)
+      type(request_type), intent(in) :: request
+      type(bundle_type), intent(inout) :: bundle
+      !> The run failed; nothing was written.
+      type(error_type), allocatable, intent(out) :: error
+      type(case_type), target :: case
+      type(results_type) :: results
+      type(outcome_type) :: outcome
+      character(len=:), allocatable :: path, output, text
+      integer :: i
+
+      call request%get_text('path', path)
+      call request%get_text('output', output)
+      if (request%get_number('progress') > 0.0_wp) call begin_progress()
+      call run_case(path, output, request%get_number('replace') > 0.0_wp, request%get_number('channels') > 0.0_wp, case, &
+         results, outcome, error)
+      call end_progress()
+      if (allocated(error)) return
+      call get_case_text(case, text)
+      call bundle%add_text('case', text)
+      call bundle%add_text('directory', outcome%directory)
+      call bundle%add_text('table', outcome%table)
+      do i = 1, outcome%n_message
+         call bundle%add_text('messages.'//to_text(i), outcome%messages(i)%text)
+      end do
+      call bundle%add_number('conforms', merge(1.0_wp, 0.0_wp, outcome%conforms))
+      call add_results(bundle, case, results)
+   end subroutine answer_run
+
+   !> What a case asks for, without levels and energies: callers ask for those in the bands that they need.
+   subroutine answer_solve(case, bundle, error)
+      type(case_type), intent(in) :: case
+      type(bundle_type), intent(inout) :: bundle
+      !> A computation failed.
+      type(error_type), allocatable, intent(out) :: error
+      type(results_type) :: results
+
+      call compute(case, scope_type(levels=.false., energies=.false.), results, error)
+      if (.not. allocated(error)) call add_results(bundle, case, results)
+   end subroutine answer_solve
+
+   !> The free modes of the ball of a case.
+   subroutine answer_modes(case, bundle, error)
+      type(case_type), intent(inout) :: case
+      type(bundle_type), intent(inout) :: bundle
+      !> A computation failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      case%has_impact = .false.
+      call answer_solve(case, bundle, error)
+   end subroutine answer_modes
+
+   !> The quasi-static compression of the ball of a case.
+   subroutine answer_compression(case, bundle, error)
+      type(case_type), intent(in) :: case
+      type(bundle_type), intent(inout) :: bundle
+      !> The model has none, or the ball cannot be pressed so far.
+      type(error_type), allocatable, intent(out) :: error
+      type(compression_type) :: compression
+
+      call compress_case(case, compression, error)
+      if (.not. allocated(error)) call add_compression(bundle, compression)
+   end subroutine answer_compression
+
+   !> The loss factor of the material of a case against `frequency`, Hz.
+   subroutine answer_loss_factors(case, request, bundle, error)
+      type(case_type), intent(in) :: case
+      type(request_type), intent(in) :: request
+      type(bundle_type), intent(inout) :: bundle
+      !> The model has none.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: frequency(:), loss_factor(:)
+
+      frequency = request%get_array('frequency')
+      allocate (loss_factor, mold=frequency)
+      associate (model => case%models(get_model_number(case))%model)
+         call model%get_loss_factors(case%ball, frequency, loss_factor, error)
+      end associate
+      if (.not. allocated(error)) call bundle%add_array('loss_factors', shape(frequency), loss_factor)
+   end subroutine answer_loss_factors
+
+   !> Samples of a case that differ in the values of the keys `keys`, a text with commas between: `values`, of a choice its
+   !> number from 1, [n_key, n_sample], by `threads` threads. The numbers `levels` and `forces` say whether those are
+   !> wanted. Without values only the cost of one sample, and the length of its forces.
+   subroutine answer_samples(case, request, bundle, error)
+      type(case_type), intent(in), target :: case
+      type(request_type), intent(in) :: request
+      type(bundle_type), intent(inout) :: bundle
+      !> A key is unknown, or the samples cannot be computed together.
+      type(error_type), allocatable, intent(out) :: error
+      type(column_type), allocatable :: columns(:)
+      type(sweep_type), allocatable :: sweep
+      character(len=:), allocatable :: keys
+      real(wp), allocatable :: values(:)
+
+      call request%get_text('keys', keys)
+      call find_columns(case, split(keys, nint(request%get_number('key_count'))), columns, error)
+      if (allocated(error)) return
+      call acquire_sweep(sweep)
+      call new_sweep(case, columns, request%get_number('levels') > 0.0_wp, sweep)
+      call bundle%add_number('cost', sweep%cost)
+      call bundle%add_number('force_length', real(get_sample_count(case%sampling), wp))
+      if (request%has('values')) then
+         values = request%get_array('values')
+         call solve_sweep(case, columns, reshape(values, [size(columns), size(values)/size(columns)]), &
+            nint(request%get_number('threads')), request%get_number('forces') > 0.0_wp, sweep, error)
+         if (allocated(error)) return
+         call add_samples(bundle, sweep)
+      end if
+      call release_sweep(sweep)
+   end subroutine answer_samples
+
+   !> Adds the results of samples to a bundle.
+   subroutine add_samples(bundle, sweep)
+      type(bundle_type), intent(inout) :: bundle
+      type(sweep_type), intent(in) :: sweep
+      type(text_buffer_type) :: reasons
+      integer :: i
+
+      do i = 1, size(sweep%reason)
+         if (allocated(sweep%reason(i)%text)) call reasons%append(sweep%reason(i)%text//newline)
+      end do
+      call bundle%add_text('reasons', reasons%get_text())
+      call bundle%add_array('status', shape(sweep%status), real(sweep%status, wp))
+      call bundle%add_array('quantity', shape(sweep%quantity), sweep%quantity)
+      call bundle%add_array('level', shape(sweep%level), sweep%level)
+      call bundle%add_array('conforms', shape(sweep%conforms), merge(1.0_wp, 0.0_wp, sweep%conforms))
+      call bundle%add_array('margin', shape(sweep%margin), sweep%margin)
+      call bundle%add_array('verdict', shape(sweep%verdict), merge(1.0_wp, 0.0_wp, sweep%verdict))
+      call bundle%add_array('floor_value', shape(sweep%floor_value), sweep%floor_value)
+      call bundle%add_array('force', shape(sweep%force), sweep%force)
+   end subroutine add_samples
+
+end module thud_case_answers

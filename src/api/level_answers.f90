@@ -1,0 +1,107 @@
+!> Answers on levels and ratings of any record; see `thud_answer`.
+module thud_level_answers
+   use thud_band, only: band_type, find_bands, octave_set
+   use thud_bundle, only: bundle_type
+   use thud_constants, only: recorded_band
+   use thud_error, only: error_type
+   use thud_force_exposure, only: get_force_exposure_levels
+   use thud_kinds, only: wp
+   use thud_rating, only: correct_for_background, get_a_weighted_level, get_grade, get_legacy_rating, get_rounded, &
+      get_standardisation
+   use thud_request, only: request_type
+   use thud_source_limits, only: get_peak_count
+   use thud_transform, only: get_low_pass
+   implicit none (type, external)
+   private
+
+   public :: answer_background, answer_levels, answer_peak_count, answer_rating, answer_recorded_force
+   public :: answer_standardization
+
+contains
+
+   !> Force exposure levels, dB, of `force`, N, at `sample_rate`, Hz, in the set `bands` by the method `method`.
+   subroutine answer_levels(request, bundle, error)
+      type(request_type), intent(in) :: request
+      type(bundle_type), intent(inout) :: bundle
+      !> The set is unknown, or the record has no level.
+      type(error_type), allocatable, intent(out) :: error
+      type(band_type), allocatable :: bands(:)
+      character(len=:), allocatable :: set, method
+      real(wp), allocatable :: levels(:)
+
+      call request%get_text('bands', set)
+      call request%get_text('method', method)
+      call find_bands(set, bands, error)
+      if (allocated(error)) return
+      allocate (levels(size(bands)))
+      call get_force_exposure_levels(request%get_array('force'), request%get_number('sample_rate'), bands, method, &
+         levels, error)
+      if (.not. allocated(error)) call bundle%add_array('levels', shape(levels), levels)
+   end subroutine answer_levels
+
+   !> Number of peaks of `force`, N, at `sample_rate`, Hz.
+   subroutine answer_peak_count(request, bundle)
+      type(request_type), intent(in) :: request
+      type(bundle_type), intent(inout) :: bundle
+
+      call bundle%add_number('peak_count', real(get_peak_count(request%get_array('force'), &
+         request%get_number('sample_rate')), wp))
+   end subroutine answer_peak_count
+
+   !> `force`, N, at `sample_rate`, Hz, as a force plate records it: low-passed at 1.25 kHz.
+   subroutine answer_recorded_force(request, bundle)
+      type(request_type), intent(in) :: request
+      type(bundle_type), intent(inout) :: bundle
+      real(wp), allocatable :: force(:), recorded(:)
+
+      force = request%get_array('force')
+      allocate (recorded, mold=force)
+      call get_low_pass(force, request%get_number('sample_rate'), recorded_band, recorded)
+      call bundle%add_array('force', shape(recorded), recorded)
+   end subroutine answer_recorded_force
+
+   !> Single numbers of `levels` in a room, dB, in the rated bands of the set `bands`: A-weighted, as stated, class (0 for
+   !> none), and, of octaves, by the inverse A-weighted curve.
+   subroutine answer_rating(request, bundle)
+      type(request_type), intent(in) :: request
+      type(bundle_type), intent(inout) :: bundle
+      character(len=:), allocatable :: set
+      real(wp), allocatable :: levels(:)
+      real(wp) :: a_weighted
+
+      call request%get_text('bands', set)
+      levels = request%get_array('levels')
+      a_weighted = get_a_weighted_level(set, levels)
+      call bundle%add_number('a_weighted', a_weighted)
+      call bundle%add_number('rounded', real(get_rounded(a_weighted), wp))
+      call bundle%add_number('class', real(get_grade(a_weighted), wp))
+      if (set == octave_set) call bundle%add_number('curve', real(get_legacy_rating(levels), wp))
+   end subroutine answer_rating
+
+   !> `levels`, dB, standardized to the reference room from `reverberation_time`, s, and `volume`, m3.
+   subroutine answer_standardization(request, bundle)
+      type(request_type), intent(in) :: request
+      type(bundle_type), intent(inout) :: bundle
+      real(wp), allocatable :: levels(:)
+
+      levels = request%get_array('levels')
+      levels = levels + get_standardisation(request%get_array('reverberation_time'), request%get_number('volume'))
+      call bundle%add_array('levels', shape(levels), levels)
+   end subroutine answer_standardization
+
+   !> `levels`, dB, corrected for those of the `background`, and whether the true level is at most the corrected one.
+   subroutine answer_background(request, bundle)
+      type(request_type), intent(in) :: request
+      type(bundle_type), intent(inout) :: bundle
+      real(wp), allocatable :: levels(:), corrected(:)
+      logical, allocatable :: is_upper_bound(:)
+
+      levels = request%get_array('levels')
+      allocate (corrected, mold=levels)
+      allocate (is_upper_bound(size(levels)))
+      call correct_for_background(levels, request%get_array('background'), corrected, is_upper_bound)
+      call bundle%add_array('levels', shape(levels), corrected)
+      call bundle%add_array('is_upper_bound', shape(levels), merge(1.0_wp, 0.0_wp, is_upper_bound))
+   end subroutine answer_background
+
+end module thud_level_answers

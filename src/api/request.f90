@@ -1,0 +1,111 @@
+!> What a caller in another language asks: texts, numbers and arrays by name, the counterpart of `thud_bundle`.
+module thud_request
+   use thud_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: request_type
+
+   !> Texts and arrays, each with its name.
+   type :: request_type
+      !> A line for each: name, tab, `t` and the length of a text or `n` and the number of values.
+      character(len=:), allocatable :: header
+      !> All texts, one after the other.
+      character(len=:), allocatable :: text
+      !> All values, one array after the other: [n_value].
+      real(wp), allocatable :: values(:)
+   contains
+      procedure :: has
+      procedure :: get_text
+      procedure :: get_number
+      procedure :: get_array
+   end type request_type
+
+   !> Ends a name in the header, and a line of it.
+   character(len=*), parameter :: tab = achar(9), line_feed = achar(10)
+
+contains
+
+   !> Whether there is an item of a name.
+   pure function has(self, name) result(found)
+      class(request_type), intent(in) :: self
+      character(len=*), intent(in) :: name
+      logical :: found
+
+      found = index(line_feed//self%header, line_feed//name//tab) > 0
+   end function has
+
+   !> A text, empty where there is none of the name.
+   pure subroutine get_text(self, name, text)
+      class(request_type), intent(in) :: self
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable, intent(out) :: text
+      integer :: first, length
+
+      call find(self, name, 't', first, length)
+      text = self%text(first:first + length - 1)
+   end subroutine get_text
+
+   !> A number, 0 where there is none of the name.
+   pure function get_number(self, name) result(number)
+      class(request_type), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(wp) :: number
+      integer :: first, length
+
+      call find(self, name, 'n', first, length)
+      number = 0.0_wp
+      if (length > 0) number = self%values(first)
+   end function get_number
+
+   !> An array, of no size where there is none of the name.
+   pure function get_array(self, name) result(values)
+      class(request_type), intent(in) :: self
+      character(len=*), intent(in) :: name
+      !> The values: [n].
+      real(wp), allocatable :: values(:)
+      integer :: first, length
+
+      call find(self, name, 'n', first, length)
+      values = self%values(first:first + length - 1)
+   end function get_array
+
+   !> Where an item is among those of its kind.
+   pure subroutine find(self, name, kind, first, length)
+      type(request_type), intent(in) :: self
+      character(len=*), intent(in) :: name
+      !> `t` or `n`.
+      character(len=1), intent(in) :: kind
+      !> Index of its first character or value, and their number; 0 where there is none.
+      integer, intent(out) :: first, length
+      integer :: begin, middle, end, count
+
+      first = 1
+      length = 0
+      begin = 1
+      do while (begin <= len(self%header))
+         middle = begin + index(self%header(begin:), tab) - 1
+         end = begin + index(self%header(begin:), line_feed) - 1
+         if (self%header(middle + 1:middle + 1) == kind) then
+            count = get_count(self%header(middle + 2:end - 1))
+            if (self%header(begin:middle - 1) == name) length = count
+            if (self%header(begin:middle - 1) == name) return
+            first = first + count
+         end if
+         begin = end + 1
+      end do
+   end subroutine find
+
+   !> The number that digits stand for.
+   pure function get_count(digits) result(count)
+      character(len=*), intent(in) :: digits
+      integer :: count
+      integer :: i
+
+      count = 0
+      do i = 1, len(digits)
+         count = 10*count + iachar(digits(i:i)) - iachar('0')
+      end do
+   end function get_count
+
+end module thud_request

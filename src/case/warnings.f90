@@ -1,0 +1,193 @@
+!> Warnings on what is possible but not plausible: input of no rubber, moduli of another model, forces of no source.
+module thud_warnings
+   use thud_ball, only: get_density
+   use thud_band, only: band_type, get_band_name, get_octaves, octave_count
+   use thud_case, only: case_type, get_floor_number, get_model_number
+   use thud_error, only: error_type
+   use thud_floor_model, only: reason_length
+   use thud_force_exposure, only: get_force_exposure_levels
+   use thud_force_history, only: force_history_type
+   use thud_kinds, only: wp
+   use thud_registry, only: floor_names, model_names
+   use thud_sampling, only: get_rate_limit
+   use thud_text, only: fixed, quoted, to_text
+   use thud_theory_limit, only: get_limit_sentence, is_outside, theory_limit_type
+   implicit none (type, external)
+   private
+
+   public :: add_floor_warning, get_warnings, warning_length
+
+   !> Length of a warning.
+   integer, parameter :: warning_length = 240
+
+   !> Densities of rubbers, from unfilled natural rubber with pores to highly filled, kg/m3: [2].
+   real(wp), parameter :: rubber_density(2) = [800.0_wp, 2200.0_wp]
+
+   !> Moduli of elasticity of rubbers, from gels to hard rubber, Pa: [2].
+   real(wp), parameter :: rubber_modulus(2) = [1.0e4_wp, 3.0e9_wp]
+
+   !> Poisson's ratios of rubbers, also of filled ones: [2].
+   real(wp), parameter :: rubber_ratio(2) = [0.45_wp, 0.5_wp]
+
+   !> Two moduli count as the same within this part.
+   real(wp), parameter :: same_modulus = 0.02_wp
+
+   !> Levels over all frequencies of a ball and a tyre that conform, dB re 1 N and 1 s: 4.4 dB, as of the flagship and of
+   !> a half sine of 20 ms, above the sums of their nominal octaves: [2].
+   real(wp), parameter :: source_level(2) = [44.0_wp, 52.0_wp]
+
+   !> Distance from them of a force that is probably given in other units, dB.
+   real(wp), parameter :: max_distance = 40.0_wp
+
+   !> Outer edges of the octaves 31.5 and 500 Hz, Hz: [2].
+   real(wp), parameter :: standard_band(2) = [22.4_wp, 707.0_wp]
+
+   !> Level of an octave below that over all frequencies at which rounding counts, dB.
+   real(wp), parameter :: max_decline = 120.0_wp
+
+   !> Error of a coefficient of restitution.
+   real(wp), parameter :: restitution_error = 1.0e-6_wp
+
+   !> The model that computes free modes.
+   character(len=*), parameter :: modes_model = 'finite_element'
+
+contains
+
+   !> Warnings on a case and its force.
+   subroutine get_warnings(case, history, warnings, on_floor)
+      !> The case, checked.
+      type(case_type), intent(in) :: case
+      !> Its force, of no samples without an impact.
+      type(force_history_type), intent(in) :: history
+      !> Messages: [n].
+      character(len=warning_length), allocatable, intent(out) :: warnings(:)
+      !> The force on a floor that has moved under the source.
+      type(force_history_type), intent(in), optional :: on_floor
+
+      allocate (warnings(0))
+      if (case%has_impact) then
+         call add_ball_warnings(case, case%model, warnings)
+      else
+         call add_ball_warnings(case, modes_model, warnings)
+      end if
+      if (.not. case%has_impact) return
+      if (case%has_floor .and. case%floor /= floor_names(1) .and. .not. present(on_floor)) call add(warnings, &
+         '&floor: name = '//quoted(case%floor)//' does not move under the model '//quoted(case%model) &
+         //': its force is that on a rigid floor')
+      if (case%has_floor) call add_floor_warning(case, warnings)
+      call add_limit_warnings(case, history, warnings)
+      call add_level_warnings(history, warnings)
+      if (present(on_floor)) call add_limit_warnings(case, on_floor, warnings)
+   end subroutine get_warnings
+
+   !> Adds warnings on an answer that lies outside the theory.
+   subroutine add_limit_warnings(case, history, warnings)
+      type(case_type), intent(in) :: case
+      type(force_history_type), intent(in) :: history
+      !> Messages: [n].
+      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
+      type(theory_limit_type), allocatable :: limits(:)
+      integer :: i
+
+      associate (model => case%models(get_model_number(case))%model)
+         limits = [get_rate_limit(case%sampling), model%get_theory_limits(case%ball, case%drop, case%sampling, history), &
+            theory_limit_type('model', 'restitution less 1', history%restitution - 1, highest=restitution_error, &
+            reason='it gives energy to the source'), &
+            theory_limit_type('floor', 'restitution', history%restitution, lowest=-restitution_error, &
+            reason='the source goes on downwards with a floor too light for it')]
+      end associate
+      do i = 1, size(limits)
+         if (.not. is_outside(limits(i))) cycle
+         ! One sentence on a drop, on whichever floor.
+         if (any(index(warnings, trim(limits(i)%quantity)//' is ') > 0)) cycle
+         call add(warnings, get_limit_sentence(limits(i)))
+      end do
+   end subroutine add_limit_warnings
+
+   !> Adds warnings on levels of a force in other units, and on levels that are rounding.
+   subroutine add_level_warnings(history, warnings)
+      type(force_history_type), intent(in) :: history
+      !> Messages: [n].
+      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
+      type(band_type) :: bands(octave_count)
+      type(error_type), allocatable :: error
+      real(wp) :: levels(octave_count)
+      real(wp) :: total
+      integer :: first
+
+      total = 10*log10(max(sum(history%floor_force**2)/history%sample_rate, tiny(1.0_wp)))
+      if (total < source_level(1) - max_distance .or. total > source_level(2) + max_distance) call add(warnings, &
+         'the force exposure level over all frequencies is '//fixed(total, 1)//' dB, sources that conform have ' &
+         //fixed(source_level(1), 0)//' to '//fixed(source_level(2), 0)//' dB; check the units of the input')
+      bands = get_octaves()
+      call get_force_exposure_levels(history%floor_force, history%sample_rate, bands, 'exact', levels, error)
+      if (allocated(error)) return
+      first = findloc(levels < total - max_decline, .true., dim=1)
+      if (first > 0) call add(warnings, 'octaves from '//trim(get_band_name(bands(first))) &
+         //' Hz on hold less than 1e-12 of the energy of the force: rounding counts in their levels')
+   end subroutine add_level_warnings
+
+   !> Adds a warning on octaves of the standard in which the floor is not what it claims to be.
+   subroutine add_floor_warning(case, warnings)
+      !> A case with a floor.
+      type(case_type), intent(in) :: case
+      !> Messages: [n].
+      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
+      character(len=reason_length) :: reason
+      real(wp) :: lowest, highest
+
+      associate (floor => case%floors(get_floor_number(case))%model)
+         call floor%get_validity(lowest, highest, reason)
+      end associate
+      if (lowest > standard_band(1)) call add(warnings, '&'//trim(case%floor)//': below '//fixed(lowest, 0)//' Hz ' &
+         //trim(reason))
+      if (highest < standard_band(2)) call add(warnings, '&'//trim(case%floor)//': above '//fixed(highest, 0)//' Hz ' &
+         //trim(reason))
+   end subroutine add_floor_warning
+
+   !> Adds warnings on wall and modulus of the ball, for models that use them.
+   subroutine add_ball_warnings(case, model, warnings)
+      type(case_type), intent(in) :: case
+      !> The model that uses the ball, one of `model_names`.
+      character(len=*), intent(in) :: model
+      !> Messages: [n].
+      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
+      real(wp) :: own, other, density
+      integer :: i
+
+      i = findloc(model_names == model, .true., dim=1)
+      own = case%models(i)%model%get_paper_modulus()
+      if (.not. own > 0.0_wp) return
+      density = get_density(case%ball)
+      associate (modulus => case%ball%youngs_modulus)
+         if (density < rubber_density(1) .or. density > rubber_density(2)) call add(warnings, &
+            '&ball: the wall has a density of '//fixed(density, 0)//' kg/m3, rubbers have '//fixed(rubber_density(1), 0) &
+            //' to '//fixed(rubber_density(2), 0)//'; check mass, outer_radius and wall_thickness')
+         if (modulus < rubber_modulus(1) .or. modulus > rubber_modulus(2)) call add(warnings, &
+            '&ball: youngs_modulus = '//to_text(modulus)//' Pa, rubbers have '//to_text(rubber_modulus(1))//' to ' &
+            //to_text(rubber_modulus(2))//'; check the unit')
+         if (case%ball%poisson_ratio < rubber_ratio(1)) call add(warnings, '&ball: poisson_ratio = ' &
+            //to_text(case%ball%poisson_ratio)//', rubbers have '//fixed(rubber_ratio(1), 2)//' to ' &
+            //fixed(rubber_ratio(2), 2))
+         do i = 1, size(model_names)
+            other = case%models(i)%model%get_paper_modulus()
+            if (.not. (other > 0.0_wp .and. abs(other - own) > same_modulus*own)) cycle
+            if (abs(modulus - other) > same_modulus*other) cycle
+            call add(warnings, '&ball: youngs_modulus = '//fixed(modulus/1.0e6_wp, 2)//' MPa is the modulus of the ' &
+               //"paper's ball in the model "//quoted(model_names(i))//'; '//quoted(model)//' needs ' &
+               //fixed(own/1.0e6_wp, 2)//' MPa')
+            exit
+         end do
+      end associate
+   end subroutine add_ball_warnings
+
+   !> Adds a sentence.
+   pure subroutine add(warnings, sentence)
+      !> Messages: [n].
+      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
+      character(len=*), intent(in) :: sentence
+
+      warnings = [character(len=warning_length) :: warnings, sentence]
+   end subroutine add
+
+end module thud_warnings

@@ -1,0 +1,66 @@
+!> The table of quantities: the numbers that describe an impact, each with symbol, unit, meaning and how it is shown.
+!> Summary, tables, schema, and with it all of the Python package, take them from here.
+module thud_quantities
+   use thud_force_history, only: force_history_type
+   use thud_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: get_quantities, quantities, quantity_type, sample_quantity_count
+
+   !> A number that describes an impact.
+   type :: quantity_type
+      !> Name in files and programs, and in tables for readers.
+      character(len=24) :: name = ''
+      character(len=24) :: title = ''
+      !> Symbol in formulas and figures, in the mathematical notation of matplotlib.
+      character(len=16) :: symbol = ''
+      !> SI unit, blank for pure numbers.
+      character(len=8) :: unit = ''
+      !> Unit on the screen, and how many of them are one SI unit.
+      character(len=8) :: display_unit = ''
+      real(wp) :: display_scale = 1.0_wp
+      !> Decimals on the screen.
+      integer :: decimals = 3
+      !> What it is.
+      character(len=64) :: meaning = ''
+   end type quantity_type
+
+   !> The first of them describe each sample of a sweep, too.
+   integer, parameter :: sample_quantity_count = 6
+
+   !> The quantities, in the order of `get_quantities`.
+   type(quantity_type), parameter :: quantities(*) = [ &
+      quantity_type('contact_time', 'contact time', 'T', 's', 'ms', 1.0e3_wp, 3, 'contact time'), &
+      quantity_type('peak_force', 'peak force', 'F_{max}', 'N', 'N', 1.0_wp, 1, 'maximum force on the floor'), &
+      quantity_type('peak_elastic_force', 'peak elastic force', 'F_{E,max}', 'N', 'N', 1.0_wp, 1, &
+      'maximum elastic force'), &
+      quantity_type('max_deflection', 'maximum deflection', 'd_{max}', 'm', 'mm', 1.0e3_wp, 3, 'maximum deflection'), &
+      quantity_type('restitution', 'restitution', 'e', '', '', 1.0_wp, 4, 'coefficient of restitution'), &
+      quantity_type('impulse', 'impulse', 'I', 'N s', 'N s', 1.0_wp, 3, 'time integral of the force on the floor'), &
+      quantity_type('impact_velocity', 'impact velocity', 'v_0', 'm/s', 'm/s', 1.0_wp, 3, 'velocity at first touch'), &
+      quantity_type('exact_contact_time', 'exact contact time', 'T', 's', 'ms', 1.0e3_wp, 3, &
+      'contact time between steps'), &
+      quantity_type('touch_time', 'time of first touch', 't_0', 's', 'ms', 1.0e3_wp, 3, &
+      'time of first touch in the record'), &
+      quantity_type('sample_rate', 'sample rate', 'f_s', 'Hz', 'kHz', 1.0e-3_wp, 3, 'samples per second'), &
+      quantity_type('impulse_residual', 'impulse residual', '', '', '', 1.0_wp, 6, &
+      'relative residual of the balance of momentum'), &
+      quantity_type('energy_residual', 'energy residual', '', '', '', 1.0_wp, 6, &
+      'relative residual of the balance of energy')]
+
+contains
+
+   !> The values of the quantities.
+   pure function get_quantities(history) result(values)
+      type(force_history_type), intent(in) :: history
+      !> Values, SI units: [size(quantities)].
+      real(wp) :: values(size(quantities))
+
+      values = [history%contact_time, history%peak_force, history%peak_elastic_force, history%max_deflection, &
+         history%restitution, history%impulse, history%impact_velocity, &
+         merge(history%exact_contact_time, history%contact_time, history%exact_contact_time > 0.0_wp), &
+         history%touch_time, history%sample_rate, history%impulse_residual, history%energy_residual]
+   end function get_quantities
+
+end module thud_quantities

@@ -1,0 +1,199 @@
+!> A run of many samples from end to end: case and table in, one row of results per sample out, a chunk at a time, so
+!> that the memory does not grow with the table.
+module thud_samples_run
+   use thud_band, only: band_type, get_band_name, get_octaves, octave_count
+   use thud_case, only: case_type
+   use thud_case_text, only: get_case_text
+   use thud_compute, only: get_assessed_force
+   use thud_constants, only: version
+   use thud_error, only: error_type, input_error
+   use thud_file, only: text_file_type
+   use thud_kinds, only: wp
+   use thud_sweep, only: new_sweep, solve_sweep, sweep_type
+   use thud_progress, only: report_progress
+   use thud_result_directory, only: add_text, begin_file, check_owner, close_results, open_results, result_directory_type
+   use thud_run, only: load_case, outcome_type, replaces
+   use thud_sample_report, only: get_sample_header, get_sample_rows
+   use thud_sample_table, only: open_sample_table, read_samples, sample_table_type
+   use thud_system, only: path_length
+   use thud_table, only: get_defaults_line, get_force_title, get_span_row
+   use thud_text, only: newline, replaced, to_text
+   implicit none (type, external)
+   private
+
+   public :: run_samples
+
+   !> Files of the results.
+   character(len=*), parameter :: result_file = 'samples.csv', input_file = 'samples.nml'
+
+   !> Summary of many samples.
+   type :: tally_type
+      !> Samples, those that were computed, and those that conform.
+      integer :: samples = 0, computed = 0, conforming = 0
+      !> Why the first of those failed that did.
+      character(len=1024) :: failure = ''
+      !> Minimum and maximum contact time, s, and octave levels of the force of the case, dB: [octave_count + 1, 2].
+      real(wp) :: span(octave_count + 1, 2) = spread([huge(1.0_wp), -huge(1.0_wp)], 1, octave_count + 1)
+   end type tally_type
+
+contains
+
+   !> Computes all samples of a table and writes their results.
+   subroutine run_samples(path, table_path, threads, output, replace, outcome, error)
+      !> Path of the namelist file, which gives what the table does not.
+      character(len=*), intent(in) :: path
+      character(len=*), intent(in) :: table_path
+      integer, intent(in) :: threads
+      !> Directory for the results; empty for `outputs/<name of the case>_sets`.
+      character(len=*), intent(in) :: output
+      !> Files that thud has not written are replaced, too.
+      logical, intent(in) :: replace
+      !> Table, verdict and place of the results.
+      type(outcome_type), intent(out) :: outcome
+      !> The run failed; nothing was written.
+      type(error_type), allocatable, intent(out) :: error
+      type(case_type), target :: case
+      type(sample_table_type) :: table
+      type(tally_type) :: tally
+      type(text_file_type) :: marker
+      type(result_directory_type) :: results
+      character(len=path_length) :: inputs(2)
+      logical :: differs
+
+      call load_case(path, case, error, unchecked=.true.)
+      if (allocated(error)) return
+      ! Free modes and compression are no results of samples.
+      case%has_modes = .false.
+      case%has_compression = .false.
+      if (.not. case%has_impact) error = input_error(path//': &model is missing; allowed: samples of a case ' &
+         //'with a source model')
+      if (allocated(error)) return
+      call open_sample_table(table_path, case, table, error)
+      if (allocated(error)) return
+      outcome%directory = output
+      if (output == '') outcome%directory = 'outputs/'//trim(case%name)//'_samples'
+      marker%name = input_file
+      call get_case_text(case, marker%content)
+      call check_owner(outcome%directory, marker, replace, differs, error)
+      if (allocated(error)) return
+      inputs(1) = path
+      inputs(2) = table_path
+      call open_results(outcome%directory, marker, [result_file], inputs, replace, results, error)
+      call write_samples(case, table, threads, results, tally, error)
+      call close_results(results, differs, error)
+      if (allocated(error)) return
+      if (differs) call outcome%add_message(path, replaces//outcome%directory)
+      if (tally%computed < tally%samples) call outcome%add_message(path, to_text(tally%samples - tally%computed)//' of ' &
+         //to_text(tally%samples)//' samples have no results, such as: '//trim(tally%failure))
+      outcome%conforms = tally%conforming == tally%samples
+      call describe(case, table, tally, outcome%table)
+      outcome%table = outcome%table//get_defaults_line(case)
+   end subroutine run_samples
+
+   !> Computes and writes chunk after chunk.
+   subroutine write_samples(case, table, threads, results, tally, error)
+      type(case_type), intent(in), target :: case
+      !> The table, open.
+      type(sample_table_type), intent(inout) :: table
+      integer, intent(in) :: threads
+      type(result_directory_type), intent(inout) :: results
+      type(tally_type), intent(out) :: tally
+      !> What went wrong before; or a value is not a number, the sampling cannot be used, the file cannot be written.
+      type(error_type), allocatable, intent(inout) :: error
+      type(sweep_type) :: sweep
+      type(text_file_type) :: parts(threads)
+      real(wp), allocatable :: values(:, :)
+      character(len=:), allocatable :: text
+      integer :: n, i
+
+      call new_sweep(case, table%columns, .true., sweep)
+      allocate (values(size(table%columns), get_chunk_size(sweep%cost, threads)))
+      call begin_file(results, result_file, error)
+      call get_sample_header(table, sweep, text)
+      call add_text(results, text, error)
+      do while (.not. allocated(error))
+         call read_samples(table, values, n, error)
+         if (allocated(error) .or. n == 0) exit
+         call solve_sweep(case, table%columns, values(:, :n), threads, .false., sweep, error)
+         if (allocated(error)) exit
+         ! Writing numbers takes longer than computing them.
+         !$omp parallel do num_threads(threads)
+         do i = 1, threads
+            call get_sample_rows(table, tally%samples, values(:, :n), (i - 1)*n/threads + 1, i*n/threads, sweep, &
+               parts(i)%content)
+         end do
+         !$omp end parallel do
+         call add(tally, sweep, get_assessed_force(case))
+         do i = 1, threads
+            call add_text(results, parts(i)%content, error)
+         end do
+         call report_progress(real(tally%samples, wp), 0.0_wp, 'samples')
+      end do
+      if (.not. allocated(error) .and. tally%samples == 0) error = input_error(trim(table%path) &
+         //': the table has no samples; allowed: one in each line below the keys')
+      if (.not. allocated(error) .and. tally%computed == 0) error = input_error(trim(table%path)//': none of ' &
+         //to_text(tally%samples)//' samples has results, such as: '//trim(tally%failure))
+   end subroutine write_samples
+
+   !> Samples that are read, computed and written at a time: about half a second of work for each thread.
+   pure function get_chunk_size(cost, threads) result(chunk_size)
+      !> Time that one takes, s.
+      real(wp), intent(in) :: cost
+      integer, intent(in) :: threads
+      integer :: chunk_size
+
+      chunk_size = threads*max(1, min(16384/threads, nint(0.5_wp/cost)))
+   end function get_chunk_size
+
+   !> Adds samples to a tally.
+   pure subroutine add(tally, sweep, force)
+      type(tally_type), intent(inout) :: tally
+      type(sweep_type), intent(in) :: sweep
+      !> Number of the force whose levels are summed up.
+      integer, intent(in) :: force
+      real(wp) :: values(octave_count + 1)
+      integer :: i
+
+      tally%samples = tally%samples + size(sweep%status)
+      do i = 1, size(sweep%status)
+         if (sweep%status(i) /= 0) then
+            if (tally%failure == '') tally%failure = sweep%reason(i)%text
+            cycle
+         end if
+         tally%computed = tally%computed + 1
+         if (sweep%verdict(i)) tally%conforming = tally%conforming + 1
+         values = [sweep%quantity(1, i), sweep%level(:octave_count, force, i)]
+         tally%span(:, 1) = min(tally%span(:, 1), values)
+         tally%span(:, 2) = max(tally%span(:, 2), values)
+      end do
+   end subroutine add
+
+   !> What the screen shows.
+   subroutine describe(case, table, tally, text)
+      type(case_type), intent(in) :: case
+      type(sample_table_type), intent(in) :: table
+      type(tally_type), intent(in) :: tally
+      character(len=:), allocatable, intent(out) :: text
+      type(band_type) :: octaves(octave_count)
+      integer :: i
+
+      text = 'thud '//version//'   case '//trim(case%name)//'   model '//trim(case%model)//newline//newline &
+         //'  '//to_text(tally%samples)//trim(merge(' sample, ', ' samples,', tally%samples == 1))//' ' &
+         //to_text(tally%computed)//' computed, '//to_text(tally%conforming)//' conform to '
+      if (any(table%names == 'source') .or. any(table%names == 'force')) then
+         text = text//'all their limits.'//newline
+      else
+         text = text//'all limits of the '//replaced(trim(case%source), '_', ' ')//' by the ' &
+            //get_force_title(case%level_force)//'.'//newline
+      end if
+      if (tally%computed == 0) return
+      octaves = get_octaves()
+      do i = 1, octave_count
+         ! Levels of different forces or methods have no common range.
+         if (any(table%names == 'force') .or. any(table%names == 'method')) exit
+         text = text//get_span_row('level, '//get_band_name(octaves(i))//' Hz octave', tally%span(i + 1, :), 2, 'dB')
+      end do
+      text = text//get_span_row('contact time', 1.0e3_wp*tally%span(1, :), 3, 'ms')
+   end subroutine describe
+
+end module thud_samples_run

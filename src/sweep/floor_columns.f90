@@ -1,0 +1,84 @@
+!> Results of a drop on a mobile floor and in the room below it, as columns of a table of samples.
+module thud_floor_columns
+   use thud_band, only: band_type, get_band_name
+   use thud_case, only: case_type
+   use thud_compute, only: impact_type
+   use thud_error, only: error_type
+   use thud_floor_result, only: floor_result_type
+   use thud_force_history, only: force_history_type
+   use thud_kinds, only: wp
+   use thud_power, only: not_a_number
+   use thud_rating, only: get_a_weighted_level, get_standardisation
+   use thud_room, only: get_room_bands, room_level_type
+   implicit none (type, external)
+   private
+
+   public :: column_name_length, get_floor_columns, get_floor_values
+
+   !> Length of the name of a column.
+   integer, parameter :: column_name_length = 32
+
+contains
+
+   !> Names of the columns of a case.
+   function get_floor_columns(case, bands) result(names)
+      type(case_type), intent(in) :: case
+      !> Bands of the levels: [n_band].
+      type(band_type), intent(in) :: bands(:)
+      !> The names, with units; none where the case has no floor: [n_column].
+      character(len=column_name_length), allocatable :: names(:)
+      type(band_type), allocatable :: room_bands(:)
+      type(error_type), allocatable :: error
+
+      allocate (names(0))
+      if (.not. case%has_floor) return
+      names = [character(len=column_name_length) :: get_level_names('contact', bands), 'floor_work_J']
+      if (.not. case%has_room) return
+      call get_room_bands(room_bands, error)
+      names = [character(len=column_name_length) :: names, get_level_names('room', room_bands), 'room_rating_dB', &
+         'room_standardised_rating_dB']
+   end function get_floor_columns
+
+   !> Names of levels in bands.
+   function get_level_names(prefix, bands) result(names)
+      character(len=*), intent(in) :: prefix
+      !> The bands: [n_band].
+      type(band_type), intent(in) :: bands(:)
+      !> The names, with set, frequency and unit: [n_band].
+      character(len=column_name_length) :: names(size(bands))
+      integer :: i
+
+      do i = 1, size(bands)
+         names(i) = prefix//'_'//trim(bands(i)%set)//'_'//get_band_name(bands(i))//'_Hz_dB'
+      end do
+   end function get_level_names
+
+   !> Values of the columns.
+   subroutine get_floor_values(case, n_band, levels, impact, on_floor, floor, room, values)
+      type(case_type), intent(in) :: case
+      !> Number of bands of the levels.
+      integer, intent(in) :: n_band
+      !> Levels were computed; without them all but the energy is NaN.
+      logical, intent(in) :: levels
+      !> The drop on a rigid floor, which counts where none on the floor is allocated.
+      type(impact_type), intent(in) :: impact
+      type(force_history_type), intent(in), allocatable :: on_floor
+      type(floor_result_type), intent(in) :: floor
+      type(room_level_type), intent(in) :: room
+      !> The values: [n_column].
+      real(wp), intent(out) :: values(:)
+
+      values = not_a_number
+      values(n_band + 1) = impact%history%floor_work
+      if (allocated(on_floor)) values(n_band + 1) = on_floor%floor_work
+      if (.not. levels) return
+      if (allocated(on_floor)) then
+         values(:n_band) = floor%contact_level
+      else
+         values(:n_band) = impact%assessment%level(impact%assessment%first_band:, 2)
+      end if
+      if (case%has_room) values(n_band + 2:) = [room%level, room%a_weighted, get_a_weighted_level(room%bands(1)%set, &
+         room%level + get_standardisation(room%reverberation_time, case%room%volume))]
+   end subroutine get_floor_values
+
+end module thud_floor_columns

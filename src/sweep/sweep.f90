@@ -1,0 +1,354 @@
+!> Many samples of a case, drops that differ in the values of some keys: quantities, levels and verdict of each.
+!>
+!> Samples of the shell model are computed in batches (`thud_ensemble`), all others one by one; threads share
+!> them. No number of a sample depends on the threads, on the other samples or on its index among them.
+module thud_sweep
+   use thud_band, only: band_type, get_level_bands, octave_count
+   use thud_batch_sets, only: fill_sets, suits_batch
+   use thud_blocked_drop, only: blocked_type, solve_blocked
+   use thud_case, only: case_type, check_case, get_active_fields
+   use thud_column, only: column_type
+   use thud_compute, only: compute_floor, get_assessed_force, get_cost, scope_type
+   use thud_ensemble, only: are_alike, new_projections, projections_type, solve_ensemble
+   use thud_error, only: error_type, input_error
+   use thud_field, only: check_fields, field_type
+   use thud_floor_columns, only: column_name_length, get_floor_columns, get_floor_values
+   use thud_floor_result, only: floor_result_type
+   use thud_force_history, only: force_count, force_history_type
+   use thud_interrupt, only: check_interrupt, is_interrupted
+   use thud_kinds, only: wp
+   use thud_power, only: not_a_number
+   use thud_quantities, only: get_quantities, sample_quantity_count
+   use thud_room, only: room_level_type
+   use thud_sampling, only: check_sampling, get_sample_count, get_step_count
+   use thud_shell_sets, only: set_type
+   use thud_source_limits, only: conforms, get_source_limits, source_limits_type
+   use thud_source_model, only: typical_contact
+   use thud_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: acquire_sweep, new_sweep, release_sweep, solve_sweep, sweep_type
+
+   !> Approximate time of one step in a batch, s.
+   real(wp), parameter :: batch_cost = 1.5e-8_wp
+
+   !> Why a sample has no results.
+   type :: reason_type
+      !> A message; not allocated where it has results.
+      character(len=:), allocatable :: text
+   end type reason_type
+
+   !> Results of many samples: NaN and not conforming where there are none.
+   type :: sweep_type
+      !> Bands of the levels, octaves first: [n_band].
+      type(band_type), allocatable :: bands(:)
+      !> Index of the first band that the case asks for.
+      integer :: first_band = 1
+      !> Approximate time of one sample on one core, s.
+      real(wp) :: cost = 0.0_wp
+      !> Levels and verdicts are wanted.
+      logical :: levels = .true.
+      !> Matrices of the levels, kept from call to call.
+      type(projections_type) :: projections
+      !> 0, or the code of the error: [n_sample].
+      integer, allocatable :: status(:)
+      !> Messages of the errors: [n_sample].
+      type(reason_type), allocatable :: reason(:)
+      !> The first of the table of quantities: [sample_quantity_count, n_sample].
+      real(wp), allocatable :: quantity(:, :)
+      !> Levels, dB: [n_band, force_count, n_sample].
+      real(wp), allocatable :: level(:, :, :)
+      !> The source conforms by each force: [force_count, n_sample].
+      logical, allocatable :: conforms(:, :)
+      !> Minimum distance of an octave level of the assessed force to its limits, dB, positive inside: [n_sample].
+      real(wp), allocatable :: margin(:)
+      !> The source conforms by the assessed force: [n_sample].
+      logical, allocatable :: verdict(:)
+      !> Names, with units, of what cases with a floor have in addition: [n_column].
+      character(len=column_name_length), allocatable :: floor_column(:)
+      !> Their values: [n_column, n_sample].
+      real(wp), allocatable :: floor_value(:, :)
+      !> The latest drop on a rigid floor, kept from call to call.
+      type(blocked_type) :: blocked
+      !> Forces, N, of no size where they are not wanted: [n_time, force_count, n_sample].
+      real(wp), allocatable :: force(:, :, :)
+   end type sweep_type
+
+   !> What an earlier call has prepared for the next one; one thread at a time owns it.
+   type(sweep_type), allocatable :: kept
+
+contains
+
+   !> Prepares for many samples of a case.
+   subroutine new_sweep(case, columns, levels, sweep)
+      type(case_type), intent(in), target :: case
+      !> Keys in which the samples differ: [n_column].
+      type(column_type), intent(in) :: columns(:)
+      !> Levels and verdicts are wanted.
+      logical, intent(in) :: levels
+      !> What is kept from an earlier call is used again where it fits.
+      type(sweep_type), intent(inout) :: sweep
+      type(projections_type) :: wanted
+
+      call get_level_bands(case%bands, sweep%bands, sweep%first_band)
+      sweep%levels = levels
+      sweep%cost = get_cost(case)
+      if (size(columns) > 0 .and. suits_batch(case, columns)) sweep%cost = batch_cost*get_step_count(case%sampling, &
+         typical_contact)
+      sweep%floor_column = get_floor_columns(case, sweep%bands(sweep%first_band:))
+      wanted = new_projections(case%sampling%sample_rate, sweep%bands(octave_count + 1:), get_sample_count(case%sampling))
+      if (.not. are_alike(wanted, sweep%projections)) sweep%projections = wanted
+   end subroutine new_sweep
+
+   !> Takes what an earlier call has left, or an empty one.
+   subroutine acquire_sweep(sweep)
+      !> The results of an earlier call, or none.
+      type(sweep_type), allocatable, intent(out) :: sweep
+
+      !$omp critical (thud_sweep)
+      call move_alloc(kept, sweep)
+      !$omp end critical (thud_sweep)
+      if (.not. allocated(sweep)) allocate (sweep)
+   end subroutine acquire_sweep
+
+   !> Keeps what the next call can use.
+   subroutine release_sweep(sweep)
+      !> The results, which are released.
+      type(sweep_type), allocatable, intent(inout) :: sweep
+
+      call clear(sweep)
+      !$omp critical (thud_sweep)
+      call move_alloc(sweep, kept)
+      !$omp end critical (thud_sweep)
+   end subroutine release_sweep
+
+   !> Releases the results of samples.
+   subroutine clear(sweep)
+      type(sweep_type), intent(inout) :: sweep
+
+      if (allocated(sweep%status)) deallocate (sweep%status, sweep%reason, sweep%conforms, sweep%margin, sweep%verdict, &
+         sweep%quantity, sweep%level, sweep%floor_value)
+      if (allocated(sweep%force)) deallocate (sweep%force)
+   end subroutine clear
+
+   !> Computes samples.
+   subroutine solve_sweep(case, columns, values, threads, forces, sweep, error)
+      !> The case; values of the samples may make valid what is not in it.
+      type(case_type), intent(in), target :: case
+      !> Keys in which the samples differ: [n_column].
+      type(column_type), intent(in) :: columns(:)
+      !> Their values, as `get_number` of the keys gives them: [n_column, n_sample].
+      real(wp), intent(in) :: values(:, :)
+      integer, intent(in) :: threads
+      !> Forces are wanted too.
+      logical, intent(in) :: forces
+      type(sweep_type), intent(inout) :: sweep
+      !> As of `check_samples`, there is no space in memory, or an interrupt.
+      type(error_type), allocatable, intent(out) :: error
+      integer, allocatable :: remaining(:)
+      integer :: i
+
+      call check_samples(case, columns, forces, error)
+      if (allocated(error)) return
+      call set_size(sweep, size(values, 2), merge(get_sample_count(case%sampling), 0, forces), error)
+      if (allocated(error)) return
+      remaining = [(i, i=1, size(values, 2))]
+      if (suits_batch(case, columns)) then
+         call solve_batch(case, columns, values, threads, sweep, error)
+         if (allocated(error)) return
+         ! The single solver gives the reasons.
+         remaining = pack(remaining, sweep%status /= 0)
+      end if
+      !$omp parallel num_threads(threads) if (size(remaining) > 1)
+      call solve_remaining()
+      !$omp end parallel
+      call check_interrupt(error)
+
+   contains
+
+      !> The samples of one thread, one after the other.
+      subroutine solve_remaining()
+         type(case_type), target :: own
+         type(blocked_type) :: blocked
+         type(field_type), allocatable :: fields(:)
+         integer :: i
+
+         own = case
+         allocate (fields, source=get_active_fields(own))
+         ! Free modes and compression are no results of samples.
+         own%has_modes = .false.
+         own%has_compression = .false.
+         blocked = sweep%blocked
+         !$omp do schedule(dynamic)
+         do i = 1, size(remaining)
+            if (.not. is_interrupted()) call solve_sample(own, fields, columns, values(:, remaining(i)), remaining(i), &
+               blocked, sweep)
+         end do
+         !$omp end do
+         !$omp single
+         sweep%blocked = blocked
+         !$omp end single
+      end subroutine solve_remaining
+
+   end subroutine solve_sweep
+
+   !> Refuses samples that cannot be computed together.
+   subroutine check_samples(case, columns, forces, error)
+      type(case_type), intent(in), target :: case
+      !> Keys in which the samples differ: [n_column].
+      type(column_type), intent(in) :: columns(:)
+      !> Forces are wanted.
+      logical, intent(in) :: forces
+      !> The case has no impact, a key of all samples has a value out of range, or forces are wanted of records of
+      !> different length.
+      type(error_type), allocatable, intent(out) :: error
+      type(field_type), allocatable :: fields(:)
+      integer :: i
+
+      if (.not. case%has_impact) then
+         error = input_error('the case computes no impact; allowed: a case with &model')
+         return
+      end if
+      allocate (fields, source=get_active_fields(case))
+      ! Keys of the case that all samples share.
+      call check_fields(pack(fields, fields%owner == '' .and. fields%group /= 'ball' .and. fields%group /= 'drop' &
+         .and. [(all(columns%place /= i), i=1, size(fields))]), error)
+      if (allocated(error) .or. .not. forces) return
+      if (any([(any(fields(columns(i)%place)%key == [character(len=11) :: 'duration', 'sample_rate']), &
+         i=1, size(columns))])) then
+         error = input_error('forces are wanted of samples with their own sampling; allowed: one sampling for all, ' &
+            //'that of the case')
+      else
+         call check_sampling(case%sampling, error)
+      end if
+   end subroutine check_samples
+
+   !> Space for the results of a number of samples.
+   subroutine set_size(sweep, n_sample, n_time, error)
+      type(sweep_type), intent(inout) :: sweep
+      integer, intent(in) :: n_sample
+      !> Length of the forces that are wanted.
+      integer, intent(in) :: n_time
+      !> There is no space in memory.
+      type(error_type), allocatable, intent(out) :: error
+      character(len=128) :: message
+      integer :: status
+
+      call clear(sweep)
+      allocate (sweep%status(n_sample), sweep%reason(n_sample), sweep%quantity(sample_quantity_count, n_sample), &
+         sweep%level(size(sweep%bands), force_count, n_sample), sweep%conforms(force_count, n_sample), &
+         sweep%margin(n_sample), sweep%verdict(n_sample), sweep%floor_value(size(sweep%floor_column), n_sample))
+      allocate (sweep%force(n_time, force_count, n_sample), stat=status, errmsg=message)
+      if (status /= 0) then
+         error = input_error('the forces of '//to_text(n_sample)//' samples have no space in memory; allowed: fewer at ' &
+            //'a time')
+         return
+      end if
+      sweep%conforms = .false.
+      sweep%verdict = .false.
+      sweep%margin = not_a_number
+      sweep%floor_value = not_a_number
+   end subroutine set_size
+
+   !> One sample by the single solver.
+   subroutine solve_sample(case, fields, columns, values, sample, blocked, sweep)
+      !> The case; the keys of the columns are overwritten.
+      type(case_type), intent(inout), target :: case
+      !> Its keys: [n_field].
+      type(field_type), intent(in) :: fields(:)
+      !> Keys in which the samples differ: [n_column].
+      type(column_type), intent(in) :: columns(:)
+      !> Values of this one: [n_column].
+      real(wp), intent(in) :: values(:)
+      !> Index of the sample.
+      integer, intent(in) :: sample
+      !> The drop on a rigid floor of an earlier sample, or of this one.
+      type(blocked_type), intent(inout) :: blocked
+      type(sweep_type), intent(inout) :: sweep
+      type(scope_type) :: scope
+      type(force_history_type), allocatable :: on_floor
+      type(floor_result_type) :: floor
+      type(room_level_type) :: room
+      type(error_type), allocatable :: error
+      real(wp), allocatable :: all_quantities(:)
+      integer :: i
+
+      scope = scope_type(levels=sweep%levels, energies=.false., room=sweep%levels)
+      do i = 1, size(columns)
+         if (.not. allocated(error)) call fields(columns(i)%place)%set_number(values(i), columns(i)%entry, error)
+      end do
+      if (.not. allocated(error)) call check_case(case, error)
+      if (.not. allocated(error)) call solve_blocked(case, fields, scope, blocked, error)
+      if (.not. allocated(error)) call compute_floor(case, scope, blocked%impact, on_floor, floor, room, error)
+      sweep%status(sample) = 0
+      sweep%quantity(:, sample) = not_a_number
+      sweep%level(:, :, sample) = not_a_number
+      if (size(sweep%force) > 0) sweep%force(:, :, sample) = not_a_number
+      if (allocated(error)) then
+         sweep%status(sample) = error%code
+         sweep%reason(sample)%text = error%message
+         return
+      end if
+      if (case%has_floor) call get_floor_values(case, size(sweep%bands) - sweep%first_band + 1, sweep%levels, &
+         blocked%impact, on_floor, floor, room, sweep%floor_value(:, sample))
+      associate (history => blocked%impact%history, assessment => blocked%impact%assessment)
+         all_quantities = get_quantities(history)
+         sweep%quantity(:, sample) = all_quantities(:sample_quantity_count)
+         if (size(sweep%force) > 0) then
+            sweep%force(:, 1, sample) = history%elastic_force
+            sweep%force(:, 2, sample) = history%floor_force
+         end if
+         if (.not. sweep%levels) return
+         sweep%level(:, :, sample) = assessment%level
+         sweep%conforms(:, sample) = all(conforms(assessment%criteria), dim=1)
+      end associate
+      call set_verdict(case, sample, sweep)
+   end subroutine solve_sample
+
+   !> Margin and verdict by the assessed force.
+   subroutine set_verdict(case, sample, sweep)
+      !> The case of the sample.
+      type(case_type), intent(in) :: case
+      !> Index of the sample, whose levels are known.
+      integer, intent(in) :: sample
+      type(sweep_type), intent(inout) :: sweep
+      type(source_limits_type) :: limits
+      type(error_type), allocatable :: error
+      integer :: force
+
+      force = get_assessed_force(case)
+      call get_source_limits(case%source, limits, error)
+      sweep%verdict(sample) = sweep%conforms(force, sample)
+      associate (level => sweep%level(:octave_count, force, sample))
+         sweep%margin(sample) = minval(min(level - limits%lower_level, limits%upper_level - level))
+      end associate
+   end subroutine set_verdict
+
+   !> Samples of the shell model in batches.
+   subroutine solve_batch(case, columns, values, threads, sweep, error)
+      type(case_type), intent(in), target :: case
+      !> Keys in which the samples differ: [n_column].
+      type(column_type), intent(in) :: columns(:)
+      !> Their values: [n_column, n_sample].
+      real(wp), intent(in) :: values(:, :)
+      integer, intent(in) :: threads
+      type(sweep_type), intent(inout) :: sweep
+      !> There is no space in memory.
+      type(error_type), allocatable, intent(out) :: error
+      type(set_type), allocatable :: sets(:)
+      logical, allocatable :: computed(:)
+      integer :: i
+
+      allocate (sets(size(values, 2)), computed(size(values, 2)))
+      call fill_sets(case, columns, values, sets)
+      call solve_ensemble(sets, case%sampling, trim(case%source), threads, sweep%levels, sweep%projections, computed, &
+         sweep%quantity, sweep%level, sweep%conforms, sweep%force, error)
+      if (allocated(error)) return
+      sweep%status = merge(0, 1, computed)
+      do i = 1, size(sets)
+         if (sweep%levels .and. computed(i)) call set_verdict(case, i, sweep)
+      end do
+   end subroutine solve_batch
+
+end module thud_sweep

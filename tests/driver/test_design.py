@@ -1,0 +1,199 @@
+"""Maps of conformity against a closed form and against single drops."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from conftest import REPOSITORY, naming
+
+import thud
+from thud import cli
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+MODAL: dict[str, Any] = {
+    "case": str(REPOSITORY / "inputs/rubber_ball_modal_rising.nml"),
+    "fixed": {"loss_factor": 0.2},
+    "parameters": {
+        "wall_thickness": {"values": [32, 30.6, 29], "unit": "mm"},
+        "youngs_modulus": {"values": [1.6, 1.8, 2.0], "unit": "MPa"},
+    },
+}
+
+
+def test_margin_of_a_source_with_known_levels() -> None:
+    # With a given contact time the level is 20 lg M + 10 lg h + c.
+    options = {"contact_time": 0.02, "restitution": 0.8}
+    found = thud.design(
+        {
+            "fixed": {"model": "hunt_crossley", "source": "tyre", **options},
+            "parameters": {
+                "mass": {"low": 3, "high": 9, "count": 4},
+                "height": {"low": 0.4, "high": 1, "count": 3},
+            },
+        }
+    ).dataset
+    one = thud.solve(thud.Ball(mass=1), thud.Drop(1), "hunt_crossley", **options)
+    gain = 20 * np.log10(found["mass"]) + 10 * np.log10(found["height"])
+    expected = [
+        np.minimum(level + gain - limit.lower, limit.upper - level - gain)
+        for level, limit in zip(one.levels(), one.assess("tyre").criteria[:5], strict=True)
+    ]
+    np.testing.assert_allclose(found["margin"], np.min(expected, axis=0), atol=1e-6)
+
+
+def test_map_holds_the_verdicts_of_single_drops() -> None:
+    result = thud.design(MODAL)
+    assert result.axes == ("wall_thickness", "youngs_modulus")
+    assert result.dataset["wall_thickness"].values.tolist() == [0.029, 0.0306, 0.032]
+    verdicts = []
+    for thickness in (0.029, 0.0306, 0.032):
+        for modulus in (1.6e6, 1.8e6, 2.0e6):
+            ball = thud.Ball(wall_thickness=thickness, youngs_modulus=modulus)
+            options = {"damping_law": "rising", "loss_factor": 0.2}
+            verdicts.append(bool(thud.solve(ball, model="modal_ball", **options).assess()))
+    assert result.dataset["conforms"].values.ravel().tolist() == verdicts
+    assert any(verdicts)
+    assert not all(verdicts)
+    assert (result.dataset["margin"].values.ravel() >= 0).tolist() == verdicts
+
+
+def test_ball_of_the_paper_is_marked() -> None:
+    result = thud.design(MODAL)
+    assert (result.mark, result.mark_name) == ((0.032, 1.6e6), "paper's ball")
+    figure = thud.plot.draw_design(result)
+    axes, bar = figure.axes
+    (star,) = [line for line in axes.lines if line.get_marker() == "*"]
+    assert (star.get_xdata()[0], star.get_ydata()[0]) == pytest.approx((32, 1.6))
+    assert axes.get_xlabel() == "Wall thickness, mm"
+    assert axes.get_ylabel() == "Young's modulus, MPa"
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == ["Octave limits", "All criteria met", "Paper's ball"]
+    assert bar.get_ylabel() == "Margin (force on the floor), dB"
+
+
+def test_scale_of_the_study_is_that_of_the_axes() -> None:
+    modulus = {"low": 1e5, "high": 1e8, "count": 7, "scale": "log"}
+    height = {"low": 1, "high": 2, "count": 2, "scale": "log"}
+    result = thud.design({"parameters": {"youngs_modulus": modulus, "height": height}})
+    figure = thud.plot.draw_design(result)
+    axes, _ = figure.axes
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+    # 1e8 Pa would need a power of ten beside the axis, over the legend.
+    assert axes.get_xlabel() == "Young's modulus, MPa"
+    assert axes.get_xlim() == pytest.approx((0.1, 100))
+    figure.draw_without_rendering()
+    shown = [text.get_text() for text in axes.get_xticklabels()]
+    assert {"0.1", "1", "10", "100"} <= set(shown)
+    shown = [text.get_text() for text in axes.get_yticklabels()]
+    assert {"1", "1.2", "1.4"} <= set(shown)
+    assert thud.plot.draw_design(thud.design(MODAL)).axes[0].get_xscale() == "linear"
+
+
+def test_colours_of_a_map_without_conformity_end_at_zero() -> None:
+    heights = {"low": 0.1, "high": 0.5, "count": 4}
+    study = {"parameters": {"height": heights, "mass": {"values": [2.0, 2.5]}}}
+    axes, bar = thud.plot.draw_design(thud.design(study)).axes
+    low, high = bar.get_ylim()
+    margin = thud.design(study).dataset["margin"].values
+    assert low <= margin.min()
+    assert margin.max() < 0 == high
+    # The zero is white, and round margins have lines with their numbers.
+    assert axes.collections[0].norm(0) == 0.5
+    assert len(axes.texts) > 0
+
+
+@pytest.mark.filterwarnings("error")
+def test_map_of_nearly_one_margin_is_drawn() -> None:
+    heights = {"low": 0.1, "high": 0.1001, "count": 2}
+    study = {"parameters": {"height": heights, "mass": {"values": [2.0, 2.0001]}}}
+    axes, _ = thud.plot.draw_design(thud.design(study)).axes
+    assert not axes.texts
+
+
+def test_star_on_the_edge_is_whole() -> None:
+    axes, _ = thud.plot.draw_design(thud.design(MODAL)).axes
+    (star,) = [line for line in axes.lines if line.get_marker() == "*"]
+    assert not star.get_clip_on()
+
+
+def test_base_case_is_marked_where_the_paper_has_no_value() -> None:
+    study = {
+        "fixed": {"model": "modal_ball"},
+        "parameters": {"loss_factor": {"values": [0.1, 0.2]}, "height": {"values": [2.0, 1.5]}},
+    }
+    result = thud.design(study)
+    assert (result.mark, result.mark_name) == (None, "case")
+    axes, _ = thud.plot.draw_design(result).axes
+    assert axes.get_legend() is None
+    study["parameters"]["height"] = {"values": [1.0, 1.5]}
+    assert thud.design(study).mark == (0.1, 1.0)
+
+
+def test_ball_is_that_of_the_paper_only_if_all_of_it_is() -> None:
+    axes: dict[str, Any] = {"mass": {"values": [2, 3]}, "height": {"values": [0.5, 1.5]}}
+    result = thud.design({"parameters": axes})
+    assert (result.mark, result.mark_name) == ((2.5, 1.0), "paper's ball")
+    # The values of the case for what is varied do not count.
+    result = thud.design({"case": {"drop": {"height": 1.4}}, "parameters": axes})
+    assert (result.mark, result.mark_name) == ((2.5, 1.0), "paper's ball")
+    for fixed in ({"outer_radius": 0.07}, {"gravity": 1.6}):
+        result = thud.design({"fixed": fixed, "parameters": axes})
+        assert (result.mark, result.mark_name) == ((2.5, 1.0), "case")
+
+
+def test_density_of_the_paper_is_marked() -> None:
+    density = 2.5 / (4 / 3 * np.pi * (0.089**3 - 0.057**3))
+    height: dict[str, Any] = {"height": {"values": [0.5, 1.5]}}
+    axes = {"density": {"values": [1000, 1200]}, **height}
+    result = thud.design({"parameters": axes})
+    assert (result.mark, result.mark_name) == (pytest.approx((density, 1.0)), "paper's ball")
+    result = thud.design({"fixed": {"outer_radius": 0.088}, "parameters": axes})
+    heavier = 2.5 / (4 / 3 * np.pi * (0.088**3 - 0.056**3))
+    assert (result.mark, result.mark_name) == (pytest.approx((heavier, 1.0)), "case")
+    with pytest.raises(thud.InputError, match=naming("[fixed]", "&ball: outer_radius", 0.0)):
+        thud.design({"fixed": {"outer_radius": 0}, "parameters": axes})
+    axes = {"wall_thickness": {"values": [0.03, 0.034]}, **height}
+    for given, name in ((density, "paper's ball"), (1000, "case")):
+        result = thud.design({"fixed": {"density": given}, "parameters": axes})
+        assert (result.mark, result.mark_name) == ((0.032, 1.0), name)
+
+
+def test_places_without_results_stay_empty() -> None:
+    study = {"parameters": {"height": {"values": [0.5, 1, -1]}, "mass": {"values": [2, 3, 4]}}}
+    result = thud.design(study)
+    assert int(np.isnan(result.dataset["margin"]).sum()) == 3
+    thud.plot.draw_design(result)
+    assert ("samples", "9") in result.table()
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {"height": {"values": [1, 2]}},
+        {"height": {"values": [1, 2]}, "mass": {"values": [2, 2]}},
+        {"height": {"values": [1, 2]}, "momentum_flux": {"values": ["none", "retarding"]}},
+        {name: {"values": [1, 2]} for name in ("height", "mass", "gravity")},
+    ],
+)
+def test_what_is_no_map_is_reported(parameters: dict[str, Any]) -> None:
+    with pytest.raises(thud.InputError, match=naming("[parameters]")):
+        thud.design({"parameters": parameters})
+
+
+def test_command_writes_figure_and_table(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study = tmp_path / "design.toml"
+    study.write_text("parameters = {mass={values=[2, 3]}, height={values=[1, 2]}}")
+    assert cli.main(["design", "-q", str(study), "-o", str(tmp_path)]) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        ".thud",
+        "design.nc",
+        "design.svg",
+        "design.toml",
+    ]
+    assert capsys.readouterr() == ("", "")

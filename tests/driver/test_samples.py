@@ -1,0 +1,414 @@
+"""Tables of samples through the executable."""
+
+from __future__ import annotations
+
+import csv
+import re
+import resource
+import signal
+import subprocess
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from conftest import naming
+
+import thud
+from thud.case.keys import put
+from thud.level.levels import SOURCES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    Run = Callable[..., subprocess.CompletedProcess[str]]
+
+FILES = [".thud", "samples.csv", "samples.nml"]
+CASE = """&case name = 'ball' / &ball mass = 2.45 / &drop height = 1.0 /
+&model name = 'hollow_sphere' /
+"""
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> Path:
+    """Return a case file."""
+    path = tmp_path / "ball.nml"
+    path.write_text(CASE)
+    return path
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a table of results."""
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_rows_are_those_of_solve_many(run: Run, case: Path, tmp_path: Path) -> None:
+    random = np.random.default_rng(1)
+    heights = random.uniform(0.5, 1.5, 40)
+    flux = np.resize(["momentum_balance", "retarding", "conservative", "none"], 40)
+    table = tmp_path / "table.csv"
+    lines = [
+        f"{height!r} , {choice}" for height, choice in zip(heights.tolist(), flux, strict=True)
+    ]
+    table.write_text("\n".join(["# drops", "height,momentum_flux", *lines[:20], "", *lines[20:]]))
+    case.write_text(CASE + "&levels bands = 'both' /\n")
+    result = run(case, "--samples", table)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert "40 samples, 40 computed, 0 conform" in result.stdout
+    rows = rows_of(tmp_path / "outputs/ball_samples/samples.csv")
+    parameters = {"mass": 2.45, "height": heights, "momentum_flux": flux}
+    expected = thud.solve_many(parameters)
+    thirds = thud.solve_many(parameters, bands="third")
+    assert [row["sample"] for row in rows] == [str(i + 1) for i in range(40)]
+    np.testing.assert_array_equal([float(row["height"]) for row in rows], heights)
+    assert [row["momentum_flux"] for row in rows] == list(flux)
+    for name, values in {
+        "contact_time_s": expected.contact_time,
+        "peak_elastic_force_N": expected.peak_elastic_force,
+        "impulse_N_s": expected.impulse,
+        "elastic_octave_31.5_Hz_dB": expected.elastic_octaves[:, 0],
+        "floor_octave_500_Hz_dB": expected.floor_octaves[:, 4],
+    }.items():
+        np.testing.assert_allclose([float(row[name]) for row in rows], values, rtol=1e-15)
+    for name, index in {"elastic_third_31.5_Hz_dB": 1, "elastic_third_630_Hz_dB": -1}.items():
+        found = [float(row[name]) for row in rows]
+        np.testing.assert_allclose(found, thirds.levels["elastic", "third"][:, index], rtol=1e-15)
+    assert {(row["status"], row["reason"]) for row in rows} == {("0", "")}
+
+
+def test_samples_that_fail_say_why(run: Run, case: Path, tmp_path: Path) -> None:
+    (tmp_path / "table.csv").write_text("height,mass\r\n1,2.5\r\n500,2.5\r\n1,-2.5\r\n")
+    result = run(case, "--samples", "table.csv", "--check")
+    assert result.returncode == 3
+    assert "3 samples, 1 computed" in result.stdout
+    assert re.search(naming(case, 2, 3, "&drop: height", "500.0 m"), result.stderr)
+    rows = rows_of(tmp_path / "outputs/ball_samples/samples.csv")
+    assert [row["status"] for row in rows] == ["0", "2", "1"]
+    assert re.search(naming("&drop: height", "500.0 m"), rows[1]["reason"])
+    assert rows[1]["reason"].startswith("&drop")
+    assert re.search(naming("&ball: mass", -2.5, "1.0e-12"), rows[2]["reason"])
+    assert float(rows[0]["restitution"]) == pytest.approx(0.889, abs=1e-3)
+    assert rows[1]["contact_time_s"] == rows[2]["floor_conforms"] == ""
+    assert "nan" not in (tmp_path / "outputs/ball_samples/samples.csv").read_text().lower()
+
+
+def test_results_are_kept_where_no_set_has_any(run: Run, case: Path, tmp_path: Path) -> None:
+    (tmp_path / "table.csv").write_text("height\n1\n0.5\n")
+    assert run(case, "--samples", "table.csv", "-o", "out", "-q").returncode == 0
+    before = (tmp_path / "out/samples.csv").read_bytes()
+    case.write_text(CASE.replace("2.45", "-1"))
+    result = run(case, "--samples", "table.csv", "-o", "out", "-q", "--check")
+    assert result.returncode == 1
+    assert re.search(naming("table.csv", 2, "&ball: mass", -1.0), result.stderr)
+    assert (tmp_path / "out/samples.csv").read_bytes() == before
+
+
+def test_conforming_samples_are_counted(run: Run, case: Path, tmp_path: Path) -> None:
+    case.write_text(CASE.replace("2.45", "2.59, outer_radius = 0.06105, gauge_pressure = 17.8e3")
+                    + "&levels force = 'floor' /\n")  # fmt: skip
+    (tmp_path / "table.csv").write_text("wall_thickness,youngs_modulus\n0.0244,2.03e6\n")
+    result = run(case, "--samples", "table.csv", "--check", "-o", "here")
+    assert result.returncode == 0
+    assert "1 conform to all limits of the rubber ball by the force on the floor" in result.stdout
+    assert rows_of(tmp_path / "here/samples.csv")[0]["floor_conforms"] == "yes"
+
+
+@pytest.mark.slow
+def test_threads_change_no_byte(run: Run, case: Path, tmp_path: Path) -> None:
+    heights = np.linspace(0.5, 1.5, 20_000)
+    (tmp_path / "table.csv").write_text("height\n" + "\n".join(map(str, heights)))
+    for threads in ("1", "3"):
+        result = run(case, "--samples", "table.csv", "--threads", threads, "-o", threads, "-q")
+        assert result.returncode == 0
+    assert (tmp_path / "1/samples.csv").read_bytes() == (tmp_path / "3/samples.csv").read_bytes()
+    assert len(rows_of(tmp_path / "1/samples.csv")) == 20_000
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ("", naming("table.csv", "empty")),
+        ("# nothing\n\n", naming("table.csv", "empty")),
+        ("height\n", naming("table.csv", "samples")),
+        (
+            "hieght\n1\n",
+            naming("line 1", "'hieght'", "'height'", "'mass'"),
+        ),
+        ("height,\n1,2\n", naming("line 1", "''", "'height'")),
+        ("height,mass,height\n1,2,1\n", naming("line 1", "'height'")),
+        ("height,mass\n1,2\n1\n", naming("line 3", 1, 2)),
+        ("height,mass\n1,2,3\n", naming("line 2", 3, 2)),
+        ("height\n1\none\n", naming("line 3", "height", "'one'")),
+        ("height\n1 2\n", naming("line 2", "height", "'1 2'")),
+        ("height;mass\n1,1\n", naming("line 2", 1, 2)),
+        ("height\n2*1\n", naming("line 2", "height", "'2*1'")),
+        ("height\n1+3\n", naming("line 2", "height", "'1+3'")),
+        ("height,mass\n1,\n", naming("line 2", "mass", "''")),
+        ("height,mass\nnan,2\n", naming("line 2", "height", "'nan'")),
+        ("height,momentum_flux\n1,all\n", naming("line 2", "momentum_flux", "'all'", "'none'")),
+        ("height\n1." + "0" * 70 + "e-1\n", naming("line 2", 256, 64)),
+        ("height\n" + "1," * 300 + "1\n", naming("line 2", 256, 64)),
+        ("height\n1e400\n", naming("line 2", "height", "'1e400'")),
+        ("height\n" + "1" * 5000 + "\n", naming("line 2", 4096)),
+        ("height;mass\n1;1,575\n", naming("line 2", "'1,575'", "1575")),
+        ('height,mass\n1,"1,575"\n', naming("line 2", "'1,575'", "1575")),
+        ("height;mass\n1.5;2\n1;2,5\n", naming("line 3", "'2,5'")),
+        ("height;mass\n0,5;2.5\n", naming("line 2", "'2.5'")),
+        ("height,mass\n1" + " " * 5000 + ",99\n", naming("line 2", 4096)),
+    ],
+)
+def test_bad_tables_are_refused(
+    run: Run, case: Path, tmp_path: Path, table: str, words: str
+) -> None:
+    (tmp_path / "table.csv").write_text(table)
+    result = run(case, "--samples", "table.csv")
+    assert result.returncode == 1
+    assert re.search(words, result.stderr)
+    assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "outputs/ball_samples").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--samples"], "--samples"),
+        (["--samples", "none.csv"], "none.csv"),
+        (["--samples", "."], "directory"),
+        (["--threads", "2"], naming("--threads", "--samples")),
+        (["--samples", "table.csv", "--threads", "0"], naming("--threads", "'0'", 1, 1024)),
+        (["--samples", "table.csv", "--threads", "1025"], naming("--threads", "'1025'", 1, 1024)),
+        (["--samples", "table.csv", "--threads", "2x"], naming("--threads", "'2x'", 1, 1024)),
+        (["--samples", "table.csv", "-o", "."], naming("--output .")),
+        (["--samples", "table.csv", "-o", "table.csv"], naming("--output", "table.csv")),
+    ],
+)  # fmt: skip
+def test_bad_arguments_are_refused(
+    run: Run, case: Path, tmp_path: Path, arguments: list[str], words: str
+) -> None:
+    (tmp_path / "table.csv").write_text("height\n1\n")
+    result = run(case, *arguments)
+    assert result.returncode == 1
+    assert re.search(words, result.stderr.splitlines()[0])
+
+
+def test_greatest_number_of_threads_is_taken(run: Run, case: Path) -> None:
+    # What is missing is a table, or memory for so many.
+    assert "--threads" not in run(case, "--samples", "none.csv", "--threads", "1024").stderr
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "height;wall_thickness;momentum_flux\n1,0;0,032;none\n1,2;0,03;retarding\n",
+        "height\twall_thickness\tmomentum_flux\n1,0\t0,032\tnone\n1,2\t0,03\tretarding\n",
+        "height wall_thickness  momentum_flux\n 1.0  0.032 none # first\n1.2 0.03 'retarding'\n",
+        '"height", "wall_thickness", momentum_flux\n1.0, 0.032, NONE\n1.2, 3e-2, retarding\n',
+        "height;wall_thickness;momentum_flux\n1,000;0,032;none\n1,200;0,03;retarding\n",
+        'height,wall_thickness,momentum_flux\n"1,000","0,032",none\n"1,2","0,03",retarding\n',
+    ],
+)
+def test_tables_are_read_as_records_are(run: Run, case: Path, tmp_path: Path, text: str) -> None:
+    (tmp_path / "table.csv").write_text(text)
+    assert run(case, "--samples", "table.csv", "-q").returncode == 0
+    rows = rows_of(tmp_path / "outputs/ball_samples/samples.csv")
+    found = [(float(r["height"]), float(r["wall_thickness"]), r["momentum_flux"]) for r in rows]
+    assert found == [(1.0, 0.032, "none"), (1.2, 0.03, "retarding")]
+
+
+MODELS = {
+    "modal_ball": ("loss_factor", [0.1, 0.15, 0.2], ""),
+    "finite_element": (
+        "bulk_ratio",
+        [50.0, 100.0, 200.0],
+        "&mesh radial_elements = 2, polar_elements = 16 /",
+    ),
+    "hunt_crossley": ("contact_time", [0.018, 0.02, 0.022], ""),
+    "two_mass": ("belt_mass", [0.2, 1.0, 2.0], ""),
+    "measured_modes": (
+        "frequency(2)",
+        [80.0, 89.0, 95.0],
+        "&measured_modes frequency = 24, 89, damping_ratio = 2*0.05, effective_mass = 2.35, 0.1 /",
+    ),
+}
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_every_model_has_sets(run: Run, case: Path, tmp_path: Path, model: str) -> None:
+    """Rows are those of single drops, of each model, with any number of threads."""
+    key, values, more = MODELS[model]
+    text = CASE.replace("hollow_sphere", model) + more
+    case.write_text(text)
+    (tmp_path / "table.csv").write_text(f"{key}\n" + "\n".join(map(str, values)))
+    for threads in ("1", "2"):
+        result = run(case, "--samples", "table.csv", "--threads", threads, "-o", threads, "-q")
+        assert (result.returncode, result.stderr) == (0, "")
+    assert (tmp_path / "1/samples.csv").read_bytes() == (tmp_path / "2/samples.csv").read_bytes()
+    rows = rows_of(tmp_path / "1/samples.csv")
+    base = thud.Case.from_text(text)
+    for row, value in zip(rows, values, strict=True):
+        impact = thud.solve(put(base, {key: value}))
+        assert float(row["contact_time_s"]) == impact.contact_time
+        assert float(row["peak_force_N"]) == impact.peak_force
+        level = float(row["floor_octave_125_Hz_dB"])
+        assert level == pytest.approx(impact.levels(force="floor")[2], abs=1e-9)
+
+
+def test_reasons_of_long_lists_tell_what_is_allowed(run: Run, case: Path, tmp_path: Path) -> None:
+    ratio = ", ".join(f"{0.1 + 1e-15 * i:.17f}" for i in range(64))
+    modes = f"&measured_modes allow_mass_mismatch = .true., damping_ratio = {ratio}, "
+    modes += f"effective_mass = {ratio}, frequency = {', '.join(map(str, range(20, 84)))} /"
+    case.write_text(CASE.replace("hollow_sphere", "measured_modes") + modes)
+    (tmp_path / "table.csv").write_text("damping_ratio(64)\n0.05\n-1\n0.05\n")
+    assert run(case, "--samples", "table.csv", "-o", "out", "-q").returncode == 0
+    rows = rows_of(tmp_path / "out/samples.csv")
+    assert [row["sample"] for row in rows] == ["1", "2", "3"]
+    assert re.search(naming("damping_ratio", 0, 1), rows[1]["reason"])
+
+
+def test_verdict_is_on_the_force_and_source_of_each_set(
+    run: Run, case: Path, tmp_path: Path
+) -> None:
+    # A rubber ball that conforms by its floor force alone.
+    ball = "2.59, outer_radius = 0.06105, gauge_pressure = 17.8e3"
+    rubber = "wall_thickness = 0.0244, youngs_modulus = 2.03e6"
+    case.write_text(CASE.replace("2.45", f"{ball}, {rubber}") + "&levels force = 'elastic' /\n")
+    lines = [f"{force},{source}" for force in ("elastic", "floor") for source in SOURCES]
+    (tmp_path / "table.csv").write_text("\n".join(["force,source", *lines]))
+    result = run(case, "--samples", "table.csv", "-o", "out")
+    rows = rows_of(tmp_path / "out/samples.csv")
+    base = thud.Case.from_text(case.read_text())
+    expected = []
+    for row in rows:
+        impact = thud.solve(base)
+        verdict = impact.assess(row["source"], row["force"])
+        expected.append(verdict.conforms)
+        assert (float(row["margin_dB"]) >= 0) == verdict.conforms
+    assert [row["conforms"] == "yes" for row in rows] == expected
+    assert set(expected) == {True, False}
+    assert f"{sum(expected)} conform to all their limits" in result.stdout
+    # Levels of two forces have no common range.
+    assert "level, " not in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("&model name = 'foo' /", naming("&model: name", "'foo'")),
+        ("&model name = 'foo' / &hollow_sphere /", naming("&model: name", "'foo'")),
+        ("&model / &case name = '../x' /", naming("&case: name", "'../x'")),
+    ],
+)
+def test_names_are_checked_before_any_set(
+    run: Run, case: Path, tmp_path: Path, text: str, words: str
+) -> None:
+    case.write_text(f"&ball / &drop / {text}")
+    (tmp_path / "table.csv").write_text("height\n1\n")
+    result = run(case, "--samples", "table.csv")
+    assert result.returncode == 1
+    assert re.search(words, result.stderr)
+    assert result.stderr.count("\n") == 1
+
+
+def test_odd_texts_are_read(run: Run, case: Path, tmp_path: Path) -> None:
+    lines = ["\ufeffheight,mass\r\n", "#" * 9000 + "\n", "1, 2.5\r\n", "\r\n", "1.5,2.4"]
+    (tmp_path / "table.csv").write_text("".join(lines), encoding="utf-8", newline="")
+    result = run(case, "--samples", "table.csv", "-q")
+    assert (result.returncode, result.stderr) == (0, "")
+    rows = rows_of(tmp_path / "outputs/ball_samples/samples.csv")
+    assert [(float(row["height"]), float(row["mass"])) for row in rows] == [(1, 2.5), (1.5, 2.4)]
+
+
+def test_endless_lines_take_no_memory(run: Run, case: Path) -> None:
+    def little_memory() -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (300 * 2**20, 300 * 2**20))
+
+    result = run(case, "--samples", "/dev/zero", preexec_fn=little_memory)
+    assert (result.returncode, result.stdout) == (1, "")
+    assert re.search(naming("/dev/zero", "line 1", 4096), result.stderr)
+
+
+def test_nothing_is_written_where_results_have_no_place(
+    run: Run, case: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "table.csv").write_text("height\n1\n")
+    assert run(case, "--samples", "table.csv", "-o", "o").returncode == 0
+    before = (tmp_path / "o/samples.nml").read_bytes()
+    (tmp_path / "o/samples.csv").unlink()
+    (tmp_path / "o/samples.csv/in_the_way").mkdir(parents=True)
+    case.write_text(CASE.replace("2.45", "2.5"))
+    result = run(case, "--samples", "table.csv", "-o", "o")
+    assert result.returncode == 1
+    assert "samples.csv" in result.stderr
+    assert (tmp_path / "o/samples.nml").read_bytes() == before
+    assert sorted(path.name for path in (tmp_path / "o").iterdir()) == FILES
+
+
+def test_results_replace_neither_case_nor_table(run: Run, case: Path, tmp_path: Path) -> None:
+    (tmp_path / "o").mkdir()
+    (tmp_path / "table.csv").write_text("height\n1\n")
+    for source, arguments in {
+        case: ["o/samples.csv", "--samples", "table.csv"],
+        tmp_path / "table.csv": [case, "--samples", "o/samples.csv"],
+    }.items():
+        (tmp_path / "o/samples.csv").write_bytes(source.read_bytes())
+        result = run(*arguments, "-o", "o", "--replace")
+        assert result.returncode == 1
+        assert re.search(naming("o/samples.csv"), result.stderr)
+        assert (tmp_path / "o/samples.csv").read_bytes() == source.read_bytes()
+
+
+def test_results_of_single_drops_and_of_samples_are_kept_apart(
+    run: Run, case: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "table.csv").write_text("height\n1\n")
+    assert run(case, "-o", "single").returncode == 0
+    assert run(case, "--samples", "table.csv", "-o", "many").returncode == 0
+    for arguments in (["-o", "many"], ["--samples", "table.csv", "-o", "single"]):
+        result = run(case, *arguments)
+        assert result.returncode == 1
+        assert re.search(naming("--output", arguments[-1]), result.stderr.splitlines()[0])
+
+
+@pytest.fixture
+def at_work(executable: str, case: Path, tmp_path: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """Return a long run that has begun to write into the directory o, beside a short table."""
+    heights = np.linspace(0.5, 1.5, 60_000)
+    (tmp_path / "long.csv").write_text("height\n" + "\n".join(map(str, heights)))
+    (tmp_path / "short.csv").write_text("height\n1\n")
+    command = [executable, case, "--samples", "long.csv", "-q", "-o", "o"]
+    with subprocess.Popen(command, cwd=tmp_path) as process:
+        while not (tmp_path / ".o.part/samples.csv").exists():
+            assert process.poll() is None
+        yield process
+
+
+@pytest.mark.slow
+def test_runs_in_one_directory_wait_for_each_other(
+    at_work: subprocess.Popen[bytes], run: Run, case: Path, tmp_path: Path
+) -> None:
+    assert run(case, "--samples", "short.csv", "-q", "-o", "o").returncode == 0
+    assert at_work.wait() == 0
+    assert len(rows_of(tmp_path / "o/samples.csv")) == 1
+    assert not (tmp_path / ".o.part").exists()
+
+
+def test_run_after_a_killed_one_clears_up(
+    at_work: subprocess.Popen[bytes], run: Run, case: Path, tmp_path: Path
+) -> None:
+    at_work.kill()
+    at_work.wait()
+    assert (tmp_path / ".o.part").exists()
+    assert run(case, "--samples", "short.csv", "-q", "-o", "o").returncode == 0
+    assert sorted(path.name for path in (tmp_path / "o").iterdir()) == FILES
+    assert not (tmp_path / ".o.part").exists()
+
+
+def test_interrupted_samples_leave_nothing(
+    at_work: subprocess.Popen[bytes], run: Run, case: Path, tmp_path: Path
+) -> None:
+    at_work.send_signal(signal.SIGINT)
+    assert at_work.wait() == 130
+    assert not (tmp_path / "o").exists()
+    assert not (tmp_path / ".o.part").exists()
+    assert run(case, "--samples", "short.csv", "-q", "-o", "o").returncode == 0

@@ -1,0 +1,156 @@
+"""Warnings on what is possible but not plausible."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from typing import TYPE_CHECKING
+
+import pytest
+from conftest import naming
+
+import thud
+from thud import cli
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+# What each warning names, and input that earns it.
+DOUBTFUL = {
+    naming("&ball", "density", "mass", 800, 2200): "&ball mass = 25 / &sampling duration = 0.2 /",
+    naming("&ball: youngs_modulus", "1.6 Pa", "10000.0", "3.0e9"):
+    "&ball youngs_modulus = 1.6 / &drop height = 1e-6 /"
+    " &sampling duration = 10, sample_rate = 2000 /",
+    naming("&ball: youngs_modulus", "1.60 MPa", "'hollow_sphere'", "'finite_element'", "2.08 MPa"):
+    "&model name = 'finite_element' / &mesh radial_elements = 4, polar_elements = 32 /",
+    naming("&ball: youngs_modulus", "2.08 MPa", "'finite_element'", "'modal_ball'", "1.60 MPa"):
+    "&ball youngs_modulus = 2.08e6 / &model name = 'modal_ball' /",
+    naming("level", "44", "52 dB"): "&drop height = 1e-7 /"
+    " &model name = 'hunt_crossley' / &hunt_crossley contact_time = 0.02 /",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("words", DOUBTFUL)
+@pytest.mark.slow
+def test_doubtful_input_raises_a_warning_by_every_command(
+    words: str,
+    case_file: Callable[..., Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = case_file(DOUBTFUL[words])
+    with pytest.warns(thud.PlausibilityWarning) as caught:
+        impact = thud.solve(thud.read_case(path))
+    assert [bool(re.search(words, warning)) for warning in impact.warnings].count(True) == 1
+    assert [str(warning.message) for warning in caught] == list(impact.warnings)
+    assert {warning.filename for warning in caught} == {__file__}
+    assert cli.main(["run", "--no-figures", "-q", str(path)]) == 0
+    assert any(
+        str(path) in line and re.search(words, line)
+        for line in capsys.readouterr().err.splitlines()
+    )
+    assert thud.read_results(tmp_path / "outputs/case").warnings == impact.warnings
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # the command prints warnings itself
+        assert cli.main(["compare", "-q", str(path)]) == 0
+    assert any(re.search(words, line) for line in capsys.readouterr().err.splitlines())
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "&ball /",
+        "&ball youngs_modulus = 2.1e6 / &model name = 'finite_element' / &mesh polar_elements=32 /",
+        "&ball youngs_modulus = 1.75e6 / &model name = 'modal_ball' /",
+        # The wall of a lumped source counts for nothing.
+        "&ball mass = 7.3 / &model name = 'hunt_crossley' / &hunt_crossley contact_time = 0.02 /",
+    ],
+)
+def test_plausible_input_raises_no_warning(text: str, case_file: Callable[..., Path]) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert thud.solve(thud.read_case(case_file(text))).warnings == ()
+
+
+OUTSIDE = {
+    naming("&ball: wall_thickness", "outer_radius", 0.5, 0.4): "&ball wall_thickness = 0.0445 /",
+    naming("&ball: poisson_ratio", 0.3, 0.45, "0.50"): "&ball poisson_ratio = 0.3 /",
+    naming("&drop: deflection", "outer_radius", 0.5): "&drop height = 3 /",
+    naming("&drop: deflection", "wall_thickness", 2.0): "&ball wall_thickness = 0.01, mass = 1 /",
+    naming("&drop: velocity", "youngs_modulus", "density", 0.25): "&drop height = 7 /",
+    naming("&ball", "stress", "gauge_pressure", "youngs_modulus", 0.1): "&ball"
+    " gauge_pressure = 3e5 /",
+    naming("&drop: gravity", "contact time", "velocity", 0.2): "&drop height = 0.01 /",
+    naming("&sampling: sample_rate", 4000.0, 8000.0): "&sampling sample_rate = 4000 /",
+    naming("octaves", "63 Hz", "1e-12"): "&drop height = 10 / &sampling"
+    " duration = 2 / &model name = 'hunt_crossley' /"
+    " &hunt_crossley contact_time = 1, exponent = 3 /",
+    naming("&mesh", "outer_radius", "wall_thickness", "polar_elements", 6.0): "&ball"
+    " youngs_modulus = 2.08e6 / &model name = 'finite_element' / &mesh polar_elements = 16 /",
+    naming("&mesh", "radius", "polar_elements", 4.0): "&drop height = 0.01 /"
+    " &ball youngs_modulus = 2.08e6 / &model name = 'finite_element' / &mesh polar_elements = 32 /",
+    naming("&modal_ball: rings", 14.0): "&drop height = 0.03 / &model name = 'modal_ball' /",
+    naming("&sampling: sample_rate", "substeps", 12000.0, 16000.0): "&sampling"
+    " sample_rate = 12000 / &model name = 'modal_ball' /",
+    naming("&modal_ball: radial_modes", 4.0, 5.0): "&model name = 'modal_ball' /"
+    " &modal_ball radial_modes = 4 /",
+    naming("&modal_ball: harmonics", "contact", 11.0): "&model name = 'modal_ball' /"
+    " &modal_ball harmonics = 12 /",
+    naming("&modal_ball: harmonics", "wall_thickness", "outer_radius", 2.0): "&ball mass = 0.2,"
+    " wall_thickness = 0.002 / &drop height = 0.1 / &sampling duration = 0.3 /"
+    " &model name = 'modal_ball' /",
+    naming("&floor: restitution", "-1.0e-6"): "&model name = 'hunt_crossley' /"
+    " &hunt_crossley contact_time = 0.02 / &floor name = 'oscillator' /"
+    " &oscillator mass = 0.5, stiffness = 0, damping = 0 / &sampling duration = 0.2 /",
+    naming("&model: restitution", 1, "1.0e-6"): "&hollow_sphere momentum_flux = 'none' / &floor"
+    " name = 'oscillator' / &oscillator mass = 30, stiffness = 1.70549e7,"
+    " damping = 0 / &sampling duration = 0.2 /",
+}
+
+
+def test_values_at_the_limits_of_rubbers_raise_no_warning(case_file: Callable[..., Path]) -> None:
+    text = "&ball poisson_ratio = {}, youngs_modulus = 3e9 / &sampling sample_rate = 1e6 /"
+    for ratio, number in ((0.45, 0), (0.4499, 1)):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            impact = thud.solve(thud.read_case(case_file(text.format(ratio))))
+        found = impact.warnings
+        assert sum("rubbers have" in warning for warning in found) == number, found
+
+
+@pytest.mark.parametrize("words", OUTSIDE)
+@pytest.mark.slow
+def test_answer_outside_the_theory_raises_a_warning(
+    words: str, case_file: Callable[..., Path]
+) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        found = thud.solve(thud.read_case(case_file(OUTSIDE[words]))).warnings
+    assert [bool(re.search(words, warning)) for warning in found].count(True) == 1, found
+
+
+def test_free_modes_with_the_modulus_of_the_shell_raise_a_warning() -> None:
+    with pytest.warns(thud.PlausibilityWarning, match=naming("'finite_element'", "2.08 MPa")):
+        found = thud.free_modes(radial_elements=4, polar_elements=16)
+    assert len(found.warnings) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        thud.free_modes(thud.Ball.standard(), radial_elements=4, polar_elements=16)
+
+
+def test_run_names_the_groups_that_are_left_out(
+    case_file: Callable[..., Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["run", "--no-figures", str(case_file("&drop height = 0.5 /"))]) == 0
+    assert "&ball &model" in capsys.readouterr().out
+    assert cli.main(["run", "--no-figures", "-o", "m", str(case_file("&modes count = 1 /"))]) == 0
+    assert re.search(r"defaults.*&ball(?! &model)", capsys.readouterr().out, re.IGNORECASE)
+    assert cli.main(["run", "--no-figures", "outputs/case/effective.nml"]) == 0
+    assert "default" not in capsys.readouterr().out.lower()
