@@ -13,7 +13,7 @@ module thud_coupled_impact
    use thud_receiver_stages, only: new_receiver_stages
    use thud_sampling, only: sampling_type
    use thud_text, only: to_text
-   use thud_zero_search, only: advance_search, is_found, narrow, new_zero_search, zero_search_type
+   use thud_zero_search, only: advance_search, is_found, new_zero_search, update_bracket, zero_search_type
    implicit none (type, external)
    private
 
@@ -129,7 +129,7 @@ contains
          call advance_search(search)
          call take_part(source, drop, search%trial, impact, end, error)
          if (allocated(error)) return
-         call narrow(search, get_distance(source, event, end))
+         call update_bracket(search, get_distance(source, event, end))
       end do
       call take_part(source, drop, search%right, impact, end, error)
       if (allocated(error)) return
