@@ -1,4 +1,4 @@
-!> Suggestions for misspelt words.
+!> Suggestions for misspelled words.
 module thud_suggestion
    use thud_text, only: lower_case, quoted
    implicit none (type, external)
@@ -6,14 +6,14 @@ module thud_suggestion
 
    public :: get_suggestion
 
-   !> Longer words are no misspelt ones.
+   !> Maximum length of a word that gets a suggestion.
    integer, parameter :: max_length = 64
 
 contains
 
-   !> The known word that a misspelt one probably means.
+   !> The known word that a misspelled one probably means.
    pure subroutine get_suggestion(word, known, suggestion)
-      !> The misspelt word.
+      !> The misspelled word.
       character(len=*), intent(in) :: word
       !> The known words: [n_known].
       character(len=*), intent(in) :: known(:)

@@ -25,7 +25,7 @@ module thud_rating
       real(wp) :: a_weighting(max_rated)
    end type rated_set_type
 
-   !> All sets. Thirds are not summed into octaves first: the maximum of a sum is not the sum of maxima.
+   !> All sets. One-third-octave bands are not summed into octaves first: the maximum of a sum is not the sum of maxima.
    type(rated_set_type), parameter :: rated_sets(*) = [ &
       rated_set_type('octave', 63.0_wp, 4, [-26.2_wp, -16.2_wp, -8.7_wp, -3.2_wp, spread(0.0_wp, 1, max_rated - 4)]), &
       rated_set_type('third', 50.0_wp, 12, [-30.3_wp, -26.2_wp, -22.4_wp, -19.1_wp, -16.2_wp, -13.2_wp, -10.8_wp, &

@@ -41,7 +41,7 @@ contains
    !> line nearer to the lowest point, 1 and 3 on the inner ring.
    pure function new_element_row(mesh, i) result(row)
       type(mesh_type), intent(in) :: mesh
-      !> Number of the inner ring, from 0.
+      !> Index of the inner ring, from 0.
       integer, intent(in) :: i
       type(element_row_type) :: row
       real(wp) :: point(2), weight(2), value(4), slope(4, 2), jacobian(2, 2), inverse(2, 2), r(4), z(4)

@@ -85,7 +85,7 @@ contains
             ! The work of a parabola is a third of force and height.
             contact%edge_height(j) = 3*fullness*4*strength*width**1.5_wp/(3*modulus)
             if (.not. options%layer_stiffness > 0.0_wp) cycle
-            ! A layer gives way first, the more the softer it is to the element's edge.
+            ! A layer yields first, the more the softer it is to the element's edge.
             contact%edge_force(j) = contact%edge_force(j)/(1 + modulus/(width*options%layer_stiffness))
          end do
       end associate

@@ -20,7 +20,7 @@ module thud_mode_matrices
    !> Bulk modulus over shear modulus that stands for an infinite one while the constraint is met.
    real(wp), parameter :: augmented_ratio = 1.0e4_wp
 
-   !> Change of the pressures, relative, at which the constraint counts as met: what is left of the
+   !> Change of the pressures, relative, at which the constraint counts as met: the remaining
    !> dilatations is then that of a bulk modulus 1e7 times the shear modulus or more, and the
    !> frequencies are off by less than 1e-8.
    real(wp), parameter :: constraint_tolerance = 1.0e-3_wp
