@@ -219,6 +219,7 @@ def python_module(schema: Entry) -> str:
         members = [key for key in keys if key["owner"] == floor]
         parts.append(python_class(f"Floor ``{floor}``.", members, floor, "FloorName"))
     quantities = schema["quantities"]
+    of_impacts = quantities[: schema["history_quantities"]]
     of_samples = quantities[: schema["sample_quantities"]]
     parts += [
         union("ModelOptions", models),
@@ -229,12 +230,13 @@ def python_module(schema: Entry) -> str:
               [f"{name}.name: {name}" for name in map(class_name, floors)]),
         table("Groups that every model uses.", "GROUPS",
               [f"{quoted(group)}: {class_name(group)}" for group in groups]),
-        quantity_class("ImpactQuantities", "Numbers that describe an impact.", quantities, "float"),
+        quantity_class("ImpactQuantities", "Numbers that describe an impact.", of_impacts, "float"),
         quantity_class("SampleQuantities", "Numbers that describe each of many samples.",
                        of_samples, "NDArray[np.float64]", ", shape (n_sample,)"),
         table("The table of quantities.", "QUANTITIES",
               [f"{quoted(entry['name'])}: {python_quantity(entry)}" for entry in quantities]),
-        "\n# Those of them that describe each of many samples.\n",
+        "\n# Those of them that describe a single impact, and each of many samples.\n",
+        f"IMPACT_QUANTITIES = tuple(QUANTITIES)[:{len(of_impacts)}]\n",
         f"SAMPLE_QUANTITIES = tuple(QUANTITIES)[:{len(of_samples)}]\n",
         table("Nominal and exact mid frequencies, and edges of the bands of each set, Hz.",
               "BANDS: dict[BandSet, dict[str, tuple[float, ...]]]",

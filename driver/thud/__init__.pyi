@@ -6,7 +6,6 @@ from .base.errors import (
     NumericalError as NumericalError,
     PlausibilityWarning as PlausibilityWarning,
     ThudError as ThudError,
-    WorkerWarning as WorkerWarning,
 )
 from .base.units import quantity as quantity
 from .case.case import (
@@ -17,6 +16,10 @@ from .case.case import (
 from .comparison.comparison import (
     Comparison as Comparison,
     compare as compare,
+)
+from .export.force_files import (
+    BlockedForce as BlockedForce,
+    blocked_force as blocked_force,
 )
 from .floors.floor_comparison import (
     FloorComparison as FloorComparison,
@@ -80,12 +83,11 @@ from .level.levels import (
 from .level.rating import (
     Rating as Rating,
     rating as rating,
-    standardised_level as standardised_level,
+    standardized_level as standardized_level,
 )
 from .recordings.read_recording import read_recording as read_recording
 from .recordings.recording import Recording as Recording
 from .report.write import write_report as write_report
-from .studies.blocks import read_sweep as read_sweep
 from .studies.compression_fit import (
     CompressionFit as CompressionFit,
     fit_compression as fit_compression,
@@ -106,7 +108,11 @@ from .studies.sensitivity import (
 )
 from .studies.study import Study as Study
 from .studies.surrogate import surrogate as surrogate
-from .studies.sweep import sweep as sweep
+from .studies.sweep import (
+    Sweep as Sweep,
+    read_sweep as read_sweep,
+    sweep as sweep,
+)
 from .studies.trained_surrogate import (
     Surrogate as Surrogate,
     read_surrogate as read_surrogate,

@@ -1,4 +1,4 @@
-!> The table of quantities: the numbers that describe an impact, each with symbol, unit, meaning and how it is shown.
+!> The table of quantities: every number that a result has, with symbol, unit, meaning and how it is shown.
 !> Summary, tables, schema, and with it all of the Python package, take them from here.
 module thud_quantities
    use thud_force_history, only: force_history_type
@@ -6,15 +6,15 @@ module thud_quantities
    implicit none (type, external)
    private
 
-   public :: get_quantities, quantities, quantity_type, sample_quantity_count
+   public :: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, sample_quantity_count
 
-   !> A number that describes an impact.
+   !> A number that a result has.
    type :: quantity_type
       !> Name in files and programs, and in tables for readers.
       character(len=24) :: name = ''
       character(len=24) :: title = ''
       !> Symbol in formulas and figures, in the mathematical notation of matplotlib.
-      character(len=16) :: symbol = ''
+      character(len=20) :: symbol = ''
       !> SI unit, blank for pure numbers.
       character(len=8) :: unit = ''
       !> Unit on the screen, and how many of them are one SI unit.
@@ -23,13 +23,13 @@ module thud_quantities
       !> Decimals on the screen.
       integer :: decimals = 3
       !> What it is.
-      character(len=64) :: meaning = ''
+      character(len=72) :: meaning = ''
    end type quantity_type
 
-   !> The first of them describe each sample of a sweep, too.
-   integer, parameter :: sample_quantity_count = 6
+   !> Of the table the first quantities are those of each sample of a sweep, the next ones those of single impacts too.
+   integer, parameter :: sample_quantity_count = 6, history_quantity_count = 12
 
-   !> The quantities, in the order of `get_quantities`.
+   !> The quantities; those of an impact first, in the order of `get_quantities`.
    type(quantity_type), parameter :: quantities(*) = [ &
       quantity_type('contact_time', 'contact time', 'T', 's', 'ms', 1.0e3_wp, 3, 'contact time'), &
       quantity_type('peak_force', 'peak force', 'F_{max}', 'N', 'N', 1.0_wp, 1, 'maximum force on the floor'), &
@@ -47,20 +47,41 @@ module thud_quantities
       quantity_type('impulse_residual', 'impulse residual', '', '', '', 1.0_wp, 6, &
       'relative residual of the balance of momentum'), &
       quantity_type('energy_residual', 'energy residual', '', '', '', 1.0_wp, 6, &
-      'relative residual of the balance of energy')]
+      'relative residual of the balance of energy'), &
+      quantity_type('peak_count', 'peaks of the force', '', '', '', 1.0_wp, 0, 'number of peaks of the assessed force'), &
+      quantity_type('mass', 'mass', 'M', 'kg', 'kg', 1.0_wp, 3, 'mass of the source'), &
+      quantity_type('drop_height', 'drop height', 'h', 'm', 'm', 1.0_wp, 3, 'drop height'), &
+      quantity_type('effective_mass', 'effective mass', 'M', 'kg', 'kg', 1.0_wp, 3, 'impulse over the change of velocity'), &
+      quantity_type('margin', 'margin', '', 'dB', 'dB', 1.0_wp, 2, &
+      'minimum distance of the assessed octave levels to a limit, > 0 inside'), &
+      quantity_type('floor_work', 'energy to the floor', 'W', 'J', 'mJ', 1.0e3_wp, 3, &
+      'energy that the source gives to the floor'), &
+      quantity_type('room_rating', 'level in the room', 'L_{iA,Fmax}', 'dB', 'dB', 1.0_wp, 1, &
+      'A-weighted maximum Fast level in the room, re 20 uPa'), &
+      quantity_type('standardized_rating', 'standardized level', "L'_{iA,Fmax,V,T}", 'dB', 'dB', 1.0_wp, 1, &
+      'A-weighted maximum Fast level, standardized, re 20 uPa')]
 
 contains
 
    !> The values of the quantities.
    pure function get_quantities(history) result(values)
       type(force_history_type), intent(in) :: history
-      !> Values, SI units: [size(quantities)].
-      real(wp) :: values(size(quantities))
+      !> Values, SI units: [history_quantity_count].
+      real(wp) :: values(history_quantity_count)
 
       values = [history%contact_time, history%peak_force, history%peak_elastic_force, history%max_deflection, &
          history%restitution, history%impulse, history%impact_velocity, &
          merge(history%exact_contact_time, history%contact_time, history%exact_contact_time > 0.0_wp), &
          history%touch_time, history%sample_rate, history%impulse_residual, history%energy_residual]
    end function get_quantities
+
+   !> A quantity of the table.
+   pure function get_quantity(name) result(quantity)
+      !> Its name, which the table has.
+      character(len=*), intent(in) :: name
+      type(quantity_type) :: quantity
+
+      quantity = quantities(findloc(quantities%name == name, .true., dim=1))
+   end function get_quantity
 
 end module thud_quantities

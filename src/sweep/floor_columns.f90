@@ -36,7 +36,7 @@ contains
       if (.not. case%has_room) return
       call get_room_bands(room_bands, error)
       names = [character(len=column_name_length) :: names, get_level_names('room', room_bands), 'room_rating_dB', &
-         'room_standardised_rating_dB']
+         'standardized_rating_dB']
    end function get_floor_columns
 
    !> Names of levels in bands.

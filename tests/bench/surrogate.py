@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 
 import thud
-from thud.base.tables import format_rows
 
 STUDY = Path(__file__).parents[2] / "inputs/studies/flagship.toml"
 # Sets whose time is measured.
@@ -26,7 +25,7 @@ def main() -> None:
     before = time.process_time()
     trained = thud.surrogate(STUDY, "outputs/flagship", progress=True)
     print(f"training: {time.process_time() - before:.1f} s of processor time")
-    print(format_rows(trained.table()))
+    print(trained.table())
 
     low, high = trained.region.T
     draw = np.random.default_rng(12345)

@@ -9,7 +9,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.stats import t
 
 import thud
-from thud.studies.compression_fit import _doubts, _ratio
+from thud.studies.compression_fit import _ratio, _warnings
 
 TRUE = thud.Ball(youngs_modulus=1.83e6)
 START = thud.Ball(youngs_modulus=3e6)
@@ -35,8 +35,9 @@ def test_modulus_and_touch_are_found_with_honest_intervals(
         noise = np.random.default_rng(seed).normal(scale=3.0, size=len(force))
         fit = thud.fit_compression(deflection, force + noise, START, MODEL, confidence=0.9)
         truth = np.array([TRUE.youngs_modulus, TOUCH])
-        covered += (fit.interval[:, 0] < truth) & (truth < fit.interval[:, 1])
-        errors.append((np.array([fit.youngs_modulus, fit.touch]) - truth) ** 2)
+        low, high = np.array(list(fit.intervals().values())).T
+        covered += (low < truth) & (truth < high)
+        errors.append((fit.estimate - truth) ** 2)
         assert fit.noise == pytest.approx(3.0, rel=0.5)
         assert fit.warnings == ()
     # Of 12 intervals of 90 %, fewer than 7 hold the truth with a probability of 5e-4; of 100 seeds
@@ -49,9 +50,14 @@ def test_fit_shows_its_numbers(measured: tuple[np.ndarray, np.ndarray]) -> None:
     noise = np.random.default_rng(1).normal(scale=0.5, size=len(measured[1]))
     fit = thud.fit_compression(measured[0], measured[1] + noise, START, MODEL)
     assert repr(fit).startswith("<CompressionFit: E 1.8")
-    assert [row[0] for row in fit.rows()] == ["parameter", "youngs_modulus", "touch"]
-    assert fit.curve.case.ball.youngs_modulus == fit.youngs_modulus
-    shown = np.interp(measured[0] - fit.touch, fit.curve.deflection, fit.curve.force)
+    assert [(row[0], row[-1]) for row in fit.rows()[1:]] == [
+        ("youngs_modulus", "MPa"), ("touch", "mm")
+    ]  # fmt: skip
+    table = fit.to_dataframe()
+    np.testing.assert_allclose(table["model_N"] - table["force_N"], fit.residuals)
+    assert len(fit.plot().axes[0].lines) == 2
+    assert fit.curve.case.ball.youngs_modulus == fit.values["youngs_modulus"]
+    shown = np.interp(measured[0] - fit.values["touch"], fit.curve.deflection, fit.curve.force)
     np.testing.assert_allclose(shown - measured[1] - noise, fit.residuals, atol=1.0)
 
 
@@ -117,20 +123,16 @@ def test_covariance_is_that_of_the_linearised_curve(
         return np.asarray(PchipInterpolator(curve.deflection, curve.force)(
             np.maximum(deflection - touch, 0)))  # fmt: skip
 
-    best = np.array([fit.youngs_modulus, fit.touch])
+    best = fit.estimate
     assert model(*best) - force - noise == pytest.approx(fit.residuals, abs=0.5)
     steps = np.diag([1e3, 1e-6])
     slopes = np.stack([(model(*(best + s)) - model(*(best - s))) / (2 * s.sum()) for s in steps])
     expected = deviation**2 * np.linalg.inv(slopes @ slopes.T)
     np.testing.assert_allclose(fit.covariance, expected, rtol=0.02)
     width = t.ppf(0.95, len(force) - 2) * np.sqrt(np.diag(fit.covariance))
-    np.testing.assert_allclose(fit.interval, np.stack([best - width, best + width], axis=1))
+    ends = np.array(list(fit.intervals().values()))
+    np.testing.assert_allclose(ends, np.stack([best - width, best + width], axis=1))
     assert fit.confidence == 0.9
-    rows = fit.rows()[1:]
-    for row, scale, value, ends in zip(rows, (1e-6, 1e3), best, fit.interval, strict=True):
-        assert [float(cell) for cell in row[2:]] == pytest.approx(
-            [scale * value, scale * ends[0], scale * ends[1]], rel=1e-4
-        )
 
 
 def test_search_starts_with_the_work_of_the_measured_curve() -> None:
@@ -154,8 +156,8 @@ def test_search_starts_with_the_work_of_the_measured_curve() -> None:
 def test_touch_at_the_limit_of_the_search_is_doubted(place: float, *, doubted: bool) -> None:
     bounds = ([-np.inf, -0.04], [np.inf, 0.9])
     signs = np.random.default_rng(1).normal(size=60)
-    assert len(_doubts(signs, place, bounds)) == int(doubted)
-    assert len(_doubts(abs(signs), place, bounds)) == int(doubted) + 1
+    assert len(_warnings(signs, place, bounds)) == int(doubted)
+    assert len(_warnings(abs(signs), place, bounds)) == int(doubted) + 1
 
 
 @pytest.mark.parametrize("count", [4, 5])
@@ -168,4 +170,4 @@ def test_fewest_points_leave_something_to_two_parameters(
             thud.fit_compression(measured[0][some], measured[1][some], START, MODEL)
     else:
         fit = thud.fit_compression(measured[0][some], measured[1][some], START, MODEL)
-        assert fit.youngs_modulus == pytest.approx(TRUE.youngs_modulus, rel=0.01)
+        assert fit.values["youngs_modulus"] == pytest.approx(TRUE.youngs_modulus, rel=0.01)

@@ -167,7 +167,7 @@ def test_places_without_results_stay_empty() -> None:
     result = thud.design(study)
     assert int(np.isnan(result.dataset["margin"]).sum()) == 3
     thud.plot.draw_design(result)
-    assert ("samples", "9") in result.table()
+    assert ("samples", "9") in result.rows()
 
 
 @pytest.mark.parametrize(

@@ -23,9 +23,10 @@ from conftest import REPOSITORY, naming
 import thud
 from thud import cli
 from thud.base.files import own_path
-from thud.studies import blocks, evaluation, fit
+from thud.studies import blocks, fit, samples
 from thud.studies.blocks import Blocks
 from thud.studies.dataset import disk_space
+from thud.studies.directory import take
 from thud.studies.sweep import KIND
 
 sys.path.insert(0, str(REPOSITORY / "tests/faults"))
@@ -54,13 +55,13 @@ def values(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def test_zarr_holds_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    expected = values(thud.sweep(HEIGHTS))
-    found = thud.sweep({"name": "a", **HEIGHTS, "format": "zarr"}, tmp_path)
+    expected = values(thud.sweep(HEIGHTS).dataset)
+    found = thud.sweep({"name": "a", **HEIGHTS, "format": "zarr"}, tmp_path).dataset
     assert (tmp_path / "a.zarr").is_dir()
     assert values(found).identical(expected)
     # Whatever is larger than a byte is Zarr now, and written one variable at a time.
     monkeypatch.setattr("thud.studies.blocks.LARGE", 1)
-    found = thud.sweep({"name": "b", **HEIGHTS}, tmp_path)
+    found = thud.sweep({"name": "b", **HEIGHTS}, tmp_path).dataset
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.zarr", "b.zarr"]
     assert values(found).identical(expected)
 
@@ -112,7 +113,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
     """Return the results of the long study, computed at a stretch."""
     path = tmp_path_factory.mktemp("whole") / "long.toml"
     path.write_text(LONG)
-    return thud.sweep(path)
+    return thud.sweep(path).dataset
 
 
 def start(study: str, folder: Path, *more: str) -> subprocess.Popen[str]:
@@ -143,15 +144,15 @@ def test_ended_study_goes_on_where_it_stopped(
     else:
         assert process.returncode == -signal.SIGKILL
     assert not (tmp_path / "long.nc").exists()
-    finished = thud.read_sweep(tmp_path / "long.partial")
+    finished = thud.read_sweep(tmp_path / "long.partial").dataset
     assert 0 < finished.sizes["sample"] < 1000
     known = np.isin(whole["height"], finished["height"])
     assert values(finished).identical(values(whole.isel(set=known)))
 
     computed = []
-    evaluate = evaluation.evaluate
+    evaluate = samples.evaluate
 
-    def count(block: evaluation.Block) -> dict[str, Any]:
+    def count(block: samples.Block) -> dict[str, Any]:
         computed.append(len(block.columns["height"]))
         return evaluate(block)
 
@@ -159,11 +160,11 @@ def test_ended_study_goes_on_where_it_stopped(
     # What is finished needs no space again.
     left = disk_space(thud.read_study(tmp_path / "long.toml")) - 1
     monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=left))
-    resumed = thud.sweep(tmp_path / "long.toml", tmp_path)
+    resumed = thud.sweep(tmp_path / "long.toml", tmp_path).dataset
     assert sum(computed) == 1000 - finished.sizes["sample"]
     assert values(resumed).identical(values(whole))
     assert not (tmp_path / "long.partial").exists()
-    again = thud.sweep(tmp_path / "long.toml", tmp_path)
+    again = thud.sweep(tmp_path / "long.toml", tmp_path).dataset
     assert again.identical(resumed)
     assert sum(computed) == 1000 - finished.sizes["sample"]
 
@@ -194,7 +195,7 @@ def test_full_disk_is_reported_and_loses_nothing(
         assert errors.count("\n") == 1
         assert len(list(tmp_path.glob("long.partial/*.nc"))) == partial
         assert not list(tmp_path.rglob(".*part"))
-    assert values(thud.sweep(tmp_path / "long.toml", tmp_path)).identical(values(whole))
+    assert values(thud.sweep(tmp_path / "long.toml", tmp_path).dataset).identical(values(whole))
 
 
 @pytest.mark.slow
@@ -223,13 +224,13 @@ def test_disk_that_is_full_for_zarr_is_reported_and_loses_nothing(
     assert "File too large" in errors
     assert errors.count("\n") == 1
     assert sorted(found.name for found in tmp_path.iterdir()) == ["long.partial", "long.toml"]
-    assert thud.read_sweep(tmp_path / "long.partial").sizes["sample"] == 1000
+    assert thud.read_sweep(tmp_path / "long.partial").dataset.sizes["sample"] == 1000
 
     def compute_again(*_: object) -> None:
         pytest.fail("all samples were kept")
 
     monkeypatch.setattr("thud.studies.backends.evaluate", compute_again)
-    assert values(thud.sweep(path, tmp_path)).identical(values(whole))
+    assert values(thud.sweep(path, tmp_path).dataset).identical(values(whole))
 
 
 def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
@@ -261,18 +262,18 @@ def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
     (tmp_path / ".e.nc.part").write_text("")
     with pytest.raises(thud.InputError, match=naming("e.partial", "samples")):
         thud.read_sweep(tmp_path / "e.partial")
-    assert thud.sweep({**other, "name": "e"}, tmp_path).sizes["height"] == 1
+    assert thud.sweep({**other, "name": "e"}, tmp_path).dataset.sizes["height"] == 1
     assert not list(tmp_path.glob(".e.*"))
 
 
 def test_a_study_is_computed_once_at_a_time(tmp_path: Path) -> None:
     study = thud.read_study(HEIGHTS)
     with (
-        KIND.take(study, tmp_path),
+        take(tmp_path, KIND, study),
         pytest.raises(thud.InputError, match=naming("python")),
     ):
         thud.sweep(study, tmp_path)
-    assert thud.sweep(study, tmp_path).sizes["height"] == 2
+    assert thud.sweep(study, tmp_path).dataset.sizes["height"] == 2
 
 
 def refuse_locks(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -287,11 +288,11 @@ def refuse_locks(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_study_without_locks_is_computed_with_a_warning(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    expected = values(thud.sweep(HEIGHTS))
+    expected = values(thud.sweep(HEIGHTS).dataset)
     refuse_locks(monkeypatch)
     for form in ("netcdf", "zarr"):
         with pytest.warns(thud.LockWarning, match=re.escape(str(tmp_path))) as caught:
-            found = thud.sweep({"name": form, **HEIGHTS, "format": form}, tmp_path)
+            found = thud.sweep({"name": form, **HEIGHTS, "format": form}, tmp_path).dataset
         assert len(caught) == 1
         assert values(found).identical(expected)
     assert {path.name for path in tmp_path.iterdir()} == {"netcdf.nc", "zarr.zarr"}
@@ -312,7 +313,7 @@ def test_command_without_locks_ends_with_results_and_one_warning(tmp_path: Path)
     )
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "calls").read_text().count("flock") > 1
-    assert thud.read_sweep(tmp_path / "new/two.nc").sizes["height"] == 2
+    assert thud.read_sweep(tmp_path / "new/two.nc").dataset.sizes["height"] == 2
     assert done.stderr.count("\n") == 1
     assert "new" in done.stderr
 
@@ -331,7 +332,7 @@ def test_lock_is_that_of_the_directory_that_has_the_name(
             folder.mkdir()
 
     monkeypatch.setattr("fcntl.flock", switch)
-    with KIND.take(study, folder), pytest.raises(thud.InputError, match=naming("out/python")):
+    with take(folder, KIND, study), pytest.raises(thud.InputError, match=naming("out/python")):
         thud.sweep(study, folder)
 
 
@@ -343,31 +344,31 @@ def test_killed_study_goes_on_where_there_are_no_locks(
     own_path(tmp_path / "python.partial/.block_000000000001.nc.part").write_bytes(b"half")
     refuse_locks(monkeypatch)
     with pytest.warns(thud.LockWarning):
-        assert thud.sweep(study, tmp_path).sizes["height"] == 2
+        assert thud.sweep(study, tmp_path).dataset.sizes["height"] == 2
 
 
 def test_other_studies_leave_no_mark_on_one_at_work(tmp_path: Path) -> None:
     other = {"parameters": {"height": {"values": [70, 80], "unit": "cm"}}}
     study = thud.read_study(HEIGHTS)
     with (
-        KIND.take(study, tmp_path),
+        take(tmp_path, KIND, study),
         pytest.raises(thud.InputError, match=naming("python")),
     ):
         thud.sweep(other, tmp_path, replace=True)
     # Nothing was finished, so that the directory may change hands, but with nothing in it.
-    with KIND.take(study, tmp_path):
+    with take(tmp_path, KIND, study):
         keep_one_block(study, tmp_path)
     with pytest.raises(thud.InputError, match=naming("python", "--replace")):
         thud.sweep(other, tmp_path)
-    assert thud.sweep(other, tmp_path, replace=True)["height"].values.tolist() == [0.7, 0.8]
+    assert thud.sweep(other, tmp_path, replace=True).dataset["height"].values.tolist() == [0.7, 0.8]
 
 
 def keep_one_block(study: SampleStudy, folder: Path) -> None:
     """Begin a study and finish its first set only."""
     blocks = Blocks(folder, study, 1)
     blocks.open()
-    block = evaluation.Block(0, study.case, {"height": np.array([0.5])}, thud.__version__)
-    blocks.keep(block, evaluation.evaluate(block))
+    block = samples.Block(0, study.case, {"height": np.array([0.5])}, thud.__version__)
+    blocks.keep(block, samples.evaluate(block))
 
 
 def test_replace_leaves_nothing_of_an_older_version(tmp_path: Path) -> None:
@@ -405,7 +406,7 @@ def test_interrupt_of_a_removal_leaves_no_half_directory(
         patch.setattr("shutil.rmtree", interrupt)
         with pytest.raises(KeyboardInterrupt):
             thud.sweep(changed, tmp_path, replace=True)
-    found = thud.sweep(changed, tmp_path)
+    found = thud.sweep(changed, tmp_path).dataset
     assert found["height"].values.tolist() == [0.7]
     assert [path.name for path in tmp_path.iterdir()] == ["heights.zarr"]
 
@@ -415,7 +416,7 @@ def test_files_of_something_else_are_replaced_on_request_only(tmp_path: Path) ->
     with pytest.raises(thud.InputError, match=naming("python.nc", "--replace")):
         thud.sweep(HEIGHTS, tmp_path)
     assert (tmp_path / "python.nc").read_text() == "a paper"
-    assert thud.sweep(HEIGHTS, tmp_path, replace=True).sizes["height"] == 2
+    assert thud.sweep(HEIGHTS, tmp_path, replace=True).dataset.sizes["height"] == 2
     (tmp_path / "fit.json").write_text("[]")
     study = {"target": {"levels": [39, 31, 23, 17, 12]}, "parameters": {"mass": {}}}
     with pytest.raises(thud.InputError, match=naming("fit.json", "--replace")):
@@ -502,8 +503,8 @@ def test_results_that_cannot_be_read_for_now_stay(
 def test_unfinished_blocks_of_another_size_are_computed_again(tmp_path: Path) -> None:
     study = thud.read_study(HEIGHTS)
     keep_one_block(study, tmp_path)
-    assert thud.sweep(study, tmp_path).identical(thud.sweep(study).assign_attrs(
-        thud.read_sweep(tmp_path / "python.nc").attrs))  # fmt: skip
+    assert thud.sweep(study, tmp_path).dataset.identical(thud.sweep(study).dataset.assign_attrs(
+        thud.read_sweep(tmp_path / "python.nc").dataset.attrs))  # fmt: skip
 
 
 def children(pid: int) -> list[int]:
@@ -537,7 +538,7 @@ def test_zarr_keeps_the_order(tmp_path: Path) -> None:
             "wall_thickness": {"values": [30, 32], "unit": "mm"},
         }
     }
-    expected = thud.sweep({**study, "format": "netcdf"}, tmp_path)
-    found = thud.sweep({**study, "format": "zarr"}, tmp_path)
+    expected = thud.sweep({**study, "format": "netcdf"}, tmp_path).dataset
+    found = thud.sweep({**study, "format": "zarr"}, tmp_path).dataset
     assert list(found.variables) == list(expected.variables)
     assert [name for name in found.coords if name != "octave"] == list(study["parameters"])

@@ -139,7 +139,9 @@ def test_dataset_of_an_ensemble_is_that_of_a_study() -> None:
     many = thud.solve_many(heights, bands="third", forces=True)
     found = many.to_xarray()
     fixed = {"bands": "both"}
-    study = thud.sweep({"parameters": {"height": {"values": heights["height"]}}, "fixed": fixed})
+    study = thud.sweep(
+        {"parameters": {"height": {"values": heights["height"]}}, "fixed": fixed}
+    ).dataset
     names = set(study.data_vars) & set(found.data_vars)
     assert {"floor_level", "elastic_third_level", "margin", "reason"} <= names
     for name in names:

@@ -18,7 +18,6 @@ from synthetic import make_recording
 
 import thud
 from thud.cli.export_command import EXPORT, KINDS
-from thud.export import force_files
 from thud.export.force_files import EXPORTS, BlockedForce, blocked_force
 from thud.recordings.read_recording import read_recording
 from thud.recordings.signal_files import open_signals
@@ -56,7 +55,7 @@ def test_files_hold_the_force_to_their_last_digit(kind: str, digits: float, tmp_
     if kind == "uff":
         pytest.importorskip("pyuff", reason="the extra recordings is not installed")
     ending, _ = EXPORTS[kind]
-    path = force_files.export(kind, FORCE, tmp_path / f"force{ending}")[0]
+    path = FORCE.save(tmp_path / f"force{ending}", kind)[0]
     calibration = 2048.0 if kind == "wav" else None
     (signal,) = open_signals(path, calibration=calibration)
     # A universal file holds six digits of the time step.
@@ -72,7 +71,7 @@ def test_files_tell_units_rate_kind_and_checksum(tmp_path: Path) -> None:
     for kind, (ending, _) in EXPORTS.items():
         if kind == "uff":
             pytest.importorskip("pyuff", reason="the extra recordings is not installed")
-        paths = force_files.export(kind, FORCE, tmp_path / f"force{ending}")
+        paths = FORCE.save(tmp_path / f"force{ending}", kind)
         text = b"".join(path.read_bytes() for path in paths)
         if kind == "mat":
             from scipy.io import loadmat
@@ -84,7 +83,7 @@ def test_files_tell_units_rate_kind_and_checksum(tmp_path: Path) -> None:
 
 
 def test_full_scale_of_wav_is_a_power_of_two_above_the_peak(tmp_path: Path) -> None:
-    path, note = force_files.export_wav(FORCE, tmp_path / "force.wav")
+    path, note = FORCE.save(tmp_path / "force.wav", "wav")
     scale = 2.0 ** math.ceil(math.log2(FORCE.force.max()))
     word = f"Scale: {scale:g} N per full scale"
     with soundfile.SoundFile(str(path)) as file:
@@ -97,7 +96,7 @@ def test_full_scale_of_wav_is_a_power_of_two_above_the_peak(tmp_path: Path) -> N
 def test_wav_refuses_a_rate_that_is_not_whole(tmp_path: Path) -> None:
     force = half_sine(44100.5)
     with pytest.raises(thud.InputError, match=naming("44100.5 Hz")):
-        force_files.export_wav(force, tmp_path / "force.wav")
+        force.save(tmp_path / "force.wav", "wav")
     assert not list(tmp_path.iterdir())
 
 
@@ -118,7 +117,7 @@ def test_spectrum_is_the_transform_of_the_half_sine(start: float) -> None:
 
 
 def test_spectrum_holds_the_energy_of_the_force(tmp_path: Path) -> None:
-    (path,) = force_files.export_spectrum(FORCE, tmp_path / "spectrum.csv")
+    (path,) = FORCE.save(tmp_path / "spectrum.csv", "spectrum")
     frequency, real, imaginary, magnitude, phase = np.genfromtxt(path, delimiter=",").T[:, 1:]
     spectrum = real + 1j * imaginary
     assert magnitude * np.exp(1j * phase) == pytest.approx(spectrum, abs=1e-12)
@@ -163,7 +162,7 @@ def test_force_is_that_which_the_case_judges() -> None:
     impact = thud.solve(case)
     assert np.array_equal(blocked_force(impact).force, impact.elastic_force)
     assert np.array_equal(FORCE.force, IMPACT.floor_force)
-    assert "elastic" in blocked_force(impact).words()[0]
+    assert "elastic" in blocked_force(impact).header_lines()[0]
 
 
 def test_words_of_others_stay_in_their_lines(tmp_path: Path) -> None:
@@ -171,7 +170,7 @@ def test_words_of_others_stay_in_their_lines(tmp_path: Path) -> None:
     for kind, (ending, _) in EXPORTS.items():
         if ending == ".uff":
             pytest.importorskip("pyuff", reason="the extra recordings is not installed")
-        assert force_files.export(kind, force, tmp_path / f"force{ending}")
+        assert force.save(tmp_path / f"force{ending}", kind)
     (signal,) = open_signals(tmp_path / "force.csv")
     assert np.array_equal(signal.read(0, signal.n_sample), FORCE.force)
 
@@ -223,14 +222,14 @@ def test_recording_is_not_replaced_by_its_force(tmp_path: Path) -> None:
     force = blocked_force(thud.read_recording(path))
     for name in ("drop.csv", "link.csv"):
         with pytest.raises(thud.InputError, match=naming(name, "recording")):
-            force_files.export_csv(force, tmp_path / name)
+            force.save(tmp_path / name)
     assert path.read_bytes() == before
     # A path that its user names is replaced, the text beside it only where thud has written it.
-    force_files.export_wav(FORCE, tmp_path / "a.wav")
-    force_files.export_wav(FORCE, tmp_path / "a.wav")
+    FORCE.save(tmp_path / "a.wav", "wav")
+    FORCE.save(tmp_path / "a.wav", "wav")
     (tmp_path / "b.wav.txt").write_text("mine")
     with pytest.raises(thud.InputError, match=naming("b.wav.txt")):
-        force_files.export_wav(FORCE, tmp_path / "b.wav")
+        FORCE.save(tmp_path / "b.wav", "wav")
     assert (tmp_path / "b.wav.txt").read_text() == "mine"
 
 
@@ -303,7 +302,7 @@ def test_velocity_of_the_plate_of_scikit_fem_is_that_of_the_modal_sum(plate) -> 
 
 
 def test_example_reads_exported_force(plate, tmp_path: Path) -> None:  # noqa: ANN001
-    (path,) = force_files.export_csv(FORCE, tmp_path / "force.csv")
+    (path,) = FORCE.save(tmp_path / "force.csv")
     force, step = plate.read_force(path)
     assert np.array_equal(force, FORCE.force)
     assert step == pytest.approx(1 / 44100.0, rel=1e-12)

@@ -12,7 +12,7 @@ from scipy.signal import butter, freqz_sos, sosfilt
 
 import thud
 from thud.level.levels import BANDWIDTHS
-from thud.recordings.bank import band_filters, filter_levels
+from thud.recordings.filters import band_filters, filter_levels
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -523,7 +523,7 @@ def test_large_ball_is_valid_in_fixed_and_fit() -> None:
     starts = {"wall_thickness": 0.11, "outer_radius": 0.2}
     quiet_fit(thud.solve(ball), starts, thud.Case(ball=thud.Ball(mass=20.0)))
     fixed = {"outer_radius": 0.2, "wall_thickness": 0.1, "mass": 20}
-    found = thud.sweep({"fixed": fixed, "parameters": {"height": {"values": [1]}}})
+    found = thud.sweep({"fixed": fixed, "parameters": {"height": {"values": [1]}}}).dataset
     assert float(found["contact_time"][0]) == pytest.approx(thud.solve(ball).contact_time)
 
 

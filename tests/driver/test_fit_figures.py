@@ -65,7 +65,7 @@ def test_labels_break_where_they_do_not_fit() -> None:
 def test_level_target_has_no_ellipse_of_one_parameter() -> None:
     levels = IMPACT.levels(force="floor").tolist()
     fit = thud.fit(thud.LevelTarget(levels, uncertainty=0.5), ["youngs_modulus"])
-    figures = draw_fit(fit, fit.shown_units())
+    figures = fit.figures()
     assert list(figures) == ["fit"]
     assert labels(figures["fit"]) == ["Standard deviation of the target", "Target", "Fit"]
     assert figures["fit"].axes[1].get_xlabel() == "Octave band, Hz"

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pytest
 from conftest import naming
 
 import thud
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 IMPACT = thud.solve(duration=0.03)
 RECORD = IMPACT.time, IMPACT.floor_force + np.random.default_rng(1).normal(size=1323)
@@ -111,17 +106,3 @@ def test_record_whose_last_millisecond_is_below_a_tenth_is_whole(
     else:
         with pytest.raises(thud.InputError, match=naming("target", "force", f"{last:.0%}")):
             target.misfit()
-
-
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: thud.fit(RECORD, ["mass"], base=thud.Case()), naming("fit()", "'base'", "'case'")),
-        (lambda: thud.fit(RECORD, ["mass"], level=0.9), naming("fit()", "'level'", "'confidence'")),
-        (lambda: thud.Parameter(2.5, lower=1), naming("Parameter()", "'lower'", "'low'")),
-        (lambda: thud.Parameter(2.5, upper=3), naming("Parameter()", "'upper'", "'high'")),
-    ],
-)
-def test_old_words_are_answered_by_the_new_ones(call: Callable[[], object], words: str) -> None:
-    with pytest.raises(thud.InputError, match=words):
-        call()

@@ -16,8 +16,7 @@ from scipy import stats
 import thud
 from thud import cli
 from thud.studies.fit import KIND
-from thud.studies.fitting.inference import pair_sentences
-from thud.studies.fitting.residual_tests import UNLIKELY
+from thud.studies.fitting.inference import UNLIKELY, pair_sentences
 
 if TYPE_CHECKING:
     from pathlib import Path

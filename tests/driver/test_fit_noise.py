@@ -18,7 +18,8 @@ from scipy.linalg import toeplitz
 
 import thud
 from thud.recordings.noise import Background, covariances, fit_background, noise_covariances
-from thud.studies.fitting import force_misfit, record_noise, residual_tests, search
+from thud.studies.fitting import force_misfit, inference, record_noise, search
+from thud.studies.fitting.inference import UNLIKELY, residual_warnings
 from thud.studies.fitting.record_noise import (
     Quiet,
     Weights,
@@ -30,7 +31,6 @@ from thud.studies.fitting.record_noise import (
     to_grid,
     wave_size,
 )
-from thud.studies.fitting.residual_tests import UNLIKELY, residual_doubts
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "validation"))
 from fit_disturbances import DISTURBANCES, QUIET, RATE, TRUTH, pulse
@@ -201,12 +201,12 @@ def test_pulse_is_found_in_means_of_a_millisecond() -> None:
 def test_likelihood_of_quiet_is_that_of_normal_cells() -> None:
     background = quiet_of(2).background()
     other = replace(background, draws=2 * background.draws)
-    time = (background.quiet[0] + background.quiet[1]) / 2
+    time = (background.cells[0] + background.cells[1]) / 2
     trend = background.peak**2 * (1 + 0.01 * np.outer(time, time))
     values = [
         record_noise._log_likelihood(one)  # noqa: SLF001
         - stats.multivariate_normal.logpdf(
-            one.mean, cov=np.tensordot(one.variances, covariances(one.quiet), 1) + trend
+            one.mean, cov=np.tensordot(one.variances, covariances(one.cells), 1) + trend
         )
         for one in (background, other)
     ]
@@ -298,9 +298,9 @@ def test_strongest_tone_has_the_gain_of_its_likelihood() -> None:
 def test_white_residuals_fail_each_test_as_often_as_it_says(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(residual_tests, "UNLIKELY", 0.1)
+    monkeypatch.setattr(inference, "UNLIKELY", 0.1)
     rng, time = np.random.default_rng(7), np.arange(101) * 4e-4
-    told = [" ".join(residual_doubts(rng.normal(size=101), time)) for _ in range(500)]
+    told = [" ".join(residual_warnings(rng.normal(size=101), time)) for _ in range(500)]
     # The bound of Bonferroni is not reached by 1 - 0.1/2, and runs are whole numbers.
     low, high = stats.binom.ppf([1e-4, 1 - 1e-4], 500, [0.085, 0.115])
     for words in ("coloured", "largest", "change their sign"):
@@ -318,7 +318,7 @@ def test_runs_are_those_of_wald_and_wolfowitz() -> None:
         lengths[(positive - 1) * 2] += n - positive
         lengths[(negative - 1) * 2 + 1] += m - negative
         signs = np.repeat(np.where(np.arange(runs) % 2, -1.0, 1.0), lengths)
-        told = residual_tests.runs_doubt(signs)
+        told = inference.runs_warning(signs)
         assert bool(told) == (2 * stats.norm.sf(abs(runs - mean) / deviation) <= UNLIKELY)
         if told:
             assert f" {runs - 1} times where {mean - 1:.0f} " in told
@@ -471,19 +471,19 @@ def test_too_little_quiet_warns_unless_the_offset_is_decided() -> None:
 def test_white_residuals_pass_and_others_do_not() -> None:
     random = np.random.default_rng(1)
     time = np.arange(251) * 4e-4
-    told = sum(len(residual_doubts(random.normal(size=251), time)) for _ in range(300))
+    told = sum(len(residual_warnings(random.normal(size=251), time)) for _ in range(300))
     # Three tests of 300 sequences; more would have a probability of 1e-4.
     assert told <= stats.binom.ppf(1 - 1e-4, 900, UNLIKELY)
     white = random.normal(size=251)
     slow = np.convolve(white, [1.0, 1.0], "same") / np.sqrt(2)
     spiked = np.where(np.arange(251) == 100, 6.0, white)
-    assert "lowest" in residual_doubts(slow, time)[0]
-    assert any("sign" in one for one in residual_doubts(slow, time))
-    assert re.search(naming("residual", "40 ms", 6), residual_doubts(spiked, time)[0])
-    assert any(re.search(naming("sign", 0), one) for one in residual_doubts(np.abs(white), time))
-    assert not residual_doubts(slow[:10], time[:10])
+    assert "lowest" in residual_warnings(slow, time)[0]
+    assert any("sign" in one for one in residual_warnings(slow, time))
+    assert re.search(naming("residual", "40 ms", 6), residual_warnings(spiked, time)[0])
+    assert any(re.search(naming("sign", 0), one) for one in residual_warnings(np.abs(white), time))
+    assert not residual_warnings(slow[:10], time[:10])
     # A constant is no frequency: it is told by its runs alone.
-    assert not any("coloured" in one for one in residual_doubts(white + 3, time))
+    assert not any("coloured" in one for one in residual_warnings(white + 3, time))
 
 
 @pytest.mark.parametrize(

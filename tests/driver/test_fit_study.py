@@ -77,7 +77,7 @@ def test_units_are_those_of_the_file(tmp_path: Path) -> None:
     # The table of the record has times of its own.
     assert fit.time_shift == pytest.approx(0.2, abs=1e-6)
     assert fit.values["youngs_modulus"] == pytest.approx(1.6e6, rel=1e-6)
-    assert "1.6" in fit.table(study.units)
+    assert "1.6" in fit.table()
 
 
 def test_values_are_those_of_the_file_to_the_last_bit(tmp_path: Path) -> None:
@@ -179,8 +179,6 @@ def test_fit_that_cannot_be_saved_is_refused_before_it_is_made(
         ("[target]", "starts = 1.5\n[target]", naming("starts", 1.5, 1)),
         ("[target]", "seed = -1\n[target]", naming("seed", -1, 0)),
         ("[target]", "confidence = 2\n[target]", naming("confidence", 2, 0, 1)),
-        ("[target]", "level = 0.9\n[target]", naming("'level'", "'confidence'")),
-        ("[target]", "base = 'no.nml'\n[target]", naming("'base'", "'case'")),
         ("[target]", "fixed.mass = -1\n[target]", naming("[fixed]", "&ball: mass", -1.0)),
         ("[target]", "fixed.density = -1\n[target]", naming("[fixed]", "&ball: mass", "kg")),
         (

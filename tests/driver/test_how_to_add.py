@@ -36,7 +36,7 @@ assert many.status.tolist() == [0, 0, 1], many.reason
 for k, time in zip([5e4, 6e4], many.contact_time):
     assert abs(time / (math.pi * math.sqrt(2.5 / k)) - 1) < 1e-9
 study = {"fixed": {"model": "linear_spring"}, "parameters": {"stiffness": {"values": [5e4, 6e4]}}}
-assert thud.sweep(study).contact_time.values.tolist() == many.contact_time[:2].tolist()
+assert thud.sweep(study).dataset.contact_time.values.tolist() == many.contact_time[:2].tolist()
 found = thud.fit(impact, {"stiffness": 5e4}, thud.Case(model=thud.LinearSpring()))
 assert abs(found.values["stiffness"] - 62000.0) < 1.0, found
 assert len(thud.get_bands("low_third").nominal) == 4

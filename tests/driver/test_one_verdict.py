@@ -53,7 +53,7 @@ def test_every_command_has_the_same_peak_levels_and_verdict(
 
     swept = thud.sweep(
         {"case": str(path), "parameters": {"height": {"values": [case.drop.height]}}}
-    )
+    ).dataset
     near = BATCH if isinstance(case.model, thud.HollowSphere) else 0.0
     assert swept[peak].item() == pytest.approx(impact.peak(), rel=near, abs=0)
     np.testing.assert_allclose(

@@ -13,7 +13,7 @@ from synthetic import half_sine, make_drop
 
 from thud.level.levels import record_force
 from thud.recordings import calibration, contact, drops, flanks, measured_drop
-from thud.recordings.contact import Contact, cells_between, even_edges
+from thud.recordings.contact import Contact, cells_between, uniform_edges
 from thud.recordings.plate import Plate, correct_plate
 from thud.recordings.signal import Signal
 
@@ -22,7 +22,7 @@ RATE = 25600.0
 
 def test_quiet_cells_grow_away_from_the_contact() -> None:
     """Of 0.5 ms up to 5 ms, 2 ms up to 25 ms, 3 ms up to 0.1 s."""
-    edges = contact._quiet_edges(int(RATE), RATE) / RATE  # noqa: SLF001
+    edges = contact._background_edges(int(RATE), RATE) / RATE  # noqa: SLF001
     width, begin = np.diff(edges), edges[:-1]
     assert edges[0] == 0
     assert edges[-1] == pytest.approx(0.1, abs=1.5 / RATE)
@@ -31,11 +31,11 @@ def test_quiet_cells_grow_away_from_the_contact() -> None:
         np.testing.assert_allclose(width[inside], expected, atol=1.01 / RATE)
         assert width[inside].sum() == pytest.approx(high - low, abs=1.01 / RATE)
     # What is longer than the quiet is left out.
-    assert contact._quiet_edges(100, RATE)[-1] <= 100  # noqa: SLF001
+    assert contact._background_edges(100, RATE)[-1] <= 100  # noqa: SLF001
 
 
 def test_cells_have_their_samples_and_means() -> None:
-    edges = even_edges(10, 10 + int(0.0203 * RATE), RATE)
+    edges = uniform_edges(10, 10 + int(0.0203 * RATE), RATE)
     assert (edges[0], edges[-1]) == (10, 10 + int(0.0203 * RATE))
     # 101.5 cells of 0.2 ms.
     assert len(edges) - 1 == round(int(0.0203 * RATE) / RATE / 2e-4)
@@ -45,7 +45,7 @@ def test_cells_have_their_samples_and_means() -> None:
     np.testing.assert_allclose(begins, (edges[:-1] - 0.5) / RATE - 0.01)
     np.testing.assert_allclose(ends - begins, np.diff(edges) / RATE)
     force = np.arange(2000.0) ** 2
-    quiet, mean = contact.quiet_means(force, 700, 1300, RATE, 0.04)
+    quiet, mean = contact.background_means(force, 700, 1300, RATE, 0.04)
     for begin, end, value in zip(*quiet, mean, strict=True):
         first, stop = (round((time + 0.04) * RATE + 0.5) for time in (begin, end))
         assert value == pytest.approx(force[first:stop].mean())
@@ -274,7 +274,7 @@ def test_walks_scatter_with_the_steps_of_their_flank() -> None:
         assert spread[6] == kind.parabola
         # What is added to begin and end: 5 us for lines and jumps, 20 us for all other kinds.
         is_line = not kind.rough and kind.mean[1] == kind.mean[2] == 0
-        assert kind.left[2] == (5e-6 if is_line else 20e-6)
+        assert kind.error[2] == (5e-6 if is_line else 20e-6)
     # What is likely at touch and at release.
     np.testing.assert_allclose(np.exp(flanks.PRIOR).sum(axis=0), 1)
 

@@ -84,10 +84,10 @@ def stumble(path: Path) -> None:
 def test_what_libraries_do_stays_in_the_first_look(
     action: Callable[[Path], None], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(probe, "PATIENCE", 0.5)
+    monkeypatch.setattr(probe, "TIMEOUT", 0.5)
     handles, before = count_handles(), children()
     with pytest.raises(InputError, match=words):
-        probe.look(action, tmp_path / "p.h5", "HDF5")
+        probe.probe_in_subprocess(action, tmp_path / "p.h5", "HDF5")
     assert count_handles() == handles
     assert children() == before
 

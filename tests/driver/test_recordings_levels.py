@@ -22,14 +22,14 @@ from thud.level.estimate import Contribution, Estimate
 from thud.level.levels import RECORDED_BAND
 from thud.recordings.band_noise import band_noise
 from thud.recordings.budgets import average_estimates, find_deviant, level_estimates
-from thud.recordings.contact import cells_between, even_edges
-from thud.recordings.low_pass import attenuation, low_pass_force
+from thud.recordings.contact import cells_between, uniform_edges
+from thud.recordings.filters import low_pass_attenuation, low_pass_force
 from thud.recordings.noise import Background
 from thud.recordings.outliers import find_outliers
 from thud.recordings.plate import Plate, check_plate, correct_plate
 from thud.recordings.recorded_levels import (
     METHODS,
-    LevelEstimate,
+    DropLevels,
     average_levels,
     compare_methods,
     measure_levels,
@@ -140,7 +140,7 @@ def test_low_pass_does_nothing_to_the_bands() -> None:
             np.testing.assert_allclose(low.level, raw.level, rtol=0, atol=2e-3)
             assert "1.25 kHz" in low.steps[1]
             # A rectangle between none of it and all at the upper edge, where it is largest.
-            taken = attenuation(thud.get_bands(bands).upper, rate)
+            taken = low_pass_attenuation(thud.get_bands(bands).upper, rate)
             np.testing.assert_allclose(low.contributions["filter"], taken / math.sqrt(3))
             assert taken.max() < 0.005
             assert not raw.contributions["filter"].any()
@@ -148,7 +148,7 @@ def test_low_pass_does_nothing_to_the_bands() -> None:
     passed, _ = low_pass_force(sine, 25600.0)
     # Zero phase, half the energy, at the band edge; 19 dB at 1.6 kHz, the paper's force plate.
     np.testing.assert_allclose(passed[1000:3000], sine[1000:3000] / math.sqrt(2), atol=1e-6)
-    assert attenuation(np.array([RECORDED_BAND, 1600.0]), 1e6) == pytest.approx(
+    assert low_pass_attenuation(np.array([RECORDED_BAND, 1600.0]), 1e6) == pytest.approx(
         [3.01, 19.10], abs=0.01
     )
     short, sentence = low_pass_force(sine, 2500.0)
@@ -202,7 +202,7 @@ def test_noise_that_rises_towards_0_hz() -> None:
     quiet = [np.arange(0, drop.gate[0], 8), np.arange(drop.gate[1], len(drop.time), 8)]
     cells = [cells_between(edges, rate, middle) for edges in quiet]
     both = tuple(np.concatenate(pair) for pair in zip(*cells, strict=True))
-    inner = even_edges(*drop.gate, rate)
+    inner = uniform_edges(*drop.gate, rate)
     contact = cells_between(inner, rate, middle)
     draws = np.array([[1e-9, 0, density, 0, 0]])
     rng = np.random.default_rng(3)
@@ -567,11 +567,11 @@ def test_budget_after_the_gum() -> None:
     assert math.isnan(average_estimates([]).value)
 
 
-def level_estimate(level: float, background: float, noise: float, method: float) -> LevelEstimate:
+def level_estimate(level: float, background: float, noise: float, method: float) -> DropLevels:
     """Return an estimate with one band."""
     parts = {"noise": np.array([noise]), "method": np.array([method])}
     one = np.array([level])
-    return LevelEstimate(
+    return DropLevels(
         "drop", "octave", "fft", one - 0.01, one, one, np.array([background]), np.array([""]),
         parts, (),
     )  # fmt: skip

@@ -28,11 +28,11 @@ from thud.recordings import calibration
 from thud.recordings.calibration import calibrate
 from thud.recordings.channel import BoundedFile
 from thud.recordings.config import PlateConfig, read_config
-from thud.recordings.excursion import Excursions, check_peak, scan
 from thud.recordings.force_units import Calibration, newtons_per_unit
-from thud.recordings.grid import even_grid
+from thud.recordings.polarity import Extremes, check_peak, scan
 from thud.recordings.signal import Signal
 from thud.recordings.signal_files import open_signals
+from thud.recordings.uniform_grid import uniform_grid
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -203,12 +203,12 @@ def test_quiet_is_found_at_either_end() -> None:
         np.append(np.full(15, 500.0), force[::-1]),
     ):
         seen = scan(lambda start, stop, one=record: one[start:stop], record.size, "t.csv")
-        assert seen.quiet == 500
+        assert seen.background == 500
 
 
 def test_polarity_is_doubted_from_half_as_much_again_on() -> None:
     for low, expected in ((-1490.0, False), (-1510.0, True)):
-        told = check_peak(Excursions(low, 1000.0, 0.0), 1.0, "t.csv", assumed=False)
+        told = check_peak(Extremes(low, 1000.0, 0.0), 1.0, "t.csv", assumed=False)
         assert any("polarity" in one for one in told) == expected
 
 
@@ -416,21 +416,21 @@ def test_rounded_times_are_told(tmp_path: Path) -> None:
 def test_rounded_times_miss_the_grid_by_a_digit_at_most() -> None:
     exact = 1.25e-4 * np.arange(1001)
     rounded = np.floor(exact / 1e-5 + 1e-6) * 1e-5
-    _, step, (told,) = even_grid(rounded, "t.csv")
+    _, step, (told,) = uniform_grid(rounded, "t.csv")
     assert step == pytest.approx(1.25e-4, rel=1e-6)
     assert re.search(naming("1e-05 s"), told)
     # Half a digit below the time, and another one below the mean.
     rounded[501] -= 1e-5
     with pytest.raises(InputError, match=naming("t.csv", "row 502")):
-        even_grid(rounded, "t.csv")
+        uniform_grid(rounded, "t.csv")
 
 
 def test_digits_of_many_times_are_counted_at_even_and_odd_rows() -> None:
     time = np.arange(70_000.0)
     time[1::4] += 0.05
     time[3::4] -= 0.05
-    with pytest.raises(InputError, match=naming("evenly")):
-        even_grid(time, "t.csv")
+    with pytest.raises(InputError, match=naming("uniformly")):
+        uniform_grid(time, "t.csv")
 
 
 def table_of(row: Callable[[int, float, float], str]) -> str:
@@ -776,7 +776,7 @@ def test_useless_tables_are_told(text: str, words: str, tmp_path: Path) -> None:
 
 def test_long_tables_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_pulse(tmp_path, "comma.csv")
-    monkeypatch.setattr("thud.recordings.formats.text.MOST_NUMBERS", 600)
+    monkeypatch.setattr("thud.recordings.formats.text.MAX_NUMBERS", 600)
     assert "numbers" in refusal(path)
     path.write_bytes(b"1,2\n" * 2**20 * 65)
     assert "260 MiB" in refusal(path)

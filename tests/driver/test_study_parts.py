@@ -21,10 +21,16 @@ from thud.studies.design import KIND as DESIGN, Design, _mark
 from thud.studies.parameter import MAX_VALUES, Parameter, varied
 from thud.studies.sensitivity import sobol_indices
 from thud.studies.surrogate_levels import SurrogateLevels, confirmed, within_region
-from thud.studies.surrogate_plan import MAX_DROPS, MIN_DROPS, Plan, read_plan
 from thud.studies.surrogate_training import regress
 from thud.studies.temperature import Temperature, read_temperature
-from thud.studies.trained_surrogate import Surrogate, assess_many
+from thud.studies.trained_surrogate import (
+    MAX_DROPS,
+    MIN_DROPS,
+    Plan,
+    Surrogate,
+    assess_many,
+    read_plan,
+)
 from thud.studies.uncertainty import Uncertainty
 
 OWNERS = ("modal_ball",)
@@ -314,7 +320,7 @@ def test_table_of_the_uncertainty_has_the_shares_within_the_limits() -> None:
         deviation = math.sqrt(((level - level.mean()) ** 2).sum() / 199)
         return f"{level.mean():.2f}", f"{deviation:.2f}", f"{low:.2f} to {high:.2f}"
 
-    rows = Uncertainty(rated, levels, "rubber_ball", 50, 200, 1).table()
+    rows = Uncertainty(rated, levels, "rubber_ball", 50, 200, 1).rows()
     for row, level, one in zip(rows[1:6], levels.T, criteria, strict=True):
         share = sum(one.lower <= v <= one.upper for v in level) / 200
         assert row[1:] == (*spread(level), f"{100 * share:.1f} %")
@@ -330,7 +336,7 @@ def test_best_place_of_a_map_is_shown_in_its_unit() -> None:
     }
     found = thud.design(study)
     margin = found.dataset["margin"].values
-    rows = dict(found.table())
+    rows = dict(found.rows())
     i, j = np.unravel_index(margin.argmax(), margin.shape)
     assert rows["samples"] == "6"
     assert float(rows["largest margin, dB"]) == pytest.approx(margin.max(), abs=0.006)
@@ -340,8 +346,8 @@ def test_best_place_of_a_map_is_shown_in_its_unit() -> None:
     assert int(rows["all criteria conform"]) == found.dataset["conforms"].sum()
     # Of a room, the lowest rating.
     rating = xr.zeros_like(found.dataset["margin"]) + np.arange(6.0).reshape(3, 2)[::-1]
-    dataset = found.dataset.assign(standardised_rating=rating)
-    rows = dict(Design(dataset, found.axes, None, "case").table())
+    dataset = found.dataset.assign(standardized_rating=rating)
+    rows = dict(Design(dataset, found.axes, None, "case").rows())
     assert (rows["  at height, cm"], rows["  at mass, kg"]) == ("110", "2.4")
 
 

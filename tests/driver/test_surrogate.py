@@ -13,9 +13,9 @@ from scipy.stats import binom, norm
 
 import thud
 from thud import cli
-from thud.studies.surrogate_plan import Plan
+from thud.studies import samples
 from thud.studies.surrogate_training import regress
-from thud.studies.trained_surrogate import assess_many, keys_of
+from thud.studies.trained_surrogate import Plan, assess_many, keys_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -127,7 +127,7 @@ def test_powers_of_a_lumped_source_are_learned() -> None:
     assert (share < (0.01 / 0.9) ** 2).all()
     difference = np.abs(found.indices["total"] - exact.indices["total"]).isel(output=slice(0, 5))
     assert (difference < 0.01).all()
-    assert found.table()[0][-1] == "error of the surrogate"
+    assert found.rows()[0][-1] == "error of the surrogate"
     # Of other quantities the variances are those in dB; what does not vary has none.
     learned = thud.surrogate(LUMPED)
     found = thud.sensitivity({**LUMPED, "design": {"size": 64}}, surrogate=learned)
@@ -188,9 +188,7 @@ def test_leave_one_out_is_what_it_says() -> None:
 
 
 def test_a_response_with_a_jump_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    from thud.studies import evaluation
-
-    smooth = evaluation.solve_many
+    smooth = samples.solve_many
 
     def jump(columns: dict[str, Any], *rest: Any, **words: Any) -> thud.Ensemble:  # noqa: ANN401
         found = smooth(columns, *rest, **words)
@@ -200,7 +198,7 @@ def test_a_response_with_a_jump_is_refused(monkeypatch: pytest.MonkeyPatch) -> N
 
     study = {**LUMPED, "surrogate": {"size": 128}}
     assert thud.surrogate(study).worst[1] < 0.01
-    monkeypatch.setattr(evaluation, "solve_many", jump)
+    monkeypatch.setattr(samples, "solve_many", jump)
     words = naming("floor level 500 Hz", 64, 128, "0.1 dB", "[surrogate] error")
     with pytest.raises(thud.NumericalError, match=words):
         thud.surrogate(study)
@@ -221,9 +219,7 @@ def test_drops_are_added_until_the_bound_holds() -> None:
 
 
 def test_peaks_that_differ_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    from thud.studies import evaluation
-
-    monkeypatch.setattr(evaluation, "peak_count", lambda force, _: 1 + (force.max() > 1500))
+    monkeypatch.setattr(samples, "peak_count", lambda force, _: 1 + (force.max() > 1500))
     with pytest.raises(thud.InputError, match=naming("peaks", 1, 2)):
         thud.surrogate(LUMPED)
 
@@ -232,7 +228,7 @@ def test_points_outside_the_region_are_refused(trained: thud.Surrogate) -> None:
     wide = {**TOLERANCES, "parameters": {"height": {"values": [0.9, 1.0]}}}
     study = {name: entry for name, entry in wide.items() if name != "design"}
     study["fixed"] = {**study["fixed"], "wall_thickness": 0.0305}
-    found = thud.sweep(study, surrogate=trained)
+    found = thud.sweep(study, surrogate=trained).dataset
     assert found["status"].values.tolist() == [1, 0]
     reasons = found["reason"].values.tolist()
     assert re.search(naming("height", 0.9, 0.98, 1.02), reasons[0])
@@ -320,7 +316,7 @@ def test_training_resumes_and_results_are_kept(
         ".thud", "lumped_surrogate.npz", "lumped_training_64.nc", "lumped.svg"
     }  # fmt: skip
     first = thud.read_surrogate(folder / "lumped_surrogate.npz")
-    drops = thud.read_sweep(folder / "lumped_training_64.nc")
+    drops = thud.read_sweep(folder / "lumped_training_64.nc").dataset
     assert (drops["peaks"] == 1).all()
     # Without its result, the training takes the drops that are there.
     before = (folder / "lumped_training_64.nc").stat().st_mtime_ns
@@ -339,7 +335,7 @@ def test_training_resumes_and_results_are_kept(
 def test_results_that_are_written_hold_the_errors(trained: thud.Surrogate, tmp_path: Path) -> None:
     one = thud.uncertainty(TOLERANCES, surrogate=trained)
     thud.uncertainty(TOLERANCES, tmp_path, surrogate=trained)
-    other = thud.read_sweep(tmp_path / "tolerances.nc")
+    other = thud.read_sweep(tmp_path / "tolerances.nc").dataset
     np.testing.assert_array_equal(one.dataset["floor_level"], other["floor_level"])
     np.testing.assert_array_equal(
         other["floor_level"].attrs["surrogate_error"], trained.error_of("floor_level")
@@ -374,9 +370,9 @@ def test_map_shows_verdicts_in_doubt(trained: thud.Surrogate) -> None:
         doubtful, near & (found.dataset["margin"] >= -error) & rest[0] & rest[1]
     )
     assert 0 < int(doubtful.sum()) < doubtful.size
-    assert ("in doubt by the surrogate", f"{int(doubtful.sum())}") in found.table()
+    assert ("in doubt by the surrogate", f"{int(doubtful.sum())}") in found.rows()
     labels = [text.get_text() for text in thud.plot.draw_design(found).legends[0].get_texts()]
-    assert "In doubt by surrogate" in labels
+    assert "Undecided by surrogate" in labels
 
 
 def test_figure_shows_held_out_errors(trained: thud.Surrogate) -> None:

@@ -26,7 +26,7 @@ from thud.base._schema import MODELS
 from thud.base.units import MULTIPLES, scaled
 from thud.case.keys import known_keys, put
 from thud.impact.ensemble import get_cost
-from thud.studies import directory, evaluation, fit, sampling, sweep
+from thud.studies import directory, fit, samples, sampling, sweep
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -45,7 +45,7 @@ def test_grid_holds_what_single_drops_give() -> None:
                 "youngs_modulus": {"low": 1.5, "high": 1.7, "count": 3, "unit": "MPa"},
             }
         }
-    )
+    ).dataset
     assert found["contact_time"].dims == ("wall_thickness", "momentum_flux", "youngs_modulus")
     assert (found["status"] == 0).all()
     for thickness in (0.030, 0.035):
@@ -56,7 +56,7 @@ def test_grid_holds_what_single_drops_give() -> None:
                 cell = found.sel(
                     wall_thickness=thickness, momentum_flux=flux, youngs_modulus=modulus
                 )
-                for name in evaluation.SCALAR_QUANTITIES:
+                for name in samples.SCALAR_QUANTITIES:
                     assert float(cell[name]) == pytest.approx(getattr(impact, name), rel=1e-9)
                 for force in ("elastic", "floor"):
                     np.testing.assert_allclose(
@@ -75,7 +75,7 @@ def test_thirds_on_request(model: str, bands: str, tmp_path: Path) -> None:
         "fixed": {"model": model, "bands": bands},
         "parameters": {"height": {"values": [0.5, 1.0]}, "mass": {"values": [2.4, 2.5, 2.6]}},
     }
-    found = thud.sweep(study, tmp_path)
+    found = thud.sweep(study, tmp_path).dataset
     assert found["floor_third_level"].dims == ("height", "mass", "third")
     assert found["third"].values.tolist() == thud.get_bands("third").nominal.tolist()
     assert found["elastic_level"].dims == ("height", "mass", "octave")
@@ -84,7 +84,7 @@ def test_thirds_on_request(model: str, bands: str, tmp_path: Path) -> None:
         for name, kind in ((f"{force}_level", "octave"), (f"{force}_third_level", "third")):
             cell = found[name].sel(height=0.5, mass=2.6)
             np.testing.assert_allclose(cell, impact.levels(kind, force=force), atol=1e-6)
-    assert thud.plot.draw_sweep(found).axes
+    assert thud.plot.draw_sweep(thud.Sweep(found)).axes
 
 
 def test_dataset_tells_units_and_where_it_comes_from(tmp_path: Path) -> None:
@@ -113,7 +113,7 @@ def test_other_makers_of_points_are_another_study(monkeypatch: pytest.MonkeyPatc
     )
     grid = thud.read_study(HEIGHTS)
     before = drawn.identity, grid.identity
-    found = thud.sweep(drawn)
+    found = thud.sweep(drawn).dataset
     assert found.attrs["scipy_version"] == scipy.__version__
     assert "salib_version" not in found.attrs
     assert "salib_version" in sampling.sampler_versions("saltelli")
@@ -210,7 +210,7 @@ def test_list_pairs_values_and_entries_of_lists() -> None:
                 "damping_ratio(1)": {"values": [4, 6], "unit": "%"},
             },
         }
-    )
+    ).dataset
     assert found["contact_time"].dims == ("sample",)
     options = {"damping_ratio": [0.04, 0.05], "effective_mass": [2.4, 0.1]}
     impact = thud.solve(model="measured_modes", frequency=[24.0, 80.0], **options)
@@ -225,7 +225,7 @@ def test_key_named_as_a_result_keeps_both() -> None:
             "fixed": {"model": "hunt_crossley", "restitution": 0.8},
             "parameters": {"contact_time": {"values": [18, 22], "unit": "ms"}},
         }
-    )
+    ).dataset
     np.testing.assert_allclose(found["contact_time"], found["hunt_crossley_contact_time"])
 
 
@@ -236,7 +236,7 @@ def test_density_and_temperature_act_on_mass_and_modulus() -> None:
         "temperature": {"reference": 20, "coefficient": -0.01},
         "parameters": {"temperature": {"values": [20, 30]}, "outer_radius": {"values": [0.089]}},
     }
-    found = thud.sweep(study).isel(outer_radius=0)
+    found = thud.sweep(study).dataset.isel(outer_radius=0)
     for place, modulus in enumerate((1.6e6, 1.44e6)):
         impact = thud.solve(thud.Ball(youngs_modulus=modulus))
         assert float(found["contact_time"][place]) == pytest.approx(impact.contact_time, rel=1e-12)
@@ -247,11 +247,11 @@ def test_modulus_is_that_of_the_reference_temperature() -> None:
         "temperature": {"reference": 20, "coefficient": -0.01},
         "parameters": {"temperature": {"values": [30]}, "youngs_modulus": {"values": [1.6e6]}},
     }
-    modulus = thud.sweep(study)["youngs_modulus"]
+    modulus = thud.sweep(study).dataset["youngs_modulus"]
     assert modulus.values.tolist() == [1.6e6]
     assert "at 20 degC" in modulus.attrs["long_name"]
     del study["temperature"], study["parameters"]["temperature"]
-    assert "degC" not in thud.sweep(study)["youngs_modulus"].attrs["long_name"]
+    assert "degC" not in thud.sweep(study).dataset["youngs_modulus"].attrs["long_name"]
 
 
 WLF = {"reference": 20, "c1": 8.0, "c2": 120.0}
@@ -303,13 +303,13 @@ def test_sets_below_the_range_of_the_shift_have_no_results() -> None:
         "temperature": WLF,
         "parameters": {"temperature": {"values": [20, -100]}},
     }
-    found = thud.sweep(study)
+    found = thud.sweep(study).dataset
     assert found["status"].values.tolist() == [0, 1]
     assert "NaN" in str(found["reason"].values[1])
 
 
 def test_failing_sets_say_why_and_disturb_no_other() -> None:
-    found = thud.sweep({"parameters": {"height": {"values": [1.0, -1.0, 1000.0]}}})
+    found = thud.sweep({"parameters": {"height": {"values": [1.0, -1.0, 1000.0]}}}).dataset
     assert found["status"].values.tolist() == [0, 1, 2]
     assert found["reason"].values[0] == ""
     assert re.search(naming("&drop: height", "-1.0"), str(found["reason"].values[1]))
@@ -330,7 +330,7 @@ def test_sets_give_what_single_drops_give(fixed: dict[str, str]) -> None:
             },
         }
     )
-    found = thud.sweep(study)
+    found = thud.sweep(study).dataset
     names = list(found.coords)[1:]
     for place in np.ndindex(*(found.sizes[name] for name in names)):
         one = found.isel(dict(zip(names, place, strict=True)))
@@ -354,7 +354,7 @@ def test_each_worker_computes_blocks_on_one_thread(monkeypatch: pytest.MonkeyPat
         asked.append(options["threads"])
         return solve_many(parameters, case, **options)
 
-    monkeypatch.setattr(evaluation, "solve_many", count)
+    monkeypatch.setattr(samples, "solve_many", count)
     thud.sweep(HEIGHTS, workers=3)
     thud.sweep({**HEIGHTS, "fixed": {"method": "fft"}})
     thud.sweep({"parameters": {"sample_rate": {"values": [44100, 48000]}}})
@@ -670,7 +670,7 @@ def test_fixed_values_may_suit_parameters_only() -> None:
     thin = {"fixed": {"outer_radius": 0.02}, "parameters": {"wall_thickness": {"values": [0.005]}}}
     thick = {"fixed": {"wall_thickness": 0.1}, "parameters": {"outer_radius": {"values": [0.2]}}}
     for study in (thin, thick):
-        assert (thud.sweep(study)["status"] != thud.InputError.exit_code).all()
+        assert (thud.sweep(study).dataset["status"] != thud.InputError.exit_code).all()
 
 
 def test_unknown_keywords_are_reported() -> None:

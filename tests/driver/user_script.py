@@ -79,13 +79,13 @@ tapping: thud.TappingLevel = thud.tapping_level(floor)
 several: thud.FloorComparison = thud.compare_floors({"thin": below})
 (folder / "levels.csv").write_text("frequency,P1\n63,65\n125,64\n250,58\n500,56\n")
 site: thud.RoomLevels = thud.read_room_levels(folder / "levels.csv", volume=40.0)
-rating: thud.Rating = thud.rating(thud.standardised_level(site.level, 0.6, 40.0))
+rating: thud.Rating = thud.rating(thud.standardized_level(site.level, 0.6, 40.0))
 height = {"height": thud.Parameter(values=[0.5, 1.0])}
 mass = {"mass": thud.Parameter(low=2.4, high=2.6)}
 modulus = {"youngs_modulus": thud.Parameter(values=[1.6, 2.08], unit="MPa")}
 study: thud.Study = thud.read_study({"parameters": height})
 thud.sweep(study, folder / "sweep")
-kept = thud.read_sweep(folder / f"sweep/{study.name}.nc")
+kept: thud.Sweep = thud.read_sweep(folder / f"sweep/{study.name}.nc")
 chart: thud.Design = thud.design({"parameters": height | modulus})
 learned: thud.Surrogate = thud.surrogate({"parameters": mass})
 learned.save(folder / "mass.npz")
@@ -97,12 +97,13 @@ targets = (
     thud.ForceTarget(impacts["hollow_sphere"]),
     thud.LevelTarget(many.floor_octaves[1].tolist()),
 )
+exported: thud.BlockedForce = thud.blocked_force(impacts["hollow_sphere"])
+exported.save(folder / "force.csv")
 problems: list[type[thud.ThudError]] = [thud.InputError, thud.NumericalError]
 with warnings.catch_warnings(action="ignore", category=thud.FitWarning):
     found: list[thud.Fit] = [thud.fit(target, ["youngs_modulus"]) for target in targets]
 warnings.simplefilter("ignore", thud.PlausibilityWarning)
 warnings.simplefilter("ignore", thud.LockWarning)
-warnings.simplefilter("ignore", thud.WorkerWarning)
 results = [
     thud.compare(impacts),
     *again,
@@ -110,6 +111,8 @@ results = [
     bands,
     many,
     *found,
+    exported,
+    kept,
     chart,
     spread,
     shares,

@@ -213,10 +213,10 @@ def _log_work() -> None:
     """Make blocks small, wait shortly, keep each drop, freeze the date, write down what is kept."""
     from thud.impact import datasets
     from thud.recordings import checkpoint
-    from thud.studies import backends, blocks, sets
+    from thud.studies import backends, blocks, samples
 
-    sets._BLOCK_TIME = 0.005  # noqa: SLF001 - several blocks in a short time
-    backends.SILENCE, backends.LOOK = 4.0, 0.5
+    samples._BLOCK_TIME = 0.005  # noqa: SLF001 - several blocks in a short time
+    backends.WORKER_TIMEOUT, backends.CHECK_INTERVAL = 4.0, 0.5
     checkpoint.INTERVAL = 0.0
 
     class Frozen(datasets.datetime):  # type: ignore[name-defined, misc]

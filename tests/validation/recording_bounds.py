@@ -197,14 +197,14 @@ def oracle_drop(  # noqa: PLR0913, PLR0917 - what is known of a recording
     peak = float(clean.max())
     variances[3 + MAINS.index(draw.mains)] = (draw.hum * peak) ** 2 / 2
     middle = (first + last) / 2 / rate
-    saved = contact_module.QUIET_CELLS
-    contact_module.QUIET_CELLS = (*saved, (4e-3, 1.0))
+    saved = contact_module.BACKGROUND_CELLS
+    contact_module.BACKGROUND_CELLS = (*saved, (4e-3, 1.0))
     try:
-        quiet, mean = contact_module.quiet_means(clean, first, last, rate, middle)
+        quiet, mean = contact_module.background_means(clean, first, last, rate, middle)
     finally:
-        contact_module.QUIET_CELLS = saved
+        contact_module.BACKGROUND_CELLS = saved
     background = Background(quiet, mean, variances[None], peak)
-    edges = contact_module.even_edges(first, last, rate)
+    edges = contact_module.uniform_edges(first, last, rate)
     _, covariance = background.predict(contact_module.cells_between(edges, rate, middle))
     contact = Contact(
         Estimate(onset, 0),
@@ -243,12 +243,12 @@ def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray) -> tuple[float, f
     touch, release = contact.touch.value, contact.release.value
     signal = Signal.from_array(record, rate, "record")
     window = Window("record", signal, 0, len(record), contact.span)
-    saved = contact_module.QUIET_CELLS
-    contact_module.QUIET_CELLS = (*saved, (4e-3, 1.0))
+    saved = contact_module.BACKGROUND_CELLS
+    contact_module.BACKGROUND_CELLS = (*saved, (4e-3, 1.0))
     try:
         found = contact_module.find_posteriors(window, record, contact.background, passes=2)
     finally:
-        contact_module.QUIET_CELLS = saved
+        contact_module.BACKGROUND_CELLS = saved
     spread = float(np.hypot(*(edge.edge()[1][1] for edge in (found.touch, found.release))))
     if draw.shape != "half sine":
         return spread, np.nan

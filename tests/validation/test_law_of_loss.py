@@ -30,7 +30,7 @@ REFERENCE = np.array(
 def test_band_of_the_laws_is_that_of_the_independent_code(
     oracle: Callable[..., None], curve: Callable[..., None]
 ) -> None:
-    found = thud.sweep(STUDY)
+    found = thud.sweep(STUDY).dataset
     # The study says so; its loss factors have four digits.
     np.testing.assert_allclose(found["restitution"], 0.805, atol=0.002)
     found = found.set_index(set="fractional_order").sel(set=REFERENCE[:, 0])

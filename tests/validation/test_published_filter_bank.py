@@ -7,7 +7,7 @@ import pytest
 
 import thud
 from thud.level.levels import BANDWIDTHS
-from thud.recordings.bank import filter_levels
+from thud.recordings.filters import filter_levels
 
 library = pytest.importorskip("pyoctaveband")
 

@@ -912,9 +912,18 @@ QUANTITIES = {
     "sample_rate": Quantity("sample_rate", "sample rate", "f_s", "Hz", "kHz", 0.001, 3, "samples per second"),
     "impulse_residual": Quantity("impulse_residual", "impulse residual", "", "", "", 1.0, 6, "relative residual of the balance of momentum"),
     "energy_residual": Quantity("energy_residual", "energy residual", "", "", "", 1.0, 6, "relative residual of the balance of energy"),
+    "peak_count": Quantity("peak_count", "peaks of the force", "", "", "", 1.0, 0, "number of peaks of the assessed force"),
+    "mass": Quantity("mass", "mass", "M", "kg", "kg", 1.0, 3, "mass of the source"),
+    "drop_height": Quantity("drop_height", "drop height", "h", "m", "m", 1.0, 3, "drop height"),
+    "effective_mass": Quantity("effective_mass", "effective mass", "M", "kg", "kg", 1.0, 3, "impulse over the change of velocity"),
+    "margin": Quantity("margin", "margin", "", "dB", "dB", 1.0, 2, "minimum distance of the assessed octave levels to a limit, > 0 inside"),
+    "floor_work": Quantity("floor_work", "energy to the floor", "W", "J", "mJ", 1000.0, 3, "energy that the source gives to the floor"),
+    "room_rating": Quantity("room_rating", "level in the room", "L_{iA,Fmax}", "dB", "dB", 1.0, 1, "A-weighted maximum Fast level in the room, re 20 uPa"),
+    "standardized_rating": Quantity("standardized_rating", "standardized level", "L'_{iA,Fmax,V,T}", "dB", "dB", 1.0, 1, "A-weighted maximum Fast level, standardized, re 20 uPa"),
 }
 
-# Those of them that describe each of many samples.
+# Those of them that describe a single impact, and each of many samples.
+IMPACT_QUANTITIES = tuple(QUANTITIES)[:12]
 SAMPLE_QUANTITIES = tuple(QUANTITIES)[:6]
 
 # Nominal and exact mid frequencies, and edges of the bands of each set, Hz.

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from thud.base._schema import GROUPS, KEYS
 from thud.base.checks import refuse, shown, suggestion
-from thud.base.errors import InputError
 from thud.base.key import Key
 
 if TYPE_CHECKING:
@@ -105,8 +104,7 @@ def put(case: Case, values: Mapping[str, object]) -> Case:
         else:
             entries = list(place.get(key.name, getattr(getattr(case, group), key.name)))  # type: ignore[call-overload]
             if entry > len(entries):
-                message = f"{name} does not exist; allowed: entries 1 to {len(entries)} of the case"
-                raise InputError(message)
+                refuse(f"{name} does not exist", f"entries 1 to {len(entries)} of the case")
             entries[entry - 1] = value
             place[key.name] = tuple(entries)
     changed = {

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from tqdm import tqdm
 
 from thud.base.display import draw_all, left_out
-from thud.base.errors import InputError, LockWarning, ReportWarning, ThudError, WorkerWarning
+from thud.base.errors import InputError, LockWarning, ReportWarning, ThudError
 from thud.base.files import Results
 
 if TYPE_CHECKING:
@@ -103,9 +103,9 @@ def print_notes(warnings: Iterable[object]) -> None:
 
 @contextmanager
 def shown_at_once() -> Iterator[None]:
-    """Print warnings of reports, locks and workers as warnings, at once: the work may go on."""
+    """Print warnings of reports and locks as warnings, at once: the work may go on."""
     usual = warnings.showwarning
-    kinds = ReportWarning, LockWarning, WorkerWarning
+    kinds = ReportWarning, LockWarning
 
     def show(warning: Any, kind: type[Warning], *place: Any) -> None:  # noqa: ANN401 - of any warning
         if issubclass(kind, kinds):

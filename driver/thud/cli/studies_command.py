@@ -11,6 +11,7 @@ from tqdm import tqdm
 from thud.base.display import left_out
 from thud.base.errors import NumericalError, ThudError
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output, print_notes
+from thud.studies.directory import take
 from thud.studies.kinds import KINDS, get_kind
 
 if TYPE_CHECKING:
@@ -71,22 +72,22 @@ def run_study(options: argparse.Namespace) -> int:
     if not options.quiet:
         print(kind.describe(study), file=sys.stderr)
     drawn = not options.no_figures
-    with kind.take(study, folder, replace=options.replace, figures=drawn) as results:
+    with take(folder, kind, study, replace=options.replace, figures=drawn) as results:
         try:
             result = kind.compute(study, results, **how)
         except ThudError as error:
             message = f"{options.study}: {error}"
             raise type(error)(message) from error
         if not options.quiet:
-            tqdm.write(kind.table(result, study))
-        print_notes(f"{options.study}: {warning}" for warning in kind.warnings(result))
+            tqdm.write(result.table())
+        print_notes(f"{options.study}: {text}" for text in (*result.warnings, *result.notes))
         contents = kind.files(result, study)
         if drawn:
             with left_out("the figure of the study"):
                 from thud.plot import figure_files
 
-                contents |= figure_files(kind.figures(result, study))
+                contents |= figure_files(result.figures(study.name))
         results.write(contents)
     if not options.quiet:
         tqdm.write(f"Results: {folder}")
-    return 0 if kind.succeeded(result) else NumericalError.exit_code
+    return 0 if result.succeeded else NumericalError.exit_code

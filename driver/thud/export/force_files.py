@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.bridge import version
-from thud.base.checks import refuse, refuse_value, require_kind, require_number
+from thud.base.checks import refuse, refuse_value, require_choice, require_kind, require_number
 from thud.base.files import content_of, refuse_foreign, replace_file
 from thud.level.impact_result import DropForce, ImpactResult
 from thud.level.levels import RECORDED_BAND
@@ -24,10 +24,7 @@ from thud.recordings.channel import library
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-KINDS = {
-    "floor": "force on the floor",
-    "elastic": "elastic force",
-}
+KINDS = {"floor": "force on the floor", "elastic": "elastic force"}
 CONVENTION = (
     "F(f) = integral of F(t) exp(-i 2 pi f t) dt, N s, t = 0 at first touch; frequencies from 0, "
     "not doubled: F(-f) is the complex conjugate, the energy of a band is 2 * integral of |F|^2 df"
@@ -60,8 +57,8 @@ class BlockedForce(DropForce):
         spectrum: NDArray[np.complex128] = np.fft.rfft(self.force, count) / self.sample_rate * turn
         return frequency.astype(np.float64), spectrum
 
-    def words(self) -> tuple[str, ...]:
-        """Return what another reader has to know, a line each."""
+    def header_lines(self) -> tuple[str, ...]:
+        """Return what another program or reader needs to know, a line each."""
         lines = (
             f"Blocked force of {self.name}: {KINDS[self.kind]}, N, positive into the floor",
             f"{len(self.force)} samples, first sample at {self.start!r} s since first touch",
@@ -71,9 +68,39 @@ class BlockedForce(DropForce):
             *self.notes,
             f"{NOTE_END}{version()}",
         )
-        # Names of files may not be UTF-8, and words of a laboratory have several lines.
+        # Names of files may not be UTF-8, and notes of a laboratory have several lines.
         texts = (line.encode("utf-8", "replace").decode() for line in lines)
         return tuple(" ".join(text.split()) for text in texts)
+
+    def save(self, path: str | os.PathLike[str], kind: str = "csv") -> list[Path]:
+        """Write the force to a file, which is replaced if it exists; return the paths.
+
+        Parameters
+        ----------
+        path
+            Path of the file.
+        kind
+            ``"wav"``, ``"csv"``, ``"uff"``, ``"mat"`` or ``"spectrum"``.
+
+        Raises
+        ------
+        InputError
+            Where the format cannot hold the force, the file is the recording of the force, or the
+            text beside a WAV file would replace one that is not of thud.
+        OSError
+            Where a file cannot be written.
+        """
+        require_choice("kind", kind, EXPORTS)
+        contents = EXPORTS[kind][1](self, os.fspath(path))
+        for name in map(Path, contents):
+            known = content_of(name.resolve())
+            if known is not None and hashlib.sha256(known).hexdigest() == self.checksum:
+                refuse(f"{name} is the recording of the force", "another path")
+            if known is not None and name != Path(path) and NOTE_END.encode() not in known:
+                refuse_foreign(name)
+        for file, content in contents.items():
+            replace_file(file, content)
+        return [Path(file) for file in contents]
 
 
 def blocked_force(
@@ -123,15 +150,15 @@ def _resampled(given: BlockedForce, rate: float) -> BlockedForce:
     band = np.arange(1, min(RECORDED_BAND, frequency[-1], grid[-1]))
     old, new = (np.interp(band, f, s) for f, s in ((frequency, old), (grid, new)))
     error = float(np.abs(new - old).max() / np.abs(old).max())
-    told = (
+    note = (
         f"Resampled from {given.sample_rate:g} Hz, band-limited; to {RECORDED_BAND:g} Hz the "
         f"spectrum has changed by up to {error:.1e} of its maximum"
     )
-    return replace(found, notes=(*given.notes, told))
+    return replace(found, notes=(*given.notes, note))
 
 
 def wav_files(force: BlockedForce, path: str) -> dict[str, bytes]:
-    """Return a WAV file of 32-bit floats, and a text file beside it with what WAV cannot tell.
+    """Return a WAV file of 32-bit floats, and a text file beside it with what WAV cannot hold.
 
     The samples are fractions of full scale. A full scale is a power of two in newtons, so that
     scaling costs no digit; it stands in the comment of the file and in the text.
@@ -150,19 +177,19 @@ def wav_files(force: BlockedForce, path: str) -> dict[str, bytes]:
         )
     peak = float(np.abs(force.force).max())
     scale = 2.0 ** math.ceil(math.log2(peak)) if peak > 0 else 1.0
-    words = (f"Scale: {scale:g} N per full scale (calibration = {scale:g})", *force.words())
+    lines = (f"Scale: {scale:g} N per full scale (calibration = {scale:g})", *force.header_lines())
     content = io.BytesIO()
     with soundfile.SoundFile(
         content, "w", samplerate=rate, channels=1, subtype="FLOAT", format="WAV"
     ) as file:
-        file.comment = "; ".join(words)
+        file.comment = "; ".join(lines)
         file.write((force.force / scale).astype(np.float32))
-    return {path: content.getvalue(), f"{path}.txt": _lines(words)}
+    return {path: content.getvalue(), f"{path}.txt": _lines(lines)}
 
 
 def csv_files(force: BlockedForce, path: str) -> dict[str, bytes]:
     """Return a table of time, s, and force, N, each with all its digits."""
-    head = [*(f"# {line}" for line in force.words()), "time_s,force_N"]
+    head = [*(f"# {line}" for line in force.header_lines()), "time_s,force_N"]
     rows = zip(force.time.tolist(), force.force.tolist(), strict=True)
     return {path: _lines([*head, *(f"{time!r},{value!r}" for time, value in rows)])}
 
@@ -173,11 +200,10 @@ def uff_files(force: BlockedForce, path: str) -> dict[str, bytes]:
     The format holds 12 digits of the force and 6 of the time step.
     """
     pyuff = library("pyuff", "universal")
-    words = force.words()
     kind = f"{KINDS[force.kind]}, N, positive into the floor"
     start = f"first sample at {force.start:.6g} s since first touch"
     times = f"Sample rate: {force.sample_rate:.10g} Hz, {start}"
-    lines = [force.name, kind, force.date, times, words[4]]
+    lines = [force.name, kind, force.date, times, f"SHA-256: {force.checksum}"]
     name = _plain(force.name)[:UFF_NAME]
     data_set = {
         "type": 58,
@@ -222,7 +248,7 @@ def mat_files(force: BlockedForce, path: str) -> dict[str, bytes]:
             "sample_rate_Hz": force.sample_rate,
             "frequency_Hz": frequency,
             "spectrum_Ns": spectrum,
-            "about": "\n".join([*force.words(), f"Spectrum: {CONVENTION}"]),
+            "about": "\n".join([*force.header_lines(), f"Spectrum: {CONVENTION}"]),
         },
         oned_as="column",
     )
@@ -236,7 +262,7 @@ def spectrum_files(force: BlockedForce, path: str) -> dict[str, bytes]:
         [frequency, spectrum.real, spectrum.imag, np.abs(spectrum), np.angle(spectrum)]
     )
     head = [
-        *(f"# {line}" for line in (*force.words(), f"Spectrum: {CONVENTION}")),
+        *(f"# {line}" for line in (*force.header_lines(), f"Spectrum: {CONVENTION}")),
         "frequency_Hz,real_Ns,imaginary_Ns,magnitude_Ns,phase_rad",
     ]
     return {path: _lines([*head, *(",".join(map(repr, row)) for row in table.tolist())])}
@@ -250,64 +276,6 @@ EXPORTS = {
     "mat": (".mat", mat_files),
     "spectrum": ("_spectrum.csv", spectrum_files),
 }
-
-
-def export_wav(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
-    """Write a WAV file, and a text file beside it; see `wav_files` and `export`."""
-    return export("wav", force, path)
-
-
-def export_csv(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
-    """Write a table of time and force; see `csv_files` and `export`."""
-    return export("csv", force, path)
-
-
-def export_uff(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
-    """Write a universal file; see `uff_files` and `export`."""
-    return export("uff", force, path)
-
-
-def export_mat(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
-    """Write a MATLAB file; see `mat_files` and `export`."""
-    return export("mat", force, path)
-
-
-def export_spectrum(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
-    """Write a table of the complex spectrum; see `spectrum_files` and `export`."""
-    return export("spectrum", force, path)
-
-
-def export(kind: str, force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
-    """Write a force to the file of a path, which is replaced if it exists.
-
-    Parameters
-    ----------
-    kind
-        Format, one of ``EXPORTS``.
-    force
-        The force.
-    path
-        Path of the file.
-
-    Raises
-    ------
-    InputError
-        Where the format cannot hold the force, the file is the recording of the force, or the text
-        beside a WAV file would replace one that is not of thud.
-    OSError
-        Where a file cannot be written.
-    """
-    _, make = EXPORTS[kind]
-    contents = make(force, os.fspath(path))
-    for place in map(Path, contents):
-        known = content_of(place.resolve())
-        if known is not None and hashlib.sha256(known).hexdigest() == force.checksum:
-            refuse(f"{place} is the recording of the force", "another path")
-        if known is not None and place != Path(path) and NOTE_END.encode() not in known:
-            refuse_foreign(place)
-    for name, content in contents.items():
-        replace_file(name, content)
-    return [Path(name) for name in contents]
 
 
 def _lines(lines: list[str] | tuple[str, ...]) -> bytes:

@@ -53,7 +53,7 @@ class FloorComparison(Displayed):
             ("floor", *(one.floor.name.replace("_", " ") for one in found)),
             ("force", *(one.force for one in found)),
             ("L_iA,Fmax, dB", *(str(one.rating.rounded) for one in found)),
-            ("standardised, dB", *(str(one.standardised_rating.rounded) for one in found)),
+            ("standardized, dB", *(str(one.standardized_rating.rounded) for one in found)),
             *(
                 (title, *(f"{one.octave_level[i]:.1f}" for one in found))
                 for i, title in enumerate(octaves)

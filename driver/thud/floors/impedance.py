@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
     from thud.base._schema import FloorOptions
 
+    Array = NDArray[np.float64]
+
 # From floors that a ball hardly leaves to floors that change a level by 0.01 dB, N s/m.
 RESISTANCES = np.geomspace(10**2.75, 1e6, 14)
 # Lines in a band of one third octave at 25 Hz.
@@ -63,9 +65,9 @@ class BallImpedance(Displayed):
 
     case: Case
     bands: BandSet
-    frequency: NDArray[np.float64]
-    resistance: NDArray[np.float64]
-    change: NDArray[np.float64]
+    frequency: Array
+    resistance: Array
+    change: Array
     estimate: NDArray[np.complex128]
     tangent_mass: float
     tangent_stiffness: float
@@ -108,7 +110,7 @@ class BallImpedance(Displayed):
         spring = self.tangent_damping + self.tangent_stiffness / s
         return np.asarray(1 / (1 / (s * self.tangent_mass) + 1 / spring))
 
-    def limit(self, decibels: float = 1.0) -> NDArray[np.float64]:
+    def limit(self, decibels: float = 1.0) -> Array:
         """Return the resistance below which a floor changes the level, N s/m, shape (n_band,).
 
         As the change goes with one over the resistance, it is interpolated between the floors with
@@ -224,7 +226,7 @@ def ball_impedance(
     )
 
 
-def _force_on(source: Impact, resistance: float) -> NDArray[np.float64]:
+def _force_on(source: Impact, resistance: float) -> Array:
     """Return the force of the same drop on a resistance, N, shape (n_sample,)."""
     case = replace(
         source.case, modes=None, compression=None, room=None, floor=InfinitePlate(resistance)
@@ -237,9 +239,7 @@ def _force_on(source: Impact, resistance: float) -> NDArray[np.float64]:
     return moved.floor_force
 
 
-def _band_spectra(
-    force: NDArray[np.float64], sample_rate: float, bands: BandSet
-) -> list[NDArray[np.complex128]]:
+def _band_spectra(force: Array, sample_rate: float, bands: BandSet) -> list[NDArray[np.complex128]]:
     """Return the spectrum of a force in each band, at the same density of lines per band."""
     edges = get_bands(bands)
     time = np.arange(len(force)) / sample_rate

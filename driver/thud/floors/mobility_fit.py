@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
+    Array = NDArray[np.float64]
+
 Quantity = Literal["mobility", "accelerance", "receptance"]
 # Powers of i omega that make a mobility of each.
 _POWERS = {"mobility": 0, "accelerance": -1, "receptance": 1}
@@ -86,7 +88,7 @@ class MobilityFit(Displayed):
     """
 
     name: str
-    frequency: NDArray[np.float64]
+    frequency: Array
     measured: NDArray[np.complex128]
     floor: MeasuredMobility
     free_error: float
@@ -161,9 +163,9 @@ class MobilityFit(Displayed):
 
         return mobility_fit(self)
 
-    def _errors(self) -> NDArray[np.float64]:
+    def _errors(self) -> Array:
         """Return the relative errors of the lines."""
-        errors: NDArray[np.float64] = np.abs(self.mobility(self.frequency) / self.measured - 1)
+        errors: Array = np.abs(self.mobility(self.frequency) / self.measured - 1)
         return errors
 
     def __repr__(self) -> str:
@@ -236,9 +238,7 @@ def fit_mobility(
         raise type(error)(message) from error
 
 
-def _checked(
-    table: tuple[ArrayLike, ...],
-) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+def _checked(table: tuple[ArrayLike, ...]) -> tuple[Array, NDArray[np.complex128]]:
     """Return frequencies and complex values; raise InputError for anything else."""
     if len(table) != 2:  # noqa: PLR2004 - frequencies and values
         refuse(f"a tuple of {len(table)}", "frequencies, Hz, and complex values")
@@ -254,9 +254,7 @@ def _checked(
     return frequency, values.astype(complex)
 
 
-def _chosen(
-    name: str, frequency: NDArray[np.float64], values: NDArray[np.complex128]
-) -> MobilityFit:
+def _chosen(name: str, frequency: Array, values: NDArray[np.complex128]) -> MobilityFit:
     """Return the fit with the least information criterion for relative errors of equal size."""
     best, least, worse = None, np.inf, 0
     failure: ThudError | None = None
@@ -283,9 +281,7 @@ def _chosen(
     return best
 
 
-def _fit(
-    name: str, frequency: NDArray[np.float64], values: NDArray[np.complex128], order: int
-) -> MobilityFit:
+def _fit(name: str, frequency: Array, values: NDArray[np.complex128], order: int) -> MobilityFit:
     """Return the fit with a number of poles."""
     found: dict[str, Any] = ask(
         "mobility_fit", frequency=frequency, real=values.real, imaginary=values.imag, order=order
@@ -297,7 +293,7 @@ def _fit(
     return MobilityFit(name, frequency, values, MeasuredMobility(**lists), found["free_error"])
 
 
-def _read(path: Path) -> tuple[NDArray[np.float64], NDArray[np.complex128], Quantity | None]:
+def _read(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:
     """Return frequencies, values and, where the file says it, what they are."""
     if path.suffix.lower() in {".uff", ".unv", ".uf"}:
         return _read_universal(path)
@@ -326,9 +322,7 @@ def _read(path: Path) -> tuple[NDArray[np.float64], NDArray[np.complex128], Quan
     return columns["frequency"], values, known
 
 
-def _read_universal(
-    path: Path,
-) -> tuple[NDArray[np.float64], NDArray[np.complex128], Quantity | None]:
+def _read_universal(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:
     """Return the frequency response of a universal file."""
     with guarded(path, "universal"):
         require_small(path, "a universal file")

@@ -30,7 +30,7 @@ from thud.base.errors import InputError
 from thud.case.case import Case, case_text
 from thud.floors.prediction import RoomPrediction, predict_level
 from thud.level.levels import get_bands
-from thud.recordings.bank import band_filters
+from thud.recordings.filters import band_filters
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -16,13 +16,15 @@ from thud.floors.survey import RoomLevels
 from thud.impact.floor_impact import FloorImpact, new_floor_impact
 from thud.level.impact_result import ImpactResult
 from thud.level.levels import BANDWIDTHS, get_bands
-from thud.level.rating import Rating, rated_bands, rating, standardised_level
+from thud.level.rating import Rating, rated_bands, rating, standardized_level
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import FloorOptions, Room
+
+    Array = NDArray[np.float64]
 
 THIRDS = BANDWIDTHS[1]
 # Change of the force by a floor that gives way, dB, that raises a warning.
@@ -81,23 +83,23 @@ class RoomPrediction(Displayed):
 
     floor: FloorOptions
     room: Room
-    frequency: NDArray[np.float64]
-    level: NDArray[np.float64]
-    time_of_maximum: NDArray[np.float64]
-    energy: NDArray[np.float64]
-    radiation_factor: NDArray[np.float64]
-    loss_factor: NDArray[np.float64]
-    reverberation_time: NDArray[np.float64]
-    floor_modes: NDArray[np.float64]
-    room_modes: NDArray[np.float64]
-    conductance: NDArray[np.float64]
+    frequency: Array
+    level: Array
+    time_of_maximum: Array
+    energy: Array
+    radiation_factor: Array
+    loss_factor: Array
+    reverberation_time: Array
+    floor_modes: Array
+    room_modes: Array
+    conductance: Array
     few_modes: float
     mass_per_area: float
-    spread: NDArray[np.float64]
-    octave_level: NDArray[np.float64]
-    octave_time: NDArray[np.float64]
-    history_time: NDArray[np.float64]
-    history: NDArray[np.float64]
+    spread: Array
+    octave_level: Array
+    octave_time: Array
+    history_time: Array
+    history: Array
     source: ImpactResult
     force: Literal["contact", "blocked"]
     force_change: float
@@ -109,7 +111,7 @@ class RoomPrediction(Displayed):
         return rating(self.level, THIRDS)
 
     @property
-    def radiated_share(self) -> NDArray[np.float64]:
+    def radiated_share(self) -> Array:
         """Share of the floor's losses that it radiates into the room, shape (12,)."""
         air = self.room.air_density * self.room.sound_speed
         omega = 2 * np.pi * self.frequency
@@ -124,14 +126,14 @@ class RoomPrediction(Displayed):
         return rating(self.octave_level, BANDWIDTHS[0])
 
     @property
-    def standardised(self) -> NDArray[np.float64]:
+    def standardized(self) -> Array:
         """L'_i,Fmax,V,T, dB, shape (12,): in a room of 50 m3 and 0.5 s (ISO 16283-2)."""
-        return standardised_level(self.level, self.reverberation_time, self.room.volume)
+        return standardized_level(self.level, self.reverberation_time, self.room.volume)
 
     @property
-    def standardised_rating(self) -> Rating:
-        """Single numbers of the standardised levels."""
-        return rating(self.standardised, THIRDS)
+    def standardized_rating(self) -> Rating:
+        """Single numbers of the standardized levels."""
+        return rating(self.standardized, THIRDS)
 
     @property
     def has_few_modes(self) -> NDArray[np.bool_]:
@@ -158,7 +160,7 @@ class RoomPrediction(Displayed):
             )
         return tuple(found)
 
-    def difference(self, measured: RoomLevels) -> NDArray[np.float64]:
+    def difference(self, measured: RoomLevels) -> Array:
         """Return measured less predicted level, dB, shape (12,), in the room as it is.
 
         Raise InputError where the measured levels are not thirds.
@@ -172,10 +174,10 @@ class RoomPrediction(Displayed):
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, a third each."""
         head = (
-            "third, Hz", "L_i,Fmax, dB", "standardised, dB", "spread, dB", "energy, mJ",
+            "third, Hz", "L_i,Fmax, dB", "standardized, dB", "spread, dB", "energy, mJ",
             "floor modes",
         )  # fmt: skip
-        columns = (self.level, self.standardised, self.spread, 1e3 * self.energy, self.floor_modes)
+        columns = (self.level, self.standardized, self.spread, 1e3 * self.energy, self.floor_modes)
         forms = (".1f", ".1f", ".1f", ".3g", ".1f")
         cells = [
             [f"{value:{form}}" for value in column]
@@ -193,7 +195,7 @@ class RoomPrediction(Displayed):
         """Return the single numbers."""
         return (
             f"<RoomPrediction: L_iA,Fmax {self.rating.rounded} dB, "
-            f"standardised {self.standardised_rating.rounded} dB>"
+            f"standardized {self.standardized_rating.rounded} dB>"
         )
 
 

@@ -1,7 +1,7 @@
-"""Levels measured in a room below: mean of positions, background, standardisation, rating.
+"""Levels measured in a room below: mean of positions, background, standardization, rating.
 
 The chain is that of ISO 16283-2 for the rubber ball: energy mean over the positions, correction for
-the background, standardisation by reverberation time and volume, rating of ISO 717-2 annex D.
+the background, standardization by reverberation time and volume, rating of ISO 717-2 annex D.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from thud.base.checks import refuse
 from thud.base.columns import read_titled
 from thud.base.display import Displayed
 from thud.level.levels import BANDWIDTHS
-from thud.level.rating import Rating, rated_bands, rating, require_volume, standardised_level
+from thud.level.rating import Rating, rated_bands, rating, require_volume, standardized_level
 
 if TYPE_CHECKING:
     import os
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
+
+    Array = NDArray[np.float64]
 
 # Rounded mid frequencies in a decade (ISO 3, R10), and how far a title may be from one.
 R10 = np.array([1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0])
@@ -53,7 +55,7 @@ UNITS = {"frequency": "Hz", "time": "s", "background": "dB", "level": "dB"}
 OTHERS = {"khz", "ms", "min", "pa", "mpa", "upa", "np"}
 # Words in the title of a column that is no position's where there are others.
 NO_POSITION = {
-    "mean", "average", "median", "standardised", "standardized", "spread", "std", "sd", "stdev",
+    "mean", "average", "median", "standardized", "spread", "std", "sd", "stdev",
     "deviation", "uncertainty", "edt", "nominal",
 }  # fmt: skip
 # Difference of two positions, dB, as the mean over the bands, from which on one hardly is one.
@@ -84,20 +86,20 @@ class RoomLevels(Displayed):
 
     name: str
     bands: BandSet
-    frequency: NDArray[np.float64]
-    positions: NDArray[np.float64]
-    background: NDArray[np.float64] | None = None
-    reverberation_time: NDArray[np.float64] | None = None
+    frequency: Array
+    positions: Array
+    background: Array | None = None
+    reverberation_time: Array | None = None
     volume: float | None = None
 
     @property
-    def measured(self) -> NDArray[np.float64]:
+    def measured(self) -> Array:
         """Energy mean of the positions, with the background, dB, shape (n_band,)."""
-        mean: NDArray[np.float64] = 10 * np.log10((10 ** (self.positions / 10)).mean(axis=0))
+        mean: Array = 10 * np.log10((10 ** (self.positions / 10)).mean(axis=0))
         return mean
 
     @property
-    def level(self) -> NDArray[np.float64]:
+    def level(self) -> Array:
         """Energy mean L_i,Fmax without the background, dB, shape (n_band,)."""
         return self._corrected()[0]
 
@@ -107,14 +109,14 @@ class RoomLevels(Displayed):
         return self._corrected()[1]
 
     @property
-    def standardised(self) -> NDArray[np.float64] | None:
+    def standardized(self) -> Array | None:
         """L'_i,Fmax,V,T, dB, shape (n_band,); None without reverberation time or volume."""
         if self.reverberation_time is None or self.volume is None:
             return None
-        return standardised_level(self.level, self.reverberation_time, self.volume)
+        return standardized_level(self.level, self.reverberation_time, self.volume)
 
     @property
-    def spread(self) -> NDArray[np.float64] | None:
+    def spread(self) -> Array | None:
         """Standard deviation of the positions' levels, dB, shape (n_band,); None of one."""
         return self.positions.std(axis=0, ddof=1) if len(self.positions) > 1 else None
 
@@ -124,9 +126,9 @@ class RoomLevels(Displayed):
         return rating(self.level[self._rated], self.bands)
 
     @property
-    def standardised_rating(self) -> Rating | None:
-        """Single numbers of the standardised levels; None where there are none."""
-        levels = self.standardised
+    def standardized_rating(self) -> Rating | None:
+        """Single numbers of the standardized levels; None where there are none."""
+        levels = self.standardized
         return None if levels is None else rating(levels[self._rated], self.bands)
 
     @property
@@ -175,7 +177,7 @@ class RoomLevels(Displayed):
             if value is None
         ]  # fmt: skip
         if missing:
-            found.append(f"not standardised: {' and '.join(missing)} not given")
+            found.append(f"not standardized: {' and '.join(missing)} not given")
         return tuple(found)
 
     def rows(self) -> list[tuple[str, ...]]:
@@ -188,15 +190,15 @@ class RoomLevels(Displayed):
         if self.background is not None:
             titles += ["background, dB", "L_i,Fmax, dB"]
             columns += [self.background, self.level]
-        if (standardised := self.standardised) is not None:
-            titles += ["T, s", "standardised, dB"]
-            columns += [np.asarray(self.reverberation_time), standardised]
+        if (standardized := self.standardized) is not None:
+            titles += ["T, s", "standardized, dB"]
+            columns += [np.asarray(self.reverberation_time), standardized]
         cells = [
             [f"{value:z.{2 if title == 'T, s' else 1}f}" for value in column]
             for title, column in zip(titles[1:], columns, strict=True)
         ]
         for title, column in zip(titles[1:], cells, strict=True):
-            if title in {"L_i,Fmax, dB", "standardised, dB"}:
+            if title in {"L_i,Fmax, dB", "standardized, dB"}:
                 column[:] = [
                     f"< {text}" if low else text
                     for text, low in zip(column, self.is_upper_bound, strict=True)
@@ -204,15 +206,15 @@ class RoomLevels(Displayed):
         return [tuple(titles), *zip((f"{f:g}" for f in self.frequency), *cells, strict=True)]
 
     def plot(self) -> Figure:
-        """Draw the levels of positions, their mean, the standardised ones and the background."""
+        """Draw the levels of positions, their mean, the standardized ones and the background."""
         from thud.plot.rooms import room_levels
 
         return room_levels(self)
 
     def __repr__(self) -> str:
         """Return the single numbers."""
-        after = self.standardised_rating
-        more = "" if after is None else f", standardised {after.rounded} dB"
+        after = self.standardized_rating
+        more = "" if after is None else f", standardized {after.rounded} dB"
         return f"<RoomLevels, {self._count}: L_iA,Fmax {self.rating.rounded} dB{more}>"
 
     @property
@@ -225,7 +227,7 @@ class RoomLevels(Displayed):
         wanted = rated_bands(self.bands)
         return np.isin(self.frequency, wanted)
 
-    def _corrected(self) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    def _corrected(self) -> tuple[Array, NDArray[np.bool_]]:
         if self.background is None:
             return self.measured, np.zeros(len(self.frequency), dtype=bool)
         found = ask("background", levels=self.measured, background=self.background)
@@ -257,7 +259,7 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     _require_positions(
         [title for title, kind in zip(titles, kinds, strict=True) if kind == "level"], path
     )
-    columns: dict[str, NDArray[np.float64]] = {}
+    columns: dict[str, Array] = {}
     for kind in ("frequency", "background", "time"):
         if kinds.count(kind) > 1:
             refuse(f"{path}: more than one column of {kind}", ALLOWED)
@@ -299,7 +301,7 @@ def levels_csv(found: RoomLevels) -> bytes:
         "nominal_Hz": found.frequency, "mean_dB": found.measured, "spread_dB": found.spread,
         "background_dB": found.background, "level_dB": found.level,
         "is_upper_bound": found.is_upper_bound.astype(int),
-        "reverberation_time_s": found.reverberation_time, "standardised_dB": found.standardised,
+        "reverberation_time_s": found.reverberation_time, "standardized_dB": found.standardized,
     }  # fmt: skip
     known = {title: values for title, values in columns.items() if values is not None}
     text = io.StringIO()
@@ -312,11 +314,11 @@ def levels_csv(found: RoomLevels) -> bytes:
 
 def rating_table(found: RoomLevels) -> list[tuple[str, ...]]:
     """Return header and rows of the single numbers."""
-    after = found.standardised_rating
+    after = found.standardized_rating
     rows = [*found.rating.rows()]
     if after is not None:
         rows = [(*row, more[1]) for row, more in zip(rows, after.rows(), strict=True)]
-        rows[0] = ("rating", "in the room", "standardised")
+        rows[0] = ("rating", "in the room", "standardized")
         # The classes are meant for levels in the room.
         rows[2:3] = [(*row[:2], "") for row in rows[2:3]]
     return rows
@@ -361,7 +363,7 @@ def _nominal(frequency: float, path: object) -> float:
     )
 
 
-def _bands_of(frequency: NDArray[np.float64], path: object) -> BandSet:
+def _bands_of(frequency: Array, path: object) -> BandSet:
     """Return the set of bands; raise InputError where rated ones are missing or double."""
     double = frequency[1:][np.diff(frequency) <= 0]
     if double.size:

@@ -55,8 +55,8 @@ def impact_dataset(impact: Impact, histories: Mapping[str, NDArray[np.float64]])
             impact.levels(bands, force=force),
             attributes(SAMPLE_RESULTS[name]),
         )
-    for name, quantity in schema.QUANTITIES.items():
-        variables[name] = ((), getattr(impact, name), attributes(quantity))
+    for name in schema.IMPACT_QUANTITIES:
+        variables[name] = ((), getattr(impact, name), attributes(schema.QUANTITIES[name]))
     conforms = impact.assess().conforms
     variables["conforms"] = ((), conforms, attributes(SAMPLE_RESULTS["conforms"]))
     coordinates = {"time": _time(impact.time), **band_coordinates(BANDWIDTHS)}

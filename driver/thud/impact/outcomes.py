@@ -57,8 +57,8 @@ class Ensemble(SampleQuantities, Displayed):
         Likewise the energy that the source gives to the floor, J.
     room_level : ndarray, shape (n_sample, 12), or None
         Of cases with a room: maximum Fast levels in the thirds from 50 to 630 Hz, dB re 20 uPa.
-    room_rating, standardised_rating : ndarray, shape (n_sample,), or None
-        Their A-weighted sum L_iA,Fmax, dB, and that of the standardised levels; see `rating`.
+    room_rating, standardized_rating : ndarray, shape (n_sample,), or None
+        Their A-weighted sum L_iA,Fmax, dB, and that of the standardized levels; see `rating`.
     """
 
     case: Case
@@ -77,7 +77,7 @@ class Ensemble(SampleQuantities, Displayed):
     floor_work: NDArray[np.float64] | None = None
     room_level: NDArray[np.float64] | None = None
     room_rating: NDArray[np.float64] | None = None
-    standardised_rating: NDArray[np.float64] | None = None
+    standardized_rating: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         """Return the number of samples."""

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
-import f90nml.scanner
+import f90nml
 import numpy as np
 
-from thud.base._schema import QUANTITIES
+from thud.base._schema import IMPACT_QUANTITIES
 from thud.base.checks import refuse, shown
 from thud.base.errors import PlausibilityWarning, ThudError
 from thud.base.files import MANIFEST, checksum, locked, read_input, read_manifest
@@ -35,10 +35,6 @@ _OWN = {
     "floor_force": "floor_force_N",
 }
 _MOTION = ("time", "deflection", "velocity")
-
-# Where a text ends too early it prints its tables and then raises. To redirect the output meanwhile
-# would take that of other threads.
-f90nml.scanner.print = lambda *_: None
 
 
 def read_results(directory: str | os.PathLike[str]) -> Impact:
@@ -149,7 +145,7 @@ def _read_history(
         "channels": {name: values for name, values in found.items() if name != "time_s"},
         "facts": dict(facts),
         "motion": _read_motion(files, prefix) if f"{prefix}snapshots.xmf" in files else None,
-        **{name: scalars[name] for name in QUANTITIES},
+        **{name: scalars[name] for name in IMPACT_QUANTITIES},
     }
     return history, {name: force[name] for name in columns[last + 1 :]}
 

@@ -36,7 +36,7 @@ from thud.plot.files import (
     save as save,
     save_all as save_all,
 )
-from thud.plot.fits import draw_fit as draw_fit
+from thud.plot.fits import draw_fit as draw_fit, target_and_fit as target_and_fit
 from thud.plot.floors import (
     ball_impedances as ball_impedances,
     draw_floor as draw_floor,

@@ -77,7 +77,7 @@ def target_and_fit(fit: Fit, number: int = 1) -> Figure:
 def _draw_force(fitted: FittedTarget, deviation: float, above: Axes, below: Axes) -> None:
     """Draw record, fit with its background, and residual."""
     misfit = cast("ForceMisfit", fitted.misfit)
-    column = misfit.history_columns(fitted.impact, fitted.own)
+    column = misfit.columns(fitted.impact, fitted.own)
     time = 1e3 * column["time_s"]
     record, target = column["record_N"], column["target_N"]
     band = f"below {misfit.below / 1e3:.3g} kHz"

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 # Maximum size of files that are read as a whole, bytes.
 MAX_IN_MEMORY = 2**27
 # Maximum number of bytes that a library may ask for at once.
-AT_ONCE = 2**26
+MAX_PIECE = 2**26
 # Maximum number of characters of a library's message that are shown.
-SHOWN = 100
+MAX_SHOWN = 100
 MIB = 2**20
 
 
@@ -43,18 +43,17 @@ class Channel:
     n_sample : int
         Number of samples.
     samples : callable
-        Returns the values of the file, shape (stop - start,), from start to before stop.
+        Returns the values of the file from start to before stop, shape (stop - start,).
     unit : str
-        Unit of the values; empty where the file does not say it, ``"FS"`` for fractions of full
-        scale.
+        Unit of the values; ``"FS"`` for fractions of full scale, empty if unknown.
     sample_rate : float or None
-        Samples per second, Hz; None where the file does not say it.
+        Samples per second, Hz; None if unknown.
     counts : float or None
-        Counts of full scale where the values are integers, else None.
+        Counts of full scale if the values are integers, else None.
     date : str
         Date of the measurement, or empty.
     steps : tuple of str
-        What reading has done, a sentence each.
+        Processing by the reader, a sentence each.
     """
 
     name: str
@@ -69,19 +68,19 @@ class Channel:
 
 
 def shown_text(text: object) -> str:
-    """Return a text of a file or a library as a message shows it: short, printable, one line."""
+    """Return a text of a file or a library for a message: short, printable, one line."""
     line = " ".join(str(text).encode("utf-8", "replace").decode("utf-8").split())
-    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in line[:SHOWN])
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in line[:MAX_SHOWN])
 
 
 def shown_path(path: Path) -> str:
-    """Return a path as a message shows it, also where its name is not UTF-8."""
+    """Return a path for a message, even if its name is not UTF-8."""
     return os.fsencode(path).decode("utf-8", "replace")
 
 
 @contextmanager
 def guarded(path: Path, kind: str) -> Iterator[None]:
-    """Turn whatever a library raises on a damaged file into InputError, and hide its warnings."""
+    """Turn any error of a library into InputError, and hide its warnings."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -101,7 +100,7 @@ def guarded(path: Path, kind: str) -> Iterator[None]:
 
 
 def library(name: str, kind: str) -> Any:  # noqa: ANN401 - a module
-    """Import a library that only one kind of file needs; raise InputError where it is missing."""
+    """Import a library that one format needs; raise InputError where it is missing."""
     try:
         return importlib.import_module(name)
     except (ImportError, OSError) as error:  # soundfile raises OSError without its library
@@ -112,13 +111,13 @@ def library(name: str, kind: str) -> Any:  # noqa: ANN401 - a module
         )
 
 
-def require_small(path: Path, kind: str, most: int = MAX_IN_MEMORY) -> None:
+def require_small(path: Path, kind: str, limit: int = MAX_IN_MEMORY) -> None:
     """Raise InputError where a file that is read as a whole is too large."""
     size = path.stat().st_size
-    if size > most:
+    if size > limit:
         refuse(
             f"{shown_path(path)}: {size / MIB:.0f} MiB of {kind}, which is read as a whole",
-            f"up to {most // MIB} MiB; longer recordings as WAV, RF64, FLAC, HDF5 or TDMS",
+            f"up to {limit // MIB} MiB; longer recordings as WAV, RF64, FLAC, HDF5 or TDMS",
         )
 
 
@@ -136,13 +135,13 @@ class BoundedFile:
     def read(self, count: int = -1) -> bytes:
         """Return the next bytes."""
         left = max(0, self.size - self.file.tell())
-        wanted = left if count is None or count < 0 else int(count)
-        if wanted > AT_ONCE or (wanted > left and wanted > MIB):
+        size = left if count is None or count < 0 else int(count)
+        if size > MAX_PIECE or (size > left and size > MIB):
             refuse(
-                f"{self.name}: a piece of {wanted / MIB:.0f} MiB, {left / MIB:.0f} MiB are left",
-                f"pieces of up to {AT_ONCE // MIB} MiB inside the file",
+                f"{self.name}: a piece of {size / MIB:.0f} MiB, {left / MIB:.0f} MiB are left",
+                f"pieces of up to {MAX_PIECE // MIB} MiB inside the file",
             )
-        return self.file.read(wanted)
+        return self.file.read(size)
 
     def readinto(self, buffer: Buffer) -> int:
         """Fill a buffer with the next bytes."""
@@ -152,11 +151,11 @@ class BoundedFile:
         return len(data)
 
     def seek(self, offset: int, whence: int = 0) -> int:
-        """Move to another place."""
+        """Move to another position."""
         return self.file.seek(offset, whence)
 
     def tell(self) -> int:
-        """Return the place of the next byte."""
+        """Return the position of the next byte."""
         return self.file.tell()
 
     def close(self) -> None:

@@ -24,60 +24,58 @@ if TYPE_CHECKING:
     from thud.recordings.noise import Cells
     from thud.recordings.plate import Plate
 
-# Quiet used on either side of the contact, s, and its cells: length up to a distance from the
-# contact, s. Farther quiet lowers the noise of the offset by less than 5 %.
-QUIET = 0.1
-QUIET_CELLS = ((5e-4, 5e-3), (2e-3, 25e-3), (3e-3, QUIET))
-# Length of a flank in the search for the touch, s, room before it, and the latest touch, behind the
-# begin that the search for drops has found.
+# Length of background used on either side of the contact, s, and its cells: width up to a distance
+# from the contact, s. More background lowers the noise of the offset by less than 5 %.
+MAX_BACKGROUND = 0.1
+BACKGROUND_CELLS = ((5e-4, 5e-3), (2e-3, 25e-3), (3e-3, MAX_BACKGROUND))
+# Length of a flank in the search for the touch, s, margin before it, and the latest touch after the
+# start of the pulse as found by the search for drops.
 FLANK = 3e-3
-ROOM = 2e-3
-LATEST = 1e-3
-# Cells of the flank, s: the finest, the coarsest around the touch, and the part of the distance to
-# the touch elsewhere.
-FINEST = 2e-5
-COARSEST = 1e-4
+MARGIN = 2e-3
+MAX_DELAY = 1e-3
+# Cells of the flank, s: minimum, maximum around the touch, and elsewhere as fraction of the
+# distance to the touch.
+MIN_CELL = 2e-5
+MAX_CELL = 1e-4
 GROWTH = 0.15
 # Cells of the contact, s.
 CONTACT_CELL = 2e-4
-# The gate of the levels reaches this many samples beyond the contact, and more at low rates,
-# whose anti-aliasing filter comes close to the octave of 500 Hz: (GATE_RATE/rate)2 more.
+# The gate of the levels extends this many samples beyond the contact, and (GATE_RATE/rate)2 more at
+# low rates, whose anti-aliasing filter is close to the octave of 500 Hz.
 GATE_SAMPLES = 8
 GATE_RATE = 10_000.0
-# The response to a sample of the correction of a plate dies away within these periods; what lies
-# above its reach moves an edge by up to this part of one.
+# Periods of the resonance within which the correction of a plate responds to a sample; content
+# above its maximum frequency moves an edge by up to this fraction of a period.
 PLATE_PERIODS = 2.0
-PLATE_LEFT = 0.03
-# Errors of samples that are no noise, as part of the peak: digits, the filter of the recorder.
-FLOOR = 2e-4
+PLATE_ERROR = 0.03
+# Errors of samples other than noise, as fraction of the peak: quantization, filter of the recorder.
+SAMPLE_ERROR = 2e-4
 
 
 @dataclass(frozen=True, eq=False)
 class Contact(Immutable):
-    """Contact of one pulse: its times, in s from the first sample of the window.
+    """Contact of one pulse; times are in s from the first sample of the window.
 
     Attributes
     ----------
     touch, release : Estimate
         First touch and release.
     begin, end : Estimate
-        Times between which the contact lasts (`thud.impact.contact_time`).
+        Limits of the contact time (`thud.impact.contact_time`).
     peak : float
-        Maximum of the force below 1.25 kHz, less the offset, N: a scale.
+        Maximum of the force below 1.25 kHz without the offset, N: a scale.
     span : tuple of int
-        First sample of the part with its background removed, and the one behind it.
-    force : ndarray, shape (span[1] - span[0],)
-        Force of the part, N.
-    removed : ndarray, shape (span[1] - span[0],)
-        Background that was removed, N.
+        First and stop index of the force without background.
+    force, removed : ndarray, shape (span[1] - span[0],)
+        Force, N, and the background that was removed from it, N.
     gate : tuple of int
-        First sample of the contact with its margins, and the one behind it.
+        First and stop index of the contact with its margins.
     covariance : ndarray, shape (n_cell, n_cell)
-        Covariance of the background's error in even cells of the gate, N2.
+        Covariance of the error of the background in uniform cells of the gate, N2.
     background_lengths : tuple of float
-        Lengths of the background before and after, s.
+        Length of the background before and after, s.
     background : Background
-        The noise, fitted.
+        The fitted noise.
     sample_rate : float
         Samples per second, Hz.
     """
@@ -103,12 +101,12 @@ class Contact(Immutable):
         return self.force[self.gate[0] - first : self.gate[1] - first]
 
     def summed(self, functionals: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return linear functionals of the gate's samples summed over its cells: [k, n_cell]."""
+        """Sum linear functionals of the samples of the gate over its cells: [k, n_cell]."""
         edges = np.rint(np.linspace(0, functionals.shape[1], len(self.covariance) + 1))
         return np.add.reduceat(functionals, edges[:-1].astype(int), axis=1)
 
     def covariance_of(self, functionals: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the covariance of linear functionals of the gate's samples, shape (k, n)."""
+        """Return the covariance of linear functionals of the samples of the gate, shape (k, n)."""
         white = self.background.variances[0] * self.sample_rate / 2
         summed = self.summed(functionals)
         result: NDArray[np.float64] = white * functionals @ functionals.T
@@ -127,85 +125,85 @@ def _means(force: NDArray[np.float64], edges: NDArray[np.intp]) -> NDArray[np.fl
     return total / np.diff(edges)
 
 
-def _quiet_edges(length: int, rate: float) -> NDArray[np.intp]:
-    """Return edges of quiet cells, in samples away from the contact, up to a number of samples."""
+def _background_edges(length: int, rate: float) -> NDArray[np.intp]:
+    """Return edges of background cells, in samples from the contact, up to a length."""
     edges = [0.0]
-    for width, reach in QUIET_CELLS:
+    for width, reach in BACKGROUND_CELLS:
         count = int((reach - edges[-1]) / width + 1e-9)
         edges += list(edges[-1] + width * np.arange(1, count + 1))
-    places = np.unique(np.rint(np.array(edges) * rate).astype(int))
-    return places[places <= length]
+    indices = np.unique(np.rint(np.array(edges) * rate).astype(int))
+    return indices[indices <= length]
 
 
 def _spread(rate: float, plate: Plate | None) -> int:
-    """Return the samples over which filters spread an edge."""
+    """Return the number of samples over which filters spread an edge."""
     periods = int(PLATE_PERIODS * rate / plate.frequency / 2) if plate else 0
     return int((GATE_RATE / rate) ** 2) + periods
 
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """What is known of first touch and release, and the background between two quiet parts.
+    """Posteriors of first touch and release, and the background before and after.
 
     Attributes
     ----------
     touch, release : Posterior
-        First touch and release, whose time runs backwards, s from the first sample of the window.
+        First touch, and release in reversed time, s from the first sample of the window.
     background : Background
-        The noise, fitted.
+        The fitted noise.
     offset : float
-        Median of the quiet, which was removed before, N.
-    quiet : tuple of int
-        Where the quiet ends, and begins again, in samples.
+        Median of the background, which was removed before, N.
+    limits : tuple of int
+        Stop index of the background before, and first index of that after the contact.
     """
 
     touch: Posterior
     release: Posterior
     background: Background
     offset: float
-    quiet: tuple[int, int]
+    limits: tuple[int, int]
 
 
 def find_edges(window: Window, known: Background | None = None) -> tuple[Estimate, Estimate]:
-    """Return begin and end of a contact, s from the first sample of a window, to about 0.1 ms."""
+    """Return begin and end of a contact within about 0.1 ms, s from the first sample."""
     edges = find_posteriors(window, window.force, known, passes=1)
     (t0, s0), (t1, s1) = edges.touch.edge()[1], edges.release.edge()[1]
     return Estimate(t0, s0), Estimate(-t1, s1)
 
 
 def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
-    """Return the contact of a window, the force of which, N, may have been repaired."""
+    """Return the contact in a window from its force, N, which may have been repaired."""
     rate, contact = window.sample_rate, window.contact
     middle = (contact[0] + contact[1]) / 2 / rate
     edges = find_posteriors(window, force, None, passes=2)
-    background, (left, right) = edges.background, edges.quiet
+    background, (left, right) = edges.background, edges.limits
     (t0, s0), begin = edges.touch.edge()
     (t1, s1), end = edges.release.edge()
     t1 = -t1
-    left_by_plate = PLATE_LEFT / window.plate.frequency if window.plate else 0.0
+    plate_error = PLATE_ERROR / window.plate.frequency if window.plate else 0.0
     margin = GATE_SAMPLES + _spread(rate, window.plate)
     gate = (
         max(int((t0 - 3 * s0) * rate) - margin, 0),
         min(int((t1 + 3 * s1) * rate) + margin + 1, len(force)),
     )
-    inner = even_edges(*gate, rate)
+    inner = uniform_edges(*gate, rate)
     _, covariance = background.predict(cells_between(inner, rate, middle))
-    reach = int(QUIET * rate)
+    reach = int(MAX_BACKGROUND * rate)
     span = (max(0, gate[0] - reach), min(len(force), gate[1] + reach))
-    sides = [even_edges(*side, 5 * rate) for side in ((span[0], gate[0]), (gate[1], span[1]))]
+    sides = [uniform_edges(*side, 5 * rate) for side in ((span[0], gate[0]), (gate[1], span[1]))]
     cells = cells_between(np.unique(np.concatenate([*sides, inner])), rate, middle)
     time = np.arange(*span) / rate - middle
-    under = np.interp(time, (cells[0] + cells[1]) / 2, background.predict_mean(cells))
-    under += edges.offset
+    removed = np.interp(time, (cells[0] + cells[1]) / 2, background.predict_mean(cells))
+    removed += edges.offset
     return Contact(
         Estimate(t0, s0),
         Estimate(t1, s1),
-        Estimate(begin[0], math.hypot(begin[1], left_by_plate)),
-        Estimate(-end[0], math.hypot(end[1], left_by_plate)),
+        Estimate(begin[0], math.hypot(begin[1], plate_error)),
+        Estimate(-end[0], math.hypot(end[1], plate_error)),
         background.peak,
         span,
-        force[slice(*span)] - under,
-        under,
+        force[slice(*span)] - removed,
+        removed,
         gate,
         covariance,
         (left / rate, (len(force) - right) / rate),
@@ -217,68 +215,68 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
 def find_posteriors(
     window: Window, force: NDArray[np.float64], known: Background | None, passes: int
 ) -> Edges:
-    """Return the edges of a contact; the second pass knows where the quiet ends.
+    """Return the edges of a contact; the second pass knows where the background ends.
 
-    The noise may be known from elsewhere in the signal.
+    Noise that is known from another part of the signal is not fitted again.
     """
     rate, (first, stop) = window.sample_rate, window.contact
     middle = (first + stop) / 2 / rate
-    # Half of a short quiet is kept.
-    left = int(max(first - ROOM * rate, first / 2))
-    right = int(min(stop + ROOM * rate, (stop + len(force)) / 2))
-    touch = (left / rate, first / rate + ROOM)
-    release = (stop / rate - ROOM, right / rate)
+    # Half of a short background is kept.
+    left = int(max(first - MARGIN * rate, first / 2))
+    right = int(min(stop + MARGIN * rate, (stop + len(force)) / 2))
+    touch = (left / rate, first / rate + MARGIN)
+    release = (stop / rate - MARGIN, right / rate)
     offset = float(np.median(np.concatenate([force[:left], force[right:]])))
     force = force - offset
     width = max(1, round(rate / RECORDED_BAND))
     peak = float(uniform_filter1d(force[first:stop], width).max())
     for last in range(passes):
-        # The first of two passes needs no more than the grid.
+        # The first of two passes needs the coarse grid only.
         searches = 1 + 2 * last if passes > 1 else 2
-        quiet, mean = quiet_means(force, left, right, rate, middle)
+        cells, mean = background_means(force, left, right, rate, middle)
         if known is None:
-            known = fit_background(quiet, mean, peak)
-        background = Background(quiet, mean, known.draws, peak)
-        likely = Background(quiet, mean, known.variances[None], peak)
-        found = []
+            known = fit_background(cells, mean, peak)
+        background = Background(cells, mean, known.draws, peak)
+        likely = Background(cells, mean, known.variances[None], peak)
+        posteriors = []
         for sign, near, at, bounds in ((1, left, first, touch), (-1, right, stop, release)):
             ahead = bounds if sign > 0 else (-bounds[1], -bounds[0])
-            end = min(ahead[1], sign * at / rate + LATEST) + FLANK
+            end = min(ahead[1], sign * at / rate + MAX_DELAY) + FLANK
             edges = sign * flank_edges(sign * near, ahead, end, rate, fine=last > 0)
-            found.append(
+            posteriors.append(
                 find_edge(force, edges, ahead, likely, rate, middle, searches, window.plate)
             )
         if last + 1 < passes:
-            touch, back = (_reach(one.edge(), 3 / rate + 1e-4) for one in found)
+            touch, back = (_reach(one.edge(), 3 / rate + 1e-4) for one in posteriors)
             release = (-back[1], -back[0])
-            # What a filter spreads is no quiet.
+            # Samples that a filter affects are no background.
             beyond = _spread(rate, window.plate)
             left = max(int(touch[0] * rate) - beyond, first // 2)
             right = min(int(release[1] * rate) + 1 + beyond, (stop + len(force) + 1) // 2)
-    return Edges(found[0], found[1], background, offset, (left, right))
+    return Edges(posteriors[0], posteriors[1], background, offset, (left, right))
 
 
 def _reach(
-    edge: tuple[tuple[float, float], tuple[float, float]], room: float
+    edge: tuple[tuple[float, float], tuple[float, float]], margin: float
 ) -> tuple[float, float]:
-    """Return times between which first touch and begin lie, with room, s."""
+    """Return limits of first touch and begin, with a margin, s."""
     ends = np.array([(mean - 5 * spread, mean + 5 * spread) for mean, spread in edge])
-    return float(ends.min()) - room, float(ends.max()) + room
+    return float(ends.min()) - margin, float(ends.max()) + margin
 
 
-def even_edges(start: int, stop: int, rate: float) -> NDArray[np.intp]:
+def uniform_edges(start: int, stop: int, rate: float) -> NDArray[np.intp]:
     """Return edges of cells of about CONTACT_CELL at a rate, in samples."""
     count = max(1, round((stop - start) / rate / CONTACT_CELL))
     return np.unique(np.rint(np.linspace(start, stop, 1 + count)).astype(int))
 
 
-def quiet_means(
+def background_means(
     force: NDArray[np.float64], left: int, right: int, rate: float, middle: float
 ) -> tuple[Cells, NDArray[np.float64]]:
-    """Return the quiet cells on both sides of a contact, and their means, N."""
+    """Return the background cells on both sides of a contact, and their mean forces, N."""
     both = (
-        left - _quiet_edges(left, rate)[::-1],
-        right + _quiet_edges(len(force) - right, rate),
+        left - _background_edges(left, rate)[::-1],
+        right + _background_edges(len(force) - right, rate),
     )
     begins, ends = zip(*(cells_between(edges, rate, middle) for edges in both), strict=True)
     mean = [_means(force, edges) for edges in both if len(edges) > 1]
@@ -295,18 +293,18 @@ def find_edge(  # noqa: PLR0913, PLR0917 - what a flank is
     searches: int,
     plate: Plate | None = None,
 ) -> Posterior:
-    """Return what is known of the touch between bounds, s; of the release where edges fall.
+    """Return the posterior of the touch between bounds, s; of the release if the edges fall.
 
-    The time of a release runs backwards, in its bounds too.
+    The time of a release is reversed, also in its bounds.
     """
-    turned = edges[0] > edges[-1]
-    edges = edges[::-1] if turned else edges
+    reversed_ = edges[0] > edges[-1]
+    edges = edges[::-1] if reversed_ else edges
     edges = edges[(edges >= 0) & (edges <= len(force))]
     cells = cells_between(edges, rate, middle)
-    under, covariance = background.predict(cells)
+    mean, covariance = background.predict(cells)
     low, high = max(edges[0] - 1, 0), min(edges[-1] + 1, len(force))
     smooth = np.convolve(force[low:high], SMOOTHING, mode="same")[edges[0] - low :]
-    value = _means(smooth, edges - edges[0]) - under
+    value = _means(smooth, edges - edges[0]) - mean
     # Weights of the samples in the smoothed means.
     count = np.diff(edges)
     kernel = SMOOTHING if plate is None else np.convolve(SMOOTHING, _response(plate, rate))
@@ -315,19 +313,19 @@ def find_edge(  # noqa: PLR0913, PLR0917 - what a flank is
     weights[np.repeat(np.arange(len(count)), count), reach + np.arange(count.sum())] = 1
     weights = convolve1d(weights / count[:, None], kernel, mode="constant")
     covariance += background.variances[0] * rate / 2 * weights @ weights.T
-    covariance += (FLOOR * background.peak) ** 2 * np.eye(len(value))
+    covariance += (SAMPLE_ERROR * background.peak) ** 2 * np.eye(len(value))
     time = (cells[0] + cells[1]) / 2 + middle
-    if turned:
+    if reversed_:
         time, value, covariance = -time[::-1], value[::-1], covariance[::-1, ::-1]
     flank = Flank(
-        time, value, covariance, background.peak, 1 / rate, release=bool(turned), plate=plate
+        time, value, covariance, background.peak, 1 / rate, release=bool(reversed_), plate=plate
     )
     return find_touch(flank, *bounds, searches)
 
 
 @lru_cache(maxsize=4)
 def _response(plate: Plate, rate: float) -> NDArray[np.float64]:
-    """Return what the correction of a plate makes of one sample; its middle is that sample."""
+    """Return the response of the correction of a plate to one sample, in its middle."""
     reach = int(PLATE_PERIODS * rate / plate.frequency)
     unit = np.zeros(2 * reach + 1)
     unit[reach] = 1
@@ -335,15 +333,15 @@ def _response(plate: Plate, rate: float) -> NDArray[np.float64]:
 
 
 def flank_edges(
-    quiet: int, bounds: tuple[float, float], end: float, rate: float, *, fine: bool
+    first: int, bounds: tuple[float, float], end: float, rate: float, *, fine: bool
 ) -> NDArray[np.intp]:
-    """Return edges of flank cells in samples, from the end of the quiet up to a time, s."""
+    """Return edges of flank cells in samples, from the end of the background to a time, s."""
     touch, half = (bounds[0] + bounds[1]) / 2 * rate, (bounds[1] - bounds[0]) / 2 * rate
-    edges = [quiet]
+    edges = [first]
     while edges[-1] < end * rate:
         away = max(abs(edges[-1] - touch) - half, 0)
-        width = COARSEST * rate
+        width = MAX_CELL * rate
         if fine:
-            width = max(FINEST * rate, GROWTH * away, min(half / 10, width))
+            width = max(MIN_CELL * rate, GROWTH * away, min(half / 10, width))
         edges.append(edges[-1] + max(1, int(width)))
     return np.array(edges)

@@ -1,4 +1,4 @@
-"""Drops of a signal: where they are, and which pulses are bounces of which drop."""
+"""Search of drops in a signal, and assignment of bounces to them."""
 
 from __future__ import annotations
 
@@ -19,65 +19,65 @@ if TYPE_CHECKING:
     from thud.recordings.plate import Plate
     from thud.recordings.signal import Signal
 
-# Means over cells of this length, s, show pulses; a signal is searched in pieces of PIECE cells
-# that overlap by OVERLAP cells, more than a pulse with its quiet.
+# Pulses are searched in means over cells of this length, s, in pieces of PIECE cells that overlap
+# by OVERLAP cells, more than a pulse with its background.
 CELL = 1e-3
 PIECE = 30_000
 OVERLAP = 2_000
-# Cells of one value of the running baseline.
+# Cells per value of the running baseline.
 SEGMENT = 1_000
-# Pulses rise above this many deviations of the cells, or above this part of the maximum if that
-# is less, and nothing is a pulse below NO_PULSE deviations. Their edges are looked for within two
-# cells of MARGIN cells outside of FOOT of their peak: flanks of the models rise to it in 4 ms.
+# Pulses rise above this many deviations of the cells or above this fraction of the maximum,
+# whichever is less, and at least above MIN_DEVIATIONS. Their edges are searched within two cells of
+# MARGIN cells outside of FOOT of their peak: flanks of the models rise to it in 4 ms.
 RISE = 6.0
-RISE_PART = 0.4
-NO_PULSE = 4.0
+RISE_FRACTION = 0.4
+MIN_DEVIATIONS = 4.0
 FOOT = 0.2
 MARGIN = 2
-# Quiet next to a pulse, in cells from half its height.
-SIDE = 6
+# Background next to a pulse: distance from half its height, and length, in cells.
+DISTANCE = 6
 BESIDE = 20
-# Cells between two parts of one pulse.
-MERGED = 4
-# Lower pulses are no impacts: part of the highest one of a signal.
-LEAST_PART = 0.03
-# Durations of a pulse above half its peak, s: contacts of balls and tyres last 12 to 40 ms.
+# Maximum number of cells between two components of one pulse.
+MAX_GAP = 4
+# Minimum height of a pulse over the highest one of a signal.
+MIN_HEIGHT = 0.03
+# Duration of a pulse above half its peak, s: contacts of balls and tyres last 12 to 40 ms.
 DURATIONS = (0.003, 0.06)
-# A valley between two peaks of one pulse, as part of the lower one, that makes it two impacts.
+# A valley between two peaks below this fraction of the lower one makes two impacts.
 VALLEY = 0.3
-# A pulse whose peak reaches this part of the one before is a drop of its own. The limits of the
+# A pulse whose peak reaches this fraction of the one before is a drop of its own. The limits of the
 # standards let a ball return with 0.9 of its velocity, and the force follows the velocity.
-NEW_PART = 0.93
-# Flights of a bounce, s: 2 e v0/g of a drop from 2 m with e = 1; from 0.5 mm.
-LONGEST_FLIGHT = 1.3
-SHORTEST_FLIGHT = 0.02
-# Part of the signal around one drop, s.
+NEW_DROP = 0.93
+# Flights of a bounce, s: maximum 2 e v0/g of a drop from 2 m with e = 1, minimum from 0.5 mm.
+MAX_FLIGHT = 1.3
+MIN_FLIGHT = 0.02
+# Length of a window before and after a drop, s.
 BEFORE = 0.25
 AFTER = 0.5
-# Rates, Hz: twice the upper edge of the octave of 500 Hz, with room for a filter.
-LEAST_RATE = 2_000.0
+# Minimum rate, Hz: twice the upper edge of the octave of 500 Hz, with a margin for a filter.
+MIN_RATE = 2_000.0
 
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """The part of a signal around one drop.
+    """Section of a signal around one drop.
 
     Attributes
     ----------
     name : str
         Name of the drop, as ``"file.wav, drop 3"``.
     signal : Signal
-        The signal, which is read when the force is asked for.
+        The signal, which is read when the force is requested.
     start, stop : int
-        First sample of the part in the signal, and the one behind it.
+        First and stop index of the section in the signal.
     contact : tuple of int
-        First sample of the contact and the one behind it, within the part; to about 1 ms.
+        First and stop index of the contact within the section, to about 1 ms.
     bounces : tuple of Window
-        The parts around the later bounces, in order.
+        Windows of the later bounces, in order.
     warnings : tuple of str
-        Doubts about the pulse as a whole.
+        What may be wrong with the pulse as a whole.
     plate : Plate, optional
-        The plate whose resonance was taken out of the signal.
+        The plate whose resonance was corrected in the signal.
     """
 
     name: str
@@ -102,7 +102,7 @@ class Window:
 
 @dataclass
 class _Pulse:
-    """One pulse in the cells of a signal: samples from start to stop, and its height, N."""
+    """One pulse: samples from start to before stop, and its height, N."""
 
     start: int
     stop: int
@@ -112,7 +112,7 @@ class _Pulse:
 
 
 def find_windows(signal: Signal, *, progress: bool = False) -> list[Window]:
-    """Return the parts of a signal around its drops, in order.
+    """Return the windows of the drops in a signal, in order.
 
     The signal is read twice: in blocks for the search, then around each drop.
 
@@ -122,21 +122,21 @@ def find_windows(signal: Signal, *, progress: bool = False) -> list[Window]:
         Where there is no impact, or the rate is too low.
     """
     rate, name = signal.sample_rate, signal.name
-    if not rate >= LEAST_RATE:
-        refuse(f"{name}: sample_rate = {rate:g} Hz is too low", f"at least {LEAST_RATE:g} Hz")
+    if not rate >= MIN_RATE:
+        refuse(f"{name}: sample_rate = {rate:g} Hz is too low", f"at least {MIN_RATE:g} Hz")
     pulses: list[_Pulse] = []
     width = max(1, round(rate * CELL))
     for first, cells in _pieces(signal, progress=progress):
-        # The next piece holds what the end of this one may cut.
-        whole = first + (len(cells) - OVERLAP // 2) * width
+        # The next piece includes pulses that the end of this piece may cut.
+        complete = first + (len(cells) - OVERLAP // 2) * width
         if first + len(cells) * width >= signal.n_sample:
-            whole = first + (len(cells) + OVERLAP) * width
-        behind = pulses[-1].stop if pulses else 0
-        pulses += [p for p in _pulses(cells, first, rate) if behind <= p.start < p.stop <= whole]
+            complete = first + (len(cells) + OVERLAP) * width
+        last = pulses[-1].stop if pulses else 0
+        pulses += [p for p in _pulses(cells, first, rate) if last <= p.start < p.stop <= complete]
     highest = max((p.peak for p in pulses), default=0.0)
-    pulses = [pulse for pulse in pulses if pulse.peak > LEAST_PART * highest]
+    pulses = [pulse for pulse in pulses if pulse.peak > MIN_HEIGHT * highest]
     if not pulses:
-        refuse(f"{name}: no impact is found", "a pulse of 12 to 40 ms that rises above the noise")
+        refuse(f"{name}: no impact", "a pulse of 12 to 40 ms that rises above the noise")
     return list(_windows(signal, pulses))
 
 
@@ -146,12 +146,9 @@ def _pieces(signal: Signal, *, progress: bool) -> Iterator[tuple[int, NDArray[np
     kept = np.empty(0)
     first = 0
     bar = tqdm(
-        total=signal.n_sample,
-        unit="sample",
-        unit_scale=True,
-        desc=signal.name,
+        total=signal.n_sample, unit="sample", unit_scale=True, desc=signal.name,
         disable=not progress,
-    )
+    )  # fmt: skip
     block = 4_096 * width
     ready = 0
     parts: list[NDArray[np.float64]] = []
@@ -173,106 +170,105 @@ def _pieces(signal: Signal, *, progress: bool) -> Iterator[tuple[int, NDArray[np
 
 
 def _baseline(cells: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the force between the pulses: medians of segments, or a low quantile where short."""
+    """Return the force between the pulses: medians of segments, or a low quantile if short."""
     n = len(cells)
     if n < 2 * SEGMENT:
-        # In a short part a contact of up to 25 cells is taken to be no quiet.
-        part = np.clip(0.5 * (n - 25) / n, 0.08, 0.5)
-        return np.full(n, np.quantile(cells, part))
+        # A contact of up to 25 cells is not counted as background.
+        fraction = np.clip(0.5 * (n - 25) / n, 0.08, 0.5)
+        return np.full(n, np.quantile(cells, fraction))
     count = n // SEGMENT
-    whole = cells[: count * SEGMENT].reshape(count, SEGMENT)
+    segments = cells[: count * SEGMENT].reshape(count, SEGMENT)
     middle = (np.arange(count) + 0.5) * SEGMENT
-    return np.interp(np.arange(n), middle, np.median(whole, axis=1))
+    return np.interp(np.arange(n), middle, np.median(segments, axis=1))
 
 
 def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]:
-    """Return the pulses in cells, the first of which begins at a sample."""
+    """Return the pulses in cells; `first` is the first sample of the cells."""
     width = max(1, round(rate * CELL))
     level = uniform_filter1d(cells, 3, mode="nearest") - _baseline(cells)
     below = -level[level < 0]
     deviation = 1.4826 * float(np.median(below)) if below.size else 0.0
     highest = float(level.max(initial=0.0))
-    rise = min(RISE * deviation, RISE_PART * highest)
-    if highest <= max(NO_PULSE * deviation, 1e-9):
+    rise = min(RISE * deviation, RISE_FRACTION * highest)
+    if highest <= max(MIN_DEVIATIONS * deviation, 1e-9):
         return []
     above = np.flatnonzero(level > max(rise, 0.01 * highest))
-    groups = np.split(above, np.flatnonzero(np.diff(above) > MERGED) + 1)
+    groups = np.split(above, np.flatnonzero(np.diff(above) > MAX_GAP) + 1)
     pulses: list[_Pulse] = []
     for group in groups:
         top = int(group[0] + np.argmax(level[group[0] : group[-1] + 1]))
-        behind = -(-(pulses[-1].stop - first) // width) if pulses else 0
-        if top < behind:
+        free = -(-(pulses[-1].stop - first) // width) if pulses else 0
+        if top < free:
             continue
-        low, high = (_walk(level, top, step, level[top] / 2) for step in (-1, 1))
-        # Noise that runs into a pulse is none.
+        low, high = (_find_edge(level, top, step, level[top] / 2) for step in (-1, 1))
+        # Noise that merges with a pulse is no pulse.
         if level[low : high + 1].max() > level[top]:
             continue
         if not DURATIONS[0] <= (high - low + 1) * width / rate <= DURATIONS[1]:
             continue
-        # The quiet next to the pulse, which slow noise moves away from that of a second.
-        ahead, after = level[max(behind, low - BESIDE) : low - SIDE], level[high + SIDE :][:BESIDE]
-        beside = [np.quantile(part, 0.4) if part.size else 0.0 for part in (ahead, after)]
-        place = np.clip((np.arange(len(level)) - low) / max(high - low, 1), 0, 1)
-        local = level - (beside[0] + place * (beside[1] - beside[0]))
-        peak = float(local[top])
-        start = _walk(local, low, -1, FOOT * peak) - MARGIN
-        stop = _walk(local, high, 1, FOOT * peak) + 1 + MARGIN
-        start = max(start, behind)
-        warning = _told_double(local[max(group[0], behind) : group[-1] + 1])
-        pulses.append(
-            _Pulse(
-                first + start * width,
-                first + stop * width,
-                peak,
-                warnings=[warning] if warning else [],
-            )
+        # Background next to the pulse, which slow noise moves away from that of a second.
+        ahead, after = (
+            level[max(free, low - BESIDE) : low - DISTANCE],
+            level[high + DISTANCE :][:BESIDE],
         )
+        beside = [np.quantile(side, 0.4) if side.size else 0.0 for side in (ahead, after)]
+        fraction = np.clip((np.arange(len(level)) - low) / max(high - low, 1), 0, 1)
+        local = level - (beside[0] + fraction * (beside[1] - beside[0]))
+        peak = float(local[top])
+        start = max(_find_edge(local, low, -1, FOOT * peak) - MARGIN, free)
+        stop = _find_edge(local, high, 1, FOOT * peak) + 1 + MARGIN
+        warning = _double_peak_warning(local[max(group[0], free) : group[-1] + 1])
+        span = first + start * width, first + stop * width
+        pulses.append(_Pulse(*span, peak, warnings=[warning] if warning else []))
     return pulses
 
 
-def _walk(level: NDArray[np.float64], place: int, step: int, foot: float) -> int:
-    """Return the outermost cell of a pulse: behind it two cells lie at its foot."""
-    while 0 <= place + step < len(level) and (
-        level[place + step] > foot
-        or (0 <= place + 2 * step < len(level) and level[place + 2 * step] > foot)
+def _find_edge(envelope: NDArray[np.float64], start: int, direction: int, threshold: float) -> int:
+    """Return the last cell above the threshold; two cells below it in a row end the pulse."""
+    edge = start
+    while 0 <= edge + direction < len(envelope) and (
+        envelope[edge + direction] > threshold
+        or (
+            0 <= edge + 2 * direction < len(envelope) and envelope[edge + 2 * direction] > threshold
+        )
     ):
-        place += step
-    return place
+        edge += direction
+    return edge
 
 
-def _told_double(level: NDArray[np.float64]) -> str:
-    """Return a sentence where a deep valley lies between two peaks of one pulse, or nothing."""
-    top = int(np.argmax(level))
-    for side in (level[top:], level[: top + 1][::-1]):
+def _double_peak_warning(envelope: NDArray[np.float64]) -> str:
+    """Return a warning if a deep valley separates two peaks of one pulse, else an empty string."""
+    top = int(np.argmax(envelope))
+    for side in (envelope[top:], envelope[: top + 1][::-1]):
         lowest = np.minimum.accumulate(side)
         k = int(np.argmax(side - lowest))
-        if lowest[k] < VALLEY * side[k] and side[k] > VALLEY * level[top]:
+        if lowest[k] < VALLEY * side[k] and side[k] > VALLEY * envelope[top]:
             return (
                 f"two impacts meet: a second peak of {side[k]:.0f} N rises from {lowest[k]:.0f} N, "
-                "without quiet between them"
+                "without background between them"
             )
     return ""
 
 
 def _windows(signal: Signal, pulses: list[_Pulse]) -> Iterator[Window]:
-    """Yield the windows of drops, with those of their bounces."""
+    """Yield the windows of drops with their bounces."""
     drops: list[_Pulse] = []
-    flight = LONGEST_FLIGHT
+    flight = MAX_FLIGHT
     before: _Pulse | None = None
     for pulse in pulses:
         gap = np.inf if before is None else (pulse.start - before.stop) / signal.sample_rate
         bounced = (
             before is not None
             and gap < 1.02 * flight
-            and pulse.peak < NEW_PART * before.peak
-            and gap > SHORTEST_FLIGHT
+            and pulse.peak < NEW_DROP * before.peak
+            and gap > MIN_FLIGHT
         )
         if bounced:
             drops[-1].bounces.append(pulse)
             flight = gap
         else:
             drops.append(pulse)
-            flight = LONGEST_FLIGHT
+            flight = MAX_FLIGHT
         before = pulse
     edges = {id(p): k for k, p in enumerate(pulses)}
 

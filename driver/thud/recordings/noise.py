@@ -1,4 +1,4 @@
-"""Noise and background of a signal from its quiet parts (docs/recordings_theory.md, section 2)."""
+"""Noise and background of a signal next to a contact (docs/recordings_theory.md, section 2)."""
 
 from __future__ import annotations
 
@@ -29,34 +29,33 @@ DRIFT = 0.1
 # Squared lag over mean squared length of two cells below which their covariance is exact.
 NEAR = 8.0
 # Priors of the logarithms of the variances: these powers of the variance, up to a deviation of a
-# quiet cell of this part of the peak force; falling beyond.
+# cell of this fraction of the peak force; falling beyond.
 SLOPE = np.array([0.5, 0.25, 1.0, 0.25, 0.25])
 LARGE = 0.03
-# Standard deviation of each quiet cell that is no noise, over the peak force: digits.
-DIGITS = 1e-6
-# Draws of the variances from their posterior, and those that are kept.
+# Standard deviation of each cell due to quantization, over the peak force.
+QUANTIZATION = 1e-6
+# Number of draws of the variances from their posterior, and number that is kept.
 N_DRAW = 64
 N_KEPT = 16
-# Degrees of freedom of the distribution that they are drawn from.
+# Degrees of freedom of the distribution of the draws.
 FREEDOM = 5
-# Iterations of the posterior's maximum, and the change of its logarithm that ends them.
+# Maximum iterations for the maximum of the posterior, and the tolerance of its logarithm.
 MAX_ITERATIONS = 25
 TOLERANCE = 0.02
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise of a recording, white, pink and brown.
+    """Noise of a recording: white, pink and brown.
 
     Attributes
     ----------
     deviation : float
         Standard deviation of one sample, N.
     source : str
-        ``"before and after"``, ``"before"`` or ``"after"``: the quiet parts that it is known from.
+        ``"before and after"``, ``"before"`` or ``"after"``: the background that shows it.
     white, pink, brown : float
-        One-sided spectral densities at 1 Hz, N2/Hz, of the parts that are even, fall as 1/f and
-        as 1/f2.
+        One-sided spectral densities at 1 Hz, N2/Hz: constant, proportional to 1/f and to 1/f2.
     """
 
     deviation: float
@@ -73,12 +72,12 @@ class Noise:
 
     def deviation_between(self, lower: float, upper: float) -> float:
         """Return the standard deviation of the noise between two frequencies, N."""
-        parts = (
+        variances = (
             self.white * (upper - lower),
             self.pink * np.log(upper / lower),
             self.brown * (1 / lower - 1 / upper),
         )
-        return float(np.sqrt(sum(parts)))
+        return float(np.sqrt(sum(variances)))
 
 
 def noise_covariances(one: Cells, other: Cells) -> NDArray[np.float64]:
@@ -86,7 +85,7 @@ def noise_covariances(one: Cells, other: Cells) -> NDArray[np.float64]:
 
     Of pink and brown noise of density 1 at 1 Hz and of hum of 50 and 60 Hz of variance 1. The
     covariances at a lag are -ln|lag| and -pi2 |lag|, up to a constant that the unknown offset
-    takes; the mean of the first over two cells is taken to second order in their lengths.
+    absorbs; the mean of the first over two cells is taken to second order in their lengths.
     """
     (a, b), (c, d) = one, other
     lag = np.abs(((a + b) / 2)[:, None] - (c + d) / 2)
@@ -95,7 +94,7 @@ def noise_covariances(one: Cells, other: Cells) -> NDArray[np.float64]:
     lag[near] = 1.0
     pink = width / (12 * lag**2) - np.log(lag)
     brown = -(np.pi**2) * lag
-    # Of cells that touch or are the same: corner differences of the second integrals.
+    # Adjacent or equal cells: corner differences of the second integrals.
     a, b, c, d = a[near[0]], b[near[0]], c[near[1]], d[near[1]]
     size: NDArray[np.float64] = np.maximum(np.abs([b - c, a - c, b - d, a - d]), 1e-300)
     sign = np.array([1, -1, -1, 1]) / ((b - a) * (d - c))[:, None]
@@ -122,22 +121,22 @@ def _waves(cells: Cells) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class Background(Immutable):
-    """What lies under the force, from the means of quiet cells: the best linear prediction.
+    """Background under the force, predicted linearly from cells next to the contact.
 
     Attributes
     ----------
-    quiet : Cells
-        Begins and ends of the quiet cells, s.
+    cells : Cells
+        Begins and ends of the cells, s.
     mean : ndarray, shape (n_cell,)
         Their mean forces, N.
     draws : ndarray, shape (n_draw, 5)
-        Draws of what the variances may be: densities of white, pink and brown noise, N2/Hz, and
-        variances of hum of 50 and of 60 Hz, N2. One where they are known.
+        Draws of the variances: densities of white, pink and brown noise, N2/Hz, and variances of
+        hum of 50 and of 60 Hz, N2; one draw if they are known.
     peak : float
         Scale of the priors of offset and drift, N.
     """
 
-    quiet: Cells
+    cells: Cells
     mean: NDArray[np.float64]
     draws: NDArray[np.float64]
     peak: float
@@ -154,33 +153,33 @@ class Background(Immutable):
 
     @cached_property
     def _factors(self) -> list[NDArray[np.float64]]:
-        """Return the factor of the covariance of the quiet cells for each draw."""
-        parts, fixed = covariances(self.quiet), _fixed(self.quiet, self.peak)
+        """Return the factor of the covariance of the cells for each draw."""
+        unit, fixed = covariances(self.cells), _fixed(self.cells, self.peak)
         return [
-            np.asarray(np.linalg.cholesky(np.tensordot(draw, parts, 1) + fixed), dtype=np.float64)
+            np.asarray(np.linalg.cholesky(np.tensordot(draw, unit, 1) + fixed), dtype=np.float64)
             for draw in self.draws
         ]
 
     @cached_property
     def _weights(self) -> list[NDArray[np.float64]]:
-        """Return the inverse covariance of the quiet cells times their means for each draw."""
+        """Return the inverse covariance of the cells times their means for each draw."""
         return [cho_solve((f, True), self.mean, check_finite=False) for f in self._factors]
 
     def predict(self, cells: Cells) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the background of cells, N, and the covariance of its error, N2.
 
-        Both are those of the mixture of all draws. The covariance lacks the white noise of the
+        Both are of the mixture of all draws. The covariance lacks the white noise of the
         cells themselves.
         """
-        across = noise_covariances(self.quiet, cells)
-        trend = _trend(self.quiet, cells, self.peak)
+        across = noise_covariances(self.cells, cells)
+        trend = _trend(self.cells, cells, self.peak)
         total = np.tensordot(self.variances[1:], noise_covariances(cells, cells), 1)
         total += _trend(cells, cells, self.peak)
         means = np.empty((len(self.draws), len(cells[0])))
         for k, (draw, factor) in enumerate(zip(self.draws, self._factors, strict=True)):
-            one = np.tensordot(draw[1:], across, 1) + trend
-            half = _solve_lower(factor, one)
-            means[k] = self._weights[k] @ one
+            shared = np.tensordot(draw[1:], across, 1) + trend
+            half = _solve_lower(factor, shared)
+            means[k] = self._weights[k] @ shared
             total -= half.T @ half / len(self.draws)
         mean = means.mean(axis=0)
         means -= mean
@@ -188,8 +187,8 @@ class Background(Immutable):
 
     def predict_mean(self, cells: Cells) -> NDArray[np.float64]:
         """Return the background of cells, N."""
-        across = noise_covariances(self.quiet, cells)
-        mean = np.mean(self._weights, axis=0) @ _trend(self.quiet, cells, self.peak)
+        across = noise_covariances(self.cells, cells)
+        mean = np.mean(self._weights, axis=0) @ _trend(self.cells, cells, self.peak)
         for draw, weights in zip(self.draws, self._weights, strict=True):
             mean += np.tensordot(draw[1:], weights @ across, 1) / len(self.draws)
         return np.asarray(mean, dtype=np.float64)
@@ -198,7 +197,7 @@ class Background(Immutable):
     def drift(self) -> tuple[float, float]:
         """Drift, N/s, and its standard deviation."""
         prior = (self.peak * DRIFT) ** 2
-        middle = (self.quiet[0] + self.quiet[1]) / 2
+        middle = (self.cells[0] + self.cells[1]) / 2
         known = [float(np.sum(_solve_lower(factor, middle) ** 2)) for factor in self._factors]
         values = prior * np.array([middle @ weights for weights in self._weights])
         variance = max(prior - prior**2 * float(np.mean(known)), 0.0) + float(values.var())
@@ -208,20 +207,15 @@ class Background(Immutable):
     def hum(self) -> tuple[float, float, float]:
         """Frequency of the stronger hum, Hz, its amplitude and the deviation of that, N."""
         k = int(np.argmax(self.variances[3:]))
-        waves = _waves(self.quiet)[k]
-        part = (
-            waves
-            @ waves.T
-            @ np.mean(
-                [draw[3 + k] * w for draw, w in zip(self.draws, self._weights, strict=True)], axis=0
-            )
-        )
-        noise = np.mean(self.variances[0] / 2 / (self.quiet[1] - self.quiet[0]))
-        return MAINS[k], float(np.sqrt(2 * np.mean(part**2))), float(np.sqrt(2 * noise / len(part)))
+        waves = _waves(self.cells)[k]
+        scaled = [draw[3 + k] * w for draw, w in zip(self.draws, self._weights, strict=True)]
+        hum = waves @ waves.T @ np.mean(scaled, axis=0)
+        noise = np.mean(self.variances[0] / 2 / (self.cells[1] - self.cells[0]))
+        return MAINS[k], float(np.sqrt(2 * np.mean(hum**2))), float(np.sqrt(2 * noise / len(hum)))
 
 
 def _solve_lower(factor: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the solution for a lower factor; the checks of SciPy's own would take longer."""
+    """Return the solution for a lower factor, without the slow checks of SciPy."""
     return np.asarray(lapack.dtrtrs(factor, right, lower=True)[0])
 
 
@@ -232,8 +226,8 @@ def _trend(one: Cells, other: Cells, peak: float) -> NDArray[np.float64]:
 
 
 def _fixed(cells: Cells, peak: float) -> NDArray[np.float64]:
-    """Return the covariance of quiet cells that no variance scales: offset, drift and digits."""
-    return _trend(cells, cells, peak) + (DIGITS * peak) ** 2 * np.eye(len(cells[0]))
+    """Return the covariance of cells that no variance scales: offset, drift and quantization."""
+    return _trend(cells, cells, peak) + (QUANTIZATION * peak) ** 2 * np.eye(len(cells[0]))
 
 
 def covariances(cells: Cells) -> NDArray[np.float64]:
@@ -242,39 +236,39 @@ def covariances(cells: Cells) -> NDArray[np.float64]:
     return np.concatenate([white[None], noise_covariances(cells, cells)])
 
 
-def fit_background(quiet: Cells, mean: NDArray[np.float64], peak: float) -> Background:
-    """Return the background with the variances that quiet cells allow, drawn from their posterior.
+def fit_background(cells: Cells, mean: NDArray[np.float64], peak: float) -> Background:
+    """Return the background with variances drawn from their posterior.
 
     Parameters
     ----------
-    quiet
-        Begins and ends of the quiet cells, s, from near the middle of the contact.
+    cells
+        Begins and ends of the cells, s from about the middle of the contact.
     mean : ndarray, shape (n_cell,)
         Mean force of each, N.
     peak
         Peak force, N.
     """
-    parts = covariances(quiet)
-    scale = np.array([np.mean(np.diagonal(parts[0])), 1.0, np.pi**2 * 0.02, 1.0, 1.0])
-    posterior = _Posterior(parts, _fixed(quiet, peak), mean, (LARGE * peak) ** 2 / scale)
-    # Half of the size of fast changes.
-    adjoining = quiet[0][1:] - quiet[1][:-1] < 1e-3 * (quiet[1] - quiet[0])[1:]
+    unit = covariances(cells)
+    scale = np.array([np.mean(np.diagonal(unit[0])), 1.0, np.pi**2 * 0.02, 1.0, 1.0])
+    posterior = _Posterior(unit, _fixed(cells, peak), mean, (LARGE * peak) ** 2 / scale)
+    # Half the variance of fast changes.
+    adjoining = cells[0][1:] - cells[1][:-1] < 1e-3 * (cells[1] - cells[0])[1:]
     changes = np.diff(mean)[adjoining]
-    rough = (np.mean(changes**2) / 2 if changes.size else 0.0) + (DIGITS * peak) ** 2
+    rough = (np.mean(changes**2) / 2 if changes.size else 0.0) + (QUANTIZATION * peak) ** 2
     first = np.log(rough * np.array([1, 0.1, 0.1, 0.05, 0.05]) / scale)
     likely, curvature = posterior.maximum(first)
-    return Background(quiet, mean, np.exp(posterior.draw(likely, curvature)), peak)
+    return Background(cells, mean, np.exp(posterior.draw(likely, curvature)), peak)
 
 
 @dataclass(frozen=True, eq=False)
 class _Posterior:
     """Posterior of the logarithms of the variances.
 
-    The covariance of the cells is linear in the variances. The priors rise with them, up to
-    `large`: a part that is absent is found to be small, not zero.
+    The covariance of the cells is linear in the variances; `unit` holds those of unit variance. The
+    priors rise with the variances up to `large`: absent noise comes out small, not zero.
     """
 
-    parts: NDArray[np.float64]
+    unit: NDArray[np.float64]
     fixed: NDArray[np.float64]
     mean: NDArray[np.float64]
     large: NDArray[np.float64]
@@ -282,7 +276,7 @@ class _Posterior:
     def logarithm(self, phi: NDArray[np.float64]) -> float:
         """Return the logarithm of the posterior."""
         theta = np.exp(phi)
-        factor, failed = lapack.dpotrf(np.tensordot(theta, self.parts, 1) + self.fixed, lower=True)
+        factor, failed = lapack.dpotrf(np.tensordot(theta, self.unit, 1) + self.fixed, lower=True)
         if failed:
             return -np.inf
         white = _solve_lower(factor, self.mean)
@@ -294,18 +288,18 @@ class _Posterior:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the gradient, and the average information with that of the priors."""
         theta = np.exp(phi)
-        factor, _ = lapack.dpotrf(np.tensordot(theta, self.parts, 1) + self.fixed, lower=True)
+        factor, _ = lapack.dpotrf(np.tensordot(theta, self.unit, 1) + self.fixed, lower=True)
         inverse = lapack.dpotri(factor, lower=True)[0]
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
         weighted = inverse @ self.mean
-        turned = (self.parts @ weighted) * theta[:, None]
-        trace = theta * np.einsum("kij,ij->k", self.parts, inverse)
+        turned = (self.unit @ weighted) * theta[:, None]
+        trace = theta * np.einsum("kij,ij->k", self.unit, inverse)
         score = 0.5 * (turned @ weighted - trace) + SLOPE - theta / (theta + self.large)
         # At the maximum, where the score is zero, that of the likelihood is the prior's slope.
         return score, 0.5 * turned @ inverse @ turned.T + np.diag(SLOPE)
 
     def maximum(self, phi: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the most likely logarithms from a first guess, and the curvature there."""
+        """Return the most likely logarithms and the curvature there, from a first guess."""
         value = self.logarithm(phi)
         score, curvature = self._derivatives(phi)
         for _ in range(MAX_ITERATIONS):
@@ -330,10 +324,10 @@ class _Posterior:
         # Rows x with covariance inverse(curvature) = inverse(L)' inverse(L).
         lower = np.linalg.cholesky(curvature)
         phi = likely + solve_triangular(lower, steps.T, lower=True, trans="T").T
-        weight = np.array([self.logarithm(one) for one in phi]) - logarithm
+        weight = np.array([self.logarithm(draw) for draw in phi]) - logarithm
         weight = np.exp(weight - weight.max())
-        places = (np.arange(N_KEPT) + 0.5) / N_KEPT * weight.sum()
-        return np.asarray(phi[np.searchsorted(weight.cumsum(), places)])
+        quantiles = (np.arange(N_KEPT) + 0.5) / N_KEPT * weight.sum()
+        return np.asarray(phi[np.searchsorted(weight.cumsum(), quantiles)])
 
 
 @lru_cache(maxsize=8)

@@ -1,4 +1,4 @@
-"""A first look at a file in a process of its own, where a library hangs, dies or fills memory."""
+"""Probe of a file in a subprocess, where a library may hang, crash or fill memory."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from thud.recordings.channel import guarded, shown_path
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-# Seconds and bytes that the first look may take.
-PATIENCE = 10.0
+# Maximum time, s, and memory, bytes.
+TIMEOUT = 10.0
 MEMORY = 2**29
 
 
-def look(action: Callable[[Path], object], path: Path, kind: str) -> None:
-    """Do something with a file in a forked process.
+def probe_in_subprocess(action: Callable[[Path], object], path: Path, kind: str) -> None:
+    """Run an action on a file in a forked process.
 
     Raises
     ------
     InputError
-        What the action raises there, or that the process hung, died or ran out of memory.
+        As the action, or where the process hangs, crashes or runs out of memory.
     """
     reader, writer = os.pipe()
-    with guarded(path, kind):  # Python warns of forks beside threads; the child starts none
+    with guarded(path, kind):  # Python warns of a fork with threads; the child starts none
         child = os.fork()
     if not child:
         _report(action, path, kind, writer)
@@ -48,23 +48,23 @@ def look(action: Callable[[Path], object], path: Path, kind: str) -> None:
     if message:
         raise InputError(message.decode("utf-8", "replace"))
     if status:
-        what = "makes its library fail" if ended else f"is not read within {PATIENCE:g} s"
-        refuse(f"{shown_path(path)}: {what}", f"an undamaged {kind} file")
+        reason = "makes its library fail" if ended else f"is not read within {TIMEOUT:g} s"
+        refuse(f"{shown_path(path)}: {reason}", f"an undamaged {kind} file")
 
 
 def _report(action: Callable[[Path], object], path: Path, kind: str, writer: int) -> None:
-    """Do something, write what it raises to a pipe, and end the process."""
+    """Run an action, write its error to a pipe, and end the process."""
     code = 1
     # Ends a process whose parent was killed meanwhile.
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
-    signal.alarm(2 * int(PATIENCE))
+    signal.alarm(2 * int(TIMEOUT))
     try:
         size = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
-        most = size * resource.getpagesize() + MEMORY
+        limit = size * resource.getpagesize() + MEMORY
         _, hard = resource.getrlimit(resource.RLIMIT_AS)
-        allowed = most if hard == resource.RLIM_INFINITY else min(most, hard)
-        resource.setrlimit(resource.RLIMIT_AS, (allowed, hard))
-        # What dies here leaves no dump and no words.
+        limit = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
+        resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
+        # A crash leaves no core dump and no output.
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         faulthandler.disable()
         with guarded(path, kind):
@@ -78,10 +78,10 @@ def _report(action: Callable[[Path], object], path: Path, kind: str, writer: int
 
 
 def _listen(reader: int) -> tuple[bytes, bool]:
-    """Return what a process writes until it ends, and whether it ends in time."""
+    """Return the output of a process until it ends, and whether it ends in time."""
     message = b""
-    until = time.monotonic() + PATIENCE
-    while (left := until - time.monotonic()) > 0:
+    end = time.monotonic() + TIMEOUT
+    while (left := end - time.monotonic()) > 0:
         if select.select([reader], [], [], left)[0]:
             piece = os.read(reader, 4096)
             if not piece:

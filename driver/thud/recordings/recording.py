@@ -1,4 +1,4 @@
-"""A recording: drops of one source, measured, and what the standards say of it."""
+"""A recording: measured drops of one source, and their assessment."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from thud.recordings.budgets import (
     level_estimates,
 )
 from thud.recordings.config import Config, checked_config
-from thud.recordings.excursion import check_peak, scan
-from thud.recordings.low_pass import describe_low_pass
+from thud.recordings.filters import describe_low_pass
 from thud.recordings.measure_drops import measure_signals
+from thud.recordings.polarity import check_peak, scan
 from thud.recordings.recorded_levels import average_levels, compare_methods, measure_levels
 from thud.recordings.signal import Signal
 
@@ -52,8 +52,8 @@ if TYPE_CHECKING:
 class Recording(Displayed):
     """Recorded drops of one source.
 
-    Where one force is asked for (`time`, `force`, comparisons, fits) it is that of the first drop;
-    levels and the other numbers are averages over all drops.
+    `time` and `force`, also in comparisons and fits, are those of the first drop; levels and other
+    numbers are averages over all drops.
 
     Attributes
     ----------
@@ -64,9 +64,9 @@ class Recording(Displayed):
     origins : tuple of Origin
         The files.
     config : Config
-        What the laboratory says; mass, kg, and height, m, may be None.
+        Statements of the laboratory; mass, kg, and height, m, may be None.
     calibration_uncertainty : float or None
-        Relative standard uncertainty of the force; None where it is not known.
+        Relative standard uncertainty of the force; None if unknown.
     """
 
     name: str
@@ -105,16 +105,16 @@ class Recording(Displayed):
         Parameters
         ----------
         force : array_like, shape (n_sample,)
-            Force, N, positive in compression, with quiet before and after each drop.
+            Force, N, positive in compression, with background before and after each drop.
         sample_rate
             Samples per second, Hz.
         height, mass, height_uncertainty, mass_uncertainty, calibration_uncertainty, name
-            As `read_recording` takes them.
+            As for `read_recording`.
 
         Raises
         ------
         InputError
-            One sentence: what cannot be measured.
+            Where a drop cannot be measured.
         """
         config = Config(
             height=height,
@@ -137,12 +137,12 @@ class Recording(Displayed):
         workers: int = 1,
         keep: str | os.PathLike[str] | Checkpoint | None = None,
     ) -> Recording:
-        """Measure the drops of signals; the other arguments are those of `read_recording`.
+        """Measure the drops of signals; other arguments as for `read_recording`.
 
         Raises
         ------
         InputError
-            One sentence: what cannot be measured.
+            Where a drop cannot be measured.
         """
         drops, origins, uncertainty = measure_signals(
             signals, checked_config(config), progress=progress, workers=workers, keep=keep
@@ -210,7 +210,7 @@ class Recording(Displayed):
 
     @property
     def restitution(self) -> float:
-        """Mean coefficient of restitution; NaN where it is not known."""
+        """Mean coefficient of restitution; NaN if unknown."""
         return self.estimates["restitution"].value
 
     @property
@@ -225,7 +225,7 @@ class Recording(Displayed):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is doubtful: of the whole, of files and of drops; a sentence each."""
+        """What may be wrong with the recording, its files and drops, a sentence each."""
         found = [*self.own_warnings, *map(str, self.outliers)]
         found += [warning for one in self.origins for warning in one.warnings]
         found += [f"{drop.name}: {warning}" for drop in self.drops for warning in drop.warnings]
@@ -233,16 +233,16 @@ class Recording(Displayed):
 
     @cached_property
     def own_warnings(self) -> tuple[str, ...]:
-        """What is doubtful of the recording as a whole; a sentence each."""
+        """What may be wrong with the recording as a whole, a sentence each."""
         config, found = self.config, list[str]()
         if math.isnan(self.estimates["peaks"].value):
-            found.append("the number of peaks is not known: noise may have made some")
+            found.append("the number of peaks is unknown: some may be noise")
         known = sum(math.isfinite(drop.restitution.value) for drop in self.drops)
         if 0 < known < len(self.drops):
-            found.append(f"the restitution is known of {known} of {len(self.drops)} drops")
+            found.append(f"the restitution of {known} of {len(self.drops)} drops is known")
         found += check_restitution(self.drops, config.conditions(self.calibration_uncertainty))
         if config.mass is None and math.isfinite(self.estimates["mass"].value):
-            found.append("the mass is not given: the effective mass is judged")
+            found.append("the mass is not stated: the effective mass is assessed")
         found += [f"force plate: {one.sentence}" for one in config.plate_checks if one.met is False]
         plate = config.resonance
         missing = {
@@ -258,7 +258,7 @@ class Recording(Displayed):
 
     @property
     def steps(self) -> tuple[str, ...]:
-        """What was done to the signals; a sentence each."""
+        """Processing of the signals, a sentence each."""
         found = [f"{one.name}: {step}" for one in self.origins for step in one.steps]
         found += [f"{drop.name}: {step}" for drop in self.drops for step in drop.steps]
         found += self.level_steps
@@ -266,11 +266,15 @@ class Recording(Displayed):
 
     @property
     def level_steps(self) -> tuple[str, ...]:
-        """What was done to the forces before their levels were measured; a sentence each."""
+        """Processing of the forces before their levels were measured, a sentence each."""
         if not self.config.low_pass:
             return ()
         rates = dict.fromkeys(drop.sample_rate for drop in self.drops)
         return tuple(dict.fromkeys(f"levels: {describe_low_pass(rate)}" for rate in rates))
+
+    def quantity(self, name: str) -> float:
+        """Return a quantity of the table by its name, SI units; NaN if unknown."""
+        return float(getattr(self, name, math.nan))
 
     def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - there is one
         """Return the force of the first drop, corrected, N, shape (n_sample,), for any `kind`."""
@@ -327,12 +331,12 @@ class Recording(Displayed):
     def outliers(self) -> tuple[Outlier, ...]:
         """Drops that differ in a level, the contact time, the restitution or the peak.
 
-        None is left out. Levels share a significance of 5 %, and so do the others.
+        They are not excluded. Levels share a significance of 5 %, and so do the others.
         """
         return (*self.average().outliers, *find_deviant(self.drops))
 
     def level_estimates(self, bands: BandSet = "octave") -> tuple[Estimate, ...]:
-        """Return the average levels with all that makes them uncertain, dB, shape (n_band,)."""
+        """Return the average levels with their uncertainty budgets, dB, shape (n_band,)."""
         plate = self.config.resonance
         return level_estimates(
             self.average(bands),
@@ -345,14 +349,14 @@ class Recording(Displayed):
         source: LimitsSource | None = None,
         force: LevelsForce | None = None,  # noqa: ARG002 - there is one
     ) -> Verdict:
-        """Return the verdict of the standards at 95 %, with the limits of the configuration.
+        """Assess the source at 95 % by the limits of the configuration.
 
         Parameters
         ----------
         source
             ``"rubber_ball"`` or ``"tyre"``; by default that of the configuration.
         force
-            Not used: a force plate measures the force on the floor.
+            Ignored: a force plate measures the force on the floor.
         """
         return assess(
             self.level_estimates(),

@@ -1,4 +1,4 @@
-"""Files of recorded channels as signals in newtons."""
+"""Recorded files as signals in newtons."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse, require_choice, require_kind, require_number, shown
 from thud.recordings.channel import MIB, Channel, shown_path, shown_text
-from thud.recordings.excursion import POLARITIES, check_peak, find_sign, scan
 from thud.recordings.force_units import (
     ALLOWED,
     ASSUMED,
@@ -22,6 +21,7 @@ from thud.recordings.force_units import (
     require_unit,
 )
 from thud.recordings.formats import read_channels
+from thud.recordings.polarity import POLARITIES, check_peak, find_sign, scan
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
@@ -30,12 +30,12 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-# Minimum and maximum sample rate, Hz: the octave of 500 Hz needs 1.42 kHz and a filter's slope.
+# Minimum and maximum sample rate, Hz: the octave of 500 Hz needs 1.42 kHz and a filter.
 RATES = (2500.0, 1e8)
-SHORTEST = 8
-# A file of which less than this is stored is a hole; pieces of it that are looked at.
-STORED = 0.01
-MOST_PIECES = 1000
+MIN_SAMPLES = 8
+# Minimum stored fraction of a file, which else is sparse, and maximum number of inspected pieces.
+MIN_STORED = 0.01
+MAX_PIECES = 1000
 
 
 def open_signals(  # noqa: PLR0913 - the keys of the configuration
@@ -73,27 +73,27 @@ def open_signals(  # noqa: PLR0913 - the keys of the configuration
     Raises
     ------
     InputError
-        One sentence: the file is missing, damaged, too large or of no known format; channel,
-        unit, rate, calibration or sign are not known; the force is not that of such a source.
+        Where the file is missing, damaged, too large or of unknown format; channel, unit, rate,
+        calibration or sign are unknown; or the force is implausible.
     """
     if polarity is not None:
         require_choice("polarity", polarity, POLARITIES)
-    given_unit = None if unit is None else require_unit(unit, "recording")
+    stated_unit = None if unit is None else require_unit(unit, "recording")
     if sample_rate is not None:
         require_number("sample_rate", sample_rate)
-    given = _Given(given_unit, calibration, polarity, sample_rate)
+    stated = _Stated(stated_unit, calibration, polarity, sample_rate)
     file = regular_file(path)
     channels = read_channels(file)
     return [
-        _signal(file, one, given, several=len(channels) > 1)
+        _signal(file, one, stated, several=len(channels) > 1)
         for one in choose_channels(channels, channel, shown_path(file))
     ]
 
 
 def regular_file(path: str | os.PathLike[str]) -> Path:
-    """Return a path; raise InputError where it is no regular file that can be read and is stored.
+    """Return a path; raise InputError where it is no readable, completely stored, regular file.
 
-    To open a pipe could block; a hole of gigabytes is read for minutes.
+    Opening a pipe could block; reading a sparse file of gigabytes takes minutes.
     """
     require_kind("recording", path, str | os.PathLike)
     file = Path(path)
@@ -111,7 +111,7 @@ def regular_file(path: str | os.PathLike[str]) -> Path:
     if not stat.S_ISREG(found.st_mode):
         kind = "a directory" if stat.S_ISDIR(found.st_mode) else "no regular file"
         refuse(f"{name}: is {kind}", "a file")
-    if found.st_size > MIB and stored < STORED * found.st_size:
+    if found.st_size > MIB and stored < MIN_STORED * found.st_size:
         refuse(
             f"{name}: {found.st_size / MIB:.0f} MiB of which {stored / MIB:.1f} MiB are stored",
             "a complete file",
@@ -120,23 +120,23 @@ def regular_file(path: str | os.PathLike[str]) -> Path:
 
 
 def _stored(descriptor: int, size: int) -> int:
-    """Return the number of bytes of a file that are no holes, at least of its first pieces."""
-    place = stored = 0
-    for _ in range(MOST_PIECES):
+    """Return the number of stored bytes of a file, at least of its first pieces."""
+    position = stored = 0
+    for _ in range(MAX_PIECES):
         try:
-            begin = os.lseek(descriptor, place, os.SEEK_DATA)
-            place = os.lseek(descriptor, begin, os.SEEK_HOLE)
+            begin = os.lseek(descriptor, position, os.SEEK_DATA)
+            position = os.lseek(descriptor, begin, os.SEEK_HOLE)
         except OSError as error:
-            # No data after this place, or a file system that does not know.
+            # No more data, or a file system without this information.
             return stored if error.errno == errno.ENXIO else size
-        stored += place - begin
-        if place >= size:
+        stored += position - begin
+        if position >= size:
             return stored
     return size
 
 
 def choose_channels(channels: list[Channel], channel: int | str | None, name: str) -> list[Channel]:
-    """Return the channels that are meant; raise InputError where that is not clear."""
+    """Return the selected channels; raise InputError where the selection is ambiguous."""
     listed = ", ".join(
         f"{one.number}" + (f" {shown_text(one.name)!r}" if one.name else "")
         for one in channels[:20]
@@ -164,8 +164,8 @@ def choose_channels(channels: list[Channel], channel: int | str | None, name: st
 
 
 @dataclass(frozen=True)
-class _Given:
-    """What the user says about the values of a file."""
+class _Stated:
+    """Statements of the user on the values of a file."""
 
     unit: str | None
     calibration: float | str | Calibration | None
@@ -173,20 +173,20 @@ class _Given:
     sample_rate: float | None
 
 
-def _signal(path: Path, one: Channel, given: _Given, *, several: bool) -> Signal:
-    """Return the signal of a channel; raise InputError where something is not known about it."""
+def _signal(path: Path, one: Channel, stated: _Stated, *, several: bool) -> Signal:
+    """Return the signal of a channel; raise InputError where its rate or unit is unknown."""
     name = shown_path(Path(path.name))
     if several:
         name += f", {shown_text(one.name) or f'channel {one.number}'}"
-    if one.n_sample < SHORTEST:
-        refuse(f"{name}: {one.n_sample} samples", f"{SHORTEST} samples or more")
-    rate, steps = _rate(one, given, name)
-    unit, told = _unit(one, given, name)
-    factor, words, uncertainty = newtons_per_unit(unit, given.calibration, one.counts, name)
-    # The values of integers are fractions of full scale.
+    if one.n_sample < MIN_SAMPLES:
+        refuse(f"{name}: {one.n_sample} samples", f"{MIN_SAMPLES} samples or more")
+    rate, steps = _rate(one, stated, name)
+    unit, replaced = _unit(one, stated, name)
+    factor, words, uncertainty = newtons_per_unit(unit, stated.calibration, one.counts, name)
+    # Integers are read as fractions of full scale.
     scale = factor * one.counts if one.counts and unit == "counts" else factor
-    seen = scan(one.samples, one.n_sample, name)
-    sign, changed = find_sign(seen, scale, given.polarity, name)
+    extremes = scan(one.samples, one.n_sample, name)
+    sign, changed = find_sign(extremes, scale, stated.polarity, name)
     return Signal(
         name=name,
         path=str(path),
@@ -197,14 +197,14 @@ def _signal(path: Path, one: Channel, given: _Given, *, several: bool) -> Signal
         date=shown_text(one.date),
         calibration=words,
         calibration_uncertainty=uncertainty,
-        steps=(*one.steps, *steps, *told, *changed),
-        warnings=check_peak(seen, sign * scale, name, assumed=unit == ASSUMED),
+        steps=(*one.steps, *steps, *replaced, *changed),
+        warnings=check_peak(extremes, sign * scale, name, assumed=unit == ASSUMED),
     )
 
 
-def _rate(one: Channel, given: _Given, name: str) -> tuple[float, tuple[str, ...]]:
-    """Return the sample rate of a channel, Hz, and what was done."""
-    rate = one.sample_rate if given.sample_rate is None else float(given.sample_rate)
+def _rate(one: Channel, stated: _Stated, name: str) -> tuple[float, tuple[str, ...]]:
+    """Return the sample rate of a channel, Hz, and notes."""
+    rate = one.sample_rate if stated.sample_rate is None else float(stated.sample_rate)
     if rate is None:
         refuse(f"{name}: the sample rate is not known", "sample_rate in Hz, or a column of times")
     if not RATES[0] <= rate <= RATES[1]:
@@ -212,30 +212,30 @@ def _rate(one: Channel, given: _Given, name: str) -> tuple[float, tuple[str, ...
     if one.sample_rate in {None, rate}:
         return rate, ()
     was = f"{one.sample_rate:.7g} Hz"
-    return rate, (f"The rate of the file, {was}, was replaced by {rate:.7g} Hz as given.",)
+    return rate, (f"The rate of the file, {was}, was replaced by {rate:.7g} Hz as stated.",)
 
 
-def _unit(one: Channel, given: _Given, name: str) -> tuple[str, tuple[str, ...]]:
-    """Return the unit of the values of a channel, and what was done."""
+def _unit(one: Channel, stated: _Stated, name: str) -> tuple[str, tuple[str, ...]]:
+    """Return the unit of the values of a channel, and notes."""
     known = find_unit(one.unit)
-    if given.unit is not None:
-        if known == "FS" and given.unit not in {"FS", "counts"}:
+    if stated.unit is not None:
+        if known == "FS" and stated.unit not in {"FS", "counts"}:
             refuse(
-                f"{name}: the samples are integers, not values in {given.unit}",
+                f"{name}: the samples are integers, not values in {stated.unit}",
                 "calibration per full scale, such as '10 V/FS, 4 mV/N' or '5000 N/FS'",
             )
-        if known in {"", "FS", given.unit}:
-            return given.unit, ()
-        return given.unit, (
-            f"The unit of the file, {known}, was replaced by {given.unit} as given.",
+        if known in {"", "FS", stated.unit}:
+            return stated.unit, ()
+        return stated.unit, (
+            f"The unit of the file, {known}, was replaced by {stated.unit} as stated.",
         )
     if known:
         return known, ()
-    if not one.unit and given.calibration is None:
-        return ASSUMED, ("The file names no unit; the values were taken to be in N.",)
-    if one.unit or isinstance(given.calibration, str | Calibration):
-        said = f"in {shown_text(one.unit)!r}" if one.unit else "without a unit"
-        refuse(f"{name}: the values are {said}", f"unit = one of {ALLOWED}")
+    if not one.unit and stated.calibration is None:
+        return ASSUMED, ("The file states no unit; the values are assumed to be in N.",)
+    if one.unit or isinstance(stated.calibration, str | Calibration):
+        own = f"in {shown_text(one.unit)!r}" if one.unit else "without a unit"
+        refuse(f"{name}: the values are {own}", f"unit = one of {ALLOWED}")
     return "", ()
 
 

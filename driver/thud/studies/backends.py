@@ -5,25 +5,18 @@ from __future__ import annotations
 import logging
 import os
 import time
-import warnings
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    Executor,
-    Future,
-    ThreadPoolExecutor,
-    wait,
-)
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
 from thud.base.bridge import api
 from thud.base.checks import refuse, refuse_value, require_choice, require_whole, shown
-from thud.base.errors import NumericalError, ThudError, WorkerWarning
+from thud.base.errors import NumericalError, ThudError
 from thud.base.extras import require_extra
 from thud.base.processes import no_interrupt_in_processes, process_pool
 from thud.impact.ensemble import MAX_THREADS
-from thud.studies.evaluation import Block, evaluate
+from thud.studies.samples import Block, evaluate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -33,13 +26,11 @@ if TYPE_CHECKING:
     Keep = Callable[[Block, dict[str, NDArray[Any]]], None]
 
 BACKENDS = ("threads", "processes", "dask")
-# Time limit for a scheduler to answer, s.
-PATIENCE = 5
-# Time after which a worker that is not heard of has its blocks taken away, s; they are heard of
-# several times in that, also while they compute.
-SILENCE = 60.0
-# Time between two looks at the workers, s.
-LOOK = 5.0
+# Time limit for a scheduler to answer, and without any worker, s.
+SCHEDULER_TIMEOUT = 5.0
+WORKER_TIMEOUT = 60.0
+# Time between two checks of the workers, s.
+CHECK_INTERVAL = 5.0
 
 
 def run_blocks(
@@ -51,20 +42,20 @@ def run_blocks(
 ) -> None:
     """Compute blocks in any order; `keep` takes each with its results as soon as it is done.
 
-    Backend, workers and scheduler are those of `thud.studies.kind.How`. Raises NumericalError where
-    the backend loses a block.
+    For backend, workers and scheduler see `thud.studies.kind.RunOptions`. Raises NumericalError
+    where the backend loses a block.
     """
     backend, workers, scheduler = checked_backend(backend, workers, scheduler)
-    with _open(backend, workers, scheduler) as (executor, width, look):
+    with _open(backend, workers, scheduler) as (executor, width, check):
         running: dict[Future[dict[str, NDArray[Any]]], Block] = {}
         try:
             for block in blocks:
                 if len(running) >= 2 * width:
-                    _collect(running, keep, look)
+                    _collect(running, keep, check)
                 with no_interrupt_in_processes():
                     running[executor.submit(evaluate, block)] = block
             while running:
-                _collect(running, keep, look)
+                _collect(running, keep, check)
         except BaseException as error:
             # Running blocks are waited for and kept. After an interrupt the backend ends them.
             interrupted = isinstance(error, KeyboardInterrupt)
@@ -99,13 +90,13 @@ def checked_backend(
 
 
 def _collect(
-    running: dict[Future[dict[str, NDArray[Any]]], Block], keep: Keep, look: Callable[[], None]
+    running: dict[Future[dict[str, NDArray[Any]]], Block], keep: Keep, check: Callable[[], None]
 ) -> None:
-    """Keep the blocks that are done, at least one; look after the workers meanwhile."""
-    done, _ = wait(running, LOOK, FIRST_COMPLETED)
+    """Keep the blocks that are done, at least one; check the workers meanwhile."""
+    done, _ = wait(running, CHECK_INTERVAL, FIRST_COMPLETED)
     while not done:
-        look()
-        done, _ = wait(running, LOOK, FIRST_COMPLETED)
+        check()
+        done, _ = wait(running, CHECK_INTERVAL, FIRST_COMPLETED)
     for future in done:
         try:
             found = future.result()
@@ -113,8 +104,8 @@ def _collect(
             raise
         except Exception as error:
             del running[future]
-            said = f"{type(error).__name__}: {error}".partition("\n")[0].removesuffix(": ")
-            message = _sentence(f"the backend lost a block of samples ({said})")
+            reason = f"{type(error).__name__}: {error}".partition("\n")[0].removesuffix(": ")
+            message = _lost(f"the backend lost a block of samples ({reason})")
             raise NumericalError(message) from error
         keep(running[future], found)
         del running[future]
@@ -124,7 +115,7 @@ def _collect(
 def _open(
     backend: str, workers: int | None, scheduler: str | None
 ) -> Iterator[tuple[Executor, int, Callable[[], None]]]:
-    """Open a backend; yield its executor, how many blocks run at once, and what looks after it.
+    """Open a backend; yield its executor, how many blocks run at once, and a check of its workers.
 
     An interrupt ends the blocks that are running.
     """
@@ -136,17 +127,17 @@ def _open(
     if backend == "threads":
         with ThreadPoolExecutor(width) as threads:
             try:
-                yield threads, width, _no_look
+                yield threads, width, _no_check
             except KeyboardInterrupt:
                 threads.shutdown(wait=False, cancel_futures=True)
                 api.end_calls()
                 raise
         return
     with process_pool(width) as processes:
-        yield processes, width, _no_look
+        yield processes, width, _no_check
 
 
-def _no_look() -> None:
+def _no_check() -> None:
     """Threads and processes of this machine are waited for."""
 
 
@@ -163,20 +154,20 @@ def _dask(address: str) -> Iterator[tuple[Executor, int, Callable[[], None]]]:
             client = _connected(Client, address)
         except (OSError, ValueError, TypeError) as error:
             refuse(
-                f"scheduler = {shown(address)} does not answer within {PATIENCE} s",
+                f"scheduler = {shown(address)} does not answer within {SCHEDULER_TIMEOUT:g} s",
                 "the address of a running one, such as tcp://host:8786",
                 error,
             )
         with client:
-            width = _width(client)
+            width = _wait_for_cores(client)
             if not width:
                 refuse(
-                    f"scheduler = {shown(address)} shows no worker within {PATIENCE} s",
+                    f"scheduler = {shown(address)} shows no worker within {SCHEDULER_TIMEOUT:g} s",
                     "one with workers",
                 )
             with client.get_executor() as executor:
                 try:
-                    yield executor, width, _Watch(client)
+                    yield executor, width, _new_check(client)
                 except KeyboardInterrupt:
                     executor.shutdown(wait=False)
                     raise
@@ -194,7 +185,7 @@ def _connected(kind: type, address: str) -> Any:  # noqa: ANN401 - of an optiona
     def connect() -> None:
         try:
             # The default client would also manage locks of files, which stay in this process.
-            client = kind(address, timeout=PATIENCE, set_as_default=False)
+            client = kind(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
         except Exception as error:  # noqa: BLE001 - for the one who waits
             found.set_exception(error)
             return
@@ -204,79 +195,62 @@ def _connected(kind: type, address: str) -> Any:  # noqa: ANN401 - of an optiona
 
     Thread(target=connect, daemon=True).start()
     try:
-        return found.result(PATIENCE + 1)
+        return found.result(SCHEDULER_TIMEOUT + 1)
     except TimeoutError:
         late.set()
         raise
 
 
-def _width(client: Any) -> int:  # noqa: ANN401 - of an optional package
-    """Return how many blocks run at once, 0 where no worker is there in time."""
-    until = time.monotonic() + PATIENCE
-    width = 0
-    with suppress(TimeoutError, OSError):
-        while not width and time.monotonic() < until:
-            width = sum(client.sync(client.scheduler.ncores, callback_timeout=PATIENCE).values())
-            time.sleep(0.0 if width else 0.1)
-    return width
+def _cores(client: Any) -> int:  # noqa: ANN401 - of an optional package
+    """Return how many cores the workers have; raise OSError where the scheduler does not answer."""
+    return sum(client.sync(client.scheduler.ncores, callback_timeout=SCHEDULER_TIMEOUT).values())
 
 
-class _Watch:
-    """Looks after the workers of a scheduler: takes blocks away from those that are not heard of.
+def _wait_for_cores(client: Any) -> int:  # noqa: ANN401 - of an optional package
+    """Return how many cores the workers have, 0 where none is there in time."""
+    end = time.monotonic() + SCHEDULER_TIMEOUT
+    cores = 0
+    with suppress(OSError):
+        while not (cores := _cores(client)) and time.monotonic() < end:
+            time.sleep(0.1)
+    return cores
 
-    Raises NumericalError where none is left, or the scheduler does not answer.
+
+def _new_check(client: Any) -> Callable[[], None]:  # noqa: ANN401 - of an optional package
+    """Return a check that raises NumericalError where scheduler or all workers are lost.
+
+    The scheduler gives up workers that it does not hear of: `distributed.scheduler.worker-ttl`.
     """
+    last_seen = time.monotonic()
 
-    def __init__(self, client: Any) -> None:  # noqa: ANN401 - of an optional package
-        self._client = client
-        self._seen = time.monotonic()
-
-    def __call__(self) -> None:
-        """Look once."""
-        limit = SILENCE
-
-        # Sent as it stands: the scheduler may have no thud.
-        async def drop(dask_scheduler: Any) -> tuple[list[str], int]:  # noqa: ANN401
-            workers = dask_scheduler.workers
-            heard = {address: worker.last_seen for address, worker in workers.items()}
-            silent = [address for address in heard if time.time() - heard[address] > limit]
-            for address in silent:
-                await dask_scheduler.remove_worker(address, stimulus_id="silent")
-            return silent, len(workers)
-
-        client = self._client
+    def check() -> None:
+        nonlocal last_seen
         try:
-            # The public one waits for ever.
-            silent, left = client.sync(client._run_on_scheduler, drop, callback_timeout=limit)  # noqa: SLF001
-        except (TimeoutError, OSError) as error:
-            message = _sentence(f"the scheduler does not answer within {limit:g} s")
+            cores = _cores(client)
+        except OSError as error:
+            message = _lost(f"the scheduler does not answer within {SCHEDULER_TIMEOUT:g} s")
             raise NumericalError(message) from error
-        for address in silent:
-            message = (
-                f"the worker {address} was not heard of for {limit:g} s; others compute its blocks"
-            )
-            warnings.warn(message, WorkerWarning, stacklevel=2)
-        if left:
-            self._seen = time.monotonic()
-        elif silent or time.monotonic() - self._seen > limit:
-            message = _sentence("no worker of the scheduler is heard of")
-            raise NumericalError(message)
+        if cores:
+            last_seen = time.monotonic()
+        elif time.monotonic() - last_seen > WORKER_TIMEOUT:
+            raise NumericalError(_lost("the scheduler has no worker left"))
+
+    return check
 
 
-def _sentence(what: str) -> str:
+def _lost(what: str) -> str:
     return f"{what}; what was finished is kept; allowed: run the study again"
 
 
 @contextmanager
-def _silent(*names: str) -> Iterator[None]:
-    """Silence the loggers of packages: one sentence reports what fails."""
-    known = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] in names]
-    loggers = [logging.getLogger(other) for other in known]
-    usual = [logger.disabled for logger in loggers]
+def _silent(*packages: str) -> Iterator[None]:
+    """Silence the loggers of packages: one message reports what fails."""
+    names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] in packages]
+    loggers = [logger for name in names if not (logger := logging.getLogger(name)).disabled]
     for logger in loggers:
         logger.disabled = True
     try:
         yield
     finally:
-        for logger, disabled in zip(loggers, usual, strict=True):
-            logger.disabled = disabled
+        for logger in loggers:
+            logger.disabled = False

@@ -7,7 +7,6 @@ import re
 import shutil
 from contextlib import contextmanager
 from hashlib import sha256
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import xarray as xr
@@ -26,11 +25,10 @@ from thud.base.files import (
 from thud.studies.dataset import disk_space, grid_of, in_order, new_dataset
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Iterator
+    from pathlib import Path
 
-    from thud.studies.evaluation import Block
-    from thud.studies.samples import Columns, SampleStudy
+    from thud.studies.samples import Block, Columns, SampleStudy
 
 # Results that need more bytes than this are written as Zarr.
 LARGE = 256 * 2**20
@@ -157,37 +155,17 @@ def read_identity(path: Path) -> dict[str, str] | None:
     return identity
 
 
-def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
-    """Read the results of a study, also of one that was interrupted.
-
-    Parameters
-    ----------
-    path
-        A file ``.nc``, a Zarr group ``.zarr``, or the directory ``.partial`` of a study that is not
-        done: its finished samples.
-
-    Returns
-    -------
-    Dataset
-        The results; those of a Zarr group are read when they are needed.
-
-    Raises
-    ------
-    InputError
-        Where there are no results of a study.
-    OSError
-        Where they cannot be read for now.
-    """
-    place = Path(path)
-    if place.suffix == ".partial":
-        paths = block_paths(place)
+def read_dataset(path: Path) -> xr.Dataset:
+    """Return the results in a file; see `thud.read_sweep`."""
+    if path.suffix == ".partial":
+        paths = block_paths(path)
         if not paths:
-            refuse(f"{place} holds no finished samples", "results of a study")
+            refuse(f"{path} holds no finished samples", "results of a study")
         return _join(paths)
-    if place.suffix == ".zarr":
-        with _readable(place):
-            return _open_zarr(place)
-    with _open(place) as dataset:
+    if path.suffix == ".zarr":
+        with _readable(path):
+            return _open_zarr(path)
+    with _open(path) as dataset:
         return _loaded(dataset)
 
 
@@ -215,7 +193,7 @@ def _loaded(dataset: xr.Dataset) -> xr.Dataset:
         for name, variable in dataset.variables.items()
         if variable.dtype.kind == "U"
     }
-    return dataset.load().assign(texts)
+    return dataset.load().assign(texts).drop_encoding()
 
 
 @contextmanager
@@ -242,7 +220,9 @@ def _open(path: Path, *, known_whole: bool = False) -> Iterator[xr.Dataset]:
 
 def _open_zarr(path: Path) -> xr.Dataset:
     """Open a Zarr group; its arrays are read on demand, with or without Dask."""
-    return in_order(xr.open_zarr(path, consolidated=False, chunks=None))
+    dataset = in_order(xr.open_zarr(path, consolidated=False, chunks=None))
+    dataset.encoding["source"] = f"{path}"
+    return dataset
 
 
 @contextmanager
@@ -264,9 +244,8 @@ def _write(dataset: xr.Dataset, path: Path) -> None:
 
 def _require_whole(path: Path) -> None:
     """Raise ValueError for a damaged NetCDF file: HDF5 may never return from one."""
-    content, seal, digest = read_input(path).rpartition(_SEAL)
-    # Files of an older thud have no checksum.
-    if seal and sha256(content).digest() != digest:
+    content, _, digest = read_input(path).rpartition(_SEAL)
+    if sha256(content).digest() != digest:
         message = "wrong checksum"
         raise ValueError(message)
 

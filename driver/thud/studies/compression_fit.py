@@ -11,82 +11,78 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import least_squares
 
 from thud.base._schema import Ball, Compression
-from thud.base.checks import require_array, require_real
-from thud.base.display import Displayed
-from thud.base.errors import FitWarning, InputError, NumericalError
+from thud.base.checks import refuse, require_array, require_real
+from thud.base.errors import FitWarning, NumericalError
+from thud.base.extras import require_extra
 from thud.base.key import check_keywords
 from thud.impact.compression import CompressionCurve, compress
-from thud.studies.fitting.inference import coverage_factor
-from thud.studies.fitting.residual_tests import runs_doubt
+from thud.studies.fitting.estimates import Estimates
+from thud.studies.fitting.inference import require_confidence, runs_warning
 
 if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base._schema import CompressionGas, ModelName, ModelOptions
 
+    Array = NDArray[np.float64]
+
 # Points of the curves of the model, between which it is interpolated.
 _POINTS = 81
-# Data that two parameters leave something of.
-_MIN_DATA = 5
 _PARAMETERS = 2
+_MIN_DATA = 5
 
 
 @dataclass(frozen=True, eq=False)
-class CompressionFit(Displayed):
+class CompressionFit(Estimates):
     """Modulus of elasticity and first touch that fit a measured compression best.
+
+    The ``youngs_modulus``, Pa, is the storage modulus of materials with Maxwell branches, whose
+    long-term modulus the press finds; of a fractional law it is its modulus at about 1 Hz.
+    ``touch`` is the deflection at which the plates touch the ball, m. See `Estimates` for the rest.
 
     Attributes
     ----------
-    youngs_modulus : float
-        Modulus of elasticity, Pa: the storage modulus of materials with Maxwell branches, whose
-        long-term modulus the press finds; of a fractional law that is its modulus at about 1 Hz.
-    touch : float
-        Deflection at which the plates touch the ball, m.
-    covariance : ndarray, shape (2, 2)
-        Covariance of both.
-    interval : ndarray, shape (2, 2)
-        Low and high limit of each.
-    confidence : float
-        Confidence of the intervals.
-    noise : float
-        Standard deviation of a residual, N.
-    residuals : ndarray, shape (n,)
-        Model minus measured force, N.
+    deflection, force : ndarray, shape (n,)
+        The measured curve, m and N.
     curve : CompressionCurve
         The curve of the model, its deflection counted from first touch.
-    warnings : tuple of str
-        Reasons to doubt the intervals, as sentences.
     """
 
-    youngs_modulus: float
-    touch: float
-    covariance: NDArray[np.float64]
-    interval: NDArray[np.float64]
-    confidence: float
-    noise: float
-    residuals: NDArray[np.float64]
+    deflection: Array
+    force: Array
     curve: CompressionCurve
-    warnings: tuple[str, ...]
 
     def __repr__(self) -> str:
         """Return the modulus and its standard error."""
-        error = np.sqrt(self.covariance[0, 0])
-        return f"<CompressionFit: E {self.youngs_modulus / 1e6:.4g} MPa +- {error / 1e6:.2g} MPa>"
+        modulus, error = self.values["youngs_modulus"], self.standard_errors["youngs_modulus"]
+        return f"<CompressionFit: E {modulus / 1e6:.4g} MPa +- {error / 1e6:.2g} MPa>"
 
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text."""
-        (low, high), (first, last) = self.interval
-        return [
-            ("parameter", "unit", "estimate", "low", "high"),
-            *[
-                (name, unit, *(f"{value * scale:.5g}" for value in values))
-                for name, unit, scale, values in (
-                    ("youngs_modulus", "MPa", 1e-6, (self.youngs_modulus, low, high)),
-                    ("touch", "mm", 1e3, (self.touch, first, last)),
-                )
-            ],
-            *[("warning", one, "", "", "") for one in self.warnings],
-        ]
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the measured curve and the force of the model.
+
+        Raise InputError where pandas is not installed.
+        """
+        with require_extra("studies"):
+            import pandas as pd
+
+        model = self.force + self.residuals
+        return pd.DataFrame(
+            {"deflection_m": self.deflection, "force_N": self.force, "model_N": model}
+        )
+
+    def plot(self) -> Figure:
+        """Draw the measured curve from first touch on, and that of the model."""
+        from thud.plot import compression
+
+        shown = self.deflection >= self.values["touch"]
+        measured = replace(
+            self.curve,
+            deflection=(self.deflection - self.values["touch"])[shown],
+            force=self.force[shown],
+        )
+        return compression({"measured": measured, "model": self.curve})
 
 
 @check_keywords
@@ -133,7 +129,7 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
     """
     start = Ball() if ball is None else ball
     measured, wanted = _data(deflection, force)
-    factor = coverage_factor(confidence, len(wanted) - _PARAMETERS)
+    require_confidence(confidence)
     span = float(measured[-1] - measured[0])
     curves: dict[float, CompressionCurve] = {}
 
@@ -146,9 +142,9 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
             )  # fmt: skip
         return curves[modulus]
 
-    def residuals(place: NDArray[np.float64]) -> NDArray[np.float64]:
-        found = curve(float(np.exp(place[0])) * start.youngs_modulus)
-        depth = measured - measured[0] - place[1] * span
+    def residuals(x: Array) -> Array:
+        found = curve(float(np.exp(x[0])) * start.youngs_modulus)
+        depth = measured - measured[0] - x[1] * span
         model_force = PchipInterpolator(found.deflection, found.force)(np.maximum(depth, 0))
         return np.asarray(model_force - wanted)
 
@@ -157,54 +153,56 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
     first = np.array([np.log(_ratio(curve(start.youngs_modulus), measured, wanted)), 0.0])
     best = least_squares(residuals, first, bounds=bounds, x_scale=(1.0, 0.1), xtol=1e-10)
     if np.linalg.matrix_rank(best.jac) < _PARAMETERS:
-        message = "the force of this model does not tell youngs_modulus; allowed: one that has it"
+        message = (
+            "youngs_modulus has no effect on the force of this model; allowed: one that has it"
+        )
         raise NumericalError(message)
     modulus = float(np.exp(best.x[0])) * start.youngs_modulus
     touch = float(measured[0] + best.x[1] * span)
     deviation = float(np.sqrt(best.fun @ best.fun / (len(wanted) - _PARAMETERS)))
     scale = np.array([modulus, span])
     covariance = deviation**2 * np.linalg.inv(best.jac.T @ best.jac) * np.outer(scale, scale)
-    width = factor * np.sqrt(np.diag(covariance))
-    estimate = np.array([modulus, touch])
-    doubts = tuple(_doubts(best.fun, best.x[1], bounds))
-    for doubt in doubts:
-        warnings.warn(doubt, FitWarning, stacklevel=3)
+    found = tuple(_warnings(best.fun, best.x[1], bounds))
+    for text in found:
+        warnings.warn(text, FitWarning, stacklevel=3)
     return CompressionFit(
-        modulus, touch, covariance, np.column_stack([estimate - width, estimate + width]),
-        confidence, deviation, best.fun, curve(modulus), doubts,
-    )  # fmt: skip
+        names=("youngs_modulus", "touch"),
+        units=("Pa", "m"),
+        estimate=np.array([modulus, touch]),
+        covariance=covariance,
+        limits=np.array([[-np.inf, np.inf]] * _PARAMETERS),
+        confidence=confidence,
+        noise=deviation,
+        residuals=best.fun,
+        warnings=found,
+        deflection=measured,
+        force=wanted,
+        curve=curve(modulus),
+    )
 
 
-def _data(
-    deflection: ArrayLike, force: ArrayLike
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _data(deflection: ArrayLike, force: ArrayLike) -> tuple[Array, Array]:
     """Return both columns; raise InputError where they are no curve."""
     measured, wanted = (
         require_real(name, require_array(name, values, {1}))
         for name, values in (("deflection", deflection), ("force", force))
     )
     if measured.shape != wanted.shape or len(measured) < _MIN_DATA:
-        message = (
-            f"deflection has {len(measured)} entries and force {len(wanted)}; "
-            f"allowed: the same number, at least {_MIN_DATA}"
+        refuse(
+            f"deflection has {len(measured)} entries and force {len(wanted)}",
+            f"the same number, at least {_MIN_DATA}",
         )
-        raise InputError(message)
     if not (np.isfinite(measured).all() and np.isfinite(wanted).all()):
-        message = "deflection or force holds what is no finite number; allowed: finite numbers"
-        raise InputError(message)
-    if not (np.diff(measured) > 0).all():
-        at = int(np.argmin(np.diff(measured) > 0)) + 1
-        message = f"deflection does not rise at point {at + 1}; allowed: the branch of loading"
-        raise InputError(message)
+        refuse("deflection or force is not finite", "finite numbers")
+    falling = np.flatnonzero(np.diff(measured) <= 0)
+    if falling.size:
+        refuse(f"deflection does not rise at point {falling[0] + 2}", "the branch of loading")
     if not wanted[-1] > max(0.0, wanted[0]):
-        message = "force does not rise with the deflection; allowed: pressure is positive"
-        raise InputError(message)
+        refuse("force does not rise with the deflection", "pressure is positive")
     return measured, wanted
 
 
-def _ratio(
-    curve: CompressionCurve, measured: NDArray[np.float64], wanted: NDArray[np.float64]
-) -> float:
+def _ratio(curve: CompressionCurve, measured: Array, wanted: Array) -> float:
     """Return the factor that brings the work of a curve to the measured one.
 
     Raise InputError where the model has no force at such deflections.
@@ -213,23 +211,20 @@ def _ratio(
     shown = np.interp(measured - measured[0], curve.deflection, curve.force)
     model_work = float(np.trapezoid(shown, measured))
     if not model_work > 0:
-        message = (
-            f"deflection spans {np.ptp(measured):g} m, where the model shows no force; "
-            "allowed: a ball that is pressed by millimetres"
+        refuse(
+            f"deflection spans {np.ptp(measured):g} m, where the model has no force",
+            "a ball that is pressed by millimeters",
         )
-        raise InputError(message)
     return max(work, 0.01 * float(wanted[-1] * np.ptp(measured))) / model_work
 
 
-def _doubts(
-    residuals: NDArray[np.float64], place: float, bounds: tuple[list[float], list[float]]
-) -> list[str]:
-    """Return reasons to doubt the intervals."""
+def _warnings(residuals: Array, place: float, bounds: tuple[list[float], list[float]]) -> list[str]:
+    """Return why the intervals may be wrong."""
     found = []
     if min(place - bounds[0][1], bounds[1][1] - place) < 1e-6:  # noqa: PLR2004 - of the span
         found.append(
             "the first touch lies at the limit of the search: give data from first touch on"
         )
-    if runs := runs_doubt(residuals):
+    if runs := runs_warning(residuals):
         found.append(f"{runs}: the model does not explain the curve")
     return found

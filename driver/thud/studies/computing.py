@@ -12,9 +12,9 @@ from tqdm import tqdm
 from thud.base.bridge import version
 from thud.base.checks import refuse
 from thud.studies.backends import run_blocks
-from thud.studies.blocks import Blocks, read_sweep
+from thud.studies.blocks import Blocks, read_dataset
 from thud.studies.dataset import disk_space, grid_of, new_dataset
-from thud.studies.evaluation import Block
+from thud.studies.samples import Block
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -64,7 +64,7 @@ def compute_samples(study: SampleStudy, folder: Path | None, how: RunOptions) ->
             run_blocks(_blocks(study, open_starts, size), keep, *backend)
     if blocks:
         blocks.finish()
-        return read_sweep(blocks.path)
+        return read_dataset(blocks.path)
     parts = [memory[start] for start in sorted(memory)]
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return grid_of(study, new_dataset(study, study.parameter_columns(0, study.count), whole))

@@ -10,7 +10,7 @@ import xarray as xr
 from thud.impact.datasets import attributes, band_coordinates, origin, room_coordinates
 from thud.impact.quantities import ALL_QUANTITIES, BANDS, CONTACT_LEVELS, ROOM_BAND, ROOM_LEVEL
 from thud.level.levels import get_bands
-from thud.studies.evaluation import level_names
+from thud.studies.samples import level_names
 from thud.studies.sampling import sampler_versions
 
 if TYPE_CHECKING:
@@ -48,11 +48,7 @@ def new_dataset(study: SampleStudy, columns: Columns, found: Columns) -> xr.Data
         coordinates |= room_coordinates()
     for parameter in study.parameters:
         values = _objects(columns[parameter.name])
-        coordinates[parameter.coordinate] = (
-            "sample",
-            values,
-            _attributes(study, parameter),
-        )
+        coordinates[parameter.coordinate] = ("sample", values, _attributes(study, parameter))
     variables = {}
     for name, values in found.items():
         dimensions = ("sample", dimension[name]) if name in dimension else ("sample",)

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Unpack
 
 from thud.base.checks import refuse
-from thud.base.display import Displayed
 from thud.case.case import Case
 from thud.case.keys import DENSITY
 from thud.impact.quantities import RATING
+from thud.studies.result import SampleResult
 from thud.studies.sample_kind import SampleKind
 from thud.studies.study import value_in, wall_volume
 
@@ -31,7 +31,7 @@ _AXES = 2
 
 
 @dataclass(frozen=True, eq=False)
-class Design(Displayed):
+class Design(SampleResult):
     """Margin and verdict over two parameters.
 
     Attributes
@@ -39,7 +39,7 @@ class Design(Displayed):
     dataset : Dataset
         Every sample, on a grid of the two parameters in ascending order; ``margin`` is the minimum
         distance of an octave level to its limits, dB, and ``conforms`` the whole verdict; of a case
-        with a room ``standardised_rating`` is drawn, dB.
+        with a room ``standardized_rating`` is drawn, dB.
     axes : tuple of str
         The two parameters.
     mark : tuple of float or None
@@ -60,20 +60,16 @@ class Design(Displayed):
         return f"<Design, {' and '.join(self.axes)}: {count}>"
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text."""
-        return [("", ""), *self.table()]
-
-    def table(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text: the best place, and how much conforms."""
+        """Return header and rows of text: how much conforms, and the best sample."""
         margin = self.dataset["margin"]
-        rows: list[tuple[str, ...]] = [("samples", f"{margin.size}")]
+        rows: list[tuple[str, ...]] = [("quantity", "value"), ("samples", f"{margin.size}")]
         rows.append(("octave levels conform", f"{int((margin >= 0).sum())}"))
         rows.append(("all criteria conform", f"{int(self.dataset['conforms'].sum())}"))
         if "doubtful" in self.dataset:
             rows.append(("in doubt by the surrogate", f"{int(self.dataset['doubtful'].sum())}"))
         words, sign, quantity = "largest margin, dB", 1, margin
         if RATING in self.dataset:
-            words, sign, quantity = "lowest standardised rating, dB", -1, self.dataset[RATING]
+            words, sign, quantity = "lowest standardized rating, dB", -1, self.dataset[RATING]
         if quantity.notnull().any():
             best = quantity.isel((sign * quantity).argmax(...))
             rows.append((words, f"{float(best):z.2f}"))
@@ -82,6 +78,12 @@ class Design(Displayed):
                 unit = self.dataset[name].attrs["shown_unit"]
                 rows.append((f"  at {name}, {unit}", f"{float(best[name]) * 10.0**power:.4g}"))
         return rows
+
+    def plot(self) -> Figure:
+        """Return the margin over both parameters."""
+        from thud.plot import draw_design
+
+        return draw_design(self)
 
 
 class DesignKind(SampleKind[Design]):
@@ -102,12 +104,6 @@ class DesignKind(SampleKind[Design]):
         first, second = (parameter.coordinate for parameter in study.parameters)
         return Design(dataset.load().sortby([first, second]), (first, second), *_mark(study))
 
-    def draw(self, result: Design) -> Figure:
-        """Return the margin over both parameters."""
-        from thud.plot import draw_design
-
-        return draw_design(result)
-
 
 KIND = DesignKind()
 
@@ -122,11 +118,11 @@ def design(
     study
         Path of a TOML file, or what would stand in it; it has two numeric parameters.
     output, **how
-        See `sweep`.
+        As of `sweep`.
 
     Returns
     -------
-        Design
+    Design
         Margin and verdict of the force that the case assesses.
 
     Raises

@@ -9,17 +9,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Unpack
 
-from thud.base.checks import (
-    LARGEST_SEED,
-    refuse,
-    refuse_value,
-    require_kind,
-    require_whole,
-)
+from thud.base.checks import LARGEST_SEED, refuse, refuse_value, require_kind, require_whole
 from thud.base.errors import FitWarning, InputError
 from thud.base.files import read_input
 from thud.base.key import check_keywords
-from thud.base.units import scaled
 from thud.case.case import Case, check_case
 from thud.studies.directory import FORMATS
 from thud.studies.fitting.force_target import ForceTarget
@@ -31,15 +24,13 @@ from thud.studies.fitting.search import search
 from thud.studies.kind import Kind
 from thud.studies.study import Study, fix_keys, table_of, with_density
 from thud.studies.surrogate_levels import answered, confirmed, within_region
-from thud.studies.surrogate_plan import read_plan
-from thud.studies.trained_surrogate import Surrogate, read_surrogate
+from thud.studies.trained_surrogate import Surrogate, read_plan, read_surrogate
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Iterable, Sequence, Set as AbstractSet
     from pathlib import Path
 
-    from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
 
     from thud.base.files import Results
@@ -221,12 +212,6 @@ class FitStudy(Study):
     options: dict[str, Any] = field(default_factory=lambda: dict(OPTIONS))
     surrogate: Surrogate | None = None
 
-    @property
-    def units(self) -> dict[str, tuple[str, float]]:
-        """Units of the file by parameter: name, and how many SI units it is."""
-        shown = {p.name: p.shown_unit for p in self.parameters if p.unit}
-        return {name: (unit, scaled(1.0, power)) for name, (unit, power) in shown.items()}
-
     def own_identity(self) -> dict[str, str]:
         """Return target and search."""
         tables = self.tables["target"]
@@ -323,26 +308,9 @@ class FitKind(Kind[FitStudy, Fit]):
         ]
         return [*files, *figures]
 
-    def table(self, result: Fit, study: FitStudy) -> str:
-        """Return the fit as text."""
-        return f"{study.name}\n\n{result.table(study.units)}"
-
-    def warnings(self, result: Fit) -> list[str]:
-        """Return the warnings, and what is not plausible in the impacts that were found."""
-        own = [warning for target in result.targets for warning in target.impact.warnings]
-        return [*result.warnings, *dict.fromkeys(own)]
-
-    def succeeded(self, result: Fit) -> bool:
-        """Return whether the search has converged."""
-        return result.converged
-
     def files(self, result: Fit, study: FitStudy) -> dict[str, bytes]:
         """Return the numbers of the fit and its case."""
         return result.files(study=study.tables, identity=study.identity)
-
-    def figures(self, result: Fit, study: FitStudy) -> dict[str, Figure]:
-        """Return target and fit, and confidence regions."""
-        return result.figures(study.units)
 
 
 KIND = FitKind()

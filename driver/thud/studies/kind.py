@@ -1,4 +1,4 @@
-"""What a kind of study is: how it is read, computed, printed and saved."""
+"""What a kind of study is: how it is read, computed and saved."""
 
 from __future__ import annotations
 
@@ -10,13 +10,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypedDict, Ty
 
 from thud.base.checks import refuse, require_words
 from thud.studies.directory import take
+from thud.studies.result import StudyResult
 from thud.studies.study import Study, named_files, read_common, read_tables
 
 if TYPE_CHECKING:
-    from contextlib import AbstractContextManager
     from pathlib import Path
-
-    from matplotlib.figure import Figure
 
     from thud.base.files import Results
     from thud.case.case import Case
@@ -26,7 +24,7 @@ if TYPE_CHECKING:
     from thud.studies.trained_surrogate import Surrogate
 
 S = TypeVar("S", bound=Study)
-R = TypeVar("R")
+R = TypeVar("R", bound=StudyResult)
 
 
 class RunOptions(TypedDict, total=False):
@@ -61,7 +59,7 @@ class RunOptions(TypedDict, total=False):
 
 
 class Kind(ABC, Generic[S, R]):
-    """A kind of study: what its file may hold, how it is computed, what it prints and writes."""
+    """A kind of study: what its file may hold, how it is computed, what it writes."""
 
     name: ClassVar[str]
     # What its file may hold in addition to what every study has.
@@ -97,21 +95,10 @@ class Kind(ABC, Generic[S, R]):
         if output is None:
             return self.compute(study, None, **how)
         replace = how.get("replace", False)
-        with self.take(study, output, replace=replace, figures=False) as results:
+        with take(output, self, study, replace=replace, figures=False) as results:
             result = self.compute(study, results, **how)
             results.write(self.files(result, study))
             return result
-
-    def take(
-        self,
-        study: S,
-        folder: str | os.PathLike[str],
-        *,
-        replace: bool = False,
-        figures: bool = True,
-    ) -> AbstractContextManager[Results]:
-        """Return the context of a results directory of a study; see `thud.studies.directory`."""
-        return take(folder, self, study, replace=replace, figures=figures)
 
     @abstractmethod
     def new_parameter(
@@ -150,22 +137,6 @@ class Kind(ABC, Generic[S, R]):
     def listed_files(self, study: S) -> list[str]:
         """Return the names of files that a study may write and list in the manifest."""
 
-    @abstractmethod
-    def table(self, result: R, study: S) -> str:
-        """Return the result as text."""
-
-    @abstractmethod
-    def warnings(self, result: R) -> list[str]:
-        """Return warnings, as sentences."""
-
-    @abstractmethod
-    def succeeded(self, result: R) -> bool:
-        """Return whether there is any result."""
-
     def files(self, result: R, study: S) -> dict[str, bytes]:  # noqa: ARG002 - most have none
         """Return further files by their names."""
         return {}
-
-    @abstractmethod
-    def figures(self, result: R, study: S) -> dict[str, Figure]:
-        """Return figures by the names of their files."""

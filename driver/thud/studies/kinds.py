@@ -18,27 +18,24 @@ class KindInfo(NamedTuple):
 
     Attributes
     ----------
-    module : str
-        Module of this package that holds the `Kind` as ``KIND``.
     help : str
         What the command line says of it.
     has_samples : bool
         It computes samples of drops, on any backend.
     """
 
-    module: str
     help: str
     has_samples: bool = True
 
 
-# By the name of the command.
+# By the name of the command, of the function, and of the module that holds the `Kind` as ``KIND``.
 KINDS = {
-    "sweep": KindInfo("sweep", "drops over a grid, a list or a random design of parameters"),
-    "sensitivity": KindInfo("sensitivity", "Sobol indices: which parameter matters for what"),
-    "design": KindInfo("design", "which geometry and material conform to the standards"),
-    "uncertainty": KindInfo("uncertainty", "how tolerances spread levels and conformity"),
-    "surrogate": KindInfo("surrogate", "what other studies ask instead of a slow model"),
-    "fit": KindInfo("fit", "parameters of a model from a force or from levels", has_samples=False),
+    "sweep": KindInfo("drops over a grid, a list or a random design of parameters"),
+    "sensitivity": KindInfo("Sobol indices: which parameter matters for what"),
+    "design": KindInfo("which geometry and material conform to the standards"),
+    "uncertainty": KindInfo("how tolerances spread levels and conformity"),
+    "surrogate": KindInfo("what other studies ask instead of a slow model"),
+    "fit": KindInfo("parameters of a model from a force or from levels", has_samples=False),
 }
 
 
@@ -49,7 +46,7 @@ def get_kind(name: str) -> Kind[Any, Any]:
     """
     require_choice("kind", name, KINDS)
     with require_extra("studies"):
-        kind: Kind[Any, Any] = importlib.import_module(f"thud.studies.{KINDS[name].module}").KIND
+        kind: Kind[Any, Any] = importlib.import_module(f"thud.studies.{name}").KIND
     return kind
 
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections import Counter
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, Unpack
 
 from thud.base._schema import KEYS
 from thud.base.checks import refuse, require_choice
-from thud.base.tables import format_rows
 from thud.case.keys import OF_FILES, users
 from thud.studies.backends import checked_backend
 from thud.studies.blocks import read_identity, result_names
@@ -18,13 +16,13 @@ from thud.studies.dataset import disk_space
 from thud.studies.directory import FORMATS
 from thud.studies.kind import Kind
 from thud.studies.parameter import varied
+from thud.studies.result import StudyResult
 from thud.studies.samples import SampleStudy
 from thud.studies.sampling import read_design
 from thud.studies.study import table_of
-from thud.studies.surrogate_plan import read_plan
 from thud.studies.surrogate_training import surrogate_name, train
 from thud.studies.temperature import read_temperature
-from thud.studies.trained_surrogate import Surrogate, read_surrogate
+from thud.studies.trained_surrogate import Surrogate, read_plan, read_surrogate
 
 if TYPE_CHECKING:
     import os
@@ -32,7 +30,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import xarray as xr
-    from matplotlib.figure import Figure
 
     from thud.base.files import Results
     from thud.case.case import Case
@@ -41,7 +38,7 @@ if TYPE_CHECKING:
     from thud.studies.parameter import Parameter
     from thud.studies.study import Study
 
-R = TypeVar("R")
+R = TypeVar("R", bound=StudyResult)
 
 # More samples than this have to be confirmed.
 MAX_SAMPLES = 100_000
@@ -109,22 +106,10 @@ class DropsKind(Kind[SampleStudy, R]):
             refuse(self.describe(study), f"up to {MAX_SAMPLES} samples, more with yes=True (--yes)")
         checked_backend(how.get("backend"), how.get("workers"), how.get("scheduler"))
 
-    @abstractmethod
-    def draw(self, result: R) -> Figure:
-        """Return the figure of a result."""
-
     def listed_files(self, study: SampleStudy) -> list[str]:
         """Return the names of the figures, and of the surrogate that is trained."""
         trained = [surrogate_name(study)] if study.plan else []
         return [*trained, *(f"{study.name}{ending}" for ending in FORMATS)]
-
-    def table(self, result: R, study: SampleStudy) -> str:  # noqa: ARG002 - samples know their units
-        """Return the result as text."""
-        return format_rows(result.table())  # type: ignore[attr-defined]
-
-    def figures(self, result: R, study: SampleStudy) -> dict[str, Figure]:
-        """Return the figure by the name of the study."""
-        return {study.name: self.draw(result)} if self.succeeded(result) else {}
 
 
 class SampleKind(DropsKind[R]):
@@ -162,25 +147,3 @@ class SampleKind(DropsKind[R]):
     def identity_in(self, path: Path) -> dict[str, str] | None:
         """Return the identity of results."""
         return read_identity(path)
-
-    def warnings(self, result: R) -> list[str]:
-        """Return how many samples have no results, and why."""
-        dataset = _samples(result)
-        failed = dataset["status"].values != 0
-        found = []
-        if failed.any():
-            ((reason, _),) = Counter(dataset["reason"].values[failed]).most_common(1)
-            found = [f"{failed.sum()} of {failed.size} samples have no results, such as: {reason}"]
-        if "surrogate" in dataset.attrs:
-            doubtful = int(dataset["doubtful"].sum())
-            share = f"it leaves {doubtful} of {failed.size} verdicts in doubt"
-            found.append(f"{dataset.attrs['surrogate']}; {share}")
-        return found
-
-    def succeeded(self, result: R) -> bool:
-        """Return whether any sample has results."""
-        return bool((_samples(result)["status"] == 0).any())
-
-
-def _samples(result: Any) -> xr.Dataset:  # noqa: ANN401 - a dataset, or what has one
-    return getattr(result, "dataset", result)  # type: ignore[no-any-return]

@@ -9,15 +9,16 @@ import numpy as np
 import xarray as xr
 
 from thud.base.checks import refuse
-from thud.base.display import Displayed
 from thud.impact.quantities import FLOOR_QUANTITIES
 from thud.level.levels import get_bands
+from thud.studies.result import SampleResult
 from thud.studies.sample_kind import SampleKind
 from thud.studies.sampling import MIN_BASE_SAMPLES
 
 if TYPE_CHECKING:
     import os
 
+    import pandas as pd
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
@@ -38,7 +39,7 @@ _ROUNDING = 1e-24
 
 
 @dataclass(frozen=True, eq=False)
-class Sensitivity(Displayed):
+class Sensitivity(SampleResult):
     """Sobol indices of a study.
 
     Attributes
@@ -59,33 +60,33 @@ class Sensitivity(Displayed):
 
     def __repr__(self) -> str:
         """Return parameters and outputs."""
-        names = ", ".join(map(str, self.indices["parameter"].values))
+        names = ", ".join(map(str, self.indices["parameter"].to_numpy()))
         return f"<Sensitivity: {self.indices.sizes['output']} outputs to {names}>"
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text."""
-        return self.table()
-
-    def table(self) -> list[tuple[str, ...]]:
         """Return header and rows of text: total indices of each output."""
-        parameters = [str(name) for name in self.indices["parameter"].values]
+        parameters = [str(name) for name in self.indices["parameter"].to_numpy()]
         rows = [("total index of", *parameters)]
         if "surrogate" in self.indices:
             rows = [(*rows[0], "error of the surrogate")]
-        for output in self.indices["output"].values:
+        for output in self.indices["output"].to_numpy():
             row = self.indices.sel(output=output)
-            pairs = zip(row["total"].values, row["total_interval"].values, strict=True)
+            pairs = zip(row["total"].to_numpy(), row["total_interval"].to_numpy(), strict=True)
             rest = [f"{float(row['surrogate']):.3f}"] if "surrogate" in row else []
             rows.append(
                 (str(output), *(f"{total:.3f} ± {half:.3f}" for total, half in pairs), *rest)
             )
         return rows
 
-    def csv(self) -> bytes:
-        """Return all indices as a table with a line for each output and parameter."""
-        table = self.indices.to_dataframe(dim_order=["output", "parameter"])
-        text: str = table.to_csv(float_format="%.6g", na_rep="nan", lineterminator="\n")
-        return text.encode()
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return all indices, with a row for each output and parameter."""
+        return self.indices.to_dataframe(dim_order=["output", "parameter"])
+
+    def plot(self) -> Figure:
+        """Return the indices as bars."""
+        from thud.plot import draw_sensitivity
+
+        return draw_sensitivity(self)
 
 
 class SensitivityKind(SampleKind[Sensitivity]):
@@ -104,13 +105,9 @@ class SensitivityKind(SampleKind[Sensitivity]):
 
     def files(self, result: Sensitivity, study: SampleStudy) -> dict[str, bytes]:
         """Return the table of all indices."""
-        return {f"{study.name}_indices.csv": result.csv()}
-
-    def draw(self, result: Sensitivity) -> Figure:
-        """Return the indices as bars."""
-        from thud.plot import draw_sensitivity
-
-        return draw_sensitivity(result)
+        table = result.to_dataframe()
+        text = table.to_csv(float_format="%.6g", na_rep="nan", lineterminator="\n")
+        return {f"{study.name}_indices.csv": text.encode()}
 
 
 KIND = SensitivityKind()
@@ -127,7 +124,7 @@ def sensitivity(
         Path of a TOML file, or what would stand in it. ``[design] size`` is the number of base
         samples N, a power of 2 from 4; N (d + 2) samples are computed for d parameters.
     output, **how
-        See `sweep`.
+        As of `sweep`.
 
     Returns
     -------
@@ -144,17 +141,17 @@ def sensitivity(
 
 def _indices(study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
     force = study.case.levels.force
-    levels = dataset[f"{force}_level"].values
+    levels = dataset[f"{force}_level"].to_numpy()
     peak = "peak_elastic_force" if force == "elastic" else "peak_force"
     outputs = {f"level {band:g} Hz": levels[:, i] for i, band in enumerate(get_bands().nominal)}
-    outputs |= {name.replace("_", " "): dataset[name].values for name in ("contact_time", peak)}
+    outputs |= {name.replace("_", " "): dataset[name].to_numpy() for name in ("contact_time", peak)}
     # On a floor, what comes below it.
     further = (name for name in FLOOR_QUANTITIES if name in dataset and dataset[name].ndim == 1)
-    outputs |= {name.replace("_", " "): dataset[name].values for name in further}
+    outputs |= {name.replace("_", " "): dataset[name].to_numpy() for name in further}
     dimension = len(study.parameters)
-    usable = (dataset["status"].values == 0).reshape(-1, dimension + 2).all(axis=1)
+    usable = (dataset["status"].to_numpy() == 0).reshape(-1, dimension + 2).all(axis=1)
     if usable.sum() < MIN_BASE_SAMPLES:
-        reason = next(text for text in dataset["reason"].values if text)
+        reason = next(text for text in dataset["reason"].to_numpy() if text)
         refuse(
             f"only {usable.sum()} of {study.size} base samples have results ({reason})",
             "ranges in which samples have results",

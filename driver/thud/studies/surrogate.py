@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from matplotlib.figure import Figure
-
     from thud.base.files import Results
     from thud.case.case import Case
     from thud.case.keys import Value
@@ -69,20 +67,6 @@ class SurrogateKind(DropsKind[Surrogate]):
     def identity_in(self, path: Path) -> dict[str, str]:
         """Return the identity of results."""
         return read_surrogate(path).identity
-
-    def warnings(self, result: Surrogate) -> list[str]:
-        """Return how close it is, and what it does not answer."""
-        return [result.sentence]
-
-    def succeeded(self, result: Surrogate) -> bool:  # noqa: ARG002
-        """Return that there is one: its training raises otherwise."""
-        return True
-
-    def draw(self, result: Surrogate) -> Figure:
-        """Return the errors of the held-out drops."""
-        from thud.plot import draw_surrogate
-
-        return draw_surrogate(result)
 
 
 KIND = SurrogateKind()

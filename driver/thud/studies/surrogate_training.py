@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from scipy.linalg import cho_solve
+from threadpoolctl import threadpool_limits
 
 from thud.base.checks import refuse
 from thud.base.errors import InputError, NumericalError
 from thud.base.extras import require_extra
-from thud.base.threads import one_thread
 from thud.case.keys import find_key
 from thud.impact.quantities import LEVELS, SCALAR_QUANTITIES
 from thud.studies.blocks import read_identity, result_names
@@ -22,11 +22,7 @@ from thud.studies.directory import require_version
 from thud.studies.parameter import Parameter
 from thud.studies.samples import SampleStudy
 from thud.studies.sampling import unit_samples
-from thud.studies.trained_surrogate import (
-    SMOOTHNESS,
-    Surrogate,
-    read_surrogate,
-)
+from thud.studies.trained_surrogate import SMOOTHNESS, Surrogate, read_surrogate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,7 +31,7 @@ if TYPE_CHECKING:
     from thud.base.files import Results
     from thud.studies.kind import RunOptions
     from thud.studies.samples import Columns
-    from thud.studies.surrogate_plan import Plan
+    from thud.studies.trained_surrogate import Plan
 
     Values = NDArray[np.float64]
 
@@ -198,11 +194,7 @@ def regress(points: Values, values: Values, judged: NDArray[np.bool_]) -> dict[s
     with require_extra("surrogate"):
         from sklearn.exceptions import ConvergenceWarning
         from sklearn.gaussian_process import GaussianProcessRegressor
-        from sklearn.gaussian_process.kernels import (
-            ConstantKernel,
-            Matern,
-            WhiteKernel,
-        )
+        from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
     mean, scale = values.mean(axis=0), values.std(axis=0)
     # Such as a contact time that was asked for.
     scale[scale <= _ROUNDING * np.maximum(np.abs(mean), 1.0)] = 0.0
@@ -212,7 +204,7 @@ def regress(points: Values, values: Values, judged: NDArray[np.bool_]) -> dict[s
     shape = Matern(np.full(points.shape[1], 2.0), (0.05, 50.0), nu=SMOOTHNESS)
     kernel = ConstantKernel(10.0, (1e-2, 1e6)) * shape + WhiteKernel(1e-2, (1e-10, 10.0))
     process = GaussianProcessRegressor(kernel)
-    with warnings.catch_warnings(), one_thread():
+    with warnings.catch_warnings(), threadpool_limits(1, "blas"):
         # A parameter without effect ends at the longest length.
         warnings.simplefilter("ignore", ConvergenceWarning)
         process.fit(points, normal[:, chosen])

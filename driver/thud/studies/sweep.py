@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
-import xarray as xr
-
-from thud.base.tables import format_rows
 from thud.level.levels import BANDWIDTHS
+from thud.studies.blocks import read_dataset
+from thud.studies.result import SampleResult
 from thud.studies.sample_kind import SampleKind
 
 if TYPE_CHECKING:
     import os
 
+    import xarray as xr
     from matplotlib.figure import Figure
 
     from thud.studies.kind import RunOptions
@@ -20,44 +22,69 @@ if TYPE_CHECKING:
     from thud.studies.study import Source
 
 
-class Sweep(SampleKind[xr.Dataset]):
+@dataclass(frozen=True, eq=False)
+class Sweep(SampleResult):
+    """Results of all samples.
+
+    Attributes
+    ----------
+    dataset : Dataset
+        A grid has one dimension per parameter, other designs the dimension ``sample``; what is
+        stored as Zarr is read on demand.
+    """
+
+    dataset: xr.Dataset
+
+    def __post_init__(self) -> None:
+        """Copy a dataset in memory; what is stored as Zarr may be larger."""
+        if "source" not in self.dataset.encoding:
+            super().__post_init__()
+
+    def __repr__(self) -> str:
+        """Return the dimensions and how many samples conform."""
+        conforms = self.dataset["conforms"]
+        shape = " x ".join(f"{name} {size}" for name, size in conforms.sizes.items())
+        return f"<Sweep, {shape}: {int(conforms.sum())} of {conforms.size} samples conform>"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text: the range of each result."""
+        rows: list[tuple[str, ...]] = [("", "minimum", "median", "maximum")]
+        for name, variable in self.dataset.data_vars.items():
+            if variable.dtype.kind == "f":
+                bands = next((name for name in BANDWIDTHS if name in variable.dims), None)
+                for band in self.dataset[bands].values if bands else [None]:
+                    values = variable.sel({bands: band}) if bands else variable
+                    at = "" if band is None else f" {band:g} Hz"
+                    label = f"{name}{at}, {variable.attrs['units']}"
+                    numbers = (values.min(), values.median(), values.max())
+                    rows.append((label, *(f"{float(number):.4g}" for number in numbers)))
+        rows.append(("conforming samples", "", "", f"{int(self.dataset['conforms'].sum())}"))
+        return rows
+
+    def plot(self) -> Figure:
+        """Return levels against the first numeric parameter."""
+        from thud.plot import draw_sweep
+
+        return draw_sweep(self)
+
+
+class SweepKind(SampleKind[Sweep]):
     """Sweeps as a kind of study."""
 
     name = "sweep"
     designs = ("grid", "list", "random", "latin_hypercube", "sobol")
 
-    def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> xr.Dataset:  # noqa: ARG002
+    def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> Sweep:  # noqa: ARG002
         """Return the results of all samples as they are."""
-        return dataset
-
-    def table(self, result: xr.Dataset, study: SampleStudy) -> str:  # noqa: ARG002
-        """Return the range of each result as text."""
-        rows: list[tuple[str, ...]] = [("", "minimum", "median", "maximum")]
-        for name, variable in result.data_vars.items():
-            if variable.dtype.kind == "f":
-                bands = next((name for name in BANDWIDTHS if name in variable.dims), None)
-                for band in result[bands].values if bands else [None]:
-                    values = variable.sel({bands: band}) if bands else variable
-                    place = "" if band is None else f" {band:g} Hz"
-                    label = f"{name}{place}, {variable.attrs['units']}"
-                    numbers = (values.min(), values.median(), values.max())
-                    rows.append((label, *(f"{float(number):.4g}" for number in numbers)))
-        rows.append(("conforming samples", "", "", f"{int(result['conforms'].sum())}"))
-        return format_rows(rows)
-
-    def draw(self, result: xr.Dataset) -> Figure:
-        """Return levels against the first numeric parameter."""
-        from thud.plot import draw_sweep
-
-        return draw_sweep(result)
+        return Sweep(dataset)
 
 
-KIND = Sweep()
+KIND = SweepKind()
 
 
 def sweep(
     study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[RunOptions]
-) -> xr.Dataset:
+) -> Sweep:
     """Compute every sample of a study.
 
     Parameters
@@ -68,12 +95,12 @@ def sweep(
         Directory of the results; an interrupted study is continued. None: they are not written.
     **how
         Keywords `backend`, `workers`, `scheduler`, `yes`, `progress`, `replace`; see
-        `thud.studies.kind.How`.
+        `thud.studies.kind.RunOptions`.
 
     Returns
     -------
-    Dataset
-        A grid has one dimension per parameter, other designs the dimension ``sample``.
+    Sweep
+        The results of all samples.
 
     Raises
     ------
@@ -87,7 +114,31 @@ def sweep(
     Examples
     --------
     >>> found = sweep({"parameters": {"height": {"values": [50, 100], "unit": "cm"}}})
-    >>> found["contact_time"].round(4).values.tolist()
+    >>> found.dataset["contact_time"].round(4).values.tolist()
     [0.0211, 0.0204]
     """
     return KIND.run(study, output, **how)
+
+
+def read_sweep(path: str | os.PathLike[str]) -> Sweep:
+    """Read the results of a study, also of one that was interrupted.
+
+    Parameters
+    ----------
+    path
+        A file ``.nc``, a Zarr group ``.zarr``, or the directory ``.partial`` of a study that is not
+        done: its finished samples.
+
+    Returns
+    -------
+    Sweep
+        The results; those of a Zarr group are read when they are needed.
+
+    Raises
+    ------
+    InputError
+        Where there are no results of a study.
+    OSError
+        Where they cannot be read for now.
+    """
+    return Sweep(read_dataset(Path(path)))

@@ -13,20 +13,29 @@ import numpy as np
 from scipy.stats import binom
 
 from thud.base.bridge import version
-from thud.base.checks import refuse, require_kind
-from thud.base.display import Displayed
+from thud.base.checks import (
+    LARGEST_SEED,
+    refuse,
+    refuse_value,
+    require_kind,
+    require_number,
+    require_whole,
+    require_words,
+)
 from thud.base.extras import require_extra
 from thud.base.files import is_failure, read_input, replace_file
 from thud.case.case import Case, case_text
 from thud.case.keys import OF_FILES, put
 from thud.level.assessment import get_criteria
 from thud.level.levels import get_bands
+from thud.studies.result import StudyResult
 from thud.studies.study import value_in
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import LimitsSource
@@ -42,11 +51,15 @@ _TOGETHER = 250
 _ROUNDING = 1e-9
 # Smoothness of the kernel of Matern: responses that can be differentiated twice.
 SMOOTHNESS = 2.5
+# Fewer drops have no order statistic that bounds 95 % of all with a confidence of 95 %.
+MIN_DROPS = 64
+# Training takes the third power of their number.
+MAX_DROPS = 8192
 _ARRAYS = ("region", "points", "length", "weights", "mean", "scale", "residuals")
 
 
 @dataclass(frozen=True, eq=False)
-class Surrogate(Displayed):
+class Surrogate(StudyResult):
     """What has been learned from some drops of a model, for others of the same region.
 
     A Gaussian process interpolates all quantities, in dB: levels, and 20 lg of what has another
@@ -113,7 +126,18 @@ class Surrogate(Displayed):
                 rows.append((name, *(f"{number:.3f}" for number in numbers), note))
         return rows
 
-    table = rows
+    warnings = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """How close it is, and what it does not answer."""
+        return (self.sentence,)
+
+    def plot(self) -> Figure:
+        """Return the errors of the held-out drops."""
+        from thud.plot import draw_surrogate
+
+        return draw_surrogate(self)
 
     @property
     def labels(self) -> list[str]:
@@ -202,7 +226,7 @@ class Surrogate(Displayed):
     def predict(self, case: Case, columns: Columns) -> Columns:
         """Return the results of samples of a case that differ in some keys, shape (n_sample,) each.
 
-        They are those of `thud.studies.evaluation.evaluate`, and ``doubtful``: the verdict could
+        They are those of `thud.studies.samples.evaluate`, and ``doubtful``: the verdict could
         change by the errors. Samples outside the region have a status and a reason instead. Raises
         InputError as `require`.
         """
@@ -403,3 +427,62 @@ def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
             "a file that Surrogate.save wrote",
         )
     return found
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How a surrogate is trained.
+
+    Attributes
+    ----------
+    error : float
+        Bound of the error of what is judged, dB.
+    size : int
+        Maximum number of drops.
+    seed : int
+        Seed of their design, scrambled points of Sobol.
+    """
+
+    error: float = 0.1
+    size: int = 1024
+    seed: int = 0
+
+    @property
+    def identity(self) -> dict[str, str]:
+        """What a surrogate depends on besides its drops, as texts by place and key."""
+        with require_extra("surrogate"):
+            import sklearn
+        return {
+            "scikit-learn_version": sklearn.__version__,
+            **{f"[surrogate] {word}": f"{value!r}" for word, value in vars(self).items()},
+        }
+
+    @property
+    def stages(self) -> list[tuple[int, int]]:
+        """First and one past the last drop of each stage: steps of half, of at most `size`."""
+        ends = [min(MIN_DROPS, self.size)]
+        while ends[-1] < self.size:
+            # 64, 96, 128, 192, ...: whole parts of the sequence.
+            power = 1 << (ends[-1].bit_length() - 1)
+            step = power // 2 if ends[-1] == power else 2 * power - ends[-1]
+            ends.append(min(ends[-1] + step, self.size))
+        return list(zip([0, *ends[:-1]], ends, strict=True))
+
+
+def read_plan(given: Mapping[str, object], folder: Path) -> Plan | Surrogate:
+    """Return the plan of a table ``[surrogate]``, or the surrogate of the file that it names."""
+    place = "[surrogate]"
+    if "file" in given:
+        require_words(f"{place} with file", given, ("file",))
+        path = given["file"]
+        if not isinstance(path, str) or not path.strip():
+            refuse_value(f"{place} file", path, "the path of a saved surrogate")
+        return read_surrogate(folder / path)
+    require_words(place, given, ("error", "size", "seed", "file"))
+    error, size, seed = (given.get(w, getattr(Plan, w)) for w in ("error", "size", "seed"))
+    require_number(f"{place} error", error)
+    if not error > 0:  # type: ignore[operator]
+        refuse_value(f"{place} error", error, "numbers above 0, dB")
+    require_whole(f"{place} size", size, MIN_DROPS, MAX_DROPS)
+    require_whole(f"{place} seed", seed, 0, LARGEST_SEED)
+    return Plan(float(error), size, seed)  # type: ignore[arg-type]

@@ -10,10 +10,10 @@ import numpy as np
 from scipy.stats import binomtest
 
 from thud.base.checks import refuse
-from thud.base.display import Displayed
 from thud.impact.quantities import RATING
 from thud.level.assessment import octave_limits
 from thud.level.levels import get_bands
+from thud.studies.result import SampleResult
 from thud.studies.sample_kind import SampleKind
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True, eq=False)
-class Uncertainty(Displayed):
+class Uncertainty(SampleResult):
     """Distribution of the levels, and the probability of conformity.
 
     Attributes
@@ -60,10 +60,6 @@ class Uncertainty(Displayed):
     def __repr__(self) -> str:
         """Return how many samples conform."""
         return f"<Uncertainty, {self.source}: {self.conforming} of {self.computed} samples conform>"
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text."""
-        return self.table()
 
     @property
     def probability(self) -> float:
@@ -93,7 +89,7 @@ class Uncertainty(Displayed):
         counts = (conforms & ~doubtful).sum(), (conforms | doubtful).sum()
         return float(counts[0] / self.computed), float(counts[1] / self.computed)
 
-    def table(self) -> list[tuple[str, ...]]:
+    def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
         lower, upper = octave_limits(self.source)
         rows: list[tuple[str, ...]] = [
@@ -109,7 +105,7 @@ class Uncertainty(Displayed):
             rating = self.dataset[RATING].values[self.dataset["status"].values == 0]
             low, high = np.quantile(rating, [0.025, 0.975])
             spread = f"{rating.std(ddof=1):.2f}", f"{low:.2f} to {high:.2f}"
-            rows.append(("rating, standardised", f"{rating.mean():.2f}", *spread, ""))
+            rows.append(("rating, standardized", f"{rating.mean():.2f}", *spread, ""))
         low, high = self.interval
         probability = f"{100 * self.probability:.1f} %", f"± {100 * self.standard_error:.1f} %"
         interval = f"{100 * low:.1f} to {100 * high:.1f} %"
@@ -120,6 +116,12 @@ class Uncertainty(Displayed):
             share = f"{100 * low:.1f} to {100 * high:.1f} %"
             rows.append(("  by errors of the surrogate", "", "", share, ""))
         return rows
+
+    def plot(self) -> Figure:
+        """Return the distribution of the levels."""
+        from thud.plot import draw_uncertainty
+
+        return draw_uncertainty(self)
 
 
 class UncertaintyKind(SampleKind[Uncertainty]):
@@ -155,12 +157,6 @@ class UncertaintyKind(SampleKind[Uncertainty]):
             int((~good).sum()),
         )
 
-    def draw(self, result: Uncertainty) -> Figure:
-        """Return the distribution of the levels."""
-        from thud.plot import draw_uncertainty
-
-        return draw_uncertainty(result)
-
 
 KIND = UncertaintyKind()
 
@@ -175,7 +171,7 @@ def uncertainty(
     study
         Path of a TOML file, or what would stand in it; its parameters are independent.
     output, **how
-        See `sweep`.
+        As of `sweep`.
 
     Returns
     -------

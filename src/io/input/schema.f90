@@ -8,7 +8,7 @@ module thud_schema
    use thud_field, only: field_type
    use thud_interval, only: interval_type, new_interval
    use thud_kinds, only: wp
-   use thud_quantities, only: quantities, quantity_type, sample_quantity_count
+   use thud_quantities, only: history_quantity_count, quantities, quantity_type, sample_quantity_count
    use thud_rating, only: class_limits, find_rated_bands, rated_set_names
    use thud_registry, only: floor_names, model_names
    use thud_source_limits, only: criterion_count, criterion_type, get_criteria, get_source_limits, source_limits_type, &
@@ -59,7 +59,8 @@ contains
          call describe_quantity(quantities(i), entry)
          text = text//newline//entry//trim(merge(',', ' ', i < size(quantities)))
       end do
-      text = text//'],'//newline//'"sample_quantities": '//to_text(sample_quantity_count)//','//newline//'"keys": ['
+      text = text//'],'//newline//'"sample_quantities": '//to_text(sample_quantity_count)//','//newline &
+         //'"history_quantities": '//to_text(history_quantity_count)//','//newline//'"keys": ['
       do i = 1, size(fields)
          call describe(fields(i), entry)
          text = text//newline//entry//trim(merge(',', ' ', i < size(fields)))

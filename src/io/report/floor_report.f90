@@ -7,7 +7,8 @@ module thud_floor_report
    use thud_floor_result, only: floor_result_type
    use thud_force_history, only: force_history_type, force_names
    use thud_kinds, only: wp
-   use thud_quantities, only: get_quantities, quantities, sample_quantity_count
+   use thud_quantities, only: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
+      sample_quantity_count
    use thud_report, only: get_fact_group, get_force_csv, get_quantity_lines, line
    use thud_table, only: is_peak_of_other
    use thud_text, only: fixed, flush_right, newline, padded, to_text
@@ -96,7 +97,7 @@ contains
       character(len=13) :: energy
       character(len=:), allocatable :: cells
       real(wp), allocatable :: blocked_level(:)
-      real(wp) :: values(size(quantities), 2)
+      real(wp) :: values(history_quantity_count, 2)
       integer :: i
 
       blocked_level = get_blocked_levels(impact)
@@ -114,18 +115,25 @@ contains
       values(:, 2) = get_quantities(contact)
       do i = 1, sample_quantity_count
          if (is_peak_of_other(quantities(i), case)) cycle
-         associate (quantity => quantities(i))
-            call add_row(trim(quantity%title), quantity%display_scale*values(i, 1), quantity%display_scale*values(i, 2), &
-               quantity%decimals, trim(quantity%display_unit))
-         end associate
+         call add_quantity(quantities(i), values(i, 1), values(i, 2))
       end do
       call add_row('velocity of the floor', 0.0_wp, 1.0e3_wp*maxval(abs(contact%floor_velocity)), 3, 'mm/s')
       call add_row('its displacement', 0.0_wp, 1.0e3_wp*maxval(abs(contact%floor_displacement)), 4, 'mm')
-      call add_row('energy to the floor', 0.0_wp, 1.0e3_wp*contact%floor_work, 3, 'mJ')
+      call add_quantity(get_quantity('floor_work'), 0.0_wp, contact%floor_work)
       text = text//newline//'  Energies by the velocity and by the mobility of the floor differ by at most ' &
          //fixed(1.0e2_wp*get_disagreement(found), 3)//' % of all bands.'//newline
 
    contains
+
+      !> Adds a quantity of both drops.
+      subroutine add_quantity(quantity, rigid, moving)
+         type(quantity_type), intent(in) :: quantity
+         !> On a rigid floor, and on the floor, SI units.
+         real(wp), intent(in) :: rigid, moving
+
+         call add_row(trim(quantity%title), quantity%display_scale*rigid, quantity%display_scale*moving, &
+            quantity%decimals, trim(quantity%display_unit))
+      end subroutine add_quantity
 
       !> Adds a number of both drops.
       subroutine add_row(title, rigid, moving, decimals, unit)

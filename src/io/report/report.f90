@@ -7,7 +7,7 @@ module thud_report
    use thud_csv, only: get_history_csv, get_table_csv
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_kinds, only: wp
-   use thud_quantities, only: get_quantities, quantities
+   use thud_quantities, only: get_quantities, history_quantity_count, quantities
    use thud_source_limits, only: conforms, criterion_type
    use thud_text, only: join_quoted, newline, quoted, to_text
    implicit none (type, external)
@@ -140,12 +140,12 @@ contains
    function get_quantity_lines(history) result(text)
       type(force_history_type), intent(in) :: history
       character(len=:), allocatable :: text
-      real(wp) :: values(size(quantities))
+      real(wp) :: values(history_quantity_count)
       integer :: i
 
       values = get_quantities(history)
       text = ''
-      do i = 1, size(quantities)
+      do i = 1, history_quantity_count
          text = text//line(trim(quantities(i)%name), to_text(values(i)), trim(quantities(i)%unit))
       end do
    end function get_quantity_lines

@@ -7,7 +7,7 @@ module thud_result_bundle
    use thud_force_history, only: force_history_type
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
-   use thud_quantities, only: get_quantities, quantities
+   use thud_quantities, only: get_quantities, history_quantity_count, quantities
    use thud_room, only: few_modes, room_level_type
    use thud_text, only: to_text
    implicit none (type, external)
@@ -49,13 +49,13 @@ contains
       !> What the names of its items begin with.
       character(len=*), intent(in) :: prefix
       type(force_history_type), intent(in) :: history
-      real(wp) :: values(size(quantities))
+      real(wp) :: values(history_quantity_count)
       integer :: n(1)
       integer :: i
 
       n = size(history%deflection)
       values = get_quantities(history)
-      do i = 1, size(quantities)
+      do i = 1, history_quantity_count
          call bundle%add_number(prefix//'quantities.'//quantities(i)%name, values(i))
       end do
       do i = 1, size(history%fact)

@@ -7,7 +7,8 @@ module thud_table
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
-   use thud_quantities, only: get_quantities, quantities, quantity_type, sample_quantity_count
+   use thud_quantities, only: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
+      sample_quantity_count
    use thud_report, only: get_word
    use thud_source_limits, only: conforms, criterion_type
    use thud_text, only: fixed, flush_right, newline, padded, replaced, to_text
@@ -25,7 +26,7 @@ contains
       type(force_history_type), intent(in) :: history
       type(assessment_type), intent(in) :: assessment
       character(len=:), allocatable :: text
-      real(wp) :: values(size(quantities))
+      real(wp) :: values(history_quantity_count)
       integer :: i, assessed, other
 
       assessed = get_assessed_force(case)
@@ -39,11 +40,10 @@ contains
          do i = 1, octave_count
             text = text//level_row(i, criteria(i))
          end do
-         text = text//row('contact time', history%contact_time*1000, 3, 'ms', criteria(octave_count + 1), 1000.0_wp) &
-            //row('restitution', history%restitution, 4, '', criteria(octave_count + 2), 1.0_wp) &
-            //row('peaks of the force', criteria(octave_count + 3)%value, 0, '', criteria(octave_count + 3), 1.0_wp) &
-            //row('mass', case%ball%mass, 3, 'kg', criteria(octave_count + 4), 1.0_wp) &
-            //row('drop height', case%drop%height, 3, 'm', criteria(octave_count + 5), 1.0_wp)//newline
+         do i = octave_count + 1, size(criteria)
+            text = text//quantity_row(get_quantity(criteria(i)%name), criteria(i)%value, criteria(i))
+         end do
+         text = text//newline
          do i = octave_count + 1, size(assessment%bands)
             text = text//level_row(i)
          end do
@@ -53,8 +53,7 @@ contains
             ! Those with limits stand above.
             if (any(criteria%name == quantities(i)%name)) cycle
             if (is_peak_of_other(quantities(i), case)) cycle
-            text = text//row(trim(quantities(i)%title), quantities(i)%display_scale*values(i), quantities(i)%decimals, &
-               trim(quantities(i)%display_unit))
+            text = text//quantity_row(quantities(i), values(i))
          end do
          text = text//facts(history)//newline
          text = text//'  The source '//trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
@@ -138,6 +137,18 @@ contains
             //row('at the first point', force(2)/deflection(2)/1.0e3_wp, 2, 'kN/m')
       end associate
    end function get_compression_table
+
+   !> A quantity, with its limits where there are any.
+   function quantity_row(quantity, value, criterion) result(text)
+      type(quantity_type), intent(in) :: quantity
+      !> Its value and its limits, in SI units.
+      real(wp), intent(in) :: value
+      type(criterion_type), intent(in), optional :: criterion
+      character(len=:), allocatable :: text
+
+      text = row(quantity%title, quantity%display_scale*value, quantity%decimals, quantity%display_unit, criterion, &
+         quantity%display_scale)
+   end function quantity_row
 
    !> One number of the table, with its limits where there are any.
    function row(name, value, decimals, unit, criterion, scale) result(text)

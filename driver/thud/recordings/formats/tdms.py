@@ -21,15 +21,15 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-MOST_CHANNELS = 1024
-MOST_SEGMENTS = 200_000
-# Mark, kinds of contents, version, and lengths of a segment and of its description.
+MAX_CHANNELS = 1024
+MAX_SEGMENTS = 200_000
+# Mark, flags, version, and lengths of a segment and of its description.
 LEAD = struct.Struct("<4sIIQQ")
 
 
 @dataclass(frozen=True)
 class TdmsSamples:
-    """One channel of a TDMS file, which stays open: its description may be long."""
+    """One channel of a TDMS file, which stays open: reading its description may take long."""
 
     file: _OpenFile
     group: str
@@ -43,7 +43,7 @@ class TdmsSamples:
 
 
 class _OpenFile:
-    """A TDMS file that is opened when it is needed, also in another process."""
+    """A TDMS file that is opened at first use, also in another process."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -60,7 +60,7 @@ class _OpenFile:
 
 
 def _library() -> Any:  # noqa: ANN401 - a module
-    """Return the library, which writes no warnings: what they are about is refused here."""
+    """Return the library without its warnings, whose reasons are refused here."""
     found = library("nptdms", "TDMS")
     # Each of its modules has a logger with a level of its own.
     found.log.log_manager.set_level(logging.ERROR)
@@ -74,8 +74,8 @@ def read_channels(path: Path) -> list[Channel]:
         _require_complete(raw, shown_path(path))
     file = _OpenFile(path)
     found = [(group, one) for group in file.tdms.groups() for one in group.channels()]
-    if len(found) > MOST_CHANNELS:
-        refuse(f"{shown_path(path)}: {len(found)} channels", f"up to {MOST_CHANNELS}")
+    if len(found) > MAX_CHANNELS:
+        refuse(f"{shown_path(path)}: {len(found)} channels", f"up to {MAX_CHANNELS}")
     return [
         _channel(file, number, group, one)
         for number, (group, one) in enumerate(found, start=1)
@@ -107,7 +107,7 @@ def _require_complete(file: BinaryIO, name: str) -> None:
     """Raise InputError where a segment is cut off, which the library only warns of."""
     size = os.fstat(file.fileno()).st_size
     begin = 0
-    for _ in range(MOST_SEGMENTS):
+    for _ in range(MAX_SEGMENTS):
         file.seek(begin)
         lead = file.read(LEAD.size)
         if not lead:
@@ -115,4 +115,4 @@ def _require_complete(file: BinaryIO, name: str) -> None:
         if len(lead) < LEAD.size or begin + LEAD.size + LEAD.unpack(lead)[3] > size:
             refuse(f"{name}: is cut off in the segment at byte {begin}", "a complete file")
         begin += LEAD.size + LEAD.unpack(lead)[3]
-    refuse(f"{name}: more than {MOST_SEGMENTS} segments", "a recording")
+    refuse(f"{name}: more than {MAX_SEGMENTS} segments", "a recording")

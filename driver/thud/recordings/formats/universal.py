@@ -9,16 +9,16 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.recordings.channel import Channel, library, require_small, shown_path
-from thud.recordings.grid import even_grid
 from thud.recordings.header_aliases import TIME_UNITS
 from thud.recordings.signal import ArraySamples
+from thud.recordings.uniform_grid import uniform_grid
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-# The library holds the text and a list of its numbers.
-LARGEST = 2**25
-MOST_SETS = 1024
+# Maximum size in bytes: the library holds the text and a list of its numbers.
+MAX_SIZE = 2**25
+MAX_SETS = 1024
 TIME_RESPONSE = 1
 FORCES = (9, 13)
 REAL = (2, 4)
@@ -27,11 +27,11 @@ NONE = {"", "NONE"}
 
 def read_channels(path: Path) -> list[Channel]:
     """Return the time histories of a universal file."""
-    require_small(path, "a universal file", LARGEST)
+    require_small(path, "a universal file", MAX_SIZE)
     file = library("pyuff", "universal").UFF(os.fsencode(path))
     kinds = [int(kind) for kind in file.get_set_types()]
-    if len(kinds) > MOST_SETS:
-        refuse(f"{shown_path(path)}: {len(kinds)} data sets", f"up to {MOST_SETS}")
+    if len(kinds) > MAX_SETS:
+        refuse(f"{shown_path(path)}: {len(kinds)} data sets", f"up to {MAX_SETS}")
     sets = [file.read_sets(number) for number, kind in enumerate(kinds) if kind == 58]  # noqa: PLR2004
     histories = [one for one in sets if _is_history(one)]
     if not histories:
@@ -57,11 +57,11 @@ def _channel(path: Path, number: int, one: dict[str, Any]) -> Channel:
     if one["abscissa_spacing"] == 1:
         step = one["abscissa_inc"] * scale
     else:
-        _, step, steps = even_grid(np.asarray(one["x"], dtype=np.float64)[:due] * scale, name)
+        _, step, steps = uniform_grid(np.asarray(one["x"], dtype=np.float64)[:due] * scale, name)
     unit = one["ordinate_axis_units_lab"].strip()
     if unit.upper() in NONE and one["ordinate_spec_data_type"] in FORCES:
         unit = "N"
-        steps += ("The data set names no unit; as a force it was taken to be in N.",)
+        steps += ("The data set states no unit; as a force it is read in N.",)
     label = one["ordinate_axis_lab"].strip()
     return Channel(
         name=one["id1"].strip() if label.upper() in NONE else label,

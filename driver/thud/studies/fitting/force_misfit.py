@@ -12,6 +12,7 @@ from scipy.signal import ZoomFFT
 from thud.base.checks import refuse
 from thud.base.immutable import freeze
 from thud.impact.impact import Impact
+from thud.studies.fitting.inference import UNLIKELY, residual_warnings
 from thud.studies.fitting.misfit import GAIN, SHIFT, Misfit
 from thud.studies.fitting.record_noise import (
     MIN_QUIET,
@@ -21,14 +22,15 @@ from thud.studies.fitting.record_noise import (
     new_weights,
     wave_size,
 )
-from thud.studies.fitting.residual_tests import UNLIKELY, residual_doubts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.recordings.force_record import Record
     from thud.recordings.noise import Background
+    from thud.recordings.uniform_grid import Record
     from thud.studies.fitting.force_target import ForceTarget
+
+    Array = NDArray[np.float64]
 
 # Rounded times leave this part of the highest frequency open.
 SAME = 1e-5
@@ -122,7 +124,7 @@ class ForceMisfit(Misfit):
         """Deviation of white noise with the power of the noise below `below`, N; 1: not known."""
         return self.target.noise or (self.weights.deviation() if self.known_noise else 1.0)
 
-    def model_spectrum(self, impact: Impact, own: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def model_spectrum(self, impact: Impact, own: Array) -> NDArray[np.complex128]:
         """Return the transform of the force of an impact as the record would show it."""
         count = len(self.frequency)
         shape = len(impact.time), impact.sample_rate
@@ -136,17 +138,17 @@ class ForceMisfit(Misfit):
         result: NDArray[np.complex128] = self.value(GAIN, own) * turned * phase
         return result
 
-    def value(self, name: str, own: NDArray[np.float64]) -> float:
+    def value(self, name: str, own: Array) -> float:
         """Return one of its own parameters, or what it is where it is not fitted."""
         place = list(self.own).index(name) if name in self.own else None
         return {SHIFT: 0.0, GAIN: 1.0}[name] if place is None else float(own[place])
 
-    def residual(self, impact: Impact, own: NDArray[np.float64]) -> NDArray[np.float64]:
+    def residual(self, impact: Impact, own: Array) -> Array:
         """Return model minus target over standard deviation, shape (size,)."""
         rest = self._grid(self.model_spectrum(impact, own) - self.spectrum)
         return self._with_prior(self.weights.matrix @ rest, (self.value(GAIN, own) - 1))
 
-    def own_derivatives(self, impact: Impact, own: NDArray[np.float64]) -> NDArray[np.float64]:
+    def own_derivatives(self, impact: Impact, own: Array) -> Array:
         """Return the derivatives of the residual by its own parameters, shape (size, n_own)."""
         model = self.model_spectrum(impact, own)
         slopes = {
@@ -159,10 +161,10 @@ class ForceMisfit(Misfit):
         ]
         return np.column_stack(columns) if columns else np.empty((self.size, 0))
 
-    def _with_prior(self, weighted: NDArray[np.float64], gain: float) -> NDArray[np.float64]:
+    def _with_prior(self, weighted: Array, gain: float) -> Array:
         return weighted if self.prior is None else np.append(weighted, gain / self.prior)
 
-    def own_start(self, impact: Impact) -> NDArray[np.float64]:
+    def own_start(self, impact: Impact) -> Array:
         """Return where impact and record correlate most, s, and a gain of 1."""
         start = {SHIFT: self.time[0], GAIN: 1.0}
         own = np.array([start[name] for name in self.own])
@@ -175,17 +177,15 @@ class ForceMisfit(Misfit):
         own[0] += (lag - (lag > 3 / 4)) * self.period
         return own
 
-    def target_vector(self) -> NDArray[np.float64]:
+    def target_vector(self) -> Array:
         """Return the target over standard deviation, shape (size,)."""
         return self._with_prior(self.weights.matrix @ self._grid(self.spectrum), 1.0)
 
-    def data(self) -> NDArray[np.float64]:
+    def data(self) -> Array:
         """Return the record, N."""
         return self.force
 
-    def history_columns(
-        self, impact: Impact, own: NDArray[np.float64]
-    ) -> dict[str, NDArray[np.float64]]:
+    def columns(self, impact: Impact, own: Array) -> dict[str, Array]:
         """Return target and model side by side, s and N: columns by their names."""
         model = self.model_spectrum(impact, own)
         under = self.weights.background(self._grid(self.spectrum - model))
@@ -200,12 +200,7 @@ class ForceMisfit(Misfit):
             "residual_N": force + background - target,
         }
 
-    def columns(self, impact: Impact, own: NDArray[np.float64]) -> dict[str, list[object]]:
-        """Return target and model side by side, s and N: columns by their names."""
-        columns = self.history_columns(impact, own)
-        return {name: column.tolist() for name, column in columns.items()}
-
-    def nuisances(self, impact: Impact, own: NDArray[np.float64]) -> dict[str, tuple[float, float]]:
+    def nuisances(self, impact: Impact, own: Array) -> dict[str, tuple[float, float]]:
         """Return offset and amplitude of hum where they are fitted, and their errors, N."""
         value, covariance = self.weights.estimates(
             self._grid(self.spectrum - self.model_spectrum(impact, own))
@@ -222,9 +217,7 @@ class ForceMisfit(Misfit):
                 found[f"hum of {mains:g} Hz"] = size, error
         return found
 
-    def doubts(
-        self, impact: Impact, own: NDArray[np.float64], deviation: float, count: int
-    ) -> list[str]:
+    def doubts(self, impact: Impact, own: Array, deviation: float, count: int) -> list[str]:
         """Return what residuals of a deviation show that `count` parameters cannot explain.
 
         Noise is the same throughout and independent once it is weighted; what the model cannot
@@ -241,7 +234,7 @@ class ForceMisfit(Misfit):
         unit = deviation * self.unit_deviation
         found = _contact_doubt(weighted, inside, count, unit)
         if not found:
-            found = residual_doubts(weighted, time)
+            found = residual_warnings(weighted, time)
             found += _change_doubt(weighted, time < begin, time > begin + impact.contact_time)
         if not (self.quiet.known or self.target.offset is not None or self.exact):
             found.append(
@@ -250,19 +243,19 @@ class ForceMisfit(Misfit):
             )
         return found
 
-    def history(self, spectrum: NDArray[np.complex128]) -> NDArray[np.float64]:
+    def history(self, spectrum: NDArray[np.complex128]) -> Array:
         """Return the history of a transform, N, shape (n_sample,)."""
-        whole: NDArray[np.float64] = np.fft.irfft(spectrum, len(self.time), norm="ortho")
+        whole: Array = np.fft.irfft(spectrum, len(self.time), norm="ortho")
         return whole
 
-    def _grid(self, spectrum: NDArray[np.complex128]) -> NDArray[np.float64]:
+    def _grid(self, spectrum: NDArray[np.complex128]) -> Array:
         """Return the history of a transform on the grid."""
-        grid: NDArray[np.float64] = np.fft.irfft(spectrum, self.count, norm="ortho")
+        grid: Array = np.fft.irfft(spectrum, self.count, norm="ortho")
         return grid
 
 
 def _contact_doubt(
-    weighted: NDArray[np.float64], inside: NDArray[np.bool_], count: int, unit: float
+    weighted: Array, inside: NDArray[np.bool_], count: int, unit: float
 ) -> list[str]:
     """Return how residuals differ during contact from before and after, where they do."""
     during, other = int(inside.sum()) - count, int((~inside).sum())
@@ -281,7 +274,7 @@ def _contact_doubt(
 
 
 def _change_doubt(
-    weighted: NDArray[np.float64], before: NDArray[np.bool_], after: NDArray[np.bool_]
+    weighted: Array, before: NDArray[np.bool_], after: NDArray[np.bool_]
 ) -> list[str]:
     """Return how residuals before contact differ from those behind it, where they do."""
     counts = int(before.sum()), int(after.sum())

@@ -1,4 +1,4 @@
-"""Covariance and identifiability of the parameters of a fit, from residuals and Jacobian."""
+"""Covariance and identifiability of the parameters of a fit, and tests of its residuals."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    Array = NDArray[np.float64]
+
 # Columns of the Jacobian with a smaller norm over that of the target, or a larger relative error,
 # are zero.
 NO_EFFECT = 1e-9
@@ -30,7 +32,11 @@ NEGLIGIBLE = 1e-3
 # error of any model is larger than what separates them.
 STRONG = 0.9
 INSEPARABLE = 0.998
-# Part of the maximum entry below which a sentence omits a parameter.
+# Probability of a false warning by one test.
+UNLIKELY = 1e-3
+# Fewer residuals are not tested.
+MIN_TESTED = 20
+# Fraction of the maximum entry below which a sentence omits a parameter.
 SMALL = 0.05
 
 
@@ -48,12 +54,12 @@ class Inference:
         Changes that leave the residuals as they are, of the fewest parameters.
     """
 
-    covariance: NDArray[np.float64]
-    singular_values: NDArray[np.float64]
-    null: NDArray[np.float64]
+    covariance: Array
+    singular_values: Array
+    null: Array
 
 
-def infer(jacobian: NDArray[np.float64], finer: NDArray[np.float64], size: float) -> Inference:
+def infer(jacobian: Array, finer: Array, size: float) -> Inference:
     """Return covariance, singular values and null directions.
 
     `jacobian`, shape (m, n), holds derivatives of weighted residuals by scaled parameters, `finer`
@@ -76,20 +82,18 @@ def infer(jacobian: NDArray[np.float64], finer: NDArray[np.float64], size: float
     return Inference(covariance, values, _sparse(turned[lost] / length))
 
 
-def _sparse(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def _sparse(rows: Array) -> Array:
     """Return another basis of the same space: in each of its pivot columns one entry is not 0."""
     if not len(rows):
         return rows
     # The parameters that vary most represent the directions.
     _, _, order = qr(rows, pivoting=True)
     basis = np.linalg.solve(rows[:, order[: len(rows)]], rows)
-    result: NDArray[np.float64] = basis / np.abs(basis).max(axis=1, keepdims=True)
+    result: Array = basis / np.abs(basis).max(axis=1, keepdims=True)
     return result
 
 
-def worst_directions(
-    covariance: NDArray[np.float64], maximum: float
-) -> list[tuple[float, NDArray[np.float64]]]:
+def worst_directions(covariance: Array, maximum: float) -> list[tuple[float, Array]]:
     """Return directions whose standard deviation exceeds a maximum, with that deviation."""
     finite = np.flatnonzero(np.isfinite(np.diag(covariance)))
     variances, vectors = np.linalg.eigh(covariance[np.ix_(finite, finite)])
@@ -102,7 +106,7 @@ def worst_directions(
     return found
 
 
-def null_sentence(names: Sequence[str], direction: NDArray[np.float64]) -> str:
+def null_sentence(names: Sequence[str], direction: Array) -> str:
     """Return the meaning of a direction that is not identifiable."""
     part = _parts(names, direction)
     if len(part) == 1:
@@ -111,9 +115,7 @@ def null_sentence(names: Sequence[str], direction: NDArray[np.float64]) -> str:
     return f"{change} leave what is compared as it is{_product(part)}"
 
 
-def weak_sentence(
-    names: Sequence[str], direction: NDArray[np.float64], width: float, confidence: float
-) -> str:
+def weak_sentence(names: Sequence[str], direction: Array, width: float, confidence: float) -> str:
     """Return the meaning of a direction with a relative half interval `width` that is wide."""
     part = _parts(names, direction)
     share = f"{100 * width * max(abs(value) for _, value in part):.0f} %"
@@ -128,9 +130,7 @@ def weak_sentence(
     )
 
 
-def pair_sentences(
-    names: Sequence[str], correlation: NDArray[np.float64], least: float
-) -> list[str]:
+def pair_sentences(names: Sequence[str], correlation: Array, least: float) -> list[str]:
     """Return the pairs of parameters whose correlation reaches a size, the strongest first."""
     strong = np.triu(np.nan_to_num(np.abs(correlation)), 1)
     pairs = sorted(np.argwhere(strong >= least).tolist(), key=lambda pair: -strong[*pair])
@@ -145,12 +145,7 @@ def pair_sentences(
     return found
 
 
-def statement(
-    names: Sequence[str],
-    covariance: NDArray[np.float64],
-    correlation: NDArray[np.float64],
-    count: int,
-) -> list[str]:
+def statement(names: Sequence[str], covariance: Array, correlation: Array, count: int) -> list[str]:
     """Return how well parameters can be told apart, from the covariance of their relative values.
 
     The first `count` parameters are those of the model.
@@ -169,7 +164,7 @@ def statement(
     return found + pair_sentences(names, correlation, STRONG)
 
 
-def _parts(names: Sequence[str], direction: NDArray[np.float64]) -> list[tuple[str, float]]:
+def _parts(names: Sequence[str], direction: Array) -> list[tuple[str, float]]:
     """Return names and entries of a direction without negligible ones; the maximum is 1."""
     largest = np.abs(direction).max()
     found = [
@@ -212,3 +207,58 @@ def require_confidence(confidence: object) -> None:
     """Raise InputError where a confidence is not between 0 and 1."""
     if not (isinstance(confidence, float | np.floating) and 0 < confidence < 1):
         refuse_value("confidence", confidence, "0 < confidence < 1")
+
+
+def residual_warnings(residual: Array, time: Array) -> list[str]:
+    """Return what the residuals of equally spaced times, s, show beside independent noise."""
+    if len(residual) < MIN_TESTED:
+        return []
+    found = (_color_warning(residual), _outlier_warning(residual, time), runs_warning(residual))
+    return [text for text in found if text]
+
+
+def _color_warning(residual: Array) -> str:
+    """Test the cumulative periodogram (Bartlett): of white noise it is that of uniform numbers."""
+    power = np.abs(np.fft.rfft(residual)[1:]) ** 2
+    share = np.cumsum(power) / power.sum()
+    found = stats.kstest(share[:-1], "uniform")
+    if found.pvalue > UNLIKELY:
+        return ""
+    place = np.searchsorted(share, 0.5) / len(power)
+    side = "low" if place < 0.5 else "high"  # noqa: PLR2004 - halves
+    return (
+        f"the residuals are coloured: half of their power lies in the {side}est "
+        f"{min(place, 1 - place):.0%} of the compared frequencies: the noise or the model is not "
+        "what is assumed, and the intervals do not hold"
+    )
+
+
+def _outlier_warning(residual: Array, time: Array) -> str:
+    """Test the largest of n normal residuals: n times its probability (Bonferroni)."""
+    place = int(np.argmax(np.abs(residual)))
+    size = abs(float(residual[place]))
+    if 2 * len(residual) * stats.norm.sf(size) > UNLIKELY:
+        return ""
+    return (
+        f"the largest residual, at {1e3 * time[place]:.4g} ms, is {size:.3g} standard deviations: "
+        "it is no noise, and the intervals do not hold"
+    )
+
+
+def runs_warning(residual: Array) -> str:
+    """Return that residuals have too few or many runs of one sign (Wald and Wolfowitz), or ""."""
+    positive = residual > 0
+    n, m = int(positive.sum()), int((~positive).sum())
+    if not min(n, m):
+        expected, deviation = 1.0, 0.0
+    else:
+        product = 2 * n * m
+        expected = 1 + product / (n + m)
+        deviation = np.sqrt(product * (product - n - m) / (n + m - 1)) / (n + m)
+    runs = 1 + int(np.count_nonzero(positive[1:] != positive[:-1]))
+    if min(n, m) and 2 * stats.norm.sf(abs(runs - expected) / deviation) > UNLIKELY:
+        return ""
+    return (
+        f"the residuals change their sign {runs - 1} times where {expected - 1:.0f} are expected: "
+        "they are not independent, and the intervals do not hold"
+    )

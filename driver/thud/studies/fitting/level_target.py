@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from thud.base._schema import BandSet, LevelsForce
     from thud.impact.impact import Impact
 
+    Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True, eq=False)
 class LevelTarget(Plain):
@@ -100,8 +102,8 @@ class LevelMisfit(Misfit):
         self,
         target: LevelTarget,
         places: list[int],
-        values: NDArray[np.float64],
-        deviation: NDArray[np.float64],
+        values: Array,
+        deviation: Array,
         extra: list[str],
     ) -> None:
         self.bands, self.kind = target.bands, target.force
@@ -113,25 +115,25 @@ class LevelMisfit(Misfit):
         if "contact_time" in extra:
             self.step = CONTACT_STEP
 
-    def values(self, impact: Impact) -> NDArray[np.float64]:
+    def values(self, impact: Impact) -> Array:
         """Return levels, dB, and what else is compared, s and 1, of an impact, shape (size,)."""
         levels = impact.levels(self.bands, force=self.kind)[self.places]
         known = {"contact_time": impact.exact_contact_time, "restitution": impact.restitution}
         return np.concatenate([levels, [known[name] for name in self.extra]])
 
-    def residual(self, impact: Impact, own: NDArray[np.float64]) -> NDArray[np.float64]:  # noqa: ARG002
+    def residual(self, impact: Impact, own: Array) -> Array:  # noqa: ARG002
         """Return model minus target over standard deviation, shape (size,)."""
         return (self.values(impact) - self.target) / self.deviation
 
-    def target_vector(self) -> NDArray[np.float64]:
+    def target_vector(self) -> Array:
         """Return the target over standard deviation, shape (size,)."""
         return self.target / self.deviation
 
-    def data(self) -> NDArray[np.float64]:
+    def data(self) -> Array:
         """Return values and deviations of the target, dB, s and 1."""
         return np.concatenate([self.target, self.deviation])
 
-    def columns(self, impact: Impact, own: NDArray[np.float64]) -> dict[str, list[object]]:  # noqa: ARG002
+    def columns(self, impact: Impact, own: Array) -> dict[str, list[object]]:  # noqa: ARG002
         """Return target and model side by side, dB, s and 1: columns by their names."""
         nominal = get_bands(self.bands).nominal
         names = [f"{nominal[place]:g} Hz" for place in self.places]

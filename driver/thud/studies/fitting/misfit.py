@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from thud.case.case import Case
     from thud.impact.impact import Impact
 
+    Array = NDArray[np.float64]
+
 # Relative step of the central differences. The forces are smooth to 1e-13, but have kinks where a
 # sample enters or leaves the contact: 1e-3 would step over these, 1e-5 rarely does, and derivatives
 # are accurate to 1e-7 (with a rising loss factor, where contact is intermittent, to 3e-3).
@@ -73,30 +75,30 @@ class Misfit(ABC):
         return 0
 
     @abstractmethod
-    def residual(self, impact: Impact, own: NDArray[np.float64]) -> NDArray[np.float64]:
+    def residual(self, impact: Impact, own: Array) -> Array:
         """Return model minus target over standard deviation, shape (size,)."""
 
     @abstractmethod
-    def target_vector(self) -> NDArray[np.float64]:
+    def target_vector(self) -> Array:
         """Return the target over standard deviation, shape (size,)."""
 
     @abstractmethod
-    def data(self) -> NDArray[np.float64]:
+    def data(self) -> Array:
         """Return the numbers of the target as they were given."""
 
     @abstractmethod
-    def columns(self, impact: Impact, own: NDArray[np.float64]) -> Mapping[str, Sequence[object]]:
+    def columns(self, impact: Impact, own: Array) -> Mapping[str, Sequence[object] | Array]:
         """Return target and model side by side, SI units, dB: columns by their names."""
 
-    def own_derivatives(self, impact: Impact, own: NDArray[np.float64]) -> NDArray[np.float64]:  # noqa: ARG002
+    def own_derivatives(self, impact: Impact, own: Array) -> Array:  # noqa: ARG002
         """Return the derivatives of the residual by its own parameters, shape (size, n_own)."""
         return np.empty((self.size, 0))
 
-    def own_start(self, impact: Impact) -> NDArray[np.float64]:  # noqa: ARG002
+    def own_start(self, impact: Impact) -> Array:  # noqa: ARG002
         """Return its own parameters to start from."""
         return np.empty(0)
 
-    def nuisances(self, impact: Impact, own: NDArray[np.float64]) -> dict[str, tuple[float, float]]:  # noqa: ARG002
+    def nuisances(self, impact: Impact, own: Array) -> dict[str, tuple[float, float]]:  # noqa: ARG002
         """Return nuisance parameters and their standard errors, N, by name."""
         return {}
 
@@ -107,7 +109,7 @@ class Misfit(ABC):
     def doubts(
         self,
         impact: Impact,  # noqa: ARG002
-        own: NDArray[np.float64],  # noqa: ARG002
+        own: Array,  # noqa: ARG002
         deviation: float,  # noqa: ARG002
         count: int,  # noqa: ARG002
     ) -> list[str]:
@@ -115,7 +117,7 @@ class Misfit(ABC):
         return []
 
 
-def numbers(name: str, values: object, count: int) -> NDArray[np.float64]:
+def numbers(name: str, values: object, count: int) -> Array:
     """Return a list of finite numbers of a given length."""
     try:
         array = np.asarray(values, dtype=np.float64)

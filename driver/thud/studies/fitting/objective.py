@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from thud.studies.fitting.misfit import Misfit
     from thud.studies.fitting.ranges import Range
 
+    Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True, eq=False)
 class Part:
@@ -64,13 +66,13 @@ class Objective:
         self.error: ThudError | None = None
         self._last: tuple[bytes, list[Impact]] | None = None
 
-    def case_at(self, part: Part, place: NDArray[np.float64]) -> Case:
+    def case_at(self, part: Part, place: Array) -> Case:
         """Return the case of a part at a place."""
         values = place[: self.count] * self.scale[: self.count]
         names = (entry.name for entry in self.ranges)
         return with_values(part.case, dict(zip(names, values, strict=True)))
 
-    def impacts(self, place: NDArray[np.float64]) -> list[Impact]:
+    def impacts(self, place: Array) -> list[Impact]:
         """Return the impacts of a place, one for each part; none where one is impossible."""
         key = place[: self.count].tobytes()
         if self._last and self._last[0] == key:
@@ -88,12 +90,12 @@ class Objective:
         self._last = key, found
         return found
 
-    def own(self, part: Part, place: NDArray[np.float64]) -> NDArray[np.float64]:
+    def own(self, part: Part, place: Array) -> Array:
         """Return the own parameters of a part at a place."""
-        values: NDArray[np.float64] = place[part.place] * self.scale[part.place]
+        values: Array = place[part.place] * self.scale[part.place]
         return values
 
-    def residual(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
+    def residual(self, place: Array) -> Array:
         """Return the residuals of a place; infinite where there is no impact."""
         impacts = self.impacts(place)
         if not impacts:
@@ -101,7 +103,7 @@ class Objective:
         pairs = zip(self.parts, impacts, strict=True)
         return np.concatenate([p.misfit.residual(i, self.own(p, place)) for p, i in pairs])
 
-    def jacobian(self, place: NDArray[np.float64], share: float = 1.0) -> NDArray[np.float64]:
+    def jacobian(self, place: Array, share: float = 1.0) -> Array:
         """Return the derivatives of the residuals by a share of the step, (n_residual, n)."""
         step = share * max(part.misfit.step for part in self.parts)
         here = self.residual(place)
@@ -117,9 +119,7 @@ class Objective:
             jacobian[:, i] = self._column(place, i, step, here)
         return jacobian
 
-    def _column(
-        self, place: NDArray[np.float64], i: int, step: float, here: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _column(self, place: Array, i: int, step: float, here: Array) -> Array:
         """Return the derivative by one parameter; one-sided where the other side is impossible."""
         ends = []
         for beside in (min(place[i] + step, self.high[i]), max(place[i] - step, self.low[i])):
@@ -135,5 +135,5 @@ class Objective:
                 f"{place[i] * self.scale[i]:g} ({self.error})"
             )
             raise NumericalError(message)
-        column: NDArray[np.float64] = (high - low) / (above - below)
+        column: Array = (high - low) / (above - below)
         return column

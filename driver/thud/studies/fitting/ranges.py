@@ -10,7 +10,7 @@ import numpy as np
 
 from thud.base._schema import KEYS
 from thud.base.checks import refuse, require_kind, suggestion
-from thud.base.errors import InputError
+from thud.base.units import scaled
 from thud.case.keys import limits, put, users
 from thud.studies.parameter import fitted
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from thud.case.case import Case
     from thud.studies.parameter import Parameter
 
-# A start at a limit is moved away from it by this part of itself.
+# A start at a limit is moved away from it by this fraction of itself.
 INSIDE = 0.01
 # Limits of the library that exceed the start by this factor are ignored.
 FAR = 10.0
@@ -32,7 +32,7 @@ class Range:
     """Start and limits of a parameter of a fit, SI units.
 
     `scale` divides it in the search: its start, or a tenth of the range where that is 0. Further
-    starts lie within `spread`.
+    starts lie within `spread`. `given_unit` and its size in SI units are those of the study.
     """
 
     name: str
@@ -42,6 +42,7 @@ class Range:
     high: float
     scale: float
     spread: tuple[float, float]
+    given_unit: tuple[str, float] | None = None
 
 
 def known_parameters(case: Case) -> dict[str, tuple[Key, float]]:
@@ -112,17 +113,15 @@ def _get_range(case: Case, given: Parameter) -> Range:
     low = lower if given.low is None else given.low
     high = upper if given.high is None else given.high
     if not lower <= low < high <= upper:
-        message = (
-            f"[parameters] {name}: low = {low:g} and high = {high:g} are not allowed; "
-            f"allowed: {lower:g} <= low < high <= {upper:g} {key.unit}".rstrip()
+        refuse(
+            f"[parameters] {name}: low = {low:g} and high = {high:g} are not allowed",
+            f"{lower:g} <= low < high <= {upper:g} {key.unit}".rstrip(),
         )
-        raise InputError(message)
     if not low <= start <= high:
-        message = (
-            f"[parameters] {name}: start = {start:g} is not allowed; "
-            f"allowed: {low:g} <= start <= {high:g} {key.unit}".rstrip()
+        refuse(
+            f"[parameters] {name}: start = {start:g} is not allowed",
+            f"{low:g} <= start <= {high:g} {key.unit}".rstrip(),
         )
-        raise InputError(message)
     spread = (
         max(low, start - scale / SPREAD) if given.low is None else low,
         min(high, start + scale * (SPREAD - 1)) if given.high is None else high,
@@ -133,4 +132,6 @@ def _get_range(case: Case, given: Parameter) -> Range:
         low = -np.inf
     margin = min(INSIDE * scale, (high - low) / 4)
     start = min(max(start, low + margin), high - margin)
-    return Range(name, key.unit, start, low, high, scale, spread)
+    unit, power = given.shown_unit
+    given_unit = (unit, scaled(1.0, power)) if given.unit else None
+    return Range(name, key.unit, start, low, high, scale, spread, given_unit)

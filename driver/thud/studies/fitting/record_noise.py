@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from thud.base.immutable import freeze
-from thud.recordings.contact import QUIET, cells_between
+from thud.recordings.contact import MAX_BACKGROUND, cells_between
 from thud.recordings.drops import CELL, FOOT, MARGIN
 from thud.recordings.noise import (
     DRIFT,
@@ -25,7 +25,7 @@ from thud.recordings.noise import (
     fit_background,
     noise_covariances,
 )
-from thud.studies.fitting.residual_tests import UNLIKELY
+from thud.studies.fitting.inference import UNLIKELY
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.recordings.noise import Background, Cells
+
+    Array = NDArray[np.float64]
 
 # Quiet with fewer independent values in the band does not tell the noise.
 MIN_QUIET = 50
@@ -46,14 +48,14 @@ HARMONIC_EDGE = 0.95
 FLANK = 2 * MARGIN * CELL
 
 
-def to_grid(samples: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+def to_grid(samples: Array, count: int) -> Array:
     """Return columns of samples on a grid of `count` points."""
     kept = np.fft.rfft(samples, norm="ortho", axis=0)[: count // 2 + 1]
-    grid: NDArray[np.float64] = np.fft.irfft(kept, count, norm="ortho", axis=0)
+    grid: Array = np.fft.irfft(kept, count, norm="ortho", axis=0)
     return grid
 
 
-def grid_covariance(lags: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+def grid_covariance(lags: Array, count: int) -> Array:
     """Return the covariance on a grid of stationary noise, from that of samples at all lags.
 
     With X = n^-1/2 sum x_j w^(kj) and w = exp(-2 pi i/n), the sum over equal lags t is geometric:
@@ -68,11 +70,11 @@ def grid_covariance(lags: NDArray[np.float64], count: int) -> NDArray[np.float64
     covariance = 2j * np.subtract.outer(half, half) / (n * (1 - turn))
     whole = np.fft.fft((1 - np.arange(n) / n) * lags)[order].real
     np.fill_diagonal(covariance, 2 * whole - lags[0])
-    result: NDArray[np.float64] = np.fft.fft(np.fft.ifft(covariance, axis=0), axis=1).real
+    result: Array = np.fft.fft(np.fft.ifft(covariance, axis=0), axis=1).real
     return result
 
 
-def find_pulse(force: NDArray[np.float64], rate: float) -> tuple[int, int]:
+def find_pulse(force: Array, rate: float) -> tuple[int, int]:
     """Return the first sample of the pulse of a record and the one behind it, with room."""
     width = max(1, round(CELL * rate))
     smooth = np.convolve(force, np.full(width, 1 / width), mode="same")
@@ -102,7 +104,7 @@ class Quiet:
         Highest frequency that counts, Hz.
     """
 
-    force: NDArray[np.float64]
+    force: Array
     rate: float
     pulse: tuple[int, int]
     below: float
@@ -111,7 +113,7 @@ class Quiet:
     def seconds(self) -> float:
         """Length of the quiet that counts, s."""
         sides = (self.pulse[0] / self.rate, (len(self.force) - self.pulse[1]) / self.rate)
-        return sum(min(side, QUIET) for side in sides)
+        return sum(min(side, MAX_BACKGROUND) for side in sides)
 
     @property
     def freedom(self) -> int:
@@ -134,7 +136,7 @@ class Quiet:
         return float(np.std(np.concatenate([self.force[:first], self.force[stop:]])))
 
     @cached_property
-    def _means(self) -> tuple[Cells, NDArray[np.float64]]:
+    def _means(self) -> tuple[Cells, Array]:
         """Cells of the quiet, s from the middle of the pulse, and their means less the median, N.
 
         They are those of the band: wider ones would not tell the noise of its upper end. Quiet
@@ -142,7 +144,7 @@ class Quiet:
         """
         width = max(1, int(self.rate / (2 * self.below)))
         first, stop = self.pulse
-        most = int(QUIET * self.rate)
+        most = int(MAX_BACKGROUND * self.rate)
         counts = [min(length, most) // width for length in (first, len(self.force) - stop)]
         edges = (
             first - width * np.arange(1 + counts[0])[::-1],
@@ -220,14 +222,14 @@ class Quiet:
         return (tone, *wave_size(value[pair], covariance[np.ix_(pair, pair)]))
 
 
-def wave_size(value: NDArray[np.float64], covariance: NDArray[np.float64]) -> tuple[float, float]:
+def wave_size(value: Array, covariance: Array) -> tuple[float, float]:
     """Return the amplitude of a cosine and a sine, and its standard error."""
     size = float(np.hypot(*value))
     slope = value / size
     return size, float(np.sqrt(slope @ covariance @ slope))
 
 
-def cell_waves(cells: Cells, tones: Sequence[float]) -> NDArray[np.float64]:
+def cell_waves(cells: Cells, tones: Sequence[float]) -> Array:
     """Return a constant, and means of the waves of tones, Hz, over cells: [n_cell, 1 + 2 n]."""
     middle, width = (cells[0] + cells[1]) / 2, cells[1] - cells[0]
     phase = 2 * np.pi * np.multiply.outer(middle, np.asarray(tones, dtype=np.float64))
@@ -236,9 +238,7 @@ def cell_waves(cells: Cells, tones: Sequence[float]) -> NDArray[np.float64]:
     return np.concatenate([one, weight * np.cos(phase), weight * np.sin(phase)], axis=1)
 
 
-def _strongest(
-    cells: Cells, mean: NDArray[np.float64], whiten: NDArray[np.float64], grid: NDArray[np.float64]
-) -> tuple[float, float]:
+def _strongest(cells: Cells, mean: Array, whiten: Array, grid: Array) -> tuple[float, float]:
     """Return the frequency of the strongest tone in whitened means, Hz, and its gain.
 
     The gain is that of the logarithm of the likelihood, the deviation of the noise estimated.
@@ -256,22 +256,22 @@ def _strongest(
     return tone, -0.5 * len(mean) * float(np.log1p(-share))
 
 
-def _trendless(cells: Cells) -> NDArray[np.float64]:
+def _trendless(cells: Cells) -> Array:
     """Return the projection that takes offset and drift of white noise out of cells."""
     middle = (cells[0] + cells[1]) / 2
     basis, _ = np.linalg.qr(np.column_stack([np.ones_like(middle), middle]))
     return np.asarray(np.eye(len(middle)) - basis @ basis.T, dtype=np.float64)
 
 
-def _covariance(background: Background) -> NDArray[np.float64]:
+def _covariance(background: Background) -> Array:
     """Return the covariance of quiet cells, offset and drift with it, N2."""
-    middle = (background.quiet[0] + background.quiet[1]) / 2
+    middle = (background.cells[0] + background.cells[1]) / 2
     trend = OFFSET**2 + DRIFT**2 * np.multiply.outer(middle, middle)
-    parts = np.tensordot(background.variances, covariances(background.quiet), 1)
+    parts = np.tensordot(background.variances, covariances(background.cells), 1)
     return np.asarray(parts + background.peak**2 * trend, dtype=np.float64)
 
 
-def _whitening(background: Background) -> NDArray[np.float64]:
+def _whitening(background: Background) -> Array:
     """Return what makes quiet cells independent and of unit variance."""
     factor = np.linalg.cholesky(_covariance(background))
     whiten = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
@@ -285,10 +285,10 @@ def _log_likelihood(background: Background) -> float:
     return float(np.log(np.diag(whiten)).sum() - 0.5 * white @ white)
 
 
-def trimmed(force: NDArray[np.float64], rate: float) -> slice:
+def trimmed(force: Array, rate: float) -> slice:
     """Return the part of a record that holds the pulse and the quiet which counts."""
     first, stop = find_pulse(force, rate)
-    room = int(QUIET * rate)
+    room = int(MAX_BACKGROUND * rate)
     return slice(max(first - room, 0), min(stop + room, len(force)))
 
 
@@ -305,12 +305,7 @@ class Weights:
         The part of the covariance that is predicted from the residual: drift and hum, N2.
     """
 
-    def __init__(
-        self,
-        covariance: NDArray[np.float64],
-        nuisance: NDArray[np.float64],
-        predicted: NDArray[np.float64],
-    ) -> None:
+    def __init__(self, covariance: Array, nuisance: Array, predicted: Array) -> None:
         self.covariance, self.nuisance = freeze(covariance), freeze(nuisance)
         self.predicted = freeze(predicted)
         # In the order of time, the factor makes of each point what those before do not tell.
@@ -326,18 +321,16 @@ class Weights:
         spread = np.trace(noise) - noise.sum() / count
         return float(np.sqrt(spread / (count - 1)))
 
-    def estimates(
-        self, rest: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def estimates(self, rest: Array) -> tuple[Array, Array]:
         """Return the nuisance parameters of record less model, N, and their covariance, N2."""
         inverse = np.linalg.inv(self._triangle)
         return inverse @ (self._basis.T @ (self._whiten @ rest)), inverse @ inverse.T
 
-    def background(self, rest: NDArray[np.float64]) -> NDArray[np.float64]:
+    def background(self, rest: Array) -> Array:
         """Return what offset, drift and hum add to the record, N: [n], from record less model."""
         value, _ = self.estimates(rest)
         left = self._whiten.T @ (self.matrix @ rest)
-        result: NDArray[np.float64] = self.nuisance @ value + self.predicted @ left
+        result: Array = self.nuisance @ value + self.predicted @ left
         return result
 
 

@@ -5,34 +5,30 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from thud.base.bridge import version
-from thud.base.display import Displayed, left_out
+from thud.base.display import left_out
+from thud.base.extras import require_extra
 from thud.base.files import Results
 from thud.base.immutable import Immutable
-from thud.base.key import check_keywords
-from thud.base.tables import format_rows
-from thud.base.units import display_unit
 from thud.case.case import case_text
-from thud.studies.fitting.inference import coverage_factor
+from thud.studies.fitting.estimates import Estimates
 from thud.studies.fitting.misfit import SHIFT
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Mapping, Sequence
 
+    import pandas as pd
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.case.case import Case
     from thud.impact.impact import Impact
     from thud.studies.fitting.misfit import Misfit
-
-# By parameter: name of a unit, and how many SI units it is.
-Units: TypeAlias = "Mapping[str, tuple[str, float]]"
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,69 +62,50 @@ class FittedTarget(Immutable):
         """Offset and amplitude of hum, and their standard errors, N, by name."""
         return self.misfit.nuisances(self.impact, self.own)
 
-    def columns(self) -> Mapping[str, Sequence[object]]:
+    def columns(self) -> Mapping[str, Sequence[object] | NDArray[np.float64]]:
         """Return target and model side by side, SI units, dB: columns by their names."""
         return self.misfit.columns(self.impact, self.own)
 
 
 @dataclass(frozen=True, eq=False)
-class Fit(Displayed):
-    """The best parameters of a model for a target, and their uncertainty; SI units.
+class Fit(Estimates):
+    """The best parameters of a model for one or more targets; see `Estimates` for the rest.
 
     Attributes
     ----------
     names : tuple of str
         The parameters; last those of the records, where they are free: ``"time_shift"``, the time
         of first touch, and ``"gain"``, of several records with their number, as ``"gain(2)"``.
-    units : tuple of str
-        Their units.
-    estimate : ndarray, shape (n,)
-        Their values.
-    covariance : ndarray, shape (n, n)
-        Their covariance; infinite variances where they are not identifiable.
-    limits : ndarray, shape (n, 2)
-        Low and high limit of the search for each; infinite where there is none.
-    singular_values : ndarray, shape (n,)
-        Singular values of the Jacobian with columns of unit length, in descending order.
-    confidence : float
-        Confidence of the intervals in tables and files.
     noise : float
         Standard deviation of one residual of the first target: for forces that of white noise with
         the same power in the compared band, N, for levels in units of their uncertainties, or dB
         where none were given.
-    known_noise : bool
-        The standard deviations were given, or are those of the quiet of the records.
     residuals : ndarray, shape (n_residual,)
         Model minus target over its standard deviation.
+    known_noise : bool
+        The standard deviations were given, or are those of the background of the records.
+    singular_values : ndarray, shape (n,)
+        Singular values of the Jacobian with columns of unit length, in descending order.
     evaluations, failures : int
         Impacts that were computed, and that could not be.
     converged : bool
         The search has converged.
-    warnings : tuple of str
-        Parameters that are not identifiable or at their limits, residuals that are no noise, and a
-        poor model, as sentences.
     identifiability : tuple of str
         How well the parameters can be told apart, as sentences.
     targets : tuple of FittedTarget
         Case, impact and comparison of each target.
+    given_units : dict of str to tuple
+        Units in which parameters were given, and how many SI units they are.
     """
 
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    estimate: NDArray[np.float64]
-    covariance: NDArray[np.float64]
-    limits: NDArray[np.float64]
-    singular_values: NDArray[np.float64]
-    confidence: float
-    noise: float
     known_noise: bool
-    residuals: NDArray[np.float64]
+    singular_values: NDArray[np.float64]
     evaluations: int
     failures: int
     converged: bool
-    warnings: tuple[str, ...]
     identifiability: tuple[str, ...]
     targets: tuple[FittedTarget, ...]
+    given_units: dict[str, tuple[str, float]] = field(default_factory=dict)
 
     @property
     def ends(self) -> list[str]:
@@ -149,25 +126,6 @@ class Fit(Displayed):
     def misfit(self) -> Misfit:
         """The comparison of the first target."""
         return self.targets[0].misfit
-
-    @property
-    def values(self) -> dict[str, float]:
-        """Values of the parameters by name."""
-        return dict(zip(self.names, map(float, self.estimate), strict=True))
-
-    @property
-    def standard_errors(self) -> dict[str, float]:
-        """Standard errors of the parameters by name."""
-        errors = np.sqrt(np.diag(self.covariance))
-        return dict(zip(self.names, map(float, errors), strict=True))
-
-    @property
-    def correlation(self) -> NDArray[np.float64]:
-        """Correlation of the parameters, shape (n, n); NaN where a variance is infinite."""
-        errors = np.sqrt(np.diag(self.covariance))
-        with np.errstate(invalid="ignore"):
-            result: NDArray[np.float64] = self.covariance / np.outer(errors, errors)
-        return result
 
     @property
     def degrees_of_freedom(self) -> int:
@@ -197,51 +155,32 @@ class Fit(Displayed):
         """Time of first touch in the first record, s."""
         return self.targets[0].own_value(SHIFT, 0.0)
 
-    @check_keywords
-    def intervals(self, confidence: float | None = None) -> dict[str, tuple[float, float]]:
-        """Return confidence intervals by name, see `interval_freedom`.
-
-        They end at the limits of the search. `confidence` is by default that of the fit.
-        """
-        asked = self.confidence if confidence is None else confidence
-        factor = coverage_factor(asked, self.interval_freedom)
-        half = factor * np.sqrt(np.diag(self.covariance))
-        low = np.maximum(self.estimate - half, self.limits[:, 0]).tolist()
-        high = np.minimum(self.estimate + half, self.limits[:, 1]).tolist()
-        return dict(zip(self.names, zip(low, high, strict=True), strict=True))
-
     def __repr__(self) -> str:
         """Return the values, and whether the search has converged."""
         shown = zip(self.names, self.estimate, self.units, strict=True)
         values = ", ".join(f"{name} {value:.4g} {unit}".strip() for name, value, unit in shown)
         return f"<Fit, {'' if self.converged else 'not '}converged: {values}>"
 
-    def table(self, units: Units | None = None) -> str:
-        """Return the fit as text; `units` as in `shown_units`."""
-        return "\n".join([format_rows(self.rows(units)), "", *self._warning_lines()])
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is not plausible in the impacts at the result."""
+        return tuple(dict.fromkeys(r for target in self.targets for r in target.impact.warnings))
 
-    def rows(self, units: Units | None = None) -> list[tuple[str, ...]]:
-        """Return header and rows of text."""
-        interval = f"{self.confidence:.0%} interval"
-        rows: list[tuple[str, ...]] = [("parameter", "value", "standard error", interval, "unit")]
-        intervals = self.intervals()
-        for name, (shown, factor) in self.shown_units(units).items():
-            value, error = self.values[name] / factor, self.standard_errors[name] / factor
-            low, high = (end / factor for end in intervals[name])
-            digits = _digits(value, error)
-            interval = f"{low:.{digits}g} to {high:.{digits}g}" if np.isfinite(error) else "unknown"
-            rows.append((name, f"{value:.{digits}g}", f"{error:.2g}", interval, shown))
-        return rows
+    @property
+    def succeeded(self) -> bool:
+        """Whether the search has converged."""
+        return self.converged
 
-    def shown_units(self, units: Units | None = None) -> dict[str, tuple[str, float]]:
-        """Return name and SI factor of the unit of each parameter; `units` override the default."""
-        handy = {
-            name: display_unit(unit, value)
-            for (name, value), unit in zip(self.values.items(), self.units, strict=True)
-        }
-        return {**handy, **(units or {})}
+    @property
+    def display_units(self) -> dict[str, tuple[str, float]]:
+        """Name of the unit in tables and figures, and how many SI units it is, by parameter."""
+        return super().display_units | self.given_units
 
-    def _warning_lines(self) -> list[str]:
+    def table(self) -> str:
+        """Return the fit as text."""
+        return "\n".join([super().table(), "", *self._quality()])
+
+    def _quality(self) -> list[str]:
         """Return the quality of the fit, one sentence per line."""
         freedom = self.degrees_of_freedom
         quality = f", reduced chi-square {self.reduced_chi_square:.3g}" if freedom else ""
@@ -277,10 +216,6 @@ class Fit(Displayed):
             )
         source = "given" if self.known_noise else "estimated from the residuals"
         return f"standard deviation {size:.3g} {unit}, {source}"
-
-    def __str__(self) -> str:
-        """Return the fit as text, with its warnings."""
-        return "\n".join([self.table(), *(f"Warning: {text}." for text in self.warnings)])
 
     def summary(self) -> dict[str, object]:
         """Return the numbers of the fit for JSON: None where they are not finite."""
@@ -320,11 +255,27 @@ class Fit(Displayed):
             "warnings": list(self.warnings),
         }
 
-    def figures(self, units: Units | None = None) -> dict[str, Figure]:
-        """Return the figures by name; `units` as in `table`."""
+    def to_dataframe(self, number: int = 1) -> pd.DataFrame:
+        """Return a target, by its number, and the model side by side; SI units, dB.
+
+        Raise InputError where pandas is not installed.
+        """
+        with require_extra("studies"):
+            import pandas as pd
+
+        return pd.DataFrame(self.targets[number - 1].columns())
+
+    def plot(self) -> Figure:
+        """Draw the first target and the model, and below them their difference."""
+        from thud.plot import target_and_fit
+
+        return target_and_fit(self)
+
+    def figures(self, name: str = "fit") -> dict[str, Figure]:  # noqa: ARG002 - fits have one name
+        """Return the figures of all targets, and confidence regions, by the names of files."""
         from thud.plot import draw_fit
 
-        return draw_fit(self, self.shown_units(units))
+        return draw_fit(self, self.display_units)
 
     def files(self, **extra: object) -> dict[str, bytes]:
         """Return ``fit.json``, with further entries, ``fit.csv`` and ``fitted.nml`` by name.
@@ -342,38 +293,25 @@ class Fit(Displayed):
         return files
 
     def save(
-        self,
-        directory: str | os.PathLike[str],
-        units: Units | None = None,
-        *,
-        figures: bool = True,
-        replace: bool = False,
+        self, directory: str | os.PathLike[str], *, figures: bool = True, replace: bool = False
     ) -> list[Path]:
         """Write the files of `files`, and figures as PNG and SVG; return their paths.
 
-        Files that thud has not written are replaced with `replace` only. `units` are those of the
-        figures, as in `shown_units`; files have SI units. Raises InputError where a file is in the
-        way, OSError where one cannot be written.
+        Files that thud has not written are replaced with `replace` only. Raises InputError where a
+        file is in the way, OSError where one cannot be written.
         """
         contents = self.files()
         if figures:
             with left_out("the figure of the fit"):
                 from thud.plot import figure_files
 
-                contents |= figure_files(self.figures(units))
+                contents |= figure_files(self.figures())
         return Results(Path(directory), "fit", replace=replace).write(contents)
 
 
 def file_ends(count: int) -> list[str]:
     """Return what the names of the files of targets end with."""
     return [""] if count == 1 else [f"_{number}" for number in range(1, count + 1)]
-
-
-def _digits(value: float, error: float) -> int:
-    """Return the number of digits that shows a value to two digits of its error."""
-    if not (np.isfinite(error) and error > 0 and value):
-        return 6
-    return int(np.clip(np.ceil(np.log10(abs(value) / error)) + 2, 3, 12))
 
 
 def _finite(value: float) -> float | None:

@@ -10,10 +10,12 @@ from scipy import stats
 from scipy.optimize import OptimizeResult, least_squares
 from tqdm import tqdm
 
-from thud.base.errors import InputError, NumericalError, ThudError
+from thud.base.checks import refuse
+from thud.base.errors import NumericalError, ThudError
 from thud.base.units import display_unit
 from thud.studies.fitting.inference import (
     INSEPARABLE,
+    UNLIKELY,
     Inference,
     coverage_factor,
     infer,
@@ -24,7 +26,6 @@ from thud.studies.fitting.inference import (
     worst_directions,
 )
 from thud.studies.fitting.objective import Objective, new_parts
-from thud.studies.fitting.residual_tests import UNLIKELY
 from thud.studies.fitting.result import Fit, FittedTarget
 
 if TYPE_CHECKING:
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
     from thud.studies.fitting.misfit import Misfit
     from thud.studies.fitting.objective import Part
     from thud.studies.fitting.ranges import Range
+
+    Array = NDArray[np.float64]
 
 # Relative steps and gains at which the search ends.
 TOLERANCE = 1e-8
@@ -70,23 +73,21 @@ def _require_data(parts: list[Part], count: int) -> None:
     known = all(misfit.known_noise for misfit in misfits)
     for number, misfit in enumerate(misfits, start=1):
         if len(parts) > 1 and not misfit.known_noise:
-            message = (
-                f"target {number}: the weight of its residuals is not known; "
-                f"allowed: {misfit.deviation_source} where there are several targets"
+            refuse(
+                f"target {number}: the weight of its residuals is not known",
+                f"{misfit.deviation_source} where there are several targets",
             )
-            raise InputError(message)
     count += sum(len(misfit.own) for misfit in misfits)
     size = sum(misfit.size - misfit.absorbed for misfit in misfits)
     minimum = count if known else count + 1
     if size < minimum:
-        message = (
-            f"target: {size} data for {count} parameters are too few; "
-            f"allowed: {minimum} or more" + ("" if known else " where no noise is given")
+        refuse(
+            f"target: {size} data for {count} parameters are too few",
+            f"{minimum} or more" + ("" if known else " where no noise is given"),
         )
-        raise InputError(message)
 
 
-def _spread(ranges: list[Range], count: int, seed: int) -> Iterator[NDArray[np.float64]]:
+def _spread(ranges: list[Range], count: int, seed: int) -> Iterator[Array]:
     """Yield starts over their scales: the given one, then a Latin hypercube."""
     first = np.array([entry.start / entry.scale for entry in ranges])
     yield first
@@ -95,9 +96,7 @@ def _spread(ranges: list[Range], count: int, seed: int) -> Iterator[NDArray[np.f
         yield low + place * (high - low)
 
 
-def _search(
-    objective: Objective, starts: Iterator[NDArray[np.float64]], max_steps: int
-) -> tuple[NDArray[np.float64], bool]:
+def _search(objective: Objective, starts: Iterator[Array], max_steps: int) -> tuple[Array, bool]:
     """Return the best place from all starts, and whether the search converged there."""
     best: OptimizeResult | None = None
     failures: list[ThudError] = []
@@ -114,7 +113,7 @@ def _search(
     return best.x, bool(best.status > 0)
 
 
-def _descend(objective: Objective, start: NDArray[np.float64], max_steps: int) -> OptimizeResult:
+def _descend(objective: Objective, start: Array, max_steps: int) -> OptimizeResult:
     first = objective.impacts(start)
     if not first:
         message = f"the start cannot be computed: {objective.error}"
@@ -139,9 +138,7 @@ def _descend(objective: Objective, start: NDArray[np.float64], max_steps: int) -
     )
 
 
-def _conclude(
-    objective: Objective, place: NDArray[np.float64], confidence: float, *, converged: bool
-) -> Fit:
+def _conclude(objective: Objective, place: Array, confidence: float, *, converged: bool) -> Fit:
     residual = objective.residual(place)
     impacts = objective.impacts(place)
     if not impacts:
@@ -181,6 +178,7 @@ def _conclude(
         failures=objective.failures,
         converged=converged,
         warnings=(),
+        given_units={r.name: r.given_unit for r in objective.ranges if r.given_unit},
         identifiability=(),
         targets=tuple(
             FittedTarget(
@@ -196,11 +194,7 @@ def _conclude(
 
 
 def _doubts(
-    objective: Objective,
-    answer: Fit,
-    place: NDArray[np.float64],
-    known: Inference,
-    covariance: NDArray[np.float64],
+    objective: Objective, answer: Fit, place: Array, known: Inference, covariance: Array
 ) -> list[str]:
     """Return warnings of a fit; `covariance` is that of relative values."""
     found = []
@@ -241,7 +235,7 @@ def _doubts(
     return found
 
 
-def _size_doubt(misfit: Misfit, residuals: NDArray[np.float64], freedom: float) -> list[str]:
+def _size_doubt(misfit: Misfit, residuals: Array, freedom: float) -> list[str]:
     """Return that residuals are too large for the noise, where they are."""
     if not misfit.known_noise or freedom <= 0:
         return []

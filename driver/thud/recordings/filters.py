@@ -1,4 +1,4 @@
-"""Octave and third-octave filters of class 1 (IEC 61260-1), and levels measured with them."""
+"""Filters of class 1 (IEC 61260-1) with levels, and the low-pass at 1.25 kHz of the paper."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.signal import butter, resample, sosfilt, zpk2sos
+from scipy.signal import butter, resample, sosfilt, sosfiltfilt, zpk2sos
 
 from thud.base.checks import refuse, require_array, require_number, require_real
-from thud.level.levels import get_bands
+from thud.level.levels import RECORDED_BAND, get_bands
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -23,9 +23,13 @@ ORDER = 3
 # Minimum ratio of sample rate and upper band edge. Below it the bilinear transform flattens the
 # lower skirt, which then misses the mask: by 0.8 dB at 3.5, by 4 dB at 2.5.
 MIN_RATIO = 4.0
-# Share of a filter's energy that the padding may cut off: 4e-7 dB at most where the band holds as
-# much energy as the filter's transient.
+# Maximum fraction of the energy of a filter that the padding cuts off: 4e-7 dB if the band holds as
+# much energy as the transient of the filter.
 CUT = 1e-7
+# Order of the Butterworth low-pass, which runs forwards and backwards.
+LOW_PASS_ORDER = 6
+# Energy that each run removes at the band edge over what it leaves: together they leave a half.
+RUN_LOSS = math.sqrt(2) - 1
 
 
 def band_filters(bands: BandSet, sample_rate: float) -> NDArray[np.float64]:
@@ -81,8 +85,8 @@ def filter_levels(
     rate = float(sample_rate) * factor
     sections, ringing = _filters(bands, rate)
     if factor > 1:
-        # Interpolated by its Fourier transform: the spectrum below half the rate is unchanged. What
-        # the interpolation adds before and after the record needs room on both sides.
+        # Interpolated by its Fourier transform: the spectrum below half the rate is unchanged. The
+        # interpolation rings before and after the record.
         record = np.pad(record, int(ringing.max()))
         record = resample(record, factor * len(record))
     for band in np.flatnonzero(inside):
@@ -111,6 +115,45 @@ def _filters(bands: BandSet, sample_rate: float) -> tuple[NDArray[np.float64], N
         zeros, poles, gain = butter(ORDER, (lower, upper), "bandpass", fs=sample_rate, output="zpk")
         sections[band] = zpk2sos(zeros, poles, gain)
         radius = np.abs(poles).max()
-        # The energy of what rings decays at least as radius**(2 n).
+        # The energy of the ringing decays at least as radius**(2 n).
         ringing[band] = math.ceil(math.log(CUT) / (2 * math.log(radius)))
     return sections, ringing
+
+
+def low_pass_force(
+    force: NDArray[np.float64], sample_rate: float
+) -> tuple[NDArray[np.float64], str]:
+    """Return a force low-passed at 1.25 kHz, N, shape (n_sample,), without delay, and a note.
+
+    A Butterworth filter of order 6 runs forwards and backwards; together they are 3.01 dB down at
+    1.25 kHz. If the sample rate, Hz, is too low for such frequencies, the force is unchanged.
+    """
+    if sample_rate <= 2 * RECORDED_BAND:
+        return force, describe_low_pass(sample_rate)
+    # Both runs attenuate by (1 + (t/t_corner)**12)**2 in energy, t = tan(pi f / rate): 2 at the
+    # band edge.
+    edge = math.tan(math.pi * RECORDED_BAND / sample_rate)
+    corner = sample_rate / math.pi * math.atan(edge / RUN_LOSS ** (1 / (2 * LOW_PASS_ORDER)))
+    sections = butter(LOW_PASS_ORDER, corner, fs=sample_rate, output="sos")
+    margin = min(len(force) - 1, math.ceil(10 * sample_rate / RECORDED_BAND))
+    filtered: NDArray[np.float64] = sosfiltfilt(sections, force, padlen=max(margin, 0))
+    return filtered, describe_low_pass(sample_rate)
+
+
+def describe_low_pass(sample_rate: float) -> str:
+    """Return what `low_pass_force` does at a sample rate, Hz."""
+    if sample_rate <= 2 * RECORDED_BAND:
+        return f"no low-pass at 1.25 kHz: the sample rate, {sample_rate:g} Hz, is one"
+    return (
+        f"low-pass, -3 dB at 1.25 kHz: Butterworth of order {LOW_PASS_ORDER}, forwards and "
+        "backwards (no delay)"
+    )
+
+
+def low_pass_attenuation(frequency: NDArray[np.float64], sample_rate: float) -> NDArray[np.float64]:
+    """Return the attenuation of the low-pass, dB; zero if it is not applied."""
+    if sample_rate <= 2 * RECORDED_BAND:
+        return np.zeros(frequency.shape)
+    edge = math.tan(math.pi * RECORDED_BAND / sample_rate)
+    ratio = np.tan(np.pi * np.minimum(frequency / sample_rate, 0.5)) / edge
+    return np.asarray(20 * np.log10(1 + RUN_LOSS * ratio ** (2 * LOW_PASS_ORDER)))

@@ -1,0 +1,87 @@
+"""What every kind of study returns."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections import Counter
+from typing import TYPE_CHECKING
+
+from thud.base.display import Displayed
+from thud.base.tables import format_rows
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+class StudyResult(Displayed):
+    """Result of a study: `rows` and `table`, `plot`, `warnings` and `notes`.
+
+    Attributes
+    ----------
+    warnings : tuple of str
+        Why numbers may be wrong or missing, a sentence each.
+    """
+
+    warnings: tuple[str, ...]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was done, a sentence each."""
+        return ()
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether there is any result."""
+        return True
+
+    def table(self) -> str:
+        """Return the result as text."""
+        return format_rows(self.rows())
+
+    @abstractmethod
+    def plot(self) -> Figure:
+        """Return the figure of the result."""
+
+    def figures(self, name: str) -> dict[str, Figure]:
+        """Return all figures by the names of their files; `name` is that of the study."""
+        return {name: self.plot()} if self.succeeded else {}
+
+
+class SampleResult(StudyResult):
+    """Result of a study of samples.
+
+    Attributes
+    ----------
+    dataset : Dataset
+        Every sample of the study.
+    """
+
+    dataset: xr.Dataset
+
+    @property
+    def warnings(self) -> tuple[str, ...]:  # type: ignore[override]
+        """How many samples have no results, and why."""
+        failed = self.dataset["status"].values != 0
+        if not failed.any():
+            return ()
+        ((reason, _),) = Counter(self.dataset["reason"].values[failed]).most_common(1)
+        return (f"{failed.sum()} of {failed.size} samples have no results, such as: {reason}",)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """How close the surrogate is, and how many verdicts it leaves in doubt."""
+        if "surrogate" not in self.dataset.attrs:
+            return ()
+        doubtful = self.dataset["doubtful"]
+        share = f"{int(doubtful.sum())} of {doubtful.size} verdicts in doubt"
+        return (f"{self.dataset.attrs['surrogate']}; it leaves {share}",)
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether any sample has results."""
+        return bool((self.dataset["status"] == 0).any())
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return every sample, with units and provenance."""
+        return self.dataset.copy()
