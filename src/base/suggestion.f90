@@ -30,7 +30,7 @@ contains
       if (3*distance(i) <= max(len(word), len_trim(known(i)))) suggestion = ' (did you mean '//quoted(known(i))//'?)'
    end subroutine get_suggestion
 
-   !> Number of letters to insert, delete, replace or swap with their neighbours, to make one word of the other
+   !> Number of letters to insert, delete, replace or swap with their neighbors, to make one word of the other
    !> (Damerau and Levenshtein, adjacent swaps only).
    pure function get_distance(one, other) result(distance)
       character(len=*), intent(in) :: one, other

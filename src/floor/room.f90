@@ -178,19 +178,19 @@ contains
       prediction%conductance = conductance
       prediction%surface_mass = get_surface_mass(plate)
       prediction%energy = 10**(force_level/10)*conductance
-      prediction%radiation_factor = get_plate_radiation(plate, room%air, bands%centre)
-      prediction%loss_factor = get_total_loss(plate, room%air, bands%centre)
+      prediction%radiation_factor = get_plate_radiation(plate, room%air, bands%center)
+      prediction%loss_factor = get_total_loss(plate, room%air, bands%center)
       prediction%reverberation_time = get_reverberation_times(room, size(bands))
       prediction%floor_modes = get_mode_density(plate)*width
-      prediction%room_modes = get_room_mode_density(room, bands%centre)*width
+      prediction%room_modes = get_room_mode_density(room, bands%center)*width
       allocate (prediction%level(size(bands)), prediction%time(size(bands)), prediction%spread(size(bands)))
-      floor_decay = 2*pi*bands%centre*prediction%loss_factor
+      floor_decay = 2*pi*bands%center*prediction%loss_factor
       do i = 1, size(bands)
          energies(i) = get_band_energies(plate, room, prediction, i)
          call get_fast_maximum(energies(i)%loss, energies(i)%start, energies(i)%weight, maximum(i), prediction%time(i))
          prediction%spread(i) = get_level_spread([ &
             get_band_variance(2, get_mode_density(plate), floor_decay(i), width(i)), &
-            get_band_variance(3, get_room_mode_density(room, bands(i)%centre), &
+            get_band_variance(3, get_room_mode_density(room, bands(i)%center), &
             decay_of_60_db/prediction%reverberation_time(i), width(i))])
       end do
       prediction%level = 10*log10(maximum/reference_pressure**2)
@@ -275,7 +275,7 @@ contains
       plates = [plate, get_walls(room%walls)]
       at_room = size(plates) + 1
       at_cavity = at_room + 1
-      associate (f => prediction%bands(band)%centre, third => prediction%bands(band), air => room%air, &
+      associate (f => prediction%bands(band)%center, third => prediction%bands(band), air => room%air, &
          ceiling => room%ceiling, area => plate%length*plate%width)
          radiated = air%density*air%sound_speed/get_surface_mass(plates)*get_plate_radiation(plates, air, f)
          flow = new_energy_flow([get_mode_density(plates), get_room_mode_density(room, f)], &

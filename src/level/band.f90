@@ -39,7 +39,7 @@ module thud_band
       !> Name of the band, its rounded mid frequency, Hz.
       real(wp) :: nominal = 0.0_wp
       !> Exact mid frequency, Hz.
-      real(wp) :: centre = 0.0_wp
+      real(wp) :: center = 0.0_wp
       !> Band edges, Hz.
       real(wp) :: lower = 0.0_wp, upper = 0.0_wp
    end type band_type

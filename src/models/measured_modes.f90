@@ -207,7 +207,7 @@ contains
       type(mode_type), intent(in) :: modes(:)
       !> Velocity at first touch, m/s; time since first touch, s.
       real(wp), intent(in) :: impact_velocity, time
-      !> Deflection of the centre of mass, m; its velocity, m/s; force on the floor, N.
+      !> Deflection of the center of mass, m; its velocity, m/s; force on the floor, N.
       real(wp), intent(out) :: deflection, velocity, force
       !> Power of the dashpots, W; kinetic and elastic energy, J.
       real(wp), intent(out), optional :: power, stored

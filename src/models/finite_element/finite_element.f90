@@ -217,7 +217,7 @@ contains
    !> Marches until the ball has left for good.
    subroutine march(run, start, contacts, options, sampling, history, error)
       type(impact_run_type), intent(inout) :: run
-      !> Height of its centre of mass at first touch, m.
+      !> Height of its center of mass at first touch, m.
       real(wp), intent(in) :: start
       type(contacts_type), intent(inout) :: contacts
       !> Bounces, flight, step.

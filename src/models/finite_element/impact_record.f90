@@ -57,7 +57,7 @@ contains
       type(impact_run_type), intent(in) :: run
       !> Index of the sample.
       integer, intent(in) :: i
-      !> Height of the centre of mass at first touch, m.
+      !> Height of the center of mass at first touch, m.
       real(wp), intent(in) :: start
       type(force_history_type), intent(inout) :: history
 
@@ -83,7 +83,7 @@ contains
       type(impact_run_type), intent(in) :: run
       !> Index of the latest sample.
       integer, intent(in) :: last
-      !> Height of the centre of mass at first touch, m.
+      !> Height of the center of mass at first touch, m.
       real(wp), intent(in) :: start
       type(force_history_type), intent(inout) :: history
       real(wp) :: mass, speed, rise, time

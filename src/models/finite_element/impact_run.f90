@@ -231,7 +231,7 @@ contains
          run%dissipated + run%contact_loss + run%friction_loss + run%floor%work
    end function get_energy
 
-   !> Height of the centre of mass.
+   !> Height of the center of mass.
    pure function get_mean_height(run) result(height)
       type(impact_run_type), intent(in) :: run
       !> The height, m.
@@ -240,7 +240,7 @@ contains
       height = sum(run%mass(:, :, 2)*run%position(:, :, 2))/sum(run%mass(:, :, 2))
    end function get_mean_height
 
-   !> Velocity of the centre of mass.
+   !> Velocity of the center of mass.
    pure function get_mean_velocity(run) result(velocity)
       type(impact_run_type), intent(in) :: run
       !> The velocity upwards, m/s.

@@ -269,7 +269,7 @@ contains
 
       change = 0.0_wp
       n = size(force)
-      ! Nodes of neighbouring lines and rings, two coordinates each.
+      ! Nodes of neighboring lines and rings, two coordinates each.
       width = 2*size(force, 2) + 3
       allocate (band(3*width + 1, n), solution(n, 2), pivot(n))
       call get_tangent(pressed, fixed, width, band, failed)

@@ -195,7 +195,7 @@ contains
       real(wp) :: lost
       integer :: i
 
-      ! Sums of zeros, which compilers vectorise; velocities are NaN where a stage has left the domain.
+      ! Sums of zeros, which compilers vectorize; velocities are NaN where a stage has left the domain.
       lost = 0.0_wp
       if (compressing) then
          !$omp simd reduction(+: lost)

@@ -234,7 +234,7 @@ contains
                d4 = y4 - point
                a4 = s*get_flux_acceleration(z4, d4, inverse) - get_deceleration(y4, d4, c0, c1, c2, c3, c4, c5, c6, c7)
 
-               ! Added, as a branch would not be vectorised.
+               ! Added, as a branch would not be vectorized.
                outside = merge(0.0_wp, not_a_number, max(max(abs(d1), abs(d2)), max(abs(d3), abs(d4))) <= series%reach(i))
                outsides = outsides + outside
                sixth = h*(1/6.0_wp)

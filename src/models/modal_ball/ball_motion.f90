@@ -17,7 +17,7 @@ module thud_ball_motion
    type :: ball_motion_type
       !> Amplitudes of the modes, m sqrt(kg), their rates and strains of their branches: [n_mode, 2 + n_branch].
       real(wp), allocatable :: motion(:, :)
-      !> Height of the centre of mass, m.
+      !> Height of the center of mass, m.
       real(wp) :: height
       !> Its velocity upwards, m/s.
       real(wp) :: speed
@@ -37,7 +37,7 @@ module thud_ball_motion
       real(wp), allocatable :: before(:, :), mode_impulse(:)
       !> Gaps between rings and floor, and of rings that stick to where they touched first, m: [n_gap].
       real(wp), allocatable :: gap(:)
-      !> Gaps of the undeformed ball with its centre on the resting floor, m: [n_gap].
+      !> Gaps of the undeformed ball with its center on the resting floor, m: [n_gap].
       real(wp), allocatable :: start(:)
    end type ball_motion_type
 

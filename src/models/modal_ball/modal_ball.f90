@@ -288,7 +288,7 @@ contains
             end if
             if (contact%last == size(rings%radius)) then
                error = numerical_error('&drop: '//to_text(1.0e3_wp*n_step*interval)//' ms after first touch the ball lies ' &
-                  //'on its outermost ring, its centre sunk by '//to_text(1.0e3_wp*(ball%outer_radius - state%height)) &
+                  //'on its outermost ring, its center sunk by '//to_text(1.0e3_wp*(ball%outer_radius - state%height)) &
                   //' mm; allowed: a lower height, or a stiffer ball')
                return
             end if

@@ -1,7 +1,7 @@
 !> Rings around the lowest point of the sphere that take the pressure of the floor.
 !>
-!> The pressure is linear between neighbouring rings: ring i stands for the hat that is 1 at its angle and 0 at its
-!> neighbours'. Its height is the mean over that hat, so that force times displacement is work. Loads on lines instead would
+!> The pressure is linear between neighboring rings: ring i stands for the hat that is 1 at its angle and 0 at its
+!> neighbors'. Its height is the mean over that hat, so that force times displacement is work. Loads on lines instead would
 !> converge with the first power of the spacing, and take many more harmonics.
 !>
 !> Rings that stick have two degrees of freedom, down and inwards; each has its row of the mode shapes, first that of
@@ -22,7 +22,7 @@ module thud_surface_rings
    type :: surface_rings_type
       !> Distance of each from the axis: [n_ring].
       real(wp), allocatable :: radius(:)
-      !> Mean height of each hat below the centre: [n_ring].
+      !> Mean height of each hat below the center: [n_ring].
       real(wp), allocatable :: height(:)
       !> Mean displacement of each hat by unit U and by unit V of each harmonic: [n_dof*n_ring, 2, 0:highest].
       real(wp), allocatable :: shape_at_ring(:, :, :)
