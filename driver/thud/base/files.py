@@ -269,12 +269,8 @@ def checksum(content: bytes) -> str:
 def read_manifest(folder: Path) -> dict[str, Entry]:
     """Return the entries of the manifest of a directory, none without a manifest.
 
-    The last checksum of a file is that of its latest content.
-
-    Raises
-    ------
-    InputError
-        Where another file has its name.
+    The last checksum of a file is that of its latest content. Raise InputError where another file
+    has its name.
     """
     path = folder / MANIFEST
     if not os.path.lexists(path):

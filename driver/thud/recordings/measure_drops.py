@@ -71,17 +71,13 @@ def measure_signals(
     *,
     progress: bool = False,
     workers: int = 1,
-    keep: str | os.PathLike[str] | Checkpoint | None = None,
+    checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
 ) -> tuple[tuple[Drop, ...], tuple[Origin, ...], float | None]:
     """Return the drops of signals, their origins, and the relative uncertainty of the force.
 
     The uncertainty is the largest of all signals, None if it is unknown for one. The arguments are
-    those of `read_recording`.
-
-    Raises
-    ------
-    InputError
-        Where there are no signals, or a drop cannot be measured.
+    those of `read_recording`. Raise InputError where there are no signals, or a drop cannot be
+    measured.
     """
     drops: list[Drop] = []
     origins: list[Origin] = []

@@ -164,10 +164,7 @@ def correct_plate(
 def correct_window(window: Window, plate: Plate) -> tuple[Window, tuple[str, ...], tuple[str, ...]]:
     """Return a window of the force that was applied to a plate, the processing, and warnings.
 
-    Raises
-    ------
-    InputError
-        Where the pulse is cut, clipped, doubled or has long dropouts.
+    Raise InputError where the pulse is cut, clipped, doubled or has long dropouts.
     """
     # Clipping and dropouts are faults of the recorded force; corrected, a dropout would ring.
     force, steps, warnings = repair(window)

@@ -184,10 +184,7 @@ def compare_methods(
 def average_levels(estimates: Sequence[DropLevels]) -> AverageLevels:
     """Return the energy average of the levels of drops, their spread and their outliers.
 
-    Raises
-    ------
-    InputError
-        Where there are no drops, or their bands or methods differ.
+    Raise InputError where there are no drops, or their bands or methods differ.
     """
     if len({(e.bands, e.method) for e in estimates}) != 1:
         refuse("the drops differ in bands or method, or there are none", "levels of one kind")

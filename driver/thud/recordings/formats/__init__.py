@@ -78,10 +78,7 @@ OTHERS = {
 def read_channels(path: Path) -> list[Channel]:
     """Return the channels of a file; its content shows the format.
 
-    Raises
-    ------
-    InputError
-        Where the format is unknown or the file is damaged.
+    Raise InputError where the format is unknown or the file is damaged.
     """
     with guarded(path, "a file"), path.open("rb") as file:
         head = file.read(HEAD)
