@@ -145,7 +145,11 @@ class Recording(Displayed):
             Where a drop cannot be measured.
         """
         drops, origins, uncertainty = measure_signals(
-            signals, checked_config(config), progress=progress, workers=workers, checkpoint=keep
+            signals,
+            checked_config(config),
+            progress=progress,
+            workers=workers,
+            checkpoint=checkpoint,
         )
         name = Path(origins[0].path or origins[0].name).stem
         return cls(name, drops, origins, config, uncertainty)
@@ -273,6 +277,10 @@ class Recording(Displayed):
             return ()
         rates = dict.fromkeys(drop.sample_rate for drop in self.drops)
         return tuple(dict.fromkeys(f"levels: {describe_low_pass(rate)}" for rate in rates))
+
+    def quantity(self, name: str) -> float:
+        """Return a quantity of the table by its name, SI units; NaN if unknown."""
+        return float(getattr(self, name, math.nan))
 
     def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - of the protocol
         """Return the force of the first drop, corrected, N, shape (n_sample,), for any `kind`."""
