@@ -38,15 +38,7 @@ LONG = 600.0
 
 @dataclass(frozen=True)
 class Origin:
-    """Signal that drops come from.
-
-    Attributes
-    ----------
-    name, path, checksum, date, calibration, sample_rate, steps, warnings
-        As those of the `Signal`; the checksum is SHA-256.
-    drops : int
-        Number of drops.
-    """
+    """Signal that a number of drops come from; its attributes are those of `Signal`."""
 
     name: str
     path: str

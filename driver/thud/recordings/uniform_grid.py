@@ -26,17 +26,7 @@ MAX_FORCE = 1e12
 
 
 class Record(NamedTuple):
-    """A force over time.
-
-    Attributes
-    ----------
-    time : ndarray, shape (n_sample,)
-        Time, s, uniformly spaced.
-    force : ndarray, shape (n_sample,)
-        Force, N.
-    sample_rate : float
-        Samples per second, Hz.
-    """
+    """A force, N, over uniformly spaced times, s, both of shape (n_sample,), and its rate, Hz."""
 
     time: NDArray[np.float64]
     force: NDArray[np.float64]
@@ -47,12 +37,8 @@ def uniform_grid(time: NDArray[np.float64], name: str) -> tuple[float, float, tu
     """Return start and step, s, of the uniform grid that fits times best, and notes.
 
     Times, s, shape (n_sample,), may miss it by their rounding to the last written digit: at
-    44.1 kHz, the sixth decimal is a twentieth of a step.
-
-    Raises
-    ------
-    InputError
-        Names the time off the grid, or the step that is not allowed.
+    44.1 kHz, the sixth decimal is a twentieth of a step. Raise InputError with the time off the
+    grid, or the step that is not allowed.
     """
     if not np.isfinite(time).all():
         refuse(f"{name}: a time is not finite", "real numbers, s")

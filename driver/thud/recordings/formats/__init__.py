@@ -20,19 +20,10 @@ HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 class Format(NamedTuple):
-    """A format.
+    """A format: name, module that reads it, suffixes, and whether the first bytes match it.
 
-    Attributes
-    ----------
-    name, module : str
-        Name for messages, and name of its module.
-    suffixes : tuple of str
-        Suffixes of its files.
-    matches : callable
-        Whether the first bytes of a file are of this format.
-    is_probed : bool
-        Whether its library may hang, crash or fill memory on damaged files, so that it is probed in
-        a subprocess first.
+    It is probed in a subprocess first if its library may hang, crash or fill memory on damaged
+    files.
     """
 
     name: str
