@@ -186,10 +186,10 @@ def test_correlations_are_shown_to_the_digit_that_differs_from_1() -> None:
     found = pair_sentences("abcd", np.where(sizes, sizes, sizes.T), 0.9)
     # The strongest first; above 0.998 no model tells them apart.
     assert found == [
-        "b and c cannot be told apart: correlation −0.99996",
-        "a and b cannot be told apart: correlation 0.999",
-        "a and c are hard to tell apart: correlation 0.95",
-        "c and d are hard to tell apart: correlation 0.90",
+        "b and c cannot be separated: correlation −0.99996",
+        "a and b cannot be separated: correlation 0.999",
+        "a and c can hardly be separated: correlation 0.95",
+        "c and d can hardly be separated: correlation 0.90",
     ]
 
 

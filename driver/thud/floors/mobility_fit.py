@@ -61,7 +61,7 @@ _OTHERS = {
 # Numbers of poles that are tried; the library takes no more.
 _ORDERS = (2, 4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64)
 # Numbers without a gain after which no more are tried.
-_PATIENCE = 5
+_STAGNATION_LIMIT = 5
 # Error below which no more poles are tried: that of a table with eight digits.
 _EXACT = 1e-8
 # Error of the fit that raises a warning, and of the change that makes it passive.
@@ -221,8 +221,8 @@ def fit_mobility(
     # A line at 0 Hz has no phase.
     frequency, values = frequency[frequency != 0], values[frequency != 0]
     values = values * (2j * np.pi * frequency) ** _POWERS[quantity or "mobility"]
-    if (n_line := len(frequency)) <= 1:
-        refuse(f"{place}: {n_line} lines above 0 Hz", "two or more")
+    if (count_of_lines := len(frequency)) <= 1:
+        refuse(f"{place}: {count_of_lines} lines above 0 Hz", "two or more")
     if not (good := np.isfinite(values) & (values != 0)).all():
         line = good.argmin()
         shown = "not finite" if values[line] else "0"
@@ -261,7 +261,9 @@ def _chosen(name: str, frequency: Array, values: NDArray[np.complex128]) -> Mobi
     orders = [order for order in _ORDERS if order < len(frequency)]
     for order in orders or [1]:
         # Three values for each coefficient, or noise is fitted.
-        if best is not None and (worse == _PATIENCE or 3 * (2 * order + 1) > 2 * len(frequency)):
+        if best is not None and (
+            worse == _STAGNATION_LIMIT or 3 * (2 * order + 1) > 2 * len(frequency)
+        ):
             break
         worse += 1
         try:

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 THIRDS = BANDWIDTHS[1]
-# Change of the force by a floor that gives way, dB, that raises a warning.
-NOTICED = 0.1
+# Change of the force by a yielding floor, dB, that raises a warning.
+MIN_CHANGE = 0.1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -153,9 +153,9 @@ class RoomPrediction(Displayed):
                 f"with a standard deviation of {self.spread[few].max():.1f} to "
                 f"{self.spread[few].min():.1f} dB"
             )
-        if self.force == "blocked" and abs(self.force_change) > NOTICED:
+        if self.force == "blocked" and abs(self.force_change) > MIN_CHANGE:
             found.append(
-                f"the floor gives way: the peak of the force would change by about "
+                f"the floor yields: the peak of the force would change by about "
                 f"{self.force_change:.1f} dB, and the force on a rigid floor is used"
             )
         return tuple(found)

@@ -36,7 +36,7 @@ CONCRETE, WITHIN = 3500 / 2300, 1.26
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TappingLevel(Displayed):
-    """Normalised level of the tapping machine below a homogeneous floor, in thirds.
+    """Normalized level of the tapping machine below a homogeneous floor, in thirds.
 
     Attributes
     ----------

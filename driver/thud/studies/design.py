@@ -145,13 +145,13 @@ def _mark(study: SampleStudy) -> tuple[tuple[float, float] | None, str]:
     rest = set(paper) - set(names) - {"mass" if by_density else DENSITY.name}
     of_paper = set(names) <= set(paper) and all(math.isclose(ours[n], paper[n]) for n in rest)
     values = paper if of_paper else ours
-    places: list[Any] = [values.get(name, value_in(study.case, name)) for name in names]
+    positions: list[Any] = [values.get(name, value_in(study.case, name)) for name in names]
     ends = [(min(grid), max(grid)) for grid in (p.grid() for p in study.parameters)]
     inside = all(
-        place is not None and low <= float(place) <= high
-        for place, (low, high) in zip(places, ends, strict=True)
+        position is not None and low <= float(position) <= high
+        for position, (low, high) in zip(positions, ends, strict=True)
     )
-    x, y = places
+    x, y = positions
     return (float(x), float(y)) if inside else None, "paper's ball" if of_paper else "case"
 
 

@@ -102,7 +102,7 @@ class Kind(ABC, Generic[S, R]):
 
     @abstractmethod
     def new_parameter(
-        self, name: str, given: object, case: Case, centre: Value | None
+        self, name: str, given: object, case: Case, default_mean: Value | None
     ) -> Parameter:
         """Return a parameter of its name, table, case and value there."""
 

@@ -59,14 +59,14 @@ class DropsKind(Kind[SampleStudy, R]):
     designs: ClassVar[tuple[str, ...]]
 
     def new_parameter(
-        self, name: str, given: object, case: Case, centre: Value | None
+        self, name: str, given: object, case: Case, default_mean: Value | None
     ) -> Parameter:
         """Return a parameter that varies."""
         if name == "bands":
             refuse(
                 "[parameters] bands is not allowed", "bands in [fixed], the same for all samples"
             )
-        return varied(name, given, users(case), centre)
+        return varied(name, given, users(case), default_mean)
 
     def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SampleStudy:
         """Return a study with its design."""

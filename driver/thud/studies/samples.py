@@ -62,7 +62,7 @@ class SampleStudy(Study):
     plan: Plan | None = None
     surrogate: Surrogate | None = None
 
-    # Whether the peaks of the judged force are counted in each sample.
+    # Whether the peaks of the assessed force are counted in each sample.
     counts_peaks: ClassVar[bool] = False
 
     def own_identity(self) -> dict[str, str]:
@@ -110,12 +110,14 @@ class SampleStudy(Study):
     def parameter_columns(self, start: int, stop: int) -> Columns:
         """Return values of samples `start` to `stop` - 1 by parameter, shape (n_sample,)."""
         if self.design == "grid":
-            places = np.unravel_index(np.arange(start, stop), self.shape)
-            return {p.name: p.grid()[i] for p, i in zip(self.parameters, places, strict=True)}
+            indices = np.unravel_index(np.arange(start, stop), self.shape)
+            return {p.name: p.grid()[i] for p, i in zip(self.parameters, indices, strict=True)}
         if self.design == "list":
             return {p.name: p.grid()[start:stop] for p in self.parameters}
-        shares = unit_samples(self.design, len(self.parameters), self.size, self.seed, start, stop)
-        return {p.name: p.quantile(shares[:, i]) for i, p in enumerate(self.parameters)}
+        fractions = unit_samples(
+            self.design, len(self.parameters), self.size, self.seed, start, stop
+        )
+        return {p.name: p.quantile(fractions[:, i]) for i, p in enumerate(self.parameters)}
 
     def key_columns(self, columns: Columns) -> Columns:
         """Return samples of `parameter_columns` as values of keys, shape (n_sample,).
@@ -153,7 +155,7 @@ def evaluate(block: Block) -> Columns:
     Returns the `SCALAR_QUANTITIES`; the levels of `level_names`, dB, shape (n_sample, n_band);
     ``margin``, dB; ``conforms``; ``status`` and ``reason``; on floors ``contact_octave_level`` and
     the like, and `FLOOR_QUANTITIES`; of a surrogate ``doubtful``; where they are counted, the
-    ``peaks`` of the judged force. Samples with an error have no numbers: NaN.
+    ``peaks`` of the assessed force. Samples with an error have no numbers: NaN.
     Raises InputError where this is another version of thud.
     """
     if block.version != version():

@@ -35,7 +35,7 @@ WORDS = ("name", "case", "fixed", "parameters")
 # Longer texts are shortened to their beginning and a checksum.
 _LONG = 300
 # Quantiles of the parameters at which a case is tried.
-SHARES = (0.01, 0.5, 0.99)
+TRIAL_QUANTILES = (0.01, 0.5, 0.99)
 _NAMED_KEY = re.compile(r"&\w+: (\w+)")
 
 
@@ -86,10 +86,10 @@ class Study:
             found |= {f"&{group}: {key}": f"{value!r}" for key, value in keys.items()}
         return {key: _shortened(value) for key, value in found.items()}
 
-    def trial_case(self, share: float) -> Case:
+    def trial_case(self, quantile: float) -> Case:
         """Return the case with its parameters at a quantile; InputError where there is none."""
         acting = (p for p in self.parameters if p.key not in {DENSITY, TEMPERATURE})
-        found = {p.name: p.trial(share) for p in acting}
+        found = {p.name: p.trial(quantile) for p in acting}
         case = put(self.case, {name: v for name, v in found.items() if v is not None})
         return case if self.density is None else with_density(case, self.density)
 
@@ -227,16 +227,16 @@ def fix_keys(
     for name, entry in fixed.items():
         if name == "model":
             continue
-        place = f"{table} {name}"
-        key, place_in_list = find_key(name, users(case))
+        label = f"{table} {name}"
+        key, index = find_key(name, users(case))
         if key == TEMPERATURE:
-            refuse(f"{place} is not allowed", "temperature in [parameters]")
-        value = quantity(place, entry, key.unit)
-        if key.kind == "list" and place_in_list is None:
+            refuse(f"{label} is not allowed", "temperature in [parameters]")
+        value = quantity(label, entry, key.unit)
+        if key.kind == "list" and index is None:
             entries = value if isinstance(value, list) else [value]
-            values[name] = tuple(checked(place, key, item, 0) for item in entries)
+            values[name] = tuple(checked(label, key, item, 0) for item in entries)
         else:
-            values[name] = checked(place, key, value, 0)
+            values[name] = checked(label, key, value, 0)
     density = values.pop(DENSITY.name, None)
     return put(case, values), density  # type: ignore[return-value]
 
@@ -258,13 +258,13 @@ def _require_valid(study: Study, fixed: Mapping[str, Any]) -> None:
     """Raise InputError where the library refuses a fixed value for all values of the parameters."""
     keys = {name.partition("(")[0] for name in fixed} | ({"mass"} if study.density else set())
     refusals = []
-    for share in SHARES:
+    for quantile in TRIAL_QUANTILES:
         try:
-            check_case(replace(study.trial_case(share), modes=None, compression=None))
+            check_case(replace(study.trial_case(quantile), modes=None, compression=None))
         except InputError as error:
             refusals.append(str(error))
     named = [_NAMED_KEY.match(refusal) for refusal in refusals]
-    if len(named) == len(SHARES) and all(found and found[1] in keys for found in named):
+    if len(named) == len(TRIAL_QUANTILES) and all(found and found[1] in keys for found in named):
         message = f"[fixed]: {refusals[0]}"
         raise InputError(message)
 

@@ -32,10 +32,10 @@ class SurrogateKind(DropsKind[Surrogate]):
     designs = ("grid",)
 
     def new_parameter(
-        self, name: str, given: object, case: Case, centre: Value | None
+        self, name: str, given: object, case: Case, default_mean: Value | None
     ) -> Parameter:
         """Return a parameter that varies from a minimum to a maximum."""
-        found = super().new_parameter(name, given, case, centre)
+        found = super().new_parameter(name, given, case, default_mean)
         if found.low is None or found.count or found.scale != Parameter.scale:
             refuse(f"[parameters] {name} is not a range of a surrogate", "low, high and unit")
         # The samples of the study are the corners of the region.

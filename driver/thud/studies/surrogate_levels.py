@@ -48,7 +48,7 @@ class SurrogateLevels(LevelMisfit):
             self.name = self.name.replace("_", f"_{self.bands}_")
         if self.name not in surrogate.outputs:
             refuse(f"the surrogate has no {self.name}", f"{', '.join(surrogate.outputs)}")
-        missed = np.sqrt(surrogate.mean_square(self.name))[self.places]
+        missed = np.sqrt(surrogate.mean_square(self.name))[self.indices]
         ratios = [np.sqrt(surrogate.mean_square(n)[0]) * np.log(10) / 20 for n in self.extra]
         sizes = self.target[len(missed) :]
         own = [np.array([r * s]) for r, s in zip(ratios, sizes, strict=True)]
@@ -68,7 +68,7 @@ class SurrogateLevels(LevelMisfit):
         found = self.surrogate.predict(case, columns)
         if found["status"][0]:
             raise NumericalError(found["reason"][0])
-        levels = found[self.name][0][self.places]
+        levels = found[self.name][0][self.indices]
         values = np.concatenate([levels, *(found[name] for name in self.extra)])
         if not np.isfinite(values).all():
             refuse("the surrogate does not answer all quantities of the target", "others")

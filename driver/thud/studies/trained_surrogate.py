@@ -44,9 +44,9 @@ if TYPE_CHECKING:
     Values = NDArray[np.float64]
 
 # Share of the held-out drops within the error that is stated, and the confidence of that.
-SHARE = 0.95
+COVERAGE = 0.95
 # Samples that are computed together: their kernel stays in the cache.
-_TOGETHER = 250
+_CHUNK = 250
 # Values beyond the region by this part of its width are rounding.
 _ROUNDING = 1e-9
 # Smoothness of the kernel of Matern: responses that can be differentiated twice.
@@ -79,7 +79,7 @@ class Surrogate(StudyResult):
     bound : float
         Maximum error of what is answered, dB; other quantities are NaN.
     peaks : int
-        Number of peaks of the judged force, the same in all drops.
+        Number of peaks of the assessed force, the same in all drops.
     identity : dict of str to str
         What the drops and their choice depend on.
     points : ndarray, shape (n_drop, n_key)
@@ -109,8 +109,8 @@ class Surrogate(StudyResult):
     residuals: Values
 
     def __repr__(self) -> str:
-        """Return the keys and the largest error of what is judged."""
-        error = float(self.errors[self.judged].max())
+        """Return the keys and the largest error of what is assessed."""
+        error = float(self.errors[self.assessed].max())
         return (
             f"<Surrogate of {len(self.points)} drops by {', '.join(self.keys)}: "
             f"95 % within {error:.3f} dB>"
@@ -150,7 +150,7 @@ class Surrogate(StudyResult):
         return found
 
     @property
-    def judged(self) -> NDArray[np.bool_]:
+    def assessed(self) -> NDArray[np.bool_]:
         """Which numbers the verdict depends on, shape (n_number,)."""
         names = {f"{self.case.levels.force}_level", "contact_time", "restitution"}
         return np.repeat([name in names for name in self.outputs], list(self.outputs.values()))
@@ -160,19 +160,19 @@ class Surrogate(StudyResult):
         """Error of each number, dB, shape (n_number,); NaN where the model has no such result."""
         count = len(self.points)
         # With 58 drops or fewer there is no such order statistic.
-        place = int(binom.ppf(SHARE, count, SHARE))
-        found: Values = np.sort(np.abs(self.residuals), axis=0)[place]
+        rank = int(binom.ppf(COVERAGE, count, COVERAGE))
+        found: Values = np.sort(np.abs(self.residuals), axis=0)[rank]
         return found
 
     @property
     def worst(self) -> tuple[str, float]:
-        """Name and error, dB, of the judged number with the largest error."""
-        errors = np.where(self.judged, self.errors, -np.inf)
+        """Name and error, dB, of the assessed number with the largest error."""
+        errors = np.where(self.assessed, self.errors, -np.inf)
         return self.labels[int(np.nanargmax(errors))], float(np.nanmax(errors))
 
     @property
     def sentence(self) -> str:
-        """How it was trained, its largest error of what is judged, and what it does not answer."""
+        """How it was trained, its largest assessed error, and what it does not answer."""
         label, error = self.worst
         found = (
             f"surrogate of {len(self.points)} drops: 95 % of held-out drops within {error:.2g} dB "
@@ -241,12 +241,12 @@ class Surrogate(StudyResult):
         width = high - low
         edge = _ROUNDING * np.maximum(width, np.abs(high))
         outside = ~((values >= low - edge) & (values <= high + edge))
-        places = (values - low) / np.where(width > 0, width, 1.0)
+        points = (values - low) / np.where(width > 0, width, 1.0)
         kernel = Matern(self.length, nu=SMOOTHNESS)
         numbers = np.empty((count, len(self.mean)))
-        for start in range(0, count, _TOGETHER):
-            some = slice(start, start + _TOGETHER)
-            numbers[some] = kernel(places[some], self.points) @ self.weights
+        for start in range(0, count, _CHUNK):
+            some = slice(start, start + _CHUNK)
+            numbers[some] = kernel(points[some], self.points) @ self.weights
         numbers = numbers * self.scale + self.mean
         numbers[:, ~(self.errors <= self.bound)] = np.nan
         failed = outside.any(axis=1)
@@ -288,8 +288,8 @@ class Surrogate(StudyResult):
         return found | verdicts | {"status": status, "reason": reasons}
 
     @property
-    def is_whole(self) -> bool:
-        """Whether its parts fit together, and what is judged has numbers."""
+    def is_complete(self) -> bool:
+        """Whether its parts fit together, and what is assessed has numbers."""
         drops, keys, numbers = len(self.points), len(self.keys), sum(self.outputs.values())
         shapes = {
             "region": (keys, 2), "points": (drops, keys), "length": (keys,),
@@ -300,11 +300,11 @@ class Surrogate(StudyResult):
             return False
         low, high = self.region.T
         known = (self.points, self.length, *(
-            getattr(self, name)[..., self.judged] for name in ("weights", "mean", "residuals")
+            getattr(self, name)[..., self.assessed] for name in ("weights", "mean", "residuals")
         ))  # fmt: skip
         return bool(
             drops > 0
-            and self.judged.any()
+            and self.assessed.any()
             and (low <= high).all()
             and (self.length > 0).all()
             and all(np.isfinite(part).all() for part in known)
@@ -363,11 +363,11 @@ def assess_many(
         Source whose limits apply.
     """
     count, bands = values[0].shape
-    judged, by = (_columns(part, count) for part in (values, errors))
+    assessed, by = (_columns(part, count) for part in (values, errors))
     criteria = get_criteria(source)
     lower = np.array([one.lower for one in criteria])
     upper = np.array([one.upper for one in criteria])
-    inside = np.minimum(judged - lower, upper - judged)
+    inside = np.minimum(assessed - lower, upper - assessed)
     surely, perhaps = ((inside >= sign * by).all(axis=1) for sign in (1, -1))
     return {
         "margin": inside[:, :bands].min(axis=1),
@@ -414,7 +414,7 @@ def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
         header["case"] = Case.from_text(header["case"])
         header["keys"] = tuple(header["keys"])
         found = Surrogate(**header, **arrays)
-        intact = found.digest == digest and found.is_whole
+        intact = found.digest == digest and found.is_complete
     except Exception as error:
         if is_failure(error):
             raise
@@ -436,7 +436,7 @@ class Plan:
     Attributes
     ----------
     error : float
-        Bound of the error of what is judged, dB.
+        Bound of the error of what is assessed, dB.
     size : int
         Maximum number of drops.
     seed : int
@@ -471,18 +471,18 @@ class Plan:
 
 def read_plan(given: Mapping[str, object], folder: Path) -> Plan | Surrogate:
     """Return the plan of a table ``[surrogate]``, or the surrogate of the file that it names."""
-    place = "[surrogate]"
+    label = "[surrogate]"
     if "file" in given:
-        require_words(f"{place} with file", given, ("file",))
+        require_words(f"{label} with file", given, ("file",))
         path = given["file"]
         if not isinstance(path, str) or not path.strip():
-            refuse_value(f"{place} file", path, "the path of a saved surrogate")
+            refuse_value(f"{label} file", path, "the path of a saved surrogate")
         return read_surrogate(folder / path)
-    require_words(place, given, ("error", "size", "seed", "file"))
+    require_words(label, given, ("error", "size", "seed", "file"))
     error, size, seed = (given.get(w, getattr(Plan, w)) for w in ("error", "size", "seed"))
-    require_number(f"{place} error", error)
+    require_number(f"{label} error", error)
     if not error > 0:  # type: ignore[operator]
-        refuse_value(f"{place} error", error, "numbers above 0, dB")
-    require_whole(f"{place} size", size, MIN_DROPS, MAX_DROPS)
-    require_whole(f"{place} seed", seed, 0, LARGEST_SEED)
+        refuse_value(f"{label} error", error, "numbers above 0, dB")
+    require_whole(f"{label} size", size, MIN_DROPS, MAX_DROPS)
+    require_whole(f"{label} seed", seed, 0, LARGEST_SEED)
     return Plan(float(error), size, seed)  # type: ignore[arg-type]

@@ -43,7 +43,7 @@ class Uncertainty(SampleResult):
     dataset : Dataset
         Every sample.
     levels : ndarray, shape (n_sample, 5)
-        Octave levels of the force that is judged, dB; samples without results are left out.
+        Octave levels of the assessed force, dB; samples without results are left out.
     source : str
         Source whose limits apply.
     conforming, computed, failed : int
@@ -131,7 +131,7 @@ class UncertaintyKind(SampleKind[Uncertainty]):
     designs = ("random",)
 
     def new_parameter(
-        self, name: str, given: object, case: Case, centre: Value | None
+        self, name: str, given: object, case: Case, default_mean: Value | None
     ) -> Parameter:
         """Return a parameter that varies; the limits are the same for all samples."""
         if name in {"source", "force"}:
@@ -139,7 +139,7 @@ class UncertaintyKind(SampleKind[Uncertainty]):
                 f"[parameters] {name} is not allowed, because all samples have the same limits",
                 f"{name} in [fixed]",
             )
-        return super().new_parameter(name, given, case, centre)
+        return super().new_parameter(name, given, case, default_mean)
 
     def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> Uncertainty:
         """Return the distribution over all samples."""

@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 # are zero.
 NO_EFFECT = 1e-9
 UNRESOLVED = 0.5
-# Singular values of the Jacobian below this part of the maximum, or below this many of its own
+# Singular values of the Jacobian below this fraction of the maximum, or below this many of its own
 # errors, are zero.
 MIN_RATIO = 1e-6
 ERRORS = 3.0
 # Entries of a unit vector below this are zero.
 NEGLIGIBLE = 1e-3
-# Correlations that are told, and above which two parameters cannot be told apart in practice: the
-# error of any model is larger than what separates them.
+# Correlations that are stated, and above which two parameters cannot be separated in practice: the
+# error of any model exceeds their difference.
 STRONG = 0.9
 INSEPARABLE = 0.998
 # Probability of a false warning by one test.
@@ -139,14 +139,14 @@ def pair_sentences(names: Sequence[str], correlation: Array, least: float) -> li
         size = strong[i, j]
         # 1.00 would hide a difference.
         digits = int(np.clip(np.ceil(-np.log10(max(1 - size, 1e-9))), 2, 9))
-        words = "cannot be told" if size >= INSEPARABLE else "are hard to tell"
+        words = "cannot be" if size >= INSEPARABLE else "can hardly be"
         value = f"{correlation[i, j]:.{digits}f}".replace("-", "−")
-        found.append(f"{names[i]} and {names[j]} {words} apart: correlation {value}")
+        found.append(f"{names[i]} and {names[j]} {words} separated: correlation {value}")
     return found
 
 
 def statement(names: Sequence[str], covariance: Array, correlation: Array, count: int) -> list[str]:
-    """Return how well parameters can be told apart, from the covariance of their relative values.
+    """Return how well parameters can be separated, from the covariance of their relative values.
 
     The first `count` parameters are those of the model.
     """
@@ -199,8 +199,8 @@ def coverage_factor(confidence: float, freedom: int | None) -> float:
     It is Student's t, or normal where the noise is known (`freedom` is None).
     """
     require_confidence(confidence)
-    place = (1 + confidence) / 2
-    return float(stats.norm.ppf(place) if freedom is None else stats.t.ppf(place, freedom))
+    quantile = (1 + confidence) / 2
+    return float(stats.norm.ppf(quantile) if freedom is None else stats.t.ppf(quantile, freedom))
 
 
 def require_confidence(confidence: object) -> None:
@@ -224,24 +224,24 @@ def _color_warning(residual: Array) -> str:
     found = stats.kstest(share[:-1], "uniform")
     if found.pvalue > UNLIKELY:
         return ""
-    place = np.searchsorted(share, 0.5) / len(power)
-    side = "low" if place < 0.5 else "high"  # noqa: PLR2004 - halves
+    fraction = np.searchsorted(share, 0.5) / len(power)
+    side = "low" if fraction < 0.5 else "high"  # noqa: PLR2004 - halves
     return (
-        f"the residuals are coloured: half of their power lies in the {side}est "
-        f"{min(place, 1 - place):.0%} of the compared frequencies: the noise or the model is not "
-        "what is assumed, and the intervals do not hold"
+        f"the residuals are colored: half of their power lies in the {side}est "
+        f"{min(fraction, 1 - fraction):.0%} of the compared frequencies: noise or model differ "
+        "from what is assumed, and the intervals do not hold"
     )
 
 
 def _outlier_warning(residual: Array, time: Array) -> str:
     """Test the largest of n normal residuals: n times its probability (Bonferroni)."""
-    place = int(np.argmax(np.abs(residual)))
-    size = abs(float(residual[place]))
+    index = int(np.argmax(np.abs(residual)))
+    size = abs(float(residual[index]))
     if 2 * len(residual) * stats.norm.sf(size) > UNLIKELY:
         return ""
     return (
-        f"the largest residual, at {1e3 * time[place]:.4g} ms, is {size:.3g} standard deviations: "
-        "it is no noise, and the intervals do not hold"
+        f"the largest residual, at {1e3 * time[index]:.4g} ms, is {size:.3g} standard deviations: "
+        "it is not noise, and the intervals do not hold"
     )
 
 
