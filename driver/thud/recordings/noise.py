@@ -239,14 +239,8 @@ def covariances(cells: Cells) -> NDArray[np.float64]:
 def fit_background(cells: Cells, mean: NDArray[np.float64], peak: float) -> Background:
     """Return the background with variances drawn from their posterior.
 
-    Parameters
-    ----------
-    cells
-        Begins and ends of the cells, s from about the middle of the contact.
-    mean : ndarray, shape (n_cell,)
-        Mean force of each, N.
-    peak
-        Peak force, N.
+    Cells are given by begins and ends, s from about the middle of the contact, and their mean
+    forces, N, shape (n_cell,); the peak force is in N.
     """
     unit = covariances(cells)
     scale = np.array([np.mean(np.diagonal(unit[0])), 1.0, np.pi**2 * 0.02, 1.0, 1.0])
