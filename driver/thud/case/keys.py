@@ -40,16 +40,16 @@ DENSITY = Key("", "ball", "density", "real", "kg/m3", "density of the wall")
 TEMPERATURE = Key("", "ball", "temperature", "real", "degC", "temperature of the ball")
 
 
-def users(case: Case) -> tuple[str, ...]:
+def key_owners(case: Case) -> tuple[str, ...]:
     """Return what of a case has keys of its own: its model, its floor, its room."""
     floor = case.floor.name if case.floor else ""
-    found = (case.model.name if case.model else "", floor, "room" if case.room else "")
-    return tuple(filter(None, found))
+    result = (case.model.name if case.model else "", floor, "room" if case.room else "")
+    return tuple(filter(None, result))
 
 
 @lru_cache
 def known_keys(owners: tuple[str, ...]) -> Mapping[str, Key]:
-    """Return the keys in which samples may differ, by name; see `users`.
+    """Return the keys in which samples may differ, by name; see `key_owners`.
 
     Those of floor and room have names that begin with their group, such as ``"plate.thickness"``,
     and their own where no other key has it.
@@ -69,7 +69,7 @@ def known_keys(owners: tuple[str, ...]) -> Mapping[str, Key]:
 
 
 def find_key(name: str, owners: tuple[str, ...]) -> tuple[Key, int | None]:
-    """Return a key by its name, and the entry of a list: of ``"frequency(2)"`` 2; see `users`.
+    """Return a key by its name, and the entry of a list: of ``"frequency(2)"`` 2; see `key_owners`.
 
     Raises
     ------
@@ -89,12 +89,12 @@ def find_key(name: str, owners: tuple[str, ...]) -> tuple[Key, int | None]:
     return key, int(match[2]) if match[2] else None
 
 
-def put(case: Case, values: Mapping[str, object]) -> Case:
+def with_values(case: Case, values: Mapping[str, object]) -> Case:
     """Return a case with other values of some keys; entries of lists are named as in `find_key`."""
     assert case.model is not None  # noqa: S101 - studies have a model, see `read_study`
     groups: dict[str, dict[str, object]] = {}
     for name, value in values.items():
-        key, entry = find_key(name, users(case))
+        key, entry = find_key(name, key_owners(case))
         group = key.group if key.group in {*GROUPS, "room"} else "model"
         if case.floor and key.owner == case.floor.name:
             group = "floor"
@@ -108,7 +108,8 @@ def put(case: Case, values: Mapping[str, object]) -> Case:
             entries[entry - 1] = value
             place[key.name] = tuple(entries)
     changed = {
-        group: dataclasses.replace(getattr(case, group), **found) for group, found in groups.items()
+        group: dataclasses.replace(getattr(case, group), **result)
+        for group, result in groups.items()
     }
     return dataclasses.replace(case, **changed)
 

@@ -32,7 +32,7 @@ def disk_space(study: SampleStudy) -> int:
     return files * _FILE_BYTES + 2 * total * (_SAMPLE_BYTES + 8 * (levels + len(study.parameters)))
 
 
-def new_dataset(study: SampleStudy, columns: Columns, found: Columns) -> xr.Dataset:
+def new_dataset(study: SampleStudy, columns: Columns, result: Columns) -> xr.Dataset:
     """Return the results of some samples, along the dimension ``sample``, levels also along bands.
 
     `columns` holds their parameters by name, `found` what `evaluate` returns.
@@ -43,14 +43,14 @@ def new_dataset(study: SampleStudy, columns: Columns, found: Columns) -> xr.Data
         **CONTACT_LEVELS,
     }
     coordinates: dict[str, Any] = band_coordinates(bands for _, bands in levels.values())
-    if ROOM_LEVEL in found:
+    if ROOM_LEVEL in result:
         dimension[ROOM_LEVEL] = ROOM_BAND
         coordinates |= room_coordinates()
     for parameter in study.parameters:
         values = _objects(columns[parameter.name])
         coordinates[parameter.coordinate] = ("sample", values, _attributes(study, parameter))
     variables = {}
-    for name, values in found.items():
+    for name, values in result.items():
         dimensions = ("sample", dimension[name]) if name in dimension else ("sample",)
         words: dict[str, Any] = {**attributes(ALL_QUANTITIES[name])}
         if study.surrogate and name in study.surrogate.outputs:

@@ -94,10 +94,10 @@ class DesignKind(SampleKind[Design]):
 
     def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SampleStudy:
         """Return a study of two numeric parameters."""
-        found = super().complete(study, given, folder)
-        if len(found.parameters) != _AXES or not all(map(_is_axis, found.parameters)):
+        result = super().complete(study, given, folder)
+        if len(result.parameters) != _AXES or not all(map(_is_axis, result.parameters)):
             refuse("[parameters] do not make a map", "two numeric ones of two values or more")
-        return found
+        return result
 
     def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> Design:
         """Return the map of all samples."""

@@ -136,7 +136,7 @@ def _pairs(
     case: Case, targets: Sequence[Target], names: AbstractSet[str]
 ) -> list[tuple[Case, Misfit]]:
     """Return the case of each target and what the fit needs of it."""
-    found: list[tuple[Case, Misfit]] = []
+    result: list[tuple[Case, Misfit]] = []
     for number, target in enumerate(targets, start=1):
         place = "target" if len(targets) == 1 else f"target {number}"
         require_kind(f"{place}: fixed", target.fixed, Mapping)
@@ -151,13 +151,13 @@ def _pairs(
         try:
             if target.fixed:
                 check_case(replace(own, modes=None))
-            found.append((own, target.misfit()))
+            result.append((own, target.misfit()))
         except InputError as error:
             if len(targets) == 1:
                 raise
             message = f"{place}: {str(error).removeprefix('target: ')}"
             raise InputError(message) from error
-    return found
+    return result
 
 
 def _search(
@@ -216,16 +216,16 @@ class FitStudy(Study):
         """Return target and search."""
         tables = self.tables["target"]
         tables = tables if isinstance(tables, list) else [tables]
-        found: dict[str, str] = {}
+        result: dict[str, str] = {}
         for end, table, (_, misfit) in zip(
             file_ends(len(tables)), tables, self.pairs(), strict=True
         ):
-            found |= {f"[target{end}] {key}": f"{value!r}" for key, value in table.items()}
+            result |= {f"[target{end}] {key}": f"{value!r}" for key, value in table.items()}
             digest = hashlib.sha256(misfit.data().tobytes()).hexdigest()[:16]
-            found[f"numbers of [target{end}]"] = digest
+            result[f"numbers of [target{end}]"] = digest
         if self.surrogate:
-            found["surrogate"] = self.surrogate.digest
-        return found | {name: f"{value!r}" for name, value in self.options.items()}
+            result["surrogate"] = self.surrogate.digest
+        return result | {name: f"{value!r}" for name, value in self.options.items()}
 
     def pairs(self) -> list[tuple[Case, Misfit]]:
         """Return the case of each target and what the fit needs of it."""
@@ -262,14 +262,14 @@ class FitKind(Kind[FitStudy, Fit]):
         # JSON knows neither dates nor infinity.
         shown = json.loads(json.dumps(given, default=str), parse_constant=str)
         head = {**vars(study), "case": case}
-        found = FitStudy(**head, targets=targets, tables=shown, options=options)
-        found.pairs()
+        result = FitStudy(**head, targets=targets, tables=shown, options=options)
+        result.pairs()
         if "surrogate" not in given:
-            return found
+            return result
         trained = read_plan(table_of(given, "surrogate"), folder)
         if not isinstance(trained, Surrogate):
             refuse("[surrogate] of a fit has no file", "file, of a surrogate that is trained")
-        return self.with_surrogate(found, trained)
+        return self.with_surrogate(result, trained)
 
     def with_surrogate(
         self, study: FitStudy, given: Surrogate | str | os.PathLike[str]

@@ -38,7 +38,7 @@ class RunOptions(TypedDict, total=False):
         Number of threads or processes; by default one per processor.
     scheduler : str or None
         Address of a Dask scheduler.
-    yes : bool
+    allow_large : bool
         Start also with more samples than have to be confirmed.
     progress : bool
         Show a progress bar.
@@ -52,7 +52,7 @@ class RunOptions(TypedDict, total=False):
     backend: Literal["threads", "processes", "dask"] | None
     workers: int | None
     scheduler: str | None
-    yes: bool
+    allow_large: bool
     progress: bool
     replace: bool
     surrogate: Surrogate | str | os.PathLike[str] | None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, Unpack
 
 from thud.base._schema import KEYS
 from thud.base.checks import refuse, require_choice
-from thud.case.keys import OF_FILES, users
+from thud.case.keys import OF_FILES, key_owners
 from thud.studies.backends import checked_backend
 from thud.studies.blocks import read_identity, result_names
 from thud.studies.computing import compute_samples
@@ -66,7 +66,7 @@ class DropsKind(Kind[SampleStudy, R]):
             refuse(
                 "[parameters] bands is not allowed", "bands in [fixed], the same for all samples"
             )
-        return varied(name, given, users(case), default_mean)
+        return varied(name, given, key_owners(case), default_mean)
 
     def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SampleStudy:
         """Return a study with its design."""
@@ -82,14 +82,14 @@ class DropsKind(Kind[SampleStudy, R]):
         if case.model and files:
             case = replace(case, model=replace(case.model, **files))  # type: ignore[arg-type]
         head = {**vars(study), "case": case}
-        found = SampleStudy(**head, **design, temperature=temperature, format=written)
+        result = SampleStudy(**head, **design, temperature=temperature, format=written)
         if "surrogate" not in given:
-            return found
+            return result
         _require_no_floor(case)
         plan = read_plan(table_of(given, "surrogate"), folder)
         if isinstance(plan, Surrogate):
-            return self.with_surrogate(found, plan)
-        return replace(found, plan=plan)
+            return self.with_surrogate(result, plan)
+        return replace(result, plan=plan)
 
     def with_surrogate(
         self, study: SampleStudy, given: Surrogate | str | os.PathLike[str]
@@ -102,8 +102,11 @@ class DropsKind(Kind[SampleStudy, R]):
 
     def require(self, study: SampleStudy, **how: Unpack[RunOptions]) -> None:
         """Raise InputError where there are too many samples, or no such backend."""
-        if study.count > MAX_SAMPLES and not how.get("yes"):
-            refuse(self.describe(study), f"up to {MAX_SAMPLES} samples, more with yes=True (--yes)")
+        if study.count > MAX_SAMPLES and not how.get("allow_large"):
+            refuse(
+                self.describe(study),
+                f"up to {MAX_SAMPLES} samples, or allow_large=True (--yes)",
+            )
         checked_backend(how.get("backend"), how.get("workers"), how.get("scheduler"))
 
     def listed_files(self, study: SampleStudy) -> list[str]:

@@ -35,18 +35,18 @@ class SurrogateKind(DropsKind[Surrogate]):
         self, name: str, given: object, case: Case, default_mean: Value | None
     ) -> Parameter:
         """Return a parameter that varies from a minimum to a maximum."""
-        found = super().new_parameter(name, given, case, default_mean)
-        if found.low is None or found.count or found.scale != Parameter.scale:
+        result = super().new_parameter(name, given, case, default_mean)
+        if result.low is None or result.count or result.scale != Parameter.scale:
             refuse(f"[parameters] {name} is not a range of a surrogate", "low, high and unit")
         # The samples of the study are the corners of the region.
-        return replace(found, count=2)
+        return replace(result, count=2)
 
     def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SampleStudy:
         """Return a study with the plan of its training."""
-        found = super().complete(study, {"surrogate": {}, **given}, folder)
-        if found.plan is None:
+        result = super().complete(study, {"surrogate": {}, **given}, folder)
+        if result.plan is None:
             refuse("[surrogate] file is not allowed in its own training", "error, size and seed")
-        return found
+        return result
 
     def compute(
         self, study: SampleStudy, results: Results | None, **how: Unpack[RunOptions]

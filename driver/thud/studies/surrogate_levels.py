@@ -65,11 +65,11 @@ class SurrogateLevels(LevelMisfit):
         columns: dict[str, Any] = {
             name: np.array([value_in(case, name)]) for name in self.surrogate.keys
         }
-        found = self.surrogate.predict(case, columns)
-        if found["status"][0]:
-            raise NumericalError(found["reason"][0])
-        levels = found[self.name][0][self.indices]
-        values = np.concatenate([levels, *(found[name] for name in self.extra)])
+        result = self.surrogate.predict(case, columns)
+        if result["status"][0]:
+            raise NumericalError(result["reason"][0])
+        levels = result[self.name][0][self.indices]
+        values = np.concatenate([levels, *(result[name] for name in self.extra)])
         if not np.isfinite(values).all():
             refuse("the surrogate does not answer all quantities of the target", "others")
         return cast("Impact", Answer(values))

@@ -74,8 +74,8 @@ class Uncertainty(SampleResult):
     @property
     def interval(self) -> tuple[float, float]:
         """Wilson's score interval of the probability, of 95 %; valid for none and for all too."""
-        found = binomtest(self.conforming, self.computed).proportion_ci(CONFIDENCE, "wilson")
-        return found.low, found.high
+        result = binomtest(self.conforming, self.computed).proportion_ci(CONFIDENCE, "wilson")
+        return result.low, result.high
 
     @property
     def surrogate_range(self) -> tuple[float, float] | None:
