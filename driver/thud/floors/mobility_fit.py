@@ -25,12 +25,14 @@ from thud.base.checks import (
 from thud.base.columns import read_titled
 from thud.base.display import Displayed
 from thud.base.errors import NumericalError, ThudError
+from thud.base.extras import require_extra
 from thud.case.case import Case
 from thud.impact.mobility import mobility
 from thud.level.levels import get_bands
 from thud.recordings.channel import guarded, library, require_small
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
@@ -98,6 +100,17 @@ class MobilityFit(Displayed):
         return mobility(self.floor, frequency)
 
     @property
+    def values(self) -> dict[str, float]:
+        """Parameters of the floor by name, entries of lists as ``"damping_ratio(1)"``."""
+        result: dict[str, float] = {}
+        for name, value in vars(self.floor).items():
+            if isinstance(value, tuple):
+                result |= {f"{name}({i})": entry for i, entry in enumerate(value, start=1)}
+            else:
+                result[name] = value
+        return result
+
+    @property
     def error(self) -> float:
         """Relative error, root of the mean square over the lines."""
         return float(np.sqrt(np.mean(self._errors() ** 2)))
@@ -149,6 +162,19 @@ class MobilityFit(Displayed):
             for band, (error, level) in self.band_errors().items()
         ]
         return [("octave, Hz", "error, %", "real part, dB"), *body]
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the measured mobility and the fit, m/(N s), complex.
+
+        Raise InputError where pandas is not installed.
+        """
+        with require_extra("studies"):
+            import pandas as pd
+
+        fitted = self.mobility(self.frequency)
+        return pd.DataFrame(
+            {"frequency_Hz": self.frequency, "measured": self.measured, "fitted": fitted}
+        )
 
     def namelist(self) -> str:
         """Return the groups ``&floor`` and ``&measured_mobility`` as text for a case."""

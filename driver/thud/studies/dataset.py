@@ -66,7 +66,7 @@ def _attributes(study: SampleStudy, parameter: Parameter) -> dict[str, Any]:
     if law and parameter.name in law.keys:
         meaning += f" at {law.reference:g} degC; changed by its temperature"
     return {
-        "units": key.unit or "1",
+        **attributes(key),
         "long_name": meaning,
         "group": key.group,
         "key": parameter.name,

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 from thud.base.checks import refuse
 from thud.case.case import Case
-from thud.case.keys import DENSITY
+from thud.case.keys import DENSITY, value_in
 from thud.impact.quantities import RATING
 from thud.studies.result import SampleResult
 from thud.studies.sample_kind import SampleKind
-from thud.studies.study import value_in, wall_volume
+from thud.studies.study import wall_volume
 
 if TYPE_CHECKING:
     import os

@@ -238,7 +238,7 @@ class FitKind(Kind[FitStudy, Fit]):
     name = "fit"
     words = ("target", "surrogate", *OPTIONS)
 
-    def new_parameter(self, name: str, given: object, case: Case, centre: object) -> Parameter:  # noqa: ARG002
+    def new_parameter(self, name: str, given: object, case: Case, density: object) -> Parameter:  # noqa: ARG002
         """Return a parameter that is fitted."""
         return fitted_parameter(name, given, case)
 

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from thud.base.files import Results
     from thud.case.case import Case
-    from thud.case.keys import Value
     from thud.studies.parameter import Parameter
     from thud.studies.study import Source
     from thud.studies.trained_surrogate import Surrogate
@@ -102,9 +101,9 @@ class Kind(ABC, Generic[S, R]):
 
     @abstractmethod
     def new_parameter(
-        self, name: str, given: object, case: Case, default_mean: Value | None
+        self, name: str, given: object, case: Case, density: float | None
     ) -> Parameter:
-        """Return a parameter of its name, table, case and value there."""
+        """Return a parameter of its name and table; the density of the wall where it is fixed."""
 
     @abstractmethod
     def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> S:

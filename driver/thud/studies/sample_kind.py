@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, Unpack
 
 from thud.base._schema import KEYS
 from thud.base.checks import refuse, require_choice
-from thud.case.keys import OF_FILES, key_owners
+from thud.case.keys import DENSITY, OF_FILES, key_owners, value_in
 from thud.studies.backends import checked_backend
 from thud.studies.blocks import read_identity, result_names
 from thud.studies.computing import compute_samples
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
     from thud.base.files import Results
     from thud.case.case import Case
-    from thud.case.keys import Value
     from thud.studies.kind import RunOptions
     from thud.studies.parameter import Parameter
     from thud.studies.study import Study
@@ -59,14 +58,15 @@ class DropsKind(Kind[SampleStudy, R]):
     designs: ClassVar[tuple[str, ...]]
 
     def new_parameter(
-        self, name: str, given: object, case: Case, default_mean: Value | None
+        self, name: str, given: object, case: Case, density: float | None
     ) -> Parameter:
         """Return a parameter that varies."""
         if name == "bands":
             refuse(
                 "[parameters] bands is not allowed", "bands in [fixed], the same for all samples"
             )
-        return varied(name, given, key_owners(case), default_mean)
+        mean = density if name == DENSITY.name else value_in(case, name)
+        return varied(name, given, key_owners(case), mean)
 
     def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SampleStudy:
         """Return a study with its design."""

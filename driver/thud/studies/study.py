@@ -21,7 +21,7 @@ from thud.base.checks import refuse, refuse_value, require_kind, require_words, 
 from thud.base.errors import InputError
 from thud.base.files import read_input
 from thud.case.case import Case, check_case, new_model, read_case, tables_case
-from thud.case.keys import DENSITY, TEMPERATURE, Value, find_key, key_owners, with_values
+from thud.case.keys import DENSITY, TEMPERATURE, find_key, key_owners, with_values
 from thud.studies.parameter import Parameter, checked, quantity
 
 if TYPE_CHECKING:
@@ -172,7 +172,7 @@ def read_common(
     folder: Path,
     kind: str,
     words: Iterable[str],
-    new_parameter: Callable[[str, object, Case, Value | None], Parameter],
+    new_parameter: Callable[[str, object, Case, float | None], Parameter],
 ) -> Study:
     """Read what all kinds share; `words` are those that this kind has in addition to `WORDS`."""
     require_words("the study", given, (*WORDS, *words))
@@ -184,10 +184,7 @@ def read_common(
     case, density = fix_keys(_case(given.get("case"), folder, fixed), fixed)
     if not parameters:
         refuse("[parameters] is empty", "one parameter or more")
-    result = tuple(
-        new_parameter(name, entry, case, density if name == DENSITY.name else value_in(case, name))
-        for name, entry in parameters.items()
-    )
+    result = tuple(new_parameter(name, entry, case, density) for name, entry in parameters.items())
     _require_use(fixed, parameters)
     study = Study(name, kind, case, result, density)
     _require_valid(study, fixed)
@@ -281,20 +278,3 @@ def wall_volume(outer_radius: Any, wall_thickness: Any) -> Any:  # noqa: ANN401 
     # Powers of absurd radii raise OverflowError, their products are infinite.
     outer_cube, inner_cube = (radius * radius * radius for radius in (outer_radius, inner))
     return 4 / 3 * np.pi * (outer_cube - inner_cube)
-
-
-def value_in(case: Case, name: str) -> Value | None:
-    """Return the value of a key in a case; None where it has none, or a list of them."""
-    groups: tuple[object, ...] = (
-        case.ball, case.drop, case.sampling, case.levels, case.limits, case.model, case.floor,
-        case.room,
-    )  # fmt: skip
-    group, dot, rest = name.rpartition(".")
-    if dot:
-        groups = (case.room if group == "room" else case.floor,)
-    key, _, entry = rest.partition("(")
-    values = (getattr(group, key, None) for group in groups)
-    result = next((value for value in values if value is not None), None)
-    if isinstance(result, tuple) and entry:
-        result = next(iter(result[int(entry.rstrip(")")) - 1 :]), None)
-    return result if isinstance(result, Value) else None

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from thud.base.files import Results
     from thud.case.case import Case
-    from thud.case.keys import Value
     from thud.studies.kind import RunOptions
     from thud.studies.samples import SampleStudy
     from thud.studies.study import Source, Study
@@ -32,10 +31,10 @@ class SurrogateKind(DropsKind[Surrogate]):
     designs = ("grid",)
 
     def new_parameter(
-        self, name: str, given: object, case: Case, default_mean: Value | None
+        self, name: str, given: object, case: Case, density: float | None
     ) -> Parameter:
         """Return a parameter that varies from a minimum to a maximum."""
-        result = super().new_parameter(name, given, case, default_mean)
+        result = super().new_parameter(name, given, case, density)
         if result.low is None or result.count or result.scale != Parameter.scale:
             refuse(f"[parameters] {name} is not a range of a surrogate", "low, high and unit")
         # The samples of the study are the corners of the region.

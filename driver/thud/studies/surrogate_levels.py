@@ -10,10 +10,10 @@ import numpy as np
 from thud.base.checks import refuse
 from thud.base.errors import NumericalError
 from thud.base.immutable import freeze
+from thud.case.keys import value_in
 from thud.impact.compute import compute
 from thud.level.levels import BANDWIDTHS
 from thud.studies.fitting.level_target import LevelMisfit
-from thud.studies.study import value_in
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -25,11 +25,10 @@ from thud.base.checks import (
 from thud.base.extras import require_extra
 from thud.base.files import is_failure, read_input, replace_file
 from thud.case.case import Case, case_text
-from thud.case.keys import OF_FILES, with_values
+from thud.case.keys import OF_FILES, value_in, with_values
 from thud.level.assessment import get_criteria
 from thud.level.levels import get_bands
 from thud.studies.result import StudyResult
-from thud.studies.study import value_in
 
 if TYPE_CHECKING:
     import os

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from thud.base._schema import LimitsSource
     from thud.case.case import Case
-    from thud.case.keys import Value
     from thud.studies.kind import RunOptions
     from thud.studies.parameter import Parameter
     from thud.studies.samples import SampleStudy
@@ -131,7 +130,7 @@ class UncertaintyKind(SampleKind[Uncertainty]):
     designs = ("random",)
 
     def new_parameter(
-        self, name: str, given: object, case: Case, default_mean: Value | None
+        self, name: str, given: object, case: Case, density: float | None
     ) -> Parameter:
         """Return a parameter that varies; the limits are the same for all samples."""
         if name in {"source", "force"}:
@@ -139,7 +138,7 @@ class UncertaintyKind(SampleKind[Uncertainty]):
                 f"[parameters] {name} is not allowed, because all samples have the same limits",
                 f"{name} in [fixed]",
             )
-        return super().new_parameter(name, given, case, default_mean)
+        return super().new_parameter(name, given, case, density)
 
     def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> Uncertainty:
         """Return the distribution over all samples."""
