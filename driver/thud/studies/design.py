@@ -113,22 +113,8 @@ def design(
 ) -> Design:
     """Compute which geometry and material conform to the standards.
 
-    Parameters
-    ----------
-    study
-        Path of a TOML file, or what would stand in it; it has two numeric parameters.
-    output, **how
-        As of `sweep`.
-
-    Returns
-    -------
-    Design
-        Margin and verdict of the force that the case assesses.
-
-    Raises
-    ------
-    InputError
-        As `sweep`; also where there are not two numeric parameters with two values or more.
+    The study has two numeric parameters with two values or more; arguments and errors are those of
+    `sweep`.
     """
     return KIND.run(study, output, **how)
 

@@ -150,12 +150,8 @@ class Block:
 
 
 def evaluate(block: Block) -> Columns:
-    """Compute the samples of a block.
+    """Return the results of a block by their names in `ALL_QUANTITIES`; NaN where a sample fails.
 
-    Returns the `SCALAR_QUANTITIES`; the levels of `level_names`, dB, shape (n_sample, n_band);
-    ``margin``, dB; ``conforms``; ``status`` and ``reason``; on floors ``contact_octave_level`` and
-    the like, and `FLOOR_QUANTITIES`; of a surrogate ``doubtful``; where they are counted, the
-    ``peaks`` of the assessed force. Samples with an error have no numbers: NaN.
     Raises InputError where this is another version of thud.
     """
     if block.version != version():

@@ -118,23 +118,9 @@ def sensitivity(
 ) -> Sensitivity:
     """Compute Sobol indices of the octave levels, the contact time and the peak of the force.
 
-    Parameters
-    ----------
-    study
-        Path of a TOML file, or what would stand in it. ``[design] size`` is the number of base
-        samples N, a power of 2 from 4; N (d + 2) samples are computed for d parameters.
-    output, **how
-        As of `sweep`.
-
-    Returns
-    -------
-    Sensitivity
-        Indices of the force that the case assesses, with confidence intervals.
-
-    Raises
-    ------
-    InputError
-        As `sweep`; also where too few samples have results.
+    ``[design] size`` of the study is the number of base samples N, a power of 2 from 4; N (d + 2)
+    samples are computed for d parameters. Arguments and errors are those of `sweep`; InputError is
+    also raised where too few samples have results.
     """
     return KIND.run(study, output, **how)
 

@@ -76,23 +76,9 @@ def surrogate(
 ) -> Surrogate:
     """Train a surrogate: what studies may ask instead of the model.
 
-    Parameters
-    ----------
-    study
-        Path of a TOML file, or what would stand in it; each parameter has low and high.
-    output, **how
-        See `sweep`. The drops are kept; an interrupted training is continued.
-
-    Returns
-    -------
-    Surrogate
-        To be given to `sweep` and the others as `surrogate`, and saved by its `save`.
-
-    Raises
-    ------
-    InputError
-        As `sweep`; also where a drop has no result or the number of peaks differs among drops.
-    NumericalError
-        Where the error exceeds its bound with all the drops that are allowed.
+    Each parameter of the study has low and high. Arguments and errors are those of `sweep`, which
+    takes the result as `surrogate`, and so do the others. The drops are kept; an interrupted
+    training is continued. InputError is also raised where a drop has no result or the number of
+    peaks differs among drops, NumericalError where the error exceeds its bound with all drops.
     """
     return KIND.run(study, output, **how)

@@ -165,21 +165,7 @@ def uncertainty(
 ) -> Uncertainty:
     """Compute how tolerances spread the levels, and the probability of conformity.
 
-    Parameters
-    ----------
-    study
-        Path of a TOML file, or what would stand in it; its parameters are independent.
-    output, **how
-        As of `sweep`.
-
-    Returns
-    -------
-    Uncertainty
-        Levels of the force that the case assesses, and the probability of conformity.
-
-    Raises
-    ------
-    InputError
-        As `sweep`; also where fewer than two samples have results.
+    The parameters of the study are independent. Arguments and errors are those of `sweep`;
+    InputError is also raised where fewer than two samples have results.
     """
     return KIND.run(study, output, **how)
