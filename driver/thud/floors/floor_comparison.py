@@ -40,7 +40,7 @@ class FloorComparison(Displayed):
 
     @property
     def warnings(self) -> list[str]:
-        """What a reader of the numbers has to know, with the names of the floors."""
+        """Caveats of the numbers, with the names of the floors."""
         result = self.predictions.items()
         return [f"{name}: {warning}" for name, one in result for warning in one.warnings]
 

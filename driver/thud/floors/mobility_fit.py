@@ -138,7 +138,7 @@ class MobilityFit(Displayed):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a reader of the fit has to know."""
+        """Why the fit may be wrong, a sentence each."""
         result = []
         negative = np.mean(self.measured.real < 0)
         if negative > 0:

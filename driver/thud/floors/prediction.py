@@ -142,7 +142,7 @@ class RoomPrediction(Displayed):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a reader of the numbers has to know."""
+        """Caveats of the numbers."""
         few = self.has_few_modes
         result = [*self.floor_warnings]
         if few.any():

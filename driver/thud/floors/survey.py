@@ -148,7 +148,7 @@ class RoomLevels(Displayed):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a reader of the numbers has to know."""
+        """Caveats of the numbers."""
         result = []
         if len(self.positions) < MIN_POSITIONS:
             result.append(

@@ -43,7 +43,7 @@ class Design(SampleResult):
     axes : tuple of str
         The two parameters.
     mark : tuple of float or None
-        Where the ball of the paper, or else the case, lies; None where it has no such place.
+        Where the ball of the paper, or else the case, lies; None where that is outside the map.
     mark_name : str
         ``"paper's ball"`` or ``"case"``.
     """
@@ -124,7 +124,7 @@ def _is_axis(parameter: Parameter) -> bool:
 
 
 def _mark(study: SampleStudy) -> tuple[tuple[float, float] | None, str]:
-    """Return the place of the paper's ball if all else is as in the paper, else of the case."""
+    """Return the position of the paper's ball if all else is as in the paper, else of the case."""
     names = [parameter.name for parameter in study.parameters]
     paper, ours = _ball_and_drop(Case(), None), _ball_and_drop(study.case, study.density)
     by_density = study.density is not None or DENSITY.name in names

@@ -24,7 +24,7 @@ from thud.studies.fitting.search import search
 from thud.studies.kind import Kind
 from thud.studies.study import Study, fix_keys, table_of, with_density
 from thud.studies.surrogate_levels import answered, confirmed, within_region
-from thud.studies.trained_surrogate import Surrogate, read_plan, read_surrogate
+from thud.studies.trained_surrogate import Surrogate, get_surrogate, read_plan
 
 if TYPE_CHECKING:
     import os
@@ -115,9 +115,8 @@ def fit(  # noqa: PLR0913 - options of a search
     _require_options(options)
     known = bound_parameters(case, parameters)
     pairs = _pairs(case, _targets(target), {parameter.name for parameter in known})
-    if surrogate is not None and not isinstance(surrogate, Surrogate):
-        surrogate = read_surrogate(surrogate)
-    found = _search(pairs, get_ranges(case, known), options, surrogate, progress=progress)
+    trained = None if surrogate is None else get_surrogate(surrogate)
+    found = _search(pairs, get_ranges(case, known), options, trained, progress=progress)
     for sentence in found.warnings:
         warnings.warn(sentence, FitWarning, stacklevel=3)
     return found
@@ -138,15 +137,15 @@ def _pairs(
     """Return the case of each target and what the fit needs of it."""
     result: list[tuple[Case, Misfit]] = []
     for number, target in enumerate(targets, start=1):
-        place = "target" if len(targets) == 1 else f"target {number}"
-        require_kind(f"{place}: fixed", target.fixed, Mapping)
+        label = "target" if len(targets) == 1 else f"target {number}"
+        require_kind(f"{label}: fixed", target.fixed, Mapping)
         for name in target.fixed:
             if name in names or name == "model":
                 refuse(
-                    f"{place}: fixed {name} is not allowed",
+                    f"{label}: fixed {name} is not allowed",
                     "keys of ball, drop and model that are not among [parameters]",
                 )
-        own, density = fix_keys(case, target.fixed, f"{place}: fixed")
+        own, density = fix_keys(case, target.fixed, f"{label}: fixed")
         own = own if density is None else with_density(own, density)
         try:
             if target.fixed:
@@ -155,7 +154,7 @@ def _pairs(
         except InputError as error:
             if len(targets) == 1:
                 raise
-            message = f"{place}: {str(error).removeprefix('target: ')}"
+            message = f"{label}: {str(error).removeprefix('target: ')}"
             raise InputError(message) from error
     return result
 
@@ -271,11 +270,8 @@ class FitKind(Kind[FitStudy, Fit]):
             refuse("[surrogate] of a fit has no file", "file, of a surrogate that is trained")
         return self.with_surrogate(result, trained)
 
-    def with_surrogate(
-        self, study: FitStudy, given: Surrogate | str | os.PathLike[str]
-    ) -> FitStudy:
+    def with_surrogate(self, study: FitStudy, trained: Surrogate) -> FitStudy:
         """Return a study whose drops a surrogate answers. Raises InputError where it cannot."""
-        trained = given if isinstance(given, Surrogate) else read_surrogate(given)
         _answered(study.pairs(), trained, study.parameters)
         return replace(study, surrogate=trained)
 

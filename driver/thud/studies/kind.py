@@ -12,6 +12,7 @@ from thud.base.checks import refuse, require_words
 from thud.studies.directory import take
 from thud.studies.result import StudyResult
 from thud.studies.study import Study, named_files, read_common, read_tables
+from thud.studies.trained_surrogate import get_surrogate
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -87,7 +88,7 @@ class Kind(ABC, Generic[S, R]):
         require_words("keywords", how, RunOptions.__annotations__)
         study = self.read_study(source)
         if (surrogate := how.get("surrogate")) is not None:
-            study = self.with_surrogate(study, surrogate)
+            study = self.with_surrogate(study, get_surrogate(surrogate))
             if isinstance(surrogate, str | os.PathLike):
                 study = dataclasses.replace(study, inputs=(*study.inputs, surrogate))
         self.require(study, **how)
@@ -109,7 +110,7 @@ class Kind(ABC, Generic[S, R]):
     def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> S:
         """Return a study with what only this kind has."""
 
-    def with_surrogate(self, study: S, given: Surrogate | str | os.PathLike[str]) -> S:  # noqa: ARG002
+    def with_surrogate(self, study: S, trained: Surrogate) -> S:  # noqa: ARG002
         """Return a study whose drops a surrogate answers."""
         refuse(f"surrogate is not allowed for a {self.name} study", "studies of samples of drops")
 

@@ -221,7 +221,7 @@ def fitted(name: str, given: object, owners: tuple[str, ...]) -> Parameter:
 def _begin(
     name: str, given: object, owners: tuple[str, ...], words: Sequence[str]
 ) -> tuple[str, Key, Mapping[str, Any], int]:
-    """Return place, key, table and power of ten of the unit of a parameter."""
+    """Return label, key, table and power of ten of the unit of a parameter."""
     label = f"[parameters] {name}"
     key, entry = find_key(name, owners)
     if key.kind == "list" and entry is None:

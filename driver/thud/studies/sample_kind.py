@@ -22,10 +22,9 @@ from thud.studies.sampling import read_design
 from thud.studies.study import table_of
 from thud.studies.surrogate_training import surrogate_name, train
 from thud.studies.temperature import read_temperature
-from thud.studies.trained_surrogate import Surrogate, read_plan, read_surrogate
+from thud.studies.trained_surrogate import Surrogate, read_plan
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Mapping
     from pathlib import Path
 
@@ -91,14 +90,11 @@ class DropsKind(Kind[SampleStudy, R]):
             return self.with_surrogate(result, plan)
         return replace(result, plan=plan)
 
-    def with_surrogate(
-        self, study: SampleStudy, given: Surrogate | str | os.PathLike[str]
-    ) -> SampleStudy:
+    def with_surrogate(self, study: SampleStudy, trained: Surrogate) -> SampleStudy:
         """Return a study whose samples a surrogate answers. Raises InputError where it cannot."""
         _require_no_floor(study.case)
-        surrogate = given if isinstance(given, Surrogate) else read_surrogate(given)
-        surrogate.require(study.case, study.key_columns(study.parameter_columns(0, 1)))
-        return replace(study, plan=None, surrogate=surrogate)
+        trained.require(study.case, study.key_columns(study.parameter_columns(0, 1)))
+        return replace(study, plan=None, surrogate=trained)
 
     def require(self, study: SampleStudy, **how: Unpack[RunOptions]) -> None:
         """Raise InputError where there are too many samples, or no such backend."""

@@ -76,7 +76,7 @@ class Study:
 
     @property
     def identity(self) -> dict[str, str]:
-        """What its results depend on, as texts by place and key."""
+        """What its results depend on, as texts by group and key."""
         result = {"thud": version(), "kind": self.kind, **self.own_identity()}
         result["[parameters]"] = ", ".join(p.name for p in self.parameters)
         result |= {f"[parameters] {p.name}": str(p) for p in self.parameters}

@@ -382,7 +382,7 @@ def _columns(parts: tuple[Values, ...], count: int) -> Values:
 
 
 def keys_of(case: Case) -> dict[str, str]:
-    """Return what the results of a surrogate depend on in a case, as texts by place and key."""
+    """Return what the results of a surrogate depend on in a case, as texts by group and key."""
     groups = case.to_namelist()
     return {
         f"&{group}: {key}": f"{value!r}"
@@ -390,6 +390,11 @@ def keys_of(case: Case) -> dict[str, str]:
         if group not in {"case", "limits", OF_FILES}
         for key, value in keys.items()
     }
+
+
+def get_surrogate(given: Surrogate | str | os.PathLike[str]) -> Surrogate:
+    """Return a surrogate, read where the path of its file is given."""
+    return given if isinstance(given, Surrogate) else read_surrogate(given)
 
 
 def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
@@ -448,7 +453,7 @@ class Plan:
 
     @property
     def identity(self) -> dict[str, str]:
-        """What a surrogate depends on besides its drops, as texts by place and key."""
+        """What a surrogate depends on besides its drops, as texts by group and key."""
         with require_extra("surrogate"):
             import sklearn
         return {

@@ -145,8 +145,9 @@ class ForceMisfit(Misfit):
 
     def value(self, name: str, own: Array) -> float:
         """Return one of its own parameters, or what it is where it is not fitted."""
-        place = list(self.own).index(name) if name in self.own else None
-        return {SHIFT: 0.0, GAIN: 1.0}[name] if place is None else float(own[place])
+        if name not in self.own:
+            return {SHIFT: 0.0, GAIN: 1.0}[name]
+        return float(own[list(self.own).index(name)])
 
     def residual(self, impact: Impact, own: Array) -> Array:
         """Return model minus target over standard deviation, shape (size,)."""
@@ -213,8 +214,8 @@ class ForceMisfit(Misfit):
         result = {}
         if self.offset:
             result["offset"] = float(value[0]), float(np.sqrt(covariance[0, 0]))
-        for place, tone in enumerate(self.tones, start=int(self.offset)):
-            pair = np.array([place, place + len(self.tones)])
+        for i, tone in enumerate(self.tones, start=int(self.offset)):
+            pair = np.array([i, i + len(self.tones)])
             result[f"hum of {tone:.4g} Hz"] = wave_size(value[pair], covariance[np.ix_(pair, pair)])
         if self.background is not None and self.target.hum is None:
             mains, size, error = self.background_record.mains(self.background, self.tones)
