@@ -7,8 +7,8 @@ set_target_properties(thud_library PROPERTIES
   EXPORT_NAME thud
   VERSION ${PROJECT_VERSION}
   SOVERSION ${PROJECT_VERSION_MAJOR})
-# Manual pages and completions of shells; thud-driver comes with the wheel.
-install(DIRECTORY "${PROJECT_SOURCE_DIR}/share/" DESTINATION "${CMAKE_INSTALL_DATADIR}" PATTERN "*thud-driver*" EXCLUDE)
+# Manual pages and completions of shells, if ./bootstrap has made them; thud-driver comes with the wheel.
+install(DIRECTORY "${PROJECT_SOURCE_DIR}/share/" DESTINATION "${CMAKE_INSTALL_DATADIR}" OPTIONAL PATTERN "*thud-driver*" EXCLUDE)
 install(TARGETS thud_library EXPORT thudTargets)
 install(DIRECTORY "$<TARGET_PROPERTY:thud_library,Fortran_MODULE_DIRECTORY>/" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/thud")
 

@@ -1,7 +1,7 @@
 """Make the manual pages and the completions of shells in share, of what both commands say.
 
-Run by ``./bootstrap schema``: python -P driver/generate_manual.py THUD [DIRECTORY], with the path
-of the executable.
+Run by ``./bootstrap setup``: python -P driver/generate_manual.py THUD [DIRECTORY], with the path of
+the executable.
 """
 
 from __future__ import annotations

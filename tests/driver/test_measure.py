@@ -10,10 +10,8 @@ import re
 import subprocess
 import sys
 import tomllib
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from threading import Event
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +19,6 @@ import pytest
 import soundfile
 from conftest import REPOSITORY, naming, recorded
 from synthetic import half_sine, make_recording
-from threadpoolctl import OpenBLASController, threadpool_info, threadpool_limits
 
 import thud
 from thud import cli
@@ -36,8 +33,6 @@ from thud.report import recording_files
 from thud.report.contents import report_data
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from thud.recordings.drops import Window
     from thud.recordings.measured_drop import Drop
 
@@ -478,34 +473,6 @@ def test_drops_are_measured_in_processes(monkeypatch: pytest.MonkeyPatch) -> Non
     one, two = (thud.read_recording(file, config=config, workers=n) for n in (1, 2))
     assert [drop.name for drop in two.drops] == [drop.name for drop in one.drops]
     np.testing.assert_allclose(two.levels(), one.levels(), rtol=0, atol=1e-9)
-
-
-def test_measurements_in_threads_leave_those_of_matrix_products_as_they_were() -> None:
-    time = np.arange(0, 0.02, 1 / 24_000)
-    force, _ = make_recording(1500 * np.sin(np.pi * time / 0.02), 24_000, noise_db=60)
-    begun, allowed = ([Event(), Event()] for _ in range(2))
-
-    def signals(i: int) -> Iterator[Signal]:
-        begun[i].set()
-        assert allowed[i].wait(60)
-        yield Signal.from_array(force, 24_000, f"{i}")
-
-    def used() -> set[int]:
-        return {one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"}
-
-    with threadpool_limits(2, "blas"), ThreadPoolExecutor(2) as threads:
-        # Others may set the number, too.
-        OpenBLASController.clear_controlling_thread()
-        measured = []
-        for i in range(2):
-            measured.append(threads.submit(thud.Recording.from_signals, signals(i), Config()))
-            assert begun[i].wait(60)
-        # The first one ends before the second.
-        for i in range(2):
-            assert used() == {1}
-            allowed[i].set()
-            measured[i].result()
-        assert used() == {2}
 
 
 def test_outliers_of_all_quantities_are_marked() -> None:

@@ -10,8 +10,8 @@ from conftest import naming
 
 import thud
 from thud.base.columns import read_table
-from thud.recordings.force_record import read_record
 from thud.recordings.formats.text import read_channels
+from thud.recordings.uniform_grid import read_record
 
 if TYPE_CHECKING:
     from collections.abc import Callable

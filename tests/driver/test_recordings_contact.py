@@ -274,7 +274,7 @@ def test_walks_scatter_with_the_steps_of_their_flank() -> None:
         assert spread[6] == kind.parabola
         # What is added to begin and end: 5 us for lines and jumps, 20 us for all other kinds.
         is_line = not kind.rough and kind.mean[1] == kind.mean[2] == 0
-        assert kind.left[2] == (5e-6 if is_line else 20e-6)
+        assert kind.error[2] == (5e-6 if is_line else 20e-6)
     # What is likely at touch and at release.
     np.testing.assert_allclose(np.exp(flanks.PRIOR).sum(axis=0), 1)
 

@@ -267,7 +267,7 @@ def propagated(function: Callable[..., float], *estimates: Estimate) -> Estimate
 
 IMPULSE, CONTACT = Estimate(22.0, 0.05), Estimate(0.02, 2e-4)
 FLIGHTS = Estimate(0.7, 2e-3), Estimate(0.5, 1e-3)
-FALL = DropConditions(1.2, 2.4, 0.01, 0.02, 0.003)
+CONDITIONS = DropConditions(1.2, 2.4, 0.01, 0.02, 0.003)
 LANDING = np.sqrt(2 * GRAVITY * 1.2)
 
 
@@ -289,11 +289,11 @@ def same(found: Estimate, expected: Estimate) -> None:
 
 
 def test_restitution_by_impulse_and_flight_has_the_uncertainty_of_both() -> None:
-    ways, told = FALL.restitutions(IMPULSE, CONTACT, FLIGHTS)
+    ways, told = CONDITIONS.restitutions(IMPULSE, CONTACT, FLIGHTS)
     assert not told
     same(ways["impulse"], propagated(by_impulse, IMPULSE, CONTACT))
     same(ways["bounces"], propagated(by_flight, FLIGHTS[0]))
-    shared = FALL.shared(ways, IMPULSE)
+    shared = CONDITIONS.shared(ways, IMPULSE)
     # Of the force, the mass and the height alone, with their signs.
     gain = by_impulse(22.0 * (1 + 1e-6), 0.02) - by_impulse(22.0 * (1 - 1e-6), 0.02)
     slopes = {
@@ -317,11 +317,11 @@ def test_restitution_by_impulse_and_flight_has_the_uncertainty_of_both() -> None
 
 
 def test_mean_of_two_ways_weighs_their_whole_uncertainty() -> None:
-    ways, _ = FALL.restitutions(IMPULSE, CONTACT, FLIGHTS)
-    shared = FALL.shared(ways, IMPULSE)
+    ways, _ = CONDITIONS.restitutions(IMPULSE, CONTACT, FLIGHTS)
+    shared = CONDITIONS.shared(ways, IMPULSE)
     whole = {w: ways[w].uncertainty ** 2 + np.sum(np.square([*shared[w].values()])) for w in ways}
     weights = {w: 1 / whole[w] / sum(1 / one for one in whole.values()) for w in ways}
-    mean, parts = FALL.mean(ways, IMPULSE)
+    mean, parts = CONDITIONS.mean(ways, IMPULSE)
     assert mean.value == pytest.approx(sum(weights[w] * ways[w].value for w in ways))
     assert mean.uncertainty == pytest.approx(
         np.hypot(*(weights[w] * ways[w].uncertainty for w in ways))
@@ -329,12 +329,12 @@ def test_mean_of_two_ways_weighs_their_whole_uncertainty() -> None:
     for name in ("calibration", "mass", "drop height"):
         expected = sum(weights[w] * shared[w].get(name, 0.0) for w in ways)
         assert parts[name] == pytest.approx(expected)
-    assert np.isnan(FALL.mean({}, IMPULSE)[0].value)
+    assert np.isnan(CONDITIONS.mean({}, IMPULSE)[0].value)
 
 
 def test_effective_mass_has_the_uncertainty_of_its_parts() -> None:
     back = Estimate(0.72, 0.004)
-    found = FALL.effective_mass(IMPULSE, CONTACT, back)
+    found = CONDITIONS.effective_mass(IMPULSE, CONTACT, back)
     same(
         found,
         propagated(
@@ -342,15 +342,15 @@ def test_effective_mass_has_the_uncertainty_of_its_parts() -> None:
             IMPULSE, CONTACT, back,
         ),
     )  # fmt: skip
-    assert np.isnan(FALL.effective_mass(IMPULSE, CONTACT, None).value)
+    assert np.isnan(CONDITIONS.effective_mass(IMPULSE, CONTACT, None).value)
 
 
 def fallen(impulse: float, flight: float) -> Drop:
     """Return a drop with both ways to its restitution."""
     force = Estimate(impulse, 0.05)
-    ways, _ = FALL.restitutions(force, CONTACT, [Estimate(flight, 2e-3)])
-    mean, shared = FALL.mean(ways, force)
-    mass = FALL.effective_mass(force, CONTACT, ways["bounces"])
+    ways, _ = CONDITIONS.restitutions(force, CONTACT, [Estimate(flight, 2e-3)])
+    mean, shared = CONDITIONS.mean(ways, force)
+    mass = CONDITIONS.effective_mass(force, CONTACT, ways["bounces"])
     return replace(
         make_drop(), impulse=force, restitutions=ways, restitution=mean, effective_mass=mass,
         restitution_shared=shared,
@@ -361,7 +361,7 @@ def test_mean_restitution_has_what_all_drops_share_and_what_differs_between_the_
     found = [
         fallen(impulse, flight) for impulse, flight in ((22.0, 0.7), (22.2, 0.71), (21.9, 0.7))
     ]
-    mean, difference = average_restitution(found, FALL)
+    mean, difference = average_restitution(found, CONDITIONS)
     assert mean.value == pytest.approx(np.mean([drop.restitution.value for drop in found]))
     values = [
         drop.restitutions["impulse"].value - drop.restitutions["bounces"].value for drop in found
@@ -372,21 +372,21 @@ def test_mean_restitution_has_what_all_drops_share_and_what_differs_between_the_
     noise = [np.hypot(*(way.uncertainty for way in drop.restitutions.values())) for drop in found]
     assert named["noise"] == pytest.approx(np.hypot.reduce(noise) / 3)
     for name in ("calibration", "mass", "drop height"):
-        shared = [FALL.shared(drop.restitutions, drop.impulse) for drop in found]
+        shared = [CONDITIONS.shared(drop.restitutions, drop.impulse) for drop in found]
         expected = np.mean([s["impulse"][name] - s["bounces"].get(name, 0.0) for s in shared])
         assert named[name] == pytest.approx(abs(expected))
         expected = abs(np.mean([drop.restitution_shared[name] for drop in found]))
         parts = {part.name: part.uncertainty for part in mean.contributions}
         assert parts[name] == pytest.approx(expected)
     # A rectangle from one way to the other where they differ beyond doubt.
-    exact = replace(FALL, calibration=0.0, mass_uncertainty=0.0, height_uncertainty=0.0)
+    exact = replace(CONDITIONS, calibration=0.0, mass_uncertainty=0.0, height_uncertainty=0.0)
     wrong, apart = average_restitution(found, exact)
     assert abs(apart.value) > apart.expanded
     parts = {part.name: part.uncertainty for part in wrong.contributions}
     assert parts["impulse against bounces"] == pytest.approx(abs(apart.value) / np.sqrt(3))
     # The calibration moves only the drops that it is part of.
     some = [found[0], replace(found[1], restitution_shared={})]
-    parts = {p.name: p.uncertainty for p in average_restitution(some, FALL)[0].contributions}
+    parts = {p.name: p.uncertainty for p in average_restitution(some, CONDITIONS)[0].contributions}
     assert parts["calibration"] == pytest.approx(
         abs(found[0].restitution_shared["calibration"]) / 2
     )
@@ -394,7 +394,7 @@ def test_mean_restitution_has_what_all_drops_share_and_what_differs_between_the_
 
 def test_mean_mass_has_calibration_and_height() -> None:
     found = [fallen(22.0, 0.7), fallen(22.2, 0.71)]
-    mass = average_mass(found, FALL)
+    mass = average_mass(found, CONDITIONS)
     named = {part.name: part.uncertainty for part in mass.contributions}
     assert mass.value == pytest.approx(np.mean([drop.effective_mass.value for drop in found]))
     assert named["calibration"] == pytest.approx(0.01 * mass.value)
@@ -410,7 +410,7 @@ def test_mean_mass_has_calibration_and_height() -> None:
 
     slope = (at(1.2 + 1e-5) - at(1.2 - 1e-5)) / 2e-5
     assert named["drop height"] == pytest.approx(0.003 * abs(slope), rel=1e-3)
-    assert np.isnan(average_mass(found, replace(FALL, height=None)).value)
+    assert np.isnan(average_mass(found, replace(CONDITIONS, height=None)).value)
 
 
 def test_edges_of_all_drops_share_the_smallest_uncertainty() -> None:

@@ -29,7 +29,7 @@ from thud.recordings.outliers import find_outliers
 from thud.recordings.plate import Plate, check_plate, correct_plate
 from thud.recordings.recorded_levels import (
     METHODS,
-    LevelEstimate,
+    DropLevels,
     average_levels,
     compare_methods,
     measure_levels,
@@ -567,11 +567,11 @@ def test_budget_after_the_gum() -> None:
     assert math.isnan(average_estimates([]).value)
 
 
-def level_estimate(level: float, background: float, noise: float, method: float) -> LevelEstimate:
+def level_estimate(level: float, background: float, noise: float, method: float) -> DropLevels:
     """Return an estimate with one band."""
     parts = {"noise": np.array([noise]), "method": np.array([method])}
     one = np.array([level])
-    return LevelEstimate(
+    return DropLevels(
         "drop", "octave", "fft", one - 0.01, one, one, np.array([background]), np.array([""]),
         parts, (),
     )  # fmt: skip

@@ -372,7 +372,7 @@ def test_map_shows_verdicts_in_doubt(trained: thud.Surrogate) -> None:
     assert 0 < int(doubtful.sum()) < doubtful.size
     assert ("in doubt by the surrogate", f"{int(doubtful.sum())}") in found.rows()
     labels = [text.get_text() for text in thud.plot.draw_design(found).legends[0].get_texts()]
-    assert "In doubt by surrogate" in labels
+    assert "Undecided by surrogate" in labels
 
 
 def test_figure_shows_held_out_errors(trained: thud.Surrogate) -> None:

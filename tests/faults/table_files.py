@@ -23,8 +23,8 @@ from thud.base.tables import format_rows
 from thud.floors.mobility_fit import fit_mobility
 from thud.floors.survey import levels_csv, rating_table, read_room_levels
 from thud.recordings.config import read_config
-from thud.recordings.force_record import read_record
 from thud.recordings.formats.text import read_channels
+from thud.recordings.uniform_grid import read_record
 from thud.studies.compression_fit import fit_compression
 
 if TYPE_CHECKING:

@@ -14,27 +14,27 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-# Longer values are shown by their kind.
-LONGEST_SHOWN = 80
-# No key takes a larger number, and Python refuses to print much larger ones.
+# Maximum length of a value in a message; longer ones are shown by their type.
+MAX_SHOWN = 80
+# Maximum of all numbers: Python refuses to print much larger ones.
 LARGEST = 10**300
-# Maximum seed of the libraries that draw points.
+# Maximum seed of the libraries that draw samples.
 LARGEST_SEED = 2**32 - 1
 
 
 def refuse(what: str, allowed: str, cause: Exception | None = None) -> NoReturn:
-    """Raise InputError: what cannot be used, and what is allowed."""
+    """Raise InputError: what is wrong, and what is allowed."""
     message = f"{what}; allowed: {allowed}"
     raise InputError(message) from cause
 
 
-def refuse_value(place: str, value: object, allowed: str) -> NoReturn:
+def refuse_value(name: str, value: object, allowed: str) -> NoReturn:
     """Raise InputError for a value."""
-    refuse(f"{place} = {shown(value)} is not allowed", allowed)
+    refuse(f"{name} = {shown(value)} is not allowed", allowed)
 
 
 def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
-    """Raise InputError where an argument is not of a kind."""
+    """Raise InputError where an argument is of another type."""
     if not isinstance(value, kind):
         expected = getattr(kind, "__name__", None) or " or ".join(
             k.__name__ for k in get_args(kind)
@@ -43,15 +43,15 @@ def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
 
 
 def require_choice(name: str, value: object, allowed: Iterable[str]) -> None:
-    """Raise InputError where a word is not one of those that are allowed."""
+    """Raise InputError where a word is not one of several."""
     choices = list(allowed)
     if not isinstance(value, str) or value not in choices:
-        what = f"{name} = {shown(value)} is not known{suggestion(value, choices)}"
-        refuse(what, ", ".join(map(repr, choices)))
+        unknown = f"{name} = {shown(value)} is not known{suggestion(value, choices)}"
+        refuse(unknown, ", ".join(map(repr, choices)))
 
 
 def suggestion(word: object, known: Collection[str]) -> str:
-    """Return the known word that a misspelt one probably means, as part of a sentence.
+    """Return the known word closest to a misspelled one, for the end of a message.
 
     >>> suggestion("heigth", ["gravity", "height"])
     " (did you mean 'height'?)"
@@ -59,7 +59,7 @@ def suggestion(word: object, known: Collection[str]) -> str:
     import difflib
 
     by_small = {name.lower(): name for name in known}
-    if not isinstance(word, str) or len(word) > LONGEST_SHOWN:
+    if not isinstance(word, str) or len(word) > MAX_SHOWN:
         return ""
     close = difflib.get_close_matches(word.lower(), by_small, 1, cutoff=0.7)
     return f" (did you mean {by_small[close[0]]!r}?)" if close else ""
@@ -80,7 +80,7 @@ def require_array(name: str, values: ArrayLike, dimensions: Container[int]) -> N
 
 
 def require_real(name: str, array: NDArray[Any], kinds: str = "iuf") -> NDArray[np.float64]:
-    """Return an array as float64; raise InputError where it holds other than real numbers."""
+    """Return an array as float64; raise InputError where it is not of real numbers."""
     if array.size and array.dtype.kind not in kinds:
         refuse(f"{name} is not an array of real numbers", "one dimension of them")
     return np.ascontiguousarray(array, dtype=np.float64)
@@ -101,7 +101,7 @@ def require_whole(name: str, value: Any, low: int, high: int) -> None:  # noqa: 
         refuse_value(name, value, f"whole numbers from {low} to {high}")
 
 
-def require_number(name: str, value: Any) -> None:  # noqa: ANN401 - that is the question
+def require_number(name: str, value: Any) -> None:  # noqa: ANN401 - of a user
     """Raise InputError where a value is not a finite number."""
     number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(
         value, bool
@@ -111,12 +111,12 @@ def require_number(name: str, value: Any) -> None:  # noqa: ANN401 - that is the
 
 
 def shown(value: object) -> str:
-    """Return a value as a message shows it: by its kind where it is long or has several lines."""
+    """Return a value for a message: its type if it is long or has several lines."""
     if isinstance(value, int) and abs(value) > LARGEST:
         return "a very large number"
-    # Files write lists, which objects keep as tuples.
+    # Lists of files are tuples in objects.
     text = repr(list(value) if type(value) is tuple else value)
-    fits = len(text) <= LONGEST_SHOWN and "\n" not in text
+    fits = len(text) <= MAX_SHOWN and "\n" not in text
     if fits:
         return text
     if isinstance(value, str):
@@ -125,11 +125,11 @@ def shown(value: object) -> str:
 
 
 def require_words(
-    place: str, given: Iterable[str], known: Iterable[str], also: Iterable[str] = ()
+    place: str, words: Iterable[str], known: Iterable[str], also: Iterable[str] = ()
 ) -> None:
-    """Raise InputError where a word is not known; what was meant may be one of other words, too."""
+    """Raise InputError for an unknown word; the suggestion may be one of other words too."""
     allowed = list(known)
-    for word in given:
+    for word in words:
         if word not in allowed:
             hint = suggestion(word, [*allowed, *also])
             refuse(f"{place}: {shown(word)} is not known{hint}", ", ".join(allowed))

@@ -1,4 +1,4 @@
-"""Files of numbers in columns, as instruments and spreadsheets write them."""
+"""Files of numbers in columns, from instruments and spreadsheets."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# The first of these that a line contains separates its columns; otherwise blanks do.
+# The first of these in a line separates its columns; without them blanks do.
 SEPARATORS = ("\t", ";", ",")
-# Either of the two may be the decimal mark; the other one then groups digits, as these do.
+# Decimal marks; the other mark then groups digits, as do the characters below.
 MARKS = {".": "point", ",": "comma"}
 GROUPING = " \N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}'\N{RIGHT SINGLE QUOTATION MARK}"
 QUOTED = re.compile(r'"[^"]*"')
 # Maximum length of a line.
-LONGEST = 2**16
+MAX_LINE = 2**16
 ALLOWED = (
     "columns of time, s, and force, N, separated by commas, semicolons, tabs or "
     "blanks (decimal commas with semicolons, tabs and blanks, or in quotes)"
@@ -37,7 +37,7 @@ ALLOWED = (
 def _numbers(decimal: str) -> re.Pattern[str]:
     """Return the pattern of numbers with a decimal mark: groups begin with 1 to 3 digits.
 
-    A comma that ends a number, as in ``0, 1.5``, separates columns: digits follow a decimal comma.
+    Digits follow a decimal comma: the comma in ``0, 1.5`` separates columns.
     """
     mark = re.escape(decimal)
     fraction = rf"(?:{mark}\d{'+' if decimal == ',' else '*'})?"
@@ -60,14 +60,14 @@ class DecimalMark(NamedTuple):
     mark : str
         Point or comma.
     line : int
-        Number of the line that shows it; 0 where none has to.
+        Number of the line that shows it; 0 if none is needed.
     """
 
     mark: str = "."
     line: int = 0
 
     def wrong(self, cell: str) -> str:
-        """Return what is wrong with a cell that is not a number."""
+        """Return the reason why a cell is not a number."""
         reason = f"{cell[:40]!r} is not a number"
         if is_number(cell) and self.line:
             reason += f" with the decimal {MARKS[self.mark]} of line {self.line}"
@@ -84,7 +84,7 @@ def read_titled(
 ) -> tuple[list[str], NDArray[np.float64]]:
     """Return the titles of a file of columns and its numbers, shape (n_row, n_column).
 
-    The titles are the cells of the line above the first number, none where there is no such line.
+    The titles are the cells of the line above the first number, if there is such a line.
 
     Commas, semicolons, tabs or blanks separate the columns, as in the first line of numbers; cells
     may stand in quotes. The decimal mark is that of the whole table, see `find_decimal`. Empty
@@ -93,10 +93,10 @@ def read_titled(
     Raises
     ------
     InputError
-        Names the file, and the line that is not numeric or has another number of columns.
+        Names the file, and the line that is not numeric or of another width.
     """
     try:
-        if not Path(path).is_file():  # to open a pipe could block
+        if not Path(path).is_file():  # opening a pipe could block
             raise FileNotFoundError(errno.ENOENT, "no such regular file", str(path))
         # A header may be in another encoding than UTF-8.
         with Path(path).open(encoding="utf-8-sig", errors="replace") as text:
@@ -135,29 +135,29 @@ def read_titled(
 
 
 def read_lines(text: TextIO, name: str, allowed: str) -> Iterator[str]:
-    """Yield the lines of a text without their ends.
+    """Yield the lines of a text without line ends.
 
     Raises
     ------
     InputError
         Names the line that is too long or holds zero bytes.
     """
-    for number, ended in enumerate(iter(lambda: text.readline(LONGEST + 1), ""), start=1):
+    for number, ended in enumerate(iter(lambda: text.readline(MAX_LINE + 1), ""), start=1):
         line = ended.removesuffix("\n")
         if "\0" in line:
             refuse(f"{name}: line {number} holds zero bytes", allowed)
-        if len(line) > LONGEST:
-            refuse(f"{name}: line {number} is longer than {LONGEST} characters", allowed)
+        if len(line) > MAX_LINE:
+            refuse(f"{name}: line {number} is longer than {MAX_LINE} characters", allowed)
         yield line
 
 
 def strip_comment(line: str) -> str:
-    """Return a line without its comment and what ends it."""
+    """Return a line without its comment and terminators."""
     return line.partition("#")[0].strip().rstrip(";").rstrip()
 
 
 def find_separator(line: str) -> str | None:
-    """Return what separates the columns of a line, None for blanks.
+    """Return the separator of the columns of a line, None for blanks.
 
     >>> find_separator("0,1 1,5")
     >>> find_separator("0, 1.5")
@@ -168,7 +168,7 @@ def find_separator(line: str) -> str | None:
     bare = QUOTED.sub("0", line)
     separator = next((mark for mark in SEPARATORS if mark in bare), None)
     words = re.split(" +", bare)
-    # A comma beside a blank is no decimal comma.
+    # A comma next to a blank is no decimal comma.
     are_numbers = all(is_number(word) and not word.startswith(",") for word in words)
     return None if separator == "," and len(words) > 1 and are_numbers else separator
 
@@ -188,7 +188,7 @@ def split_line(line: str, separator: str | None) -> list[str]:
 
 
 def to_number(cell: str, decimal: str) -> float | None:
-    """Return the number in a cell; None where it is not one with this decimal mark.
+    """Return the number in a cell; None if it is none with this decimal mark.
 
     >>> to_number("1.234,5", ","), to_number("1.234,5", ".")
     (1234.5, None)
@@ -209,19 +209,19 @@ def is_number(cell: str) -> bool:
 def find_decimal(
     rows: Iterable[tuple[int, list[str], bool]], separator: str | None, name: str
 ) -> DecimalMark:
-    """Return the decimal mark of a table from number and cells of its lines, and whether in quotes.
+    """Return the decimal mark of a table from its lines: number, cells, and quotation.
 
-    The first number that can be read with one of the decimal marks only decides for all: ``0,5``,
-    ``1.234,5`` and ``1,2345`` show a decimal comma, ``1,575`` shows nothing.
+    The first number that is valid with only one of the marks decides: ``0,5``, ``1.234,5`` and
+    ``1,2345`` show a decimal comma, ``1,575`` shows nothing.
 
     Raises
     ------
     InputError
-        Names the line of a number that may be two, where no number of the table decides.
+        Names the line of an ambiguous number if no number of the table decides.
     """
-    doubtful: tuple[int, str] | None = None
+    ambiguous: tuple[int, str] | None = None
     for line, cells, are_quoted in rows:
-        # Where commas separate columns, numbers without quotes have decimal points.
+        # If commas separate columns, unquoted numbers have decimal points.
         has_points = separator == "," and not are_quoted
         for cell in cells:
             if "." not in cell and "," not in cell:
@@ -229,10 +229,10 @@ def find_decimal(
             marks = [mark for mark, pattern in NUMBERS.items() if pattern.fullmatch(cell)]
             if len(marks) == 1:
                 return DecimalMark(marks[0], line)
-            if len(marks) > 1 and doubtful is None and not (has_points and "." in cell):
-                doubtful = line, cell
-    if doubtful is not None:
-        line, cell = doubtful
+            if len(marks) > 1 and ambiguous is None and not (has_points and "." in cell):
+                ambiguous = line, cell
+    if ambiguous is not None:
+        line, cell = ambiguous
         own = to_number(cell, "," if "," in cell else ".")
         both = " or ".join(f"{to_number(cell, mark):.15g}" for mark in MARKS)
         refuse(

@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-# Maximum number of characters of a message of matplotlib that is shown.
-_SHOWN = 100
+# Maximum length of a message of matplotlib.
+_MAX_SHOWN = 100
 
 
 class Displayed(Immutable, ABC):
-    """Base of results: their HTML is their text above a table."""
+    """Base of results, whose HTML is their text above a table."""
 
     @abstractmethod
     def rows(self) -> Sequence[Sequence[str]]:
@@ -33,20 +33,20 @@ class Displayed(Immutable, ABC):
 
 @contextmanager
 def left_out(figure: str) -> Iterator[None]:
-    """Warn where a figure cannot be drawn, for whatever reason: the results stand without it."""
+    """Warn if a figure cannot be drawn for any reason; the results do not need it."""
     try:
         yield
     except Exception as error:
-        # Compiled modules turn an interrupt into an error of their own.
+        # Compiled modules turn an interrupt into another error.
         if isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
             raise
-        cause = (str(error) or type(error).__name__).partition("\n")[0][:_SHOWN]
+        cause = (str(error) or type(error).__name__).partition("\n")[0][:_MAX_SHOWN]
         message = f"{figure} is not drawn ({cause}); the results are complete without it"
         warnings.warn(message, ReportWarning, stacklevel=4)
 
 
 def draw_all(draws: Mapping[str, Callable[[], Figure | None]]) -> dict[str, Figure]:
-    """Return figures by name: those that have something to show and can be drawn."""
+    """Return figures by name, without those that are empty or cannot be drawn."""
     drawn = {}
     for name, draw in draws.items():
         with left_out(name):

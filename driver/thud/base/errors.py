@@ -18,15 +18,15 @@ class FitWarning(UserWarning):
 
 
 class PlausibilityWarning(UserWarning):
-    """What was computed is possible but not plausible."""
+    """A result is possible but implausible."""
 
 
 class ReportWarning(UserWarning):
-    """A figure, a file or some letters of a report are left out, or it replaces another one."""
+    """A figure, a file or characters of a report are missing, or it replaces another report."""
 
 
 class LockWarning(RuntimeWarning):
-    """A file system has no locks, so that runs that write to one directory are not kept apart."""
+    """A file system has no locks: concurrent runs may write to one directory."""
 
 
 class InputError(ThudError, ValueError):

@@ -1,4 +1,4 @@
-"""Packages that only some functions need."""
+"""Optional packages."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
-# Distributions that have another name than what is imported.
+# Distributions by the name of the import, if they differ.
 _DISTRIBUTIONS = {"sklearn": "scikit-learn"}
 
 
 @contextmanager
 def require_extra(extra: str) -> Iterator[None]:
-    """Raise InputError where a package is not installed, with those of an optional extra."""
+    """Raise InputError where a package is missing, with the packages of an extra."""
     try:
         yield
     except ModuleNotFoundError as error:
-        wanted = packages(extra)
+        needed = packages(extra)
         missing = _DISTRIBUTIONS.get(str(error.name), str(error.name))
-        names = wanted if missing in wanted else [missing]
+        names = needed if missing in needed else [missing]
         refuse(f"{missing} is not installed", f"pip install {' '.join(names)}", error)
 
 
 def packages(extra: str) -> list[str]:
-    """Return the names of the packages of an extra; none where thud itself is not installed."""
+    """Return the names of the packages of an extra; none if thud is not installed."""
     from importlib.metadata import PackageNotFoundError, requires
 
     try:
         lines = requires("thud") or []
     except PackageNotFoundError:
         return []
-    found = (re.fullmatch(rf"([\w.-]+).*extra == ['\"]{extra}['\"]", line) for line in lines)
-    return [match[1] for match in found if match]
+    matches = (re.fullmatch(rf"([\w.-]+).*extra == ['\"]{extra}['\"]", line) for line in lines)
+    return [match[1] for match in matches if match]

@@ -1,4 +1,4 @@
-"""Files of results: written atomically, under locks, and never over those of the user."""
+"""Result files: written atomically, under locks, and never over files of the user."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from thud.base.errors import InputError, LockWarning
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-# Lists the files that thud has written to a directory; its first line.
+# Name and first line of the list of files that thud has written to a directory.
 MANIFEST = ".thud"
 HEAD = "# files that thud has written, with checksums (CRC-32)"
 # Temporary name of a file in a result directory.
 PART = f"{MANIFEST}.new"
-# Age at which a temporary file of another host is no longer being written, s.
+# Age from which a temporary file of another host is abandoned, s.
 _MAX_AGE = 86400.0
 # Errors of a file system that has no locks.
 _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS, errno.EBADF, errno.EINVAL)
-# Errors of a path with nothing there, or no regular file.
+# Errors of a path without a regular file.
 _NO_FILE = (
     errno.EINVAL, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR
 )  # fmt: skip
@@ -45,7 +45,7 @@ _NO_FILE = (
 def uninterrupted() -> Iterator[None]:
     """Defer signals until a short operation is done; file libraries print errors otherwise.
 
-    Only the main thread handles signals; others have none to defer.
+    Only the main thread handles signals.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -78,10 +78,10 @@ def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
 
 @dataclass(frozen=True)
 class Results:
-    """A directory for results, in which thud replaces only files that it has written itself.
+    """A directory for results, in which thud replaces only files that it has written.
 
-    The manifest of the directory lists these with their checksums: a file that is not listed, or
-    that has changed since, is the user's, and so is whatever is no regular file.
+    The manifest of the directory lists these with their checksums. Files that are not listed, have
+    changed since or are not regular belong to the user.
 
     Attributes
     ----------
@@ -91,11 +91,11 @@ class Results:
         The command that writes; empty for the results of a case and their figures, which the next
         input replaces as a whole.
     inputs : tuple of path-like
-        Files that the results depend on, which are never replaced.
+        Files that the results depend on, never replaced.
     replace : bool
         Replace also files that thud has not written.
     is_locked : bool
-        The caller holds the lock of the directory.
+        Whether the caller holds the lock of the directory.
     """
 
     folder: Path
@@ -105,10 +105,7 @@ class Results:
     is_locked: bool = False
 
     def require(self, names: Iterable[str], listed: Mapping[str, Entry] | None = None) -> None:
-        """Raise InputError where a file is in the way that must not be replaced.
-
-        Files that are `listed`, by default in the manifest, may be.
-        """
+        """Raise InputError for an existing file that is not `listed`, by default the manifest."""
         listed = self._listed() if listed is None else listed
         for name in names:
             path = self.folder / name
@@ -185,20 +182,20 @@ class Results:
             return {}
 
     def require_no_input(self, path: Path) -> None:
-        """Raise InputError where a path is that of an input."""
+        """Raise InputError where a path is an input."""
         if is_one_of(path, self.inputs):
             refuse(f"{path} is an input, which is never replaced", "another directory")
 
 
 class Entry(NamedTuple):
-    """What a manifest says of a file: the checksums that it may have, and what has written it."""
+    """Entry of a manifest: allowed checksums of a file, and the command that has written it."""
 
     checksums: tuple[str, ...]
     command: str = ""
 
 
 def refuse_foreign(path: Path) -> NoReturn:
-    """Raise InputError of what thud has not written."""
+    """Raise InputError for a file or directory that thud has not written."""
     if is_directory(path):
         refuse(f"{path} is a directory of something else", "another directory")
     refuse(
@@ -208,7 +205,7 @@ def refuse_foreign(path: Path) -> NoReturn:
 
 
 def is_one_of(path: Path, others: Iterable[str | os.PathLike[str]]) -> bool:
-    """Whether a path leads to one of some files, whatever their names are."""
+    """Whether a path leads to one of several files by any name."""
     for other in others:
         with suppress(OSError, ValueError):
             if path.samefile(other):
@@ -217,12 +214,12 @@ def is_one_of(path: Path, others: Iterable[str | os.PathLike[str]]) -> bool:
 
 
 def is_directory(path: Path) -> bool:
-    """Whether a path is that of a directory and no link."""
+    """Whether a path is a directory and no link."""
     return path.is_dir() and not path.is_symlink()
 
 
 def is_regular(path: Path) -> bool:
-    """Whether a path is that of a regular file and no link; to open anything else could block."""
+    """Whether a path is a regular file and no link; opening others could block."""
     try:
         return stat.S_ISREG(path.lstat().st_mode)
     except (OSError, ValueError):
@@ -230,12 +227,12 @@ def is_regular(path: Path) -> bool:
 
 
 def is_temporary(name: str) -> bool:
-    """Whether a name is that of a file that is not whole, also one of `own_path`."""
+    """Whether a name is that of a temporary file, also of `own_path`."""
     return re.fullmatch(r"\.(thud\.new|.+\.part)(\..*)?", name) is not None
 
 
 def is_failure(error: BaseException) -> bool:
-    """Whether an error of reading is one of the system, and says nothing of what is there."""
+    """Whether a reading error is a failure of the system rather than of the file."""
     return isinstance(error, OSError) and error.errno not in (None, *_NO_FILE)
 
 
@@ -247,7 +244,7 @@ def read_input(path: Path) -> bytes:
 
 def _require_own(found: os.stat_result, part: Path) -> None:
     _require_regular(found, part)
-    # It would be written to under its other name, too.
+    # Writing would also change the file of the other name.
     if found.st_nlink > 1:
         raise OSError(errno.EEXIST, f"{part.name} is a link", str(part))
 
@@ -258,26 +255,26 @@ def _require_regular(found: os.stat_result, path: Path) -> None:
 
 
 def content_of(path: Path) -> bytes | None:
-    """Return the content of a regular file, None of anything else."""
+    """Return the content of a regular file, None for anything else."""
     with suppress(OSError):
         return path.read_bytes() if is_regular(path) else None
     return None
 
 
 def checksum(content: bytes) -> str:
-    """Return the checksum of a content as manifests hold it: CRC-32 in hexadecimal digits."""
+    """Return the checksum of a content in manifests: CRC-32 in hexadecimal digits."""
     return f"{zlib.crc32(content):08X}"
 
 
 def read_manifest(folder: Path) -> dict[str, Entry]:
-    """Return what the manifest of a directory lists by name, nothing where there is none.
+    """Return the entries of the manifest of a directory, none without a manifest.
 
     The last checksum of a file is that of its latest content.
 
     Raises
     ------
     InputError
-        Where there is something else of its name.
+        Where another file has its name.
     """
     path = folder / MANIFEST
     if not os.path.lexists(path):
@@ -312,7 +309,7 @@ def _is_listed(path: Path, listed: Mapping[str, Entry]) -> bool:
 
 @contextmanager
 def locked(folder: Path, kind: int = fcntl.LOCK_EX) -> Iterator[None]:
-    """Hold the lock of a result directory, so that no other run switches or adds to it.
+    """Hold the lock of a result directory, so that no other run replaces or extends it.
 
     Raises BlockingIOError where another run holds it and `kind` has LOCK_NB.
     """
@@ -325,9 +322,9 @@ def locked(folder: Path, kind: int = fcntl.LOCK_EX) -> Iterator[None]:
 
 @contextmanager
 def _held(path: Path, flags: int, kind: int) -> Iterator[tuple[Path, int, bool]]:
-    """Open what has a path; yield the path, the descriptor, and whether that holds the lock.
+    """Open a path; yield the path, the descriptor, and whether the descriptor holds the lock.
 
-    Where there are no locks a new file gets a name of its own: several may write one of this name.
+    Without locks a new file gets a unique name, as others may write to the same name.
     """
     while True:
         descriptor = os.open(path, flags, 0o666)
@@ -363,9 +360,9 @@ def _leads_to(path: Path, descriptor: int) -> bool:
 
 
 def own_path(part: Path) -> Path:
-    """Return a temporary path that no other writer has; remove those that killed ones have left.
+    """Return a unique temporary path, and remove those of ended writers.
 
-    Its name begins with that of `part`, and ends with the writer's host and process.
+    Its name begins with that of `part`, and ends with host and process of the writer.
     """
     host = platform.node()
     for path in part.parent.iterdir():
@@ -389,7 +386,7 @@ def _is_running(process: int) -> bool:
 
 
 def remove(path: Path) -> None:
-    """Remove a file or a directory, if it exists; an interrupt leaves its name all or nothing."""
+    """Remove a file or a directory, if it exists; an interrupt leaves all of it or nothing."""
     if is_directory(path):
         gone = path.with_name(f".{path.name}.part")
         shutil.rmtree(gone, ignore_errors=True)
@@ -402,16 +399,15 @@ def remove(path: Path) -> None:
 def _replace(target: Path, content: bytes, part: Path) -> None:
     """Write a file under a temporary name in the same directory, then rename it.
 
-    Where there are locks the name is always the same, and one writer at a time has it: what a
-    killed one leaves is taken up by the next.
+    With locks all writers use the same name, one at a time, and replace the rest of a killed one.
     """
     try:
-        # A link of this name may be another user's, to a file of ours; to open a pipe could block.
+        # Another user may have put a link to one of our files; opening a pipe could block.
         flags = os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
         with _held(part, flags, fcntl.LOCK_EX) as (own, descriptor, _):
             _require_own(os.fstat(descriptor), own)
             try:
-                # Closed before it is renamed: some disks are found to be full only then.
+                # Closed before it is renamed: some full disks raise an error only then.
                 with os.fdopen(os.dup(descriptor), "wb") as file:
                     file.truncate(0)
                     file.write(content)

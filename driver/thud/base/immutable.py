@@ -1,4 +1,4 @@
-"""Base of the public types: their arrays do not change, and they are compared by value."""
+"""Base of the public types: read-only arrays, comparison by value."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 Array = TypeVar("Array", bound="NDArray[Any]")
 
-# Arrays that were frozen here, by their identity: the read-only arrays of others may change.
+# Arrays that were frozen here, by identity: other read-only arrays may change.
 _FROZEN: WeakValueDictionary[int, NDArray[Any]] = WeakValueDictionary()
 
 
@@ -36,11 +36,11 @@ class Immutable:
 
     @staticmethod
     def _keep_array(array: NDArray[Any]) -> object:
-        """Return an array as it is kept."""
+        """Return the stored form of an array."""
         return array if _is_frozen(array) else freeze(array.copy())
 
     def __setstate__(self, state: dict[str, object]) -> None:
-        """Take the fields of a copy or a pickle, whose arrays are writeable."""
+        """Set the fields of a copy or a pickle, whose arrays are writable."""
         vars(self).update(state)
         Immutable.__post_init__(self)
 
@@ -51,12 +51,12 @@ class Immutable:
         return all(map(_equal, _fields(self), _fields(other)))
 
     def __hash__(self) -> int:
-        """Return the hash of the fields; raise TypeError where one has none."""
+        """Return the hash of the fields; raise TypeError where a field has none."""
         return hash((type(self), *map(_hashed, _fields(self))))
 
 
 class Plain(Immutable):
-    """Base of inputs: arrays become tuples of numbers, as files hold them."""
+    """Base of inputs: arrays become tuples of numbers, as in files."""
 
     @staticmethod
     def _keep_array(array: NDArray[Any]) -> object:
@@ -64,26 +64,26 @@ class Plain(Immutable):
 
 
 def freeze(array: Array) -> Array:
-    """Return an own array that was made read-only, with the arrays that it is a view of.
+    """Make an array and the arrays that it views read-only, and return it.
 
-    Objects keep it, and views of it, without a copy.
+    Objects store it and its views without a copy.
     """
-    part: object = array
-    while isinstance(part, np.ndarray):
-        part.setflags(write=False)
-        _FROZEN[id(part)] = part
-        part = part.base
+    owner: object = array
+    while isinstance(owner, np.ndarray):
+        owner.setflags(write=False)
+        _FROZEN[id(owner)] = owner
+        owner = owner.base
     return array
 
 
 def _is_frozen(array: NDArray[Any]) -> bool:
-    """Return whether an array, or the one that it is a view of, was frozen here."""
+    """Return whether an array, or the array that it views, was frozen here."""
     owner = array if array.base is None else array.base
     return _FROZEN.get(id(owner)) is owner and not (array.flags.writeable or owner.flags.writeable)
 
 
 def _kept(value: object, keep_array: Callable[[NDArray[Any]], object]) -> object:
-    """Return a value with its arrays as they are kept."""
+    """Return the stored form of a value."""
     if isinstance(value, np.ndarray):
         return keep_array(value)
     if type(value) is dict:
@@ -96,8 +96,8 @@ def _kept(value: object, keep_array: Callable[[NDArray[Any]], object]) -> object
 
 
 def _kept_table(value: object, keep_array: Callable[[NDArray[Any]], object]) -> object:
-    """Return a dataset as a copy, and what has the values of an array as it is kept."""
-    # Who has a dataset has imported xarray.
+    """Return a dataset as a copy, and an object with values as a stored array."""
+    # A dataset exists only if xarray is imported.
     xarray = sys.modules.get("xarray")
     if xarray is not None and isinstance(value, xarray.Dataset):
         dataset = value.copy(deep=True)

@@ -1,4 +1,4 @@
-"""Declaration of a key of the input, and the base of the classes that take keys."""
+"""Declaration of an input key, and the base of the classes with keys."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ Kind = Literal["real", "whole", "choice", "flag", "list", "text"]
 
 @dataclass(frozen=True)
 class Key:
-    """Key as the library declares it.
+    """Input key, declared by the library.
 
     Attributes
     ----------
     owner : str
-        What uses it: a source model, a floor, ``"modes"``, ``"compression"``, ``"floor"`` or
+        Its user: a source model, a floor, ``"modes"``, ``"compression"``, ``"floor"`` or
         ``"room"``; empty for keys of every impact.
     group, name : str
         Namelist group and name.
@@ -40,7 +40,7 @@ class Key:
     choices : tuple of str
         Allowed values of a choice.
     lower, upper : float or str
-        Limits of the allowed range; one that depends on other keys of the group is a product or
+        Limits of the allowed range; a limit that depends on other keys of the group is a product or
         quotient of numbers and names of keys.
     whole : bool
         Whether it takes whole numbers only.
@@ -62,7 +62,7 @@ class Group(Plain):
     """Base of the dataclasses whose fields are keys, or groups of them."""
 
     def __new__(cls, *_: object, **words: object) -> Self:
-        """Raise InputError where a word is not a field."""
+        """Raise InputError where a keyword is not a field."""
         require_keywords(f"{cls.__name__}()", words, _names(cls))
         return super().__new__(cls)
 
@@ -72,7 +72,7 @@ def _names(group: type[Group]) -> list[str]:
 
 
 def require_keywords(place: str, given: Collection[str], known: Collection[str]) -> None:
-    """Raise InputError where a word is not known; name the classes of which it is a key."""
+    """Raise InputError for an unknown keyword; name the classes that have it."""
     unknown = [word for word in given if word not in known]
     if not unknown:
         return
@@ -88,7 +88,7 @@ def require_keywords(place: str, given: Collection[str], known: Collection[str])
 
 
 def check_keywords(function: Callable[P, R]) -> Callable[P, R]:
-    """Let a function raise InputError where it does not know a keyword."""
+    """Let a function raise InputError for an unknown keyword."""
     known = list(inspect.signature(function).parameters)
 
     @wraps(function)

@@ -1,4 +1,4 @@
-"""Pools of processes that end with the one that started them."""
+"""Pools of processes that end with their parent process."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
 def process_pool(
     width: int, prepare: Callable[[], object] | None = None
 ) -> Iterator[ProcessPoolExecutor]:
-    """Open a pool of processes; an interrupt ends what they are doing.
+    """Open a pool of processes; an interrupt ends their work.
 
     Parameters
     ----------
     width
         Number of processes.
     prepare
-        Is called in each process before its first work.
+        Called in each process before its first work.
     """
-    # Forked processes would inherit locks held by threads that they do not have.
+    # Forked processes would inherit locks of threads that they do not have.
     context = get_context("spawn")
     end, held = context.Pipe(duplex=False)
     with end, held, ProcessPoolExecutor(width, context, _start, (end, prepare)) as processes:
@@ -43,7 +43,7 @@ def process_pool(
 
 @contextmanager
 def no_interrupt_in_processes() -> Iterator[None]:
-    """Block Ctrl-C, which terminals send to all processes, in those that are started meanwhile."""
+    """Block Ctrl-C, which terminals send to all processes, in processes started meanwhile."""
     usual = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -52,8 +52,8 @@ def no_interrupt_in_processes() -> Iterator[None]:
 
 
 def _start(end: connection.Connection, prepare: Callable[[], object] | None) -> None:
-    """End with the parent process, or when it closes the other end of a pipe."""
-    # The usual lock is a semaphore of the system, which processes that end like this leave behind.
+    """End with the parent process, or when the other end of a pipe closes."""
+    # The default lock is a semaphore of the system, which would remain after such an end.
     tqdm.set_lock(RLock())
 
     def end_with_it() -> None:

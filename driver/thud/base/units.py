@@ -1,4 +1,4 @@
-"""Units of the namelist and their common multiples; all of them are powers of ten."""
+"""SI units and their multiples by powers of ten."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from decimal import Decimal
 
 from thud.base.checks import refuse, require_kind, shown, suggestion
 
-# By the unit of a key: the allowed units and their power of ten.
+# By the unit of a key: allowed units and their powers of ten.
 MULTIPLES: dict[str, dict[str, int]] = {
     "m": {"m": 0, "cm": -2, "mm": -3, "um": -6},
     "s": {"s": 0, "ms": -3, "us": -6},
@@ -26,10 +26,10 @@ MULTIPLES: dict[str, dict[str, int]] = {
     "K": {"K": 0},
     "": {"1": 0, "%": -2},
 }
-# The beginning of a quantity.
+# The number of a quantity.
 NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
 # Units of tables and figures, ascending.
-HANDY = {
+DISPLAY_UNITS = {
     "Pa": ("Pa", "kPa", "MPa", "GPa"),
     "m": ("mm", "m"),
     "s": ("ms", "s"),
@@ -42,7 +42,7 @@ HANDY = {
 def power_of(unit: object, key_unit: str, place: str) -> int:
     """Return the power of ten that converts a unit to that of a key.
 
-    Raise InputError with the place of the unit and the allowed ones where it does not fit.
+    Raise InputError where the unit does not fit; `place` names it in the message.
     """
     # Other units have no multiples.
     multiples = MULTIPLES.get(key_unit, {key_unit: 0})
@@ -58,12 +58,12 @@ def quantity(text: str) -> float:
     Parameters
     ----------
     text
-        The number and one of the units that studies take, such as ``"32 mm"``.
+        Number and unit of a study, such as ``"32 mm"``.
 
     Raises
     ------
     InputError
-        Where it is no finite number, or the unit is not known; lists the units.
+        Where it is no finite number, or the unit is unknown.
 
     Examples
     --------
@@ -77,12 +77,10 @@ def quantity(text: str) -> float:
         refuse(f"quantity = {shown(text)} is not a number and its unit", "such as '32 mm'")
     unit = text[match.end() :].strip()
     if unit not in units:
-        what = (
-            f"unit {shown(unit)} is not known{suggestion(unit, units)}"
-            if unit
-            else "unit is missing"
+        unknown = f"unit {shown(unit)} is not known{suggestion(unit, units)}"
+        refuse(
+            f"quantity = {shown(text)}: {unknown if unit else 'unit is missing'}", ", ".join(units)
         )
-        refuse(f"quantity = {shown(text)}: {what}", ", ".join(units))
     value = scaled(float(match[1]), units[unit])
     if not math.isfinite(value):
         refuse(f"quantity = {shown(text)} is too large", "finite numbers")
@@ -100,6 +98,6 @@ def scaled(value: float, power: int) -> float:
 
 def display_unit(unit: str, value: float) -> tuple[str, float]:
     """Return a unit in which a value is at least 1, and its size in SI units."""
-    known = {name: scaled(1.0, MULTIPLES[unit][name]) for name in HANDY.get(unit, ())}
+    known = {name: scaled(1.0, MULTIPLES[unit][name]) for name in DISPLAY_UNITS.get(unit, ())}
     small = [(name, factor) for name, factor in known.items() if factor <= abs(value)]
     return small[-1] if small and value else (unit, 1.0)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING
 
-from thud.cli.command import QUIET, Command, argument
+from thud.cli.command import QUIET, Command, argument, print_notes
 from thud.recordings.channel import channel_of
 
 if TYPE_CHECKING:
@@ -16,7 +15,7 @@ def run_calibrate(options: argparse.Namespace) -> int:
     """Print the lines of a configuration that a calibration record gives; return the exit code."""
     from thud.recordings.calibration import calibrate
 
-    found = calibrate(
+    result = calibrate(
         options.record,
         force=options.force,
         mass=options.mass,
@@ -24,13 +23,12 @@ def run_calibrate(options: argparse.Namespace) -> int:
         unit=options.unit,
         uncertainty=options.uncertainty,
     )
-    print(f'calibration = "{found.chain}"')
-    print(f"calibration_uncertainty = {found.uncertainty:.2g}")
+    print(f'calibration = "{result.chain}"')
+    print(f"calibration_uncertainty = {result.uncertainty:.2g}")
     if not options.quiet:
-        print(f"# {found.origin}")
+        print(f"# {result.origin}")
     if not options.uncertainty:
-        told = "the uncertainty of the known force is not given and not counted (--uncertainty)"
-        print(f"thud-driver: {told}", file=sys.stderr)
+        print_notes(["uncertainty of the known force not stated: not included (--uncertainty)"])
     return 0
 
 
@@ -44,11 +42,11 @@ CALIBRATE = Command(
             "--uncertainty",
             type=float,
             default=0.0,
-            metavar="PART",
+            metavar="FRACTION",
             help="its relative standard uncertainty, such as 0.001",
         ),
         argument("--channel", metavar="NAME|NUMBER", help="channel of the force"),
-        argument("--unit", help="unit of the recorded values, where the file does not say it"),
+        argument("--unit", help="unit of the recorded values, if the file does not state it"),
         QUIET,
     ),
     run_calibrate,

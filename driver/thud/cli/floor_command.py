@@ -32,11 +32,11 @@ def compare(options: argparse.Namespace) -> int:
         cases[case.name] = case
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PlausibilityWarning)
-        found = compare_floors(cases, progress=not options.quiet and sys.stderr.isatty())
-    print_notes(found.warnings)
-    paths = results.write(found.files())
+        comparison = compare_floors(cases, progress=not options.quiet and sys.stderr.isatty())
+    print_notes(comparison.warnings)
+    paths = results.write(comparison.files())
     if not options.quiet:
-        print(format_rows(found.rows()))
+        print(format_rows(comparison.rows()))
         print(f"Page: {paths[-1]}")
     return 0
 

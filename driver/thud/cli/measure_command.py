@@ -71,9 +71,9 @@ def measure(options: argparse.Namespace) -> int:
         print()
         for step in (*recording_files.sentences(recording, "steps"), *recording.level_steps):
             print(f"  {step}")
-        print(f"  {recording_files.verdict_sentence(recording)}")
-    told = recording_files.sentences(recording, "warnings")
-    print_notes((*recording.own_warnings, *recording.outliers, *told))
+        print(f"  {recording_files.verdict_text(recording)}")
+    messages = recording_files.sentences(recording, "warnings")
+    print_notes((*recording.own_warnings, *recording.outliers, *messages))
     if not options.quiet:
         print(f"Results: {folder}")
     return NOT_CONFORMING if options.check and not verdict else 0
@@ -92,21 +92,23 @@ MEASURE = Command(
         argument("--height-uncertainty", type=float, metavar="M", help="its standard uncertainty"),
         argument("--config", metavar="LAB.toml", help="laboratory, instruments, calibration"),
         argument("--channel", metavar="NAME|NUMBER", help="channel of the force"),
-        argument("--unit", help="unit of the recorded values, where the file does not say it"),
+        argument("--unit", help="unit of the recorded values, if the file does not state it"),
         argument(
             "--calibration", metavar="N/UNIT", help='such as "250 N/V" or "4.1 pC/N, 10 mV/pC"'
         ),
         argument(
             "--calibration-uncertainty",
             type=float,
-            metavar="PART",
+            metavar="FRACTION",
             help="relative standard uncertainty of the calibration, such as 0.005",
         ),
         argument(
             "--polarity", choices=("positive", "negative"), help="sign of a compression in the file"
         ),
-        argument("--sample-rate", type=float, metavar="HZ", help="where the file does not say it"),
-        argument("--low-pass", action="store_true", help="levels of the force below 1.25 kHz"),
+        argument("--sample-rate", type=float, metavar="HZ", help="if the file does not state it"),
+        argument(
+            "--low-pass", action="store_true", help="levels of the force low-passed at 1.25 kHz"
+        ),
         argument(
             "--workers", type=int, metavar="N", help="processes (default: one for each processor)"
         ),

@@ -15,10 +15,10 @@ def fit(options: argparse.Namespace) -> int:
     """Fit a measured mobility, print the errors, save the floor; return the exit code."""
     from thud.floors.mobility_fit import fit_mobility
 
-    found = fit_mobility(options.table, quantity=options.quantity, order=options.order)
-    shown = f"{repr(found)[1:-1]}\n{format_rows(found.rows())}"
-    file = "measured_mobility.nml", found.namelist().encode()
-    return save_result(options, options.table, found, shown, file, "mobility_fit")
+    result = fit_mobility(options.table, quantity=options.quantity, order=options.order)
+    shown = f"{repr(result)[1:-1]}\n{format_rows(result.rows())}"
+    file = "measured_mobility.nml", result.namelist().encode()
+    return save_result(options, options.table, result, shown, file, "mobility_fit")
 
 
 MOBILITY = Command(

@@ -15,12 +15,12 @@ def rate(options: argparse.Namespace) -> int:
     """Rate measured levels, print and save the result; return the exit code."""
     from thud.floors.survey import levels_csv, rating_table, read_room_levels
 
-    found = read_room_levels(options.levels, volume=options.volume)
-    shown = f"{format_rows(found.rows())}\n\n{format_rows(rating_table(found))}"
-    if (scatter := found.position_uncertainty) is not None:
+    room = read_room_levels(options.levels, volume=options.volume)
+    shown = f"{format_rows(room.rows())}\n\n{format_rows(rating_table(room))}"
+    if (scatter := room.position_uncertainty) is not None:
         shown += f"\n\n  Standard uncertainty by the scatter of positions: {scatter:.1f} dB"
-    file = "room_levels.csv", levels_csv(found)
-    return save_result(options, options.levels, found, shown, file, "room_levels")
+    file = "room_levels.csv", levels_csv(room)
+    return save_result(options, options.levels, room, shown, file, "room_levels")
 
 
 RATE = Command(

@@ -62,31 +62,31 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
         )
         raise InputError(message)
     options.done[case.name] = path
-    found = ask(
+    answer = ask(
         "run", path=os.fsencode(path), output=os.fsencode(output), replace=options.replace,
-        channels=options.all,        progress=not options.quiet,
+        channels=options.all, progress=not options.quiet,
     )  # fmt: skip
-    for warning in found.get("messages", {}).values():
+    for warning in answer.get("messages", {}).values():
         tqdm.write(f"thud-driver: {text(warning)}", file=sys.stderr)
-    folder = Path(output or os.fsdecode(found["directory"]))
-    figures = _figures(found, options)
+    folder = Path(output or os.fsdecode(answer["directory"]))
+    figures = _figures(answer, options)
     if figures:
         results = Results(folder, inputs=(path,), replace=options.replace)
-        results.write(figures, marker=found["case"])
+        results.write(figures, marker=answer["case"])
     if not options.quiet:
-        tqdm.write(f"{text(found['table'])}\n  Results: {folder}\n")
-    return bool(found["conforms"])
+        tqdm.write(f"{text(answer['table'])}\n  Results: {folder}\n")
+    return bool(answer["conforms"])
 
 
-def _figures(found: Bundle, options: argparse.Namespace) -> dict[str, bytes]:
+def _figures(answer: Bundle, options: argparse.Namespace) -> dict[str, bytes]:
     """Return the files of the figures of a run, drawn from its results in memory."""
     contents: dict[str, bytes] = {}
     if options.no_figures and not options.animation:
         return contents
-    case = Case.from_text(text(found["case"]))
-    impact = new_impact(case, found) if "samples" in found else None
-    modes = new_modes(case.ball, found) if "modes" in found else None
-    curve = new_curve(case, found) if "compression" in found else None
+    case = Case.from_text(text(answer["case"]))
+    impact = new_impact(case, answer) if "samples" in answer else None
+    modes = new_modes(case.ball, answer) if "modes" in answer else None
+    curve = new_curve(case, answer) if "compression" in answer else None
     moving = {"motion": impact, "floor_motion": impact and impact.on_floor}
     with TemporaryDirectory() as folder, left_out("a figure"):
         from thud import plot

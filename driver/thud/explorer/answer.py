@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from thud.base._schema import QUANTITIES, SAMPLE_QUANTITIES, FiniteElement
 from thud.base.checks import refuse, shown
 from thud.base.errors import ThudError
 from thud.case.case import tables_case
@@ -36,11 +39,13 @@ if TYPE_CHECKING:
 # Points of a curve on the page, and instants of an animation.
 MAX_POINTS = 400
 MAX_INSTANTS = 60
-# Samples of a record that the page asks for.
+# Time between instants of finite elements, s.
+SNAPSHOT_INTERVAL = 1e-3
+# Maximum number of samples of a record.
 MAX_SAMPLES = 200_000
 # Estimated time above which a case is computed only when the sliders rest, s.
 QUICK = 0.1
-# Part of the contact that is shown after it.
+# End of the time that is shown, in contact times.
 MARGIN = 1.05
 # Significant digits of curves.
 DIGITS = 6
@@ -69,24 +74,26 @@ def answer_quickly(case: Case) -> Answer | None:
 def answer_case(case: Case) -> Answer:
     """Return force, levels, verdict, warnings and, where there are, motion, floor and room."""
     start = time.perf_counter()
+    if isinstance(case.model, FiniteElement):
+        case = replace(case, model=replace(case.model, snapshot_interval=SNAPSHOT_INTERVAL))
     impact = compute(case)
     force = case.levels.force
-    found = _answer(impact, *contact_force(impact, force), impact.peak())
-    found["force"]["words"] = FORCE_WORDS[force]
-    found["warnings"] += impact.warnings
-    moving = impact.on_floor
-    found["motion"] = _motion(moving or impact)
-    found["floor"] = None if moving is None else _floor(impact, moving)
+    answer = _answer(impact, *contact_force(impact, force))
+    answer["force"]["words"] = FORCE_WORDS[force]
+    answer["warnings"] += impact.warnings
+    on_floor = impact.on_floor
+    answer["motion"] = _motion(on_floor or impact)
+    answer["floor"] = None if on_floor is None else _floor(impact, on_floor)
     if case.room is not None and case.floor is not None:
-        found["room"] = _room(impact)
-        further = found["room"].pop("warnings")
-        found["warnings"] += [warning for warning in further if warning not in found["warnings"]]
-    found["seconds"] = time.perf_counter() - start
-    return found
+        answer["room"] = _room(impact)
+        warnings = answer["room"].pop("warnings")
+        answer["warnings"] += [warning for warning in warnings if warning not in answer["warnings"]]
+    answer["seconds"] = time.perf_counter() - start
+    return answer
 
 
 def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answer:
-    """Return the same of a recording.
+    """Return the answer of a recording.
 
     Parameters
     ----------
@@ -104,24 +111,22 @@ def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answe
         times, force = drop.time, drop.force
         kept = (times >= 0) & (times <= MARGIN * recording.contact_time)
         curve = 1e3 * times[kept], 1e-3 * force[kept]
-        found = _answer(recording, *curve, recording.peak())
+        answer = _answer(recording, *curve)
     except ThudError as error:
-        # The user knows neither the copy nor its place.
+        # The user does not know the copy.
         raise type(error)(str(error).replace(path, shown(name))) from error
-    found["seconds"] = time.perf_counter() - start
-    found["drops"] = len(recording.drops)
+    answer["seconds"] = time.perf_counter() - start
+    answer["drops"] = len(recording.drops)
     copy = Path(path).name
     # The page says whose the warnings are.
-    found["warnings"] += [
+    answer["warnings"] += [
         warning.removeprefix(f"{copy}: ").replace(copy, name) for warning in recording.warnings
     ]
-    return found
+    return answer
 
 
-def _answer(
-    source: ImpactResult, times: NDArray[np.float64], force: NDArray[np.float64], peak: float
-) -> Answer:
-    """Return what cases and recordings share; times in ms, the force in kN."""
+def _answer(source: ImpactResult, times: NDArray[np.float64], force: NDArray[np.float64]) -> Answer:
+    """Return the common part of answers; times in ms, the force in kN."""
     verdict = source.assess()
     return {
         "force": _curve(times, 1e3 * force),
@@ -132,36 +137,43 @@ def _answer(
         "criteria": [_criterion(one) for one in verdict.criteria],
         "conforms": bool(verdict.conforms),
         "verdict": verdict.result,
-        "numbers": [
-            ["peak", float(peak), "N"],
-            ["contact", 1e3 * source.contact_time, "ms"],
-            ["restitution", *_plain([source.restitution]), ""],
-        ],
+        "numbers": _numbers(source),
         "warnings": [],
     }
 
 
-def _criterion(one: Criterion) -> Answer:
+def _numbers(source: ImpactResult) -> list[list[Any]]:
+    """Return title, value and unit of the quantities that are known, of the peaks the assessed."""
+    other = "peak_force" if source.assessed_force() == "elastic" else "peak_elastic_force"
+    rows: list[list[Any]] = []
+    for name in SAMPLE_QUANTITIES:
+        value, quantity = source.quantity(name), QUANTITIES[name]
+        if name != other and not math.isnan(value):
+            rows.append([quantity.title, value * quantity.display_scale, quantity.display_unit])
+    return rows
+
+
+def _criterion(criterion: Criterion) -> Answer:
     """Return a criterion; times are in ms, as on the screen."""
-    scale, unit = (1e3, "ms") if one.unit == "s" else (1.0, one.unit)
-    name, band = one.name.rpartition("octave_")[1:]
-    expanded = scale * one.estimate.expanded
+    scale, unit = (1e3, "ms") if criterion.unit == "s" else (1.0, criterion.unit)
+    name, band = criterion.name.rpartition("octave_")[1:]
+    expanded = scale * criterion.estimate.expanded
     return {
         "name": f"{band.replace('_', '.')} Hz" if name else humanize(band),
         "band": bool(name),
         "unit": unit,
-        "value": None if np.isnan(one.value) else round(scale * one.value, 6),
+        "value": None if np.isnan(criterion.value) else round(scale * criterion.value, 6),
         "uncertainty": expanded if 0 < expanded < np.inf else None,
-        "lower": round(scale * one.lower, 6),
-        "upper": round(scale * one.upper, 6),
-        "verdict": one.result,
+        "lower": round(scale * criterion.lower, 6),
+        "upper": round(scale * criterion.upper, 6),
+        "verdict": criterion.result,
     }
 
 
 def _motion(impact: Impact) -> Answer | None:
     """Return the surfaces of the ball over the floor, and the floor, against time, mm and ms.
 
-    None of models that have no shape. The shell of the paper is a sphere that its deflection
+    None for models without a shape. The shell of the paper is a sphere that its deflection
     flattens.
     """
     until = impact.touch_time + MARGIN * impact.contact_time
@@ -170,11 +182,11 @@ def _motion(impact: Impact) -> Answer | None:
         return None
     times = impact.time if motion is None else motion.time
     chosen = _some(np.flatnonzero(times <= until), MAX_INSTANTS)
-    found: Answer = {"time": _plain(1e3 * (times[chosen] - impact.touch_time))}
+    answer: Answer = {"time": _plain(1e3 * (times[chosen] - impact.touch_time))}
     if motion is not None:
         depth = motion.floor_displacement[chosen]
         over = motion.position[chosen] + np.stack([0 * depth, depth], -1)[:, None, None]
-        found["outer"], found["inner"] = (
+        answer["outer"], answer["inner"] = (
             [[[round(float(x), 2) for x in point] for point in line] for line in 1e3 * surface]
             for surface in (over[:, :, -1], over[:, :, 0])
         )
@@ -182,14 +194,14 @@ def _motion(impact: Impact) -> Answer | None:
         moving = impact.floor_displacement if isinstance(impact, FloorImpact) else 0 * impact.time
         depth = moving[chosen]
         ball = impact.case.ball
-        found["deflection"] = _plain(1e3 * impact.deflection[chosen])
-        found |= {"radius": 1e3 * ball.outer_radius, "wall": 1e3 * ball.wall_thickness}
-    found["floor"] = _plain(1e3 * depth)
-    return found
+        answer["deflection"] = _plain(1e3 * impact.deflection[chosen])
+        answer |= {"radius": 1e3 * ball.outer_radius, "wall": 1e3 * ball.wall_thickness}
+    answer["floor"] = _plain(1e3 * depth)
+    return answer
 
 
 def _floor(impact: Impact, moving: FloorImpact) -> Answer:
-    """Return force and velocity on a floor that moves, and what it changes in octaves."""
+    """Return force and velocity on a mobile floor, and the change in octaves."""
     shown = np.flatnonzero(moving.time <= moving.touch_time + 2 * moving.contact_time)
     times = 1e3 * (moving.time - moving.touch_time)
     contact = contact_force(moving, "floor")
@@ -215,13 +227,13 @@ def _floor(impact: Impact, moving: FloorImpact) -> Answer:
 
 def _room(impact: Impact) -> Answer:
     """Return the levels in the room below."""
-    found = predict_level(impact)
+    prediction = predict_level(impact)
     return {
-        "frequency": _plain(found.frequency),
-        "level": _plain(found.level),
-        "rating": found.rating.rounded,
-        "standardized": found.standardized_rating.rounded,
-        "warnings": list(found.warnings),
+        "frequency": _plain(prediction.frequency),
+        "level": _plain(prediction.level),
+        "rating": prediction.rating.rounded,
+        "standardized": prediction.standardized_rating.rounded,
+        "warnings": list(prediction.warnings),
     }
 
 
@@ -231,11 +243,11 @@ def _curve(times: NDArray[np.float64], values: NDArray[np.float64]) -> Answer:
     return {"time": _plain(times[chosen]), "value": _plain(values[chosen])}
 
 
-def _some(places: NDArray[np.intp], count: int) -> NDArray[np.intp]:
-    """Return at most so many of some places, evenly, the first and the last among them."""
-    even = np.linspace(0, len(places) - 1, min(len(places), count)).astype(int)
-    found: NDArray[np.intp] = places[np.unique(even)]
-    return found
+def _some(indices: NDArray[np.intp], count: int) -> NDArray[np.intp]:
+    """Return at most so many of some indices, evenly, the first and the last among them."""
+    chosen = np.linspace(0, len(indices) - 1, min(len(indices), count)).astype(int)
+    kept: NDArray[np.intp] = indices[np.unique(chosen)]
+    return kept
 
 
 def _plain(values: Iterable[float]) -> list[float | None]:

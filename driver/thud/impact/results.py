@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
-import f90nml.scanner
+import f90nml
 import numpy as np
 
 from thud.base._schema import IMPACT_QUANTITIES
@@ -35,10 +35,6 @@ _OWN = {
     "floor_force": "floor_force_N",
 }
 _MOTION = ("time", "deflection", "velocity")
-
-# Where a text ends too early it prints its tables and then raises. To redirect the output meanwhile
-# would take that of other threads.
-f90nml.scanner.print = lambda *_: None
 
 
 def read_results(directory: str | os.PathLike[str]) -> Impact:

@@ -10,9 +10,8 @@ import numpy as np
 
 from thud.base._schema import BANDS, BandSet, LevelsForce, LevelsMethod, LimitsSource
 from thud.base.bridge import ask
-from thud.base.checks import require_array, require_choice, require_real
+from thud.base.checks import refuse, refuse_value, require_array, require_choice, require_real
 from thud.base.display import Displayed
-from thud.base.errors import InputError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -57,7 +56,7 @@ class Bands(Displayed):
 
 
 def get_bands(bands: BandSet = "octave") -> Bands:
-    """Return the octaves 31.5 to 500 Hz or the thirds 25 to 630 Hz.
+    """Return the octaves 31.5 to 500 Hz or the one-third octaves 25 to 630 Hz.
 
     Parameters
     ----------
@@ -67,7 +66,7 @@ def get_bands(bands: BandSet = "octave") -> Bands:
     Raises
     ------
     InputError
-        Where `bands` is not one of these.
+        Where `bands` is unknown.
     """
     require_choice("bands", bands, BANDWIDTHS)
     return _bands(bands)
@@ -88,7 +87,7 @@ def force_exposure_levels(
     """Return the force exposure levels of a force record.
 
     The level of a band is 10 lg of its energy, 2 * integral of abs(F(f))**2 df, over 1 N2 s
-    (JIS A 1418-2). The record is taken as zero before its first and after its last sample.
+    (JIS A 1418-2). The force is zero before the first and after the last sample.
 
     Parameters
     ----------
@@ -124,7 +123,7 @@ def force_exposure_levels(
 
 
 def record_force(force: NDArray[np.float64], sample_rate: float) -> NDArray[np.float64]:
-    """Return the part of a force that a force plate records, below 1.25 kHz (paper, section 3).
+    """Return a force as a force plate records it, below 1.25 kHz (paper, section 3).
 
     Forces, N, have the shape (n_sample,) and start and end at zero; the rate is in Hz.
     """
@@ -136,19 +135,17 @@ def record_force(force: NDArray[np.float64], sample_rate: float) -> NDArray[np.f
 def peak_count(force: ArrayLike, sample_rate: float) -> int:
     """Return the number of peaks of a force: maxima with a drop of 10 % on both sides.
 
-    The force, N, shape (n_sample,), starts and ends at zero; only its part below 1.25 kHz is used.
+    The force, N, shape (n_sample,), starts and ends at zero; only content below 1.25 kHz is used.
     Raise InputError where it is empty, not finite or not one-dimensional, or the rate, Hz, is not
     positive.
     """
     record = _record(force)
     if not record.size or not np.isfinite(record).all():
-        what = "holds a value that is not finite" if record.size else "has no samples"
-        message = f"force {what}; allowed: real numbers, N"
-        raise InputError(message)
+        reason = "holds a value that is not finite" if record.size else "has no samples"
+        refuse(f"force {reason}", "real numbers, N")
     rate = to_float("sample_rate", sample_rate)
     if not 0 < rate < np.inf:
-        message = f"sample_rate = {rate} is not allowed; allowed: sample_rate > 0"
-        raise InputError(message)
+        refuse_value("sample_rate", rate, "sample_rate > 0")
     return int(ask("peak_count", force=record, sample_rate=rate)["peak_count"])
 
 
@@ -162,6 +159,5 @@ def to_float(name: str, value: object) -> float:
     try:
         return float(value)  # type: ignore[arg-type]
     except (OverflowError, TypeError, ValueError) as error:
-        shown = "a very large number" if isinstance(error, OverflowError) else repr(value)
-        message = f"{name} = {shown} is not a number; allowed: real numbers"
-        raise InputError(message) from error
+        value_text = "a very large number" if isinstance(error, OverflowError) else repr(value)
+        refuse(f"{name} = {value_text} is not a number", "real numbers", error)

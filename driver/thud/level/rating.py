@@ -1,4 +1,4 @@
-"""Single numbers of the levels in the room below, and their standardization."""
+"""Single-number ratings of the levels in the room below, and their standardization."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ if TYPE_CHECKING:
 
     from thud.base._schema import BandSet
 
-# Levels beyond it, dB, are none of sound.
-LARGEST_LEVEL = 1000.0
-# Words of the Korean classes, and their maximum levels, dB.
+# Maximum absolute level of sound, dB.
+MAX_LEVEL = 1000.0
+# Names of the Korean classes.
 CLASSES = ("none", *(f"{i}" for i in range(1, len(CLASS_LIMITS) + 1)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Rating(Displayed):
-    """Single numbers of the levels that a heavy/soft impact source causes in the room below.
+    """Single-number rating of the levels of a heavy/soft impact source in the room below.
 
     Attributes
     ----------
     bands : str
-        Bands that it is made of: octaves 63 to 500 Hz, or thirds 50 to 630 Hz.
+        Rated bands: octaves 63 to 500 Hz, or one-third octaves 50 to 630 Hz.
     a_weighted : float
-        A-weighted maximum level L_iA,Fmax, dB, not rounded (ISO 717-2 annex D).
+        A-weighted maximum level L_iA,Fmax, dB (ISO 717-2 annex D).
     rounded : int
-        The same as it is stated, a half rounded up, dB.
+        The same, rounded half up, dB.
     korean_class : int or None
         Class 1 to 4 of KS F 2863-2 by A-weighted level (at most 37, 41, 45 and 49 dB), 0 for none;
-        None for thirds, which that standard does not use. It is meant for levels that are not
-        standardized.
+        None for one-third octaves, which that standard does not use. It applies to levels that are
+        not standardized.
     curve : int or None
-        Rating of octaves by the inverse A-weighted curve that KS F 2863-2 used before, dB.
+        Inverse-A curve rating of octaves, dB, of former editions of KS F 2863-2.
     """
 
     bands: BandSet
@@ -66,7 +66,7 @@ class Rating(Displayed):
         if self.korean_class is not None:
             rows += [
                 ("class (KS F 2863-2)", CLASSES[self.korean_class]),
-                ("inverse A curve, dB (KS F 2863-2, former)", str(self.curve)),
+                ("inverse-A curve rating, dB (KS F 2863-2, former)", str(self.curve)),
             ]
         return rows
 
@@ -81,21 +81,21 @@ def rated_bands(bands: BandSet) -> NDArray[np.float64]:
 
 
 def rating(levels: ArrayLike, bands: BandSet = "octave") -> Rating:
-    """Return the single numbers of levels in the room below.
+    """Rate levels in the room below.
 
     Parameters
     ----------
     levels : array_like, shape (4,) or (12,)
-        Maximum Fast levels of the octaves 63 to 500 Hz, or of the thirds 50 to 630 Hz, dB re
-        20 uPa: measured ones, or standardized ones.
+        Maximum Fast levels of the octaves 63 to 500 Hz, or of the one-third octaves 50 to 630 Hz,
+        dB re 20 uPa, as measured or standardized.
     bands
-        ``"octave"`` or ``"third"``. Thirds are weighted one by one: maxima of thirds do not add up
-        to those of octaves.
+        ``"octave"`` or ``"third"``. Maxima of one-third octaves do not add up to those of octaves:
+        each is weighted by itself.
 
     Raises
     ------
     InputError
-        Where there are levels of other bands, or one is not a level of sound.
+        Where the number of levels is wrong, or one is no level of sound.
 
     Examples
     --------
@@ -110,9 +110,9 @@ def rating(levels: ArrayLike, bands: BandSet = "octave") -> Rating:
             f"levels have the shape {values.shape}",
             f"{frequencies.shape}, the {bands}s {frequencies[0]:g} to {frequencies[-1]:g} Hz",
         )
-    wild = values[abs(values) > LARGEST_LEVEL]
-    if wild.size:
-        refuse_value("levels", float(wild[0]), f"{-LARGEST_LEVEL:g} to {LARGEST_LEVEL:g} dB")
+    excess = values[abs(values) > MAX_LEVEL]
+    if excess.size:
+        refuse_value("levels", float(excess[0]), f"{-MAX_LEVEL:g} to {MAX_LEVEL:g} dB")
     found = ask("rating", bands=bands, levels=values)
     has_classes = bands == BANDWIDTHS[0]
     return Rating(
@@ -130,7 +130,7 @@ def standardized_level(
     """Return levels in a room of 50 m3 with a reverberation time of 0.5 s (ISO 16283-2).
 
     L'_i,Fmax,V,T = L_i,Fmax + 10 lg(V/V0) - 10 lg(g(C)/g(C0)) with C = T/1.7275 s and
-    g(C) = C**(-1/(C - 1)): what the Fast detector shows of a decay depends on its length.
+    g(C) = C**(-1/(C - 1)), the response of the Fast detector to a decay.
 
     Parameters
     ----------

@@ -327,7 +327,9 @@ def compression(curves: Mapping[str, CompressionCurve]) -> Figure:
     for name, curve in curves.items():
         require_kind(name, curve, CompressionCurve)
     figure, axes = empty_axes(2.5)
-    add_curves(axes, {name: (1e3 * one.deflection, one.force) for name, one in curves.items()})
+    add_curves(
+        axes, {name: (1e3 * curve.deflection, curve.force) for name, curve in curves.items()}
+    )
     axes.set_xlim(left=0)
     axes.set_ylim(bottom=0)
     axes.set_xlabel("Approach of the plates, mm")

@@ -57,17 +57,17 @@ def draw_floor(impact: FloorImpact) -> Figure:
     change.bar(x, impact.difference(THIRDS), color=COLORS[0], width=0.7)
     change.axhline(0, color="black", linewidth=0.6)
     change.set_ylabel("Contact −\nblocked, dB")
-    found = impact.injected_energy(THIRDS)
+    injected = impact.injected_energy(THIRDS)
     energy.set_yscale("log")
-    energy.plot(x, 1e3 * found.by_mobility, label="energy by the mobility", **line_style(0))
+    energy.plot(x, 1e3 * injected.by_mobility, label="energy by the mobility", **line_style(0))
     energy.plot(
-        x, 1e3 * found.by_motion, label="energy by the velocity", color=COLORS[1], marker="o",
+        x, 1e3 * injected.by_motion, label="energy by the velocity", color=COLORS[1], marker="o",
         markersize=3.5, linestyle="none",
     )  # fmt: skip
     energy.set_ylabel("Energy into\nthe floor, mJ")
     energy.sharex(change)
     change.tick_params(labelbottom=False)
-    band_axis(energy, found.frequency, THIRDS)
+    band_axis(energy, injected.frequency, THIRDS)
     _draw_mobility(mobility, impact)
     figure.align_ylabels()
     legend_above(history, motion, energy, mobility)
@@ -94,9 +94,9 @@ def _draw_mobility(axes: Axes, impact: FloorImpact) -> None:
     bands = get_bands(THIRDS)
     low, high = bands.lower[0], bands.upper[-1]
     frequency = np.geomspace(low, high, int(_DENSITY * np.log2(high / low)))
-    found = impact.mobility(frequency)
-    axes.loglog(frequency, abs(found), label="|Y|", color="0.6", linewidth=0.8)
-    axes.loglog(frequency, found.real, label="Re Y", color=COLORS[3], linewidth=0.8)
+    mobility = impact.mobility(frequency)
+    axes.loglog(frequency, abs(mobility), label="|Y|", color="0.6", linewidth=0.8)
+    axes.loglog(frequency, mobility.real, label="Re Y", color=COLORS[3], linewidth=0.8)
     axes.set_ylabel("Mobility Y,\nm/(N s)")
     axes.set_xlabel("Frequency, Hz")
     axes.set_xlim(low, high)
@@ -174,21 +174,21 @@ def floor_mobilities(floors: Mapping[str, FloorOptions]) -> Figure:
 
 
 @own_style()
-def mobility_fit(found: MobilityFit) -> Figure:
+def mobility_fit(fit: MobilityFit) -> Figure:
     """Draw magnitude and phase of measurement and fit against frequency."""
     figure = new_figure(3.6)
     upper, lower = figure.subplots(2, sharex=True)
-    lines = np.geomspace(found.frequency[0], found.frequency[-1], 2000)
-    fitted = found.mobility(lines)
+    lines = np.geomspace(fit.frequency[0], fit.frequency[-1], 2000)
+    fitted = fit.mobility(lines)
     upper.loglog(
-        found.frequency, abs(found.measured), ".", color="0.55", markersize=2.5, label="measured"
+        fit.frequency, abs(fit.measured), ".", color="0.55", markersize=2.5, label="measured"
     )
     upper.loglog(
         lines, abs(fitted), color=COLORS[0],
-        label=f"fitted: relative error {100 * found.error:.2g} %",
+        label=f"fitted: relative error {100 * fit.error:.2g} %",
     )  # fmt: skip
     lower.semilogx(
-        found.frequency, np.degrees(np.angle(found.measured)), ".", color="0.55", markersize=2.5
+        fit.frequency, np.degrees(np.angle(fit.measured)), ".", color="0.55", markersize=2.5
     )
     lower.semilogx(lines, np.degrees(np.angle(fitted)), color=COLORS[0])
     upper.set_ylabel("Mobility, m/(N s)")

@@ -243,8 +243,8 @@ def comparison_html(
         time, newton = contact_force(impact, kind)
         forces.append({**look, "mode": "lines", **curve_points(time, newton), "showlegend": True})
         for bands, traces in levels.items():
-            found = curve_points(_names(bands), impact.levels(bands, force=kind))
-            traces.append({**look, "mode": "lines+markers", **found, "showlegend": False})
+            points = curve_points(_names(bands), impact.levels(bands, force=kind))
+            traces.append({**look, "mode": "lines+markers", **points, "showlegend": False})
     levels["octave"].append(_tolerance(source))
     level = level_label(impacts, force)
     plots = [
@@ -293,36 +293,36 @@ _STEPS = {
 
 
 @own_style()
-def draw_floors(found: FloorComparison) -> Figure:
+def draw_floors(comparison: FloorComparison) -> Figure:
     """Draw the chain of each floor as spectra, its levels beside the classes, and the table."""
     figure = new_figure(7.2, 2 * WIDTH)
     grid = figure.add_gridspec(4, 2)
     panels = [figure.add_subplot(grid[i, j]) for i in range(2) for j in range(2)]
-    for number, (name, one) in enumerate(found.predictions.items()):
-        for axes, values in zip(panels, _chain(one), strict=True):
+    for i, (name, prediction) in enumerate(comparison.predictions.items()):
+        for axes, values in zip(panels, _chain(prediction), strict=True):
             axes.plot(
-                np.arange(len(values)), values, label=escape_label(name), **line_style(number),
-                **marker_style(number, 3.5),
+                np.arange(len(values)), values, label=escape_label(name), **line_style(i),
+                **marker_style(i, 3.5),
             )  # fmt: skip
-    nominal = next(iter(found.predictions.values())).frequency
+    nominal = next(iter(comparison.predictions.values())).frequency
     for axes, (label, logarithmic) in zip(panels, _STEPS.items(), strict=True):
         band_axis(axes, nominal, "third")
         axes.set_ylabel(label)
         if logarithmic:
             axes.set_yscale("log")
-    _draw_classes(figure.add_subplot(grid[2, :]), found)
+    _draw_classes(figure.add_subplot(grid[2, :]), comparison)
     legend_above(panels[0])
-    _add_table(figure, grid, found.rows())
+    _add_table(figure, grid, comparison.rows())
     return figure
 
 
-def floors_html(found: FloorComparison) -> str:
+def floors_html(comparison: FloorComparison) -> str:
     """Return the page of `draw_floors` with interactive plots."""
     traces: list[list[dict[str, Any]]] = [[] for _ in _STEPS]
-    for number, (name, one) in enumerate(found.predictions.items()):
-        look = curve_look(number, name)
-        names = [f"{frequency:g}" for frequency in one.frequency]
-        for step, values in zip(traces, _chain(one), strict=True):
+    for i, (name, prediction) in enumerate(comparison.predictions.items()):
+        look = curve_look(i, name)
+        names = [f"{frequency:g}" for frequency in prediction.frequency]
+        for step, values in zip(traces, _chain(prediction), strict=True):
             points = curve_points(names, values)
             step.append(
                 {**look, "mode": "lines+markers", **points, "showlegend": step is traces[-1]}
@@ -341,27 +341,29 @@ def floors_html(found: FloorComparison) -> str:
         "Statistical means over positions, floors and rooms: see the warnings of each prediction."
     )
     # The level in the room, of full width, comes first.
-    return html_page("Comparison of floors", text, found.rows(), [plots[-1], *plots[:-1]])
+    return html_page("Comparison of floors", text, comparison.rows(), [plots[-1], *plots[:-1]])
 
 
-def _chain(one: RoomPrediction) -> tuple[NDArray[np.float64], ...]:
+def _chain(prediction: RoomPrediction) -> tuple[NDArray[np.float64], ...]:
     """Return what is drawn of a prediction, in the order of the steps."""
-    force = 10 * np.log10(one.energy / one.conductance)
-    return force, one.energy, 100 * one.radiated_share, one.level
+    force = 10 * np.log10(prediction.energy / prediction.conductance)
+    return force, prediction.energy, 100 * prediction.radiated_share, prediction.level
 
 
-def _draw_classes(axes: Axes, found: FloorComparison) -> None:
+def _draw_classes(axes: Axes, comparison: FloorComparison) -> None:
     """Draw the single numbers beside the maximum levels of the Korean classes."""
-    x = np.arange(len(found.predictions))
-    room = [one.octave_rating.a_weighted for one in found.predictions.values()]
-    after = [one.standardized_rating.a_weighted for one in found.predictions.values()]
+    x = np.arange(len(comparison.predictions))
+    room = [prediction.octave_rating.a_weighted for prediction in comparison.predictions.values()]
+    after = [
+        prediction.standardized_rating.a_weighted for prediction in comparison.predictions.values()
+    ]
     axes.bar(
         x - 0.2, room, 0.36, color=COLORS[5], edgecolor="black", linewidth=0.5,
         label="in the room, of octaves",
     )  # fmt: skip
     axes.bar(
         x + 0.2, after, 0.36, color="white", edgecolor="black", linewidth=0.5,
-        hatch="//////", label="standardized, of one-third-octave bands",
+        hatch="//////", label="standardized, of prediction-third-octave bands",
     )  # fmt: skip
     for number, limit in enumerate(CLASS_LIMITS, 1):
         axes.axhline(limit, color=COLORS[1], linewidth=0.8, linestyle="--")
@@ -369,7 +371,7 @@ def _draw_classes(axes: Axes, found: FloorComparison) -> None:
             f"class {number}", (1, limit), xycoords=("axes fraction", "data"), ha="left",
             va="center", fontsize="x-small", color=COLORS[1],
         )  # fmt: skip
-    axes.set_xticks(x, [escape_label(name) for name in found.predictions], rotation=20)
+    axes.set_xticks(x, [escape_label(name) for name in comparison.predictions], rotation=20)
     axes.set_ylabel("L_iA,Fmax, dB")
     axes.set_ylim(bottom=min([CLASS_LIMITS[0], *room, *after]) - 5)
     axes.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))

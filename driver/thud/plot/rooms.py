@@ -31,96 +31,98 @@ DECAY = 30
 
 
 @own_style()
-def room_levels(found: RoomLevels) -> Figure:
+def room_levels(room: RoomLevels) -> Figure:
     """Draw levels in a room against their bands."""
     figure, axes = empty_axes(2.6)
-    x = np.arange(len(found.frequency))
-    if len(found.positions) > 1:
-        for i, levels in enumerate(found.positions):
+    x = np.arange(len(room.frequency))
+    if len(room.positions) > 1:
+        for i, levels in enumerate(room.positions):
             label = "positions" if i == 0 else None
             axes.plot(x, levels, color="0.65", linewidth=0.6, label=label)
-    number = found.rating.rounded
+    number = room.rating.rounded
     axes.plot(
-        x, found.level, color=COLORS[0], marker="o", markersize=3.5,
+        x, room.level, color=COLORS[0], marker="o", markersize=3.5,
         label=f"in the room: L_iA,Fmax {number} dB",
     )  # fmt: skip
-    after, standardized = found.standardized, found.standardized_rating
-    if after is not None and standardized is not None:
+    standardized, rating = room.standardized, room.standardized_rating
+    if standardized is not None and rating is not None:
         axes.plot(
-            x, after, color=COLORS[1], marker="s", markersize=3.5,
-            linestyle="--", label=f"standardized: {standardized.rounded} dB",
+            x, standardized, color=COLORS[1], marker="s", markersize=3.5,
+            linestyle="--", label=f"standardized: {rating.rounded} dB",
         )  # fmt: skip
-    if found.background is not None:
+    if room.background is not None:
         axes.plot(
-            x, found.background, color=COLORS[6], linewidth=0.9, linestyle=":",
+            x, room.background, color=COLORS[6], linewidth=0.9, linestyle=":",
             label="background",
         )  # fmt: skip
-    band_axis(axes, found.frequency, found.bands)
+    band_axis(axes, room.frequency, room.bands)
     axes.set_ylabel("Maximum Fast level,\ndB re 20 µPa")
     legend_above(axes)
     return figure
 
 
 @own_style()
-def draw_prediction(found: RoomPrediction, measured: RoomLevels | None = None) -> Figure:
-    """Draw what a level in the room below is made of, in thirds, and measured levels beside it.
+def draw_prediction(prediction: RoomPrediction, measured: RoomLevels | None = None) -> Figure:
+    """Draw the components of the level in the room below, and measured levels beside it.
 
-    Hollow marks are thirds of few modes, where the statistical answer is doubtful.
+    Hollow marks are bands of few modes, where the statistical answer may be wrong.
     """
     figure = new_figure(4.2, WIDTH)
     above, middle, below = figure.subplots(3, 1, sharex=True, height_ratios=(1, 1, 1.6))
-    x = np.arange(len(found.frequency))
-    few = found.has_few_modes
-    above.semilogy(x, 1e3 * found.energy, color="black", marker=".", linewidth=1)
+    x = np.arange(len(prediction.frequency))
+    few = prediction.has_few_modes
+    above.semilogy(x, 1e3 * prediction.energy, color="black", marker=".", linewidth=1)
     above.set_ylabel("Energy into\nthe floor, mJ")
     middle.plot(
-        x, found.radiation_factor, color=COLORS[2], marker="^", markersize=3, linewidth=1,
+        x, prediction.radiation_factor, color=COLORS[2], marker="^", markersize=3, linewidth=1,
         label="radiation factor",
     )  # fmt: skip
     middle.plot(
-        x, 10 * found.loss_factor, color=COLORS[3], marker="v", markersize=3, linewidth=1,
+        x, 10 * prediction.loss_factor, color=COLORS[3], marker="v", markersize=3, linewidth=1,
         linestyle="-.", label="loss factor times 10",
     )  # fmt: skip
     middle.set_ylim(bottom=0)
     middle.set_ylabel("Floor")
-    low, high = found.level - found.spread, found.level + found.spread
+    low, high = prediction.level - prediction.spread, prediction.level + prediction.spread
     below.fill_between(x, low, high, color=GREY, linewidth=0, label="± expected spread")
-    below.plot(x, found.level, color=COLORS[0])
+    below.plot(x, prediction.level, color=COLORS[0])
     for marks, face in ((few, "white"), (~few, COLORS[0])):
         below.plot(
-            x[marks], found.level[marks], color=COLORS[0], marker="o", markersize=4,
+            x[marks], prediction.level[marks], color=COLORS[0], marker="o", markersize=4,
             markerfacecolor=face, linestyle="none",
         )  # fmt: skip
-    label = f"in the room: L_iA,Fmax {found.rating.rounded} dB"
+    label = f"in the room: L_iA,Fmax {prediction.rating.rounded} dB"
     below.plot([], [], color=COLORS[0], marker="o", markersize=4, label=label)
     below.plot(
-        x, found.standardized, color=COLORS[1], marker="s", markersize=3, linewidth=1,
-        linestyle="--", label=f"standardized: {found.standardized_rating.rounded} dB",
+        x, prediction.standardized, color=COLORS[1], marker="s", markersize=3, linewidth=1,
+        linestyle="--", label=f"standardized: {prediction.standardized_rating.rounded} dB",
     )  # fmt: skip
     if measured is not None:
-        level = found.level + found.difference(measured)
+        level = prediction.level + prediction.difference(measured)
         label = f"measured: {measured.rating.rounded} dB"
         below.plot(x, level, color="black", marker="x", linewidth=1, linestyle=":", label=label)
     below.set_ylabel("Maximum Fast level,\ndB re 20 µPa")
-    band_axis(below, found.frequency, "third")
+    band_axis(below, prediction.frequency, "third")
     figure.align_ylabels()
     legend_above(below, middle)
     return figure
 
 
 @own_style()
-def draw_decay(found: RoomPrediction) -> Figure:
-    """Draw what the Fast detector shows against time, in a third of each octave."""
+def draw_decay(prediction: RoomPrediction) -> Figure:
+    """Draw the reading of the Fast detector against time, in the middle band of each octave."""
     figure, axes = empty_axes(2.6)
-    for i, band in enumerate(range(1, len(found.frequency), 3)):
-        label = f"{found.frequency[band]:g} Hz"
-        axes.plot(1e3 * found.history_time, found.history[:, band], label=label, **line_style(i))
+    for i, band in enumerate(range(1, len(prediction.frequency), 3)):
+        label = f"{prediction.frequency[band]:g} Hz"
         axes.plot(
-            1e3 * found.time_of_maximum[band], found.level[band], color=COLORS[i], marker="o",
-            markersize=4, linestyle="none",
+            1e3 * prediction.history_time, prediction.history[:, band], label=label, **line_style(i)
+        )
+        axes.plot(
+            1e3 * prediction.time_of_maximum[band], prediction.level[band], color=COLORS[i],
+            marker="o", linestyle="none",
         )  # fmt: skip
-    top = found.level[1::3].max()
-    axes.set_ylim(found.level[1::3].min() - DECAY, top + 3)
+    top = prediction.level[1::3].max()
+    axes.set_ylim(prediction.level[1::3].min() - DECAY, top + 3)
     axes.set_xlim(left=0)
     axes.set_xlabel("Time after the impact, ms")
     axes.set_ylabel("Fast level, dB re 20 µPa")
@@ -130,39 +132,39 @@ def draw_decay(found: RoomPrediction) -> Figure:
 
 
 @own_style()
-def draw_modal_room(found: ModalRoom) -> Figure:
+def draw_modal_room(room: ModalRoom) -> Figure:
     """Draw the levels of all pairs of positions, their energy mean, and the statistical level."""
     figure, axes = empty_axes(2.6)
-    x = np.arange(len(found.frequency))
-    levels = found.level.reshape(-1, len(x))
+    x = np.arange(len(room.frequency))
+    levels = room.level.reshape(-1, len(x))
     low, first, third, high = np.percentile(levels, (5, 25, 75, 95), axis=0)
     axes.vlines(x, low, high, color="0.6", linewidth=1, label="90 % of the positions")
-    axes.vlines(x, first, third, color="0.6", linewidth=6, label="half of them")
+    axes.vlines(x, first, third, color="0.6", linewidth=6, label="50 % of the positions")
     axes.plot(
-        x, found.mean, color=COLORS[0], marker="o", markersize=3.5,
+        x, room.mean, color=COLORS[0], marker="o", markersize=3.5,
         label="energy mean of the positions",
     )  # fmt: skip
-    mean, spread = found.statistical
+    mean, spread = room.statistical
     axes.fill_between(x, mean - spread, mean + spread, color=GREY, linewidth=0, zorder=0)
     axes.plot(
         x, mean, color=COLORS[1], marker="s", markersize=3.5, linestyle="--",
         label="statistical, ± expected spread",
     )  # fmt: skip
-    band_axis(axes, found.frequency, "third")
+    band_axis(axes, room.frequency, "third")
     axes.set_ylabel("Maximum Fast level,\ndB re 20 µPa")
     legend_above(axes)
     return figure
 
 
 @own_style()
-def draw_positions(found: RoomPrediction) -> Figure | None:
+def draw_positions(prediction: RoomPrediction) -> Figure | None:
     """Draw the levels of positions below a plate, if its modes can be counted."""
     # SciPy takes its time.
     from thud.floors.modal_room import ModeCountError, positions_below
 
-    if not isinstance(found.floor, Plate):
+    if not isinstance(prediction.floor, Plate):
         return None
     try:
-        return draw_modal_room(positions_below(found, balls=8, microphones=16))
+        return draw_modal_room(positions_below(prediction, balls=8, microphones=16))
     except ModeCountError:  # the statistical answer stands alone
         return None

@@ -174,13 +174,13 @@ def _excess(dataset: xr.Dataset, columns: Columns) -> _Excess:
     count = len(dataset["status"].values.ravel())
     forces = columns.get("force", np.full(count, dataset.attrs["assessed_force"]))
     sources = columns.get("source", np.full(count, dataset.attrs["limits"]))
-    found = np.where((forces == "floor")[:, np.newaxis], levels["floor"], levels["elastic"])
+    level = np.where((forces == "floor")[:, np.newaxis], levels["floor"], levels["elastic"])
     tolerances: list[float] = []
     for source in np.unique(sources):
         lower, upper = octave_limits(source)
-        found[sources == source] -= (lower + upper) / 2
+        level[sources == source] -= (lower + upper) / 2
         tolerances.extend((upper - lower) / 2)
-    return _Excess(found, (min(tolerances), max(tolerances)))
+    return _Excess(level, (min(tolerances), max(tolerances)))
 
 
 def _draw_tolerance(axes: Axes, tolerance: tuple[float, float]) -> None:
@@ -198,37 +198,37 @@ def _draw_octaves(
     max_marks: int,
 ) -> None:
     """Draw the octave levels of samples, those that are not NaN, against a parameter."""
-    places, members, names = _classes(values)
+    positions, members, names = _classes(values)
     if names is None:
-        places = places * show_parameter(axes, "x", parameter)
+        positions = positions * show_parameter(axes, "x", parameter)
     else:
-        axes.set_xticks(places, names)
+        axes.set_xticks(positions, names)
         axes.tick_params(axis="x", labelrotation=20)
         axes.set_xlabel(words(parameter))
     for i, band in enumerate(get_bands().nominal):
-        found = [levels[chosen, i] for chosen in members]
+        groups = [levels[chosen, i] for chosen in members]
         middle, lower, upper = (
-            np.array([_of(part, f) for part in found]) for f in (np.median, np.min, np.max)
+            np.array([_of(group, f) for group in groups]) for f in (np.median, np.min, np.max)
         )
-        marks = marker_style(i, 3) if len(places) <= max_marks else {}
-        axes.plot(places, middle, label=f"{band:g} Hz", **line_style(i), **marks)
+        marks = marker_style(i, 3) if len(positions) <= max_marks else {}
+        axes.plot(positions, middle, label=f"{band:g} Hz", **line_style(i), **marks)
         if np.nanmax(upper - lower, initial=0) > _TINY:
-            axes.fill_between(places, lower, upper, color=COLORS[i], alpha=0.15, linewidth=0)
+            axes.fill_between(positions, lower, upper, color=COLORS[i], alpha=0.15, linewidth=0)
 
 
 def _classes(
     values: NDArray[Any],
 ) -> tuple[NDArray[np.float64], list[NDArray[np.bool_]], list[str] | None]:
-    """Return places on an axis, the samples of each, and the names of texts."""
-    found = np.unique(values)
+    """Return positions on an axis, the samples of each, and the names of texts."""
+    distinct = np.unique(values)
     if values.dtype.kind not in "iuf":
-        members = [values == value for value in found]
-        return np.arange(len(found), dtype=float), members, [str(value) for value in found]
-    if len(found) <= _MAX_VALUES:
-        return found.astype(float), [values == value for value in found], None
+        members = [values == value for value in distinct]
+        return np.arange(len(distinct), dtype=float), members, [str(value) for value in distinct]
+    if len(distinct) <= _MAX_VALUES:
+        return distinct.astype(float), [values == value for value in distinct], None
     edges = np.quantile(values, np.linspace(0, 1, _CLASSES + 1))
-    place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _CLASSES - 1)
-    members = [place == i for i in range(_CLASSES) if (place == i).any()]
+    position = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _CLASSES - 1)
+    members = [position == i for i in range(_CLASSES) if (position == i).any()]
     return np.array([np.median(values[chosen]) for chosen in members]), members, None
 
 
@@ -283,7 +283,7 @@ def draw_design(result: Design) -> Figure:
         doubtful = dataset["doubtful"].transpose(*result.axes).values.T
     marks = {
         "All criteria met": (conforms & ~doubtful, "."),
-        "In doubt by surrogate": (doubtful, "x"),
+        "Undecided by surrogate": (doubtful, "x"),
     }
     for label, (chosen, marker) in marks.items():
         row, column = np.nonzero(chosen)
@@ -293,9 +293,9 @@ def draw_design(result: Design) -> Figure:
                 label=label,
             )  # fmt: skip
     if result.mark:
-        place = [value * scale for value, scale in zip(result.mark, scales, strict=True)]
+        position = [value * scale for value, scale in zip(result.mark, scales, strict=True)]
         axes.plot(
-            *place, "*", markersize=9, markerfacecolor="white", markeredgecolor="black",
+            *position, "*", markersize=9, markerfacecolor="white", markeredgecolor="black",
             linestyle="none", label=result.mark_name.capitalize(), clip_on=False, zorder=3,
         )  # fmt: skip
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
@@ -306,21 +306,21 @@ def draw_design(result: Design) -> Figure:
 
 
 def _draw_rating(
-    figure: Figure, axes: Axes, place: tuple[Values, Values], rating: np.ma.MaskedArray[Any, Any]
+    figure: Figure, axes: Axes, position: tuple[Values, Values], rating: np.ma.MaskedArray[Any, Any]
 ) -> None:
     """Draw the rating as colors, with lines at round values."""
     steps = np.asarray(MaxNLocator(8).tick_values(float(rating.min()), float(rating.max())))
     fine = np.linspace(steps[0], steps[-1], 5 * (len(steps) - 1) + 1)
-    filled = axes.contourf(*place, rating, levels=fine, cmap="cividis_r")
+    filled = axes.contourf(*position, rating, levels=fine, cmap="cividis_r")
     inside = steps[(steps > rating.min()) & (steps < rating.max())]
     if inside.size:
-        lines = axes.contour(*place, rating, inside, colors="black", linewidths=0.5)
+        lines = axes.contour(*position, rating, inside, colors="black", linewidths=0.5)
         axes.clabel(lines, fontsize="x-small", fmt=StrMethodFormatter("{x:g}"))
     figure.colorbar(filled, ax=axes, ticks=steps, label="Standardized L_iA,Fmax, dB re 20 µPa")
 
 
 def _draw_margin(
-    figure: Figure, axes: Axes, place: tuple[Values, Values], margin: np.ma.MaskedArray[Any, Any]
+    figure: Figure, axes: Axes, position: tuple[Values, Values], margin: np.ma.MaskedArray[Any, Any]
 ) -> Colorbar:
     """Draw the margin as colors, white at 0, with lines at 0 and at round values."""
     lower, upper = min(float(margin.min()), 0.0), max(float(margin.max()), 0.0)
@@ -329,13 +329,15 @@ def _draw_margin(
     steps = np.asarray(MaxNLocator(7).tick_values(lower, max(upper, lower + _TINY)))
     # Five colors from one line to the next.
     fine = np.linspace(steps[0], steps[-1], 5 * (len(steps) - 1) + 1)
-    filled = axes.contourf(*place, margin, levels=fine, cmap="PuOr", norm=norm)
+    filled = axes.contourf(*position, margin, levels=fine, cmap="PuOr", norm=norm)
     inside = steps[(steps > margin.min()) & (steps < margin.max()) & (steps != 0)]
     if inside.size:
-        lines = axes.contour(*place, margin, inside, colors="0.25", linewidths=0.4, linestyles="-")
+        lines = axes.contour(
+            *position, margin, inside, colors="0.25", linewidths=0.4, linestyles="-"
+        )
         axes.clabel(lines, fontsize="x-small", fmt=StrMethodFormatter("{x:g}"))
     if margin.min() < 0 < margin.max():
-        axes.contour(*place, margin, levels=[0.0], colors="black", linewidths=1.2)
+        axes.contour(*position, margin, levels=[0.0], colors="black", linewidths=1.2)
         axes.plot([], [], color="black", label="Octave limits")
     return figure.colorbar(filled, ax=axes, ticks=steps)
 
@@ -351,10 +353,10 @@ def draw_sensitivity(result: Sensitivity) -> Figure:
     outputs = [str(name) for name in indices["output"].values]
     thickness = 0.84 / len(parameters)
     figure, axes = empty_axes(0.8 + 0.075 * len(outputs) * (len(parameters) + 1))
-    place = np.arange(len(outputs), dtype=float)
+    position = np.arange(len(outputs), dtype=float)
     for i, name in enumerate(parameters):
         row = indices.sel(parameter=name)
-        at = place + (i - (len(parameters) - 1) / 2) * thickness
+        at = position + (i - (len(parameters) - 1) / 2) * thickness
         axes.barh(
             at, row["total"], 0.9 * thickness, color=COLORS[i % len(COLORS)],
             hatch=HATCHES[i % len(HATCHES)], edgecolor="white", linewidth=0,
@@ -370,7 +372,7 @@ def draw_sensitivity(result: Sensitivity) -> Figure:
             markersize=2, markerfacecolor="white", markeredgewidth=0.5,
             label="first order" if i == len(parameters) - 1 else None, **look,
         )  # fmt: skip
-    axes.set_yticks(place, outputs)
+    axes.set_yticks(position, outputs)
     axes.set_ylim(len(outputs) - 0.5, -0.5)
     axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
     words = FORCE_WORDS[result.dataset.attrs["assessed_force"]]
@@ -390,18 +392,18 @@ def draw_surrogate(result: Surrogate) -> Figure:
     figure, axes = empty_axes(0.9 + 0.2 * len(labels))
     bound = result.bound
     axes.axvspan(-bound, bound, color="0.85", linewidth=0, label=f"Bound of 95 %, {bound:g} dB")
-    place = np.arange(len(labels), dtype=float)
+    position = np.arange(len(labels), dtype=float)
     for i, values in enumerate(residuals.T):
         axes.plot(
-            values, np.full(len(values), place[i]), "|", color=COLORS[5], markersize=5,
+            values, np.full(len(values), position[i]), "|", color=COLORS[5], markersize=5,
             markeredgewidth=0.5, label=None if i else f"Each of {len(values)} held-out drops",
         )  # fmt: skip
     axes.errorbar(
-        np.zeros(len(labels)), place, xerr=result.errors[result.assessed], fmt="none",
+        np.zeros(len(labels)), position, xerr=result.errors[result.assessed], fmt="none",
         color="black", elinewidth=0.8, capsize=3, label="95 % of drops",
     )  # fmt: skip
     words = [label.replace("floor ", "").replace("elastic ", "") for label in labels]
-    axes.set_yticks(place, [word[0].upper() + word[1:] for word in words])
+    axes.set_yticks(position, [word[0].upper() + word[1:] for word in words])
     axes.set_ylim(len(labels) - 0.5, -0.5)
     axes.set_xlabel("Surrogate − model, dB")
     legend_above(axes)
@@ -420,15 +422,15 @@ def draw_uncertainty(result: Uncertainty) -> Figure:
     label = f"Tolerance, {result.source.replace('_', ' ')}"
     octave_boxes(axes, lower - nominal, upper - nominal, label)
     levels = result.levels - nominal
-    place = np.arange(len(nominal))
-    shapes = axes.violinplot(levels, place, widths=0.6, showextrema=False)
+    position = np.arange(len(nominal))
+    shapes = axes.violinplot(levels, position, widths=0.6, showextrema=False)
     for i, shape in enumerate(cast("list[PolyCollection]", shapes["bodies"])):
         shape.set(
             facecolor=COLORS[5], alpha=1, edgecolor="none", label=None if i else "Distribution"
         )
     low, middle, high = np.quantile(levels, [0.025, 0.5, 0.975], axis=0)
     axes.errorbar(
-        place, middle, (middle - low, high - middle), fmt="o", color="black", markersize=2.5,
+        position, middle, (middle - low, high - middle), fmt="o", color="black", markersize=2.5,
         elinewidth=0.8, capsize=2, label="Median, 95 % of samples",
     )  # fmt: skip
     octave_axis(axes)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
@@ -72,7 +73,10 @@ class StyledFigure(Figure):
 def new_figure(height: float, width: float = WIDTH) -> Figure:
     """Return an empty figure; lengths in inches."""
     with own_style():
-        return StyledFigure(figsize=(width, height))
+        figure = StyledFigure(figsize=(width, height))
+    # Its renderer is kept: each measurement of a text would make a new one.
+    FigureCanvasAgg(figure)
+    return figure
 
 
 @own_style()

@@ -1,4 +1,4 @@
-"""Energy of a band and of the noise in it, of many drops (docs/recordings_theory.md, section 4)."""
+"""Energy of the noise of drops in bands (docs/recordings_theory.md, section 4)."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ if TYPE_CHECKING:
     from thud.level.levels import Bands
     from thud.recordings.measured_drop import Drop
 
-# Functionals whose energy is less than this part of the largest one add nothing.
+# Energy of a functional over the largest one below which it is negligible.
 NEGLIGIBLE = 1e-14
-# Drops whose covariances are in memory at once.
-AT_ONCE = 64
+# Maximum number of drops whose covariances are in memory.
+MAX_DROPS = 64
 
 
 def band_functionals(count: int, rate: float, lower: float, upper: float) -> NDArray[np.float64]:
     """Return functionals of samples whose squares add up to the energy in a band, [n, count].
 
-    They are the eigenvectors of the band's energy times the root of their eigenvalues: of about
-    two times time times band width, all others are zero.
+    They are the eigenvectors of the energy times the root of their eigenvalues, of which all but
+    about two times duration times band width vanish.
     """
     time = (np.arange(count) - (count - 1) / 2) / rate
     nodes, weights = leggauss(12 + int(2 * (upper - lower) * count / rate))
@@ -41,24 +41,24 @@ def band_functionals(count: int, rate: float, lower: float, upper: float) -> NDA
 def band_noise(drops: Sequence[Drop], bands: Bands) -> NDArray[np.float64]:
     """Return energies of the noise of the gates in bands, N2 s, [n_drop, n_band, 2].
 
-    The expected energy, and the standard deviation of the energy of the force when that is
-    subtracted from what is measured. Drops of one rate share the functionals of the longest gate,
-    and those with gates of one length their products.
+    The last axis has the expected energy, and the standard deviation of the energy of the force
+    after its subtraction. Drops of one rate share the functionals of the longest gate, and those
+    with gates of one length their products.
     """
     alike: dict[float, dict[int, list[int]]] = {}
-    for place, drop in enumerate(drops):
+    for i, drop in enumerate(drops):
         count = drop.gate[1] - drop.gate[0]
-        alike.setdefault(drop.sample_rate, {}).setdefault(count, []).append(place)
+        alike.setdefault(drop.sample_rate, {}).setdefault(count, []).append(i)
     edges = list(zip(bands.lower, bands.upper, strict=True))
-    found = np.empty((len(drops), len(edges), 2))
+    energies = np.empty((len(drops), len(edges), 2))
     for rate, gates in alike.items():
         functionals = [band_functionals(max(gates), rate, *edge) for edge in edges]
-        for count, places in gates.items():
-            for k in range(0, len(places), AT_ONCE):
-                some = places[k : k + AT_ONCE]
+        for count, indices in gates.items():
+            for k in range(0, len(indices), MAX_DROPS):
+                some = indices[k : k + MAX_DROPS]
                 rows = [one[:, :count] for one in functionals]
-                found[some] = _energies([drops[place] for place in some], rows, edges)
-    return found
+                energies[some] = _energies([drops[i] for i in some], rows, edges)
+    return energies
 
 
 def _energies(
@@ -66,21 +66,21 @@ def _energies(
     functionals: Sequence[NDArray[np.float64]],
     edges: Sequence[tuple[float, float]],
 ) -> NDArray[np.float64]:
-    """Return what `band_noise` does of drops with gates of one length, [n_drop, n_band, 2]."""
+    """Return the energies of drops with gates of one length, [n_drop, n_band, 2]."""
     contacts = [drop.contact for drop in drops]
     forces = np.array([drop.force[slice(*drop.gate)] for drop in drops])
     slow = np.array([one.covariance for one in contacts])
     white = np.array([one.background.variances[0] * one.sample_rate / 2 for one in contacts])
-    found = np.empty((len(drops), len(edges), 2))
+    energies = np.empty((len(drops), len(edges), 2))
     for band, (rows, edge) in enumerate(zip(functionals, edges, strict=True)):
         values, summed = forces @ rows.T, contacts[0].summed(rows)
         covariance = white[:, None, None] * (rows @ rows.T) + summed @ slow @ summed.T
         noise = np.trace(covariance, axis1=1, axis2=2)
         squares = (covariance**2).sum(axis=(1, 2))
-        # The first term is too large by twice the second, on the mean.
+        # On average the first term is too large by twice the second.
         variance = 4 * np.einsum("di,dij,dj->d", values, covariance, values) - 2 * squares
         middle = sum(edge) / 2
         density, spread = np.array([one.background.density(middle) for one in contacts]).T
         variance = np.maximum(variance, 2 * squares) + (noise * spread / density) ** 2
-        found[:, band] = np.column_stack([noise, np.sqrt(variance)])
-    return found
+        energies[:, band] = np.column_stack([noise, np.sqrt(variance)])
+    return energies

@@ -21,16 +21,16 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Number of means that stand for a record, and of those that a plateau needs.
+# Number of means of a record, and minimum number of a plateau.
 MEANS = 4096
+MIN_PLATEAU = 8
 # Samples that are read at once.
 BLOCK = 2**20
-PLATEAU = 8
-# Shares of the step at which it counts as gone up and down, and of a plateau left out at its ends.
+# Fractions of the step that mark its rise and fall, and fraction of a plateau ignored at its ends.
 UP, DOWN = 0.6, 0.4
 SETTLING = 0.1
 # Maximum relative uncertainty of the step.
-UNSURE = 0.1
+MAX_UNCERTAINTY = 0.1
 
 
 def calibrate(  # noqa: PLR0913 - the keys of the configuration
@@ -43,35 +43,35 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
     gravity: float = GRAVITY,
     uncertainty: float = 0.0,
 ) -> Calibration:
-    """Return N per unit from a record in which a known force is put on or taken off the plate.
+    """Return N per unit from a record of a known force put on or taken off the plate.
 
-    Lines are fitted to the levels on both sides of each step, which takes out offset and drift.
+    Lines are fitted to the levels on both sides of each step, against offset and drift.
 
     Parameters
     ----------
     record
-        File, or a signal in the unit that is to be calibrated.
+        File, or a signal in the unit to be calibrated.
     force, mass
         Either the known force, N, or the known mass, kg.
     channel
         Number or name of the channel of a file.
     unit
-        Unit of the values, where the file does not say it.
+        Unit of the values, if the file does not state it.
     gravity
-        Acceleration of gravity at the place, m/s2.
+        Local acceleration of gravity, m/s2.
     uncertainty
         Relative standard uncertainty of the known force.
 
     Returns
     -------
     Calibration
-        Its uncertainty holds that of the step: from the residuals of the lines or, where that is
-        larger, from the scatter of several steps.
+        Its uncertainty includes that of the step, by the residuals of the lines or the scatter of
+        several steps, whichever is larger.
 
     Raises
     ------
     InputError
-        Where not one of force and mass is given, or the record has no clear step.
+        Where force and mass are both given or missing, or the record has no clear step.
     """
     if (force is None) == (mass is None):
         refuse("calibrate(): give one of force and mass", "force in N or mass in kg")
@@ -85,10 +85,10 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
     name, word, samples, count = _source(record, channel, unit)
     steps = _steps(_means(samples, count), name)
     size, deviation = _mean(steps)
-    if deviation > UNSURE * size:
+    if deviation > MAX_UNCERTAINTY * size:
         refuse(
             f"{name}: the step is {size:.4g} {word} with an uncertainty of {deviation:.2g} {word}",
-            f"a step that is known to {UNSURE:.0%}",
+            f"an uncertainty up to {MAX_UNCERTAINTY:.0%}",
         )
     known = f"{newtons:.6g} N" if mass is None else f"{mass:g} kg"
     return Calibration(
@@ -118,9 +118,9 @@ def _source(
 
 
 def _means(samples: Callable[[int, int], NDArray[np.float64]], count: int) -> NDArray[np.float64]:
-    """Return the means of equal parts of a record."""
+    """Return the means of equal sections of a record."""
     width = max(1, count // MEANS)
-    # Whole parts in each block: to read is to open the file.
+    # Complete sections in each block: each read opens the file.
     step = width * max(1, BLOCK // width)
     stop = count - count % width
     blocks = (samples(start, min(start + step, stop)) for start in range(0, stop, step))
@@ -132,20 +132,20 @@ def _steps(level: NDArray[np.float64], name: str) -> list[tuple[float, float]]:
     """Return size and standard uncertainty of the steps of a level."""
     if not np.isfinite(level).all():
         refuse(f"{name}: a value is not finite", "real numbers")
-    # Extremes of a running median: a knock is no level.
-    calm = (
+    # Extremes of a running median, against knocks.
+    smooth = (
         np.median(np.lib.stride_tricks.sliding_window_view(level, 5), axis=1)
-        if len(level) > PLATEAU
+        if len(level) > MIN_PLATEAU
         else np.zeros(1)
     )
-    share = (level - calm.min()) / (np.ptp(calm) or 1.0)
-    edges, loaded = [0], bool(share[0] > UP)
-    for place, value in enumerate(share):
+    fraction = (level - smooth.min()) / (np.ptp(smooth) or 1.0)
+    edges, loaded = [0], bool(fraction[0] > UP)
+    for index, value in enumerate(fraction):
         if (not loaded and value > UP) or (loaded and value < DOWN):
             loaded = not loaded
-            edges.append(place)
+            edges.append(index)
     edges.append(len(level))
-    if len(edges) < 3 or min(np.diff(edges)) < PLATEAU:  # noqa: PLR2004 - two plateaus
+    if len(edges) < 3 or min(np.diff(edges)) < MIN_PLATEAU:  # noqa: PLR2004 - two plateaus
         refuse(
             f"{name}: has no clear step", "a record in which a known force is put on or taken off"
         )
@@ -160,12 +160,13 @@ def _steps(level: NDArray[np.float64], name: str) -> list[tuple[float, float]]:
 
 def _level_at(level: NDArray[np.float64], begin: int, end: int, edge: int) -> tuple[float, float]:
     """Return the level at an edge of a plateau and its standard uncertainty, by a line."""
-    out = max(1, int(SETTLING * (end - begin)))
-    place = np.arange(begin + out, end - out) - edge
-    line = np.column_stack([np.ones(len(place)), place])
-    (value, slope), *_ = np.linalg.lstsq(line, level[begin + out : end - out], rcond=None)
-    rest = level[begin + out : end - out] - line @ [value, slope]
-    variance = rest @ rest / (len(place) - 2)
+    settling = max(1, int(SETTLING * (end - begin)))
+    plateau = level[begin + settling : end - settling]
+    index = np.arange(begin + settling, end - settling) - edge
+    line = np.column_stack([np.ones(len(index)), index])
+    (value, slope), *_ = np.linalg.lstsq(line, plateau, rcond=None)
+    residual = plateau - line @ [value, slope]
+    variance = residual @ residual / (len(index) - 2)
     covariance = variance * np.linalg.inv(line.T @ line)
     return float(value), math.sqrt(covariance[0, 0])
 

@@ -1,4 +1,4 @@
-"""Measured drops on disk, so that an interrupted measurement goes on where it ended."""
+"""Measured drops on disk, from which an interrupted measurement continues."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ if TYPE_CHECKING:
     from thud.recordings.config import Config
     from thud.recordings.signal import Signal
 
-# Seconds of measurement that an abrupt end may lose.
+# Maximum time of measurement that a crash loses, s.
 INTERVAL = 5.0
 PREFIX, SUFFIX = ".measured-", ".part"
-# What arrays are made of in a pickle.
+# Names of NumPy in the pickle of an array.
 NUMPY = {"_reconstruct", "_frombuffer", "scalar", "ndarray", "dtype"}
 
 
 class Checkpoint:
-    """Drops of signals, kept in a directory while others are measured; a context manager.
+    """Drops of signals in a directory while others are measured; a context manager.
 
-    Each file holds drops of one signal and one configuration, named by their digest. At the end
-    those that were opened are removed, and so is the directory if it is empty; they stay where the
-    process is interrupted or killed, or fails for another reason than its input.
+    Each file holds drops of one signal and one configuration, named by their digest. The exit
+    removes the opened files, and the directory if it is empty, unless the process is interrupted,
+    killed, or fails for another reason than its input.
 
     Parameters
     ----------
     folder
-        Directory of the files, made where it is needed; None keeps nothing.
+        Directory of the files, made if needed; None stores nothing.
     """
 
     def __init__(self, folder: str | os.PathLike[str] | None) -> None:
@@ -53,7 +53,7 @@ class Checkpoint:
         self._written = time.monotonic()
 
     def __enter__(self) -> Self:
-        """Return the drops."""
+        """Return the checkpoint."""
         return self
 
     def __exit__(
@@ -62,7 +62,7 @@ class Checkpoint:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Remove the files, or add what is not written yet where the same call may succeed."""
+        """Remove the files, or write the last drops if the same call may succeed."""
         if self.folder is None:
             return
         if kind is not None and not issubclass(kind, InputError):
@@ -70,12 +70,12 @@ class Checkpoint:
                 self._write()
             except OSError as failure:
                 message = (
-                    f"{self.folder}: the last drops are not kept ({failure.strerror}); the same "
+                    f"{self.folder}: the last drops are not stored ({failure.strerror}); the same "
                     "call measures them again"
                 )
                 warnings.warn(message, ReportWarning, stacklevel=2)
             return
-        # Those of other signals belong to another measurement.
+        # Files of other signals belong to another measurement.
         files = [p for one in self._digests for p in self._files(one)]
         with uninterrupted():
             for path in files:
@@ -89,8 +89,8 @@ class Checkpoint:
         if self.folder is None:
             return {}
         self._write()
-        told = "\n".join(map(str, (version(), signal.checksum, signal.name, config)))
-        self._digest = hashlib.sha256(told.encode("utf-8", "surrogateescape")).hexdigest()[:32]
+        identity = "\n".join(map(str, (version(), signal.checksum, signal.name, config)))
+        self._digest = hashlib.sha256(identity.encode("utf-8", "surrogateescape")).hexdigest()[:32]
         self._digests.add(self._digest)
         found: dict[int, Drop] = {}
         for path in self._files(self._digest):
@@ -103,7 +103,7 @@ class Checkpoint:
         return sorted(filter(is_regular, found))
 
     def add(self, start: int, drop: Drop) -> None:
-        """Keep a drop by its first sample; it is on disk after some seconds.
+        """Store a drop by its first sample; it is on disk after some seconds.
 
         Raises
         ------
@@ -128,13 +128,13 @@ class Checkpoint:
 
 
 def _read(path: Path) -> dict[int, Drop]:
-    """Return the drops of a file; none of one that is damaged or of another kind."""
+    """Return the drops of a file, none if it is damaged or of another kind."""
     try:
         found = _DataOnly(io.BytesIO(path.read_bytes())).load()
     except Exception:  # noqa: BLE001 - a damaged pickle raises anything; its drops are measured again
         return {}
-    whole = isinstance(found, dict) and all(isinstance(one, Drop) for one in found.values())
-    return found if whole else {}
+    valid = isinstance(found, dict) and all(isinstance(drop, Drop) for drop in found.values())
+    return found if valid else {}
 
 
 class _DataOnly(pickle.Unpickler):

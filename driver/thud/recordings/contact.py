@@ -247,7 +247,7 @@ def find_posteriors(
                 find_edge(force, edges, ahead, likely, rate, middle, searches, window.plate)
             )
         if last + 1 < passes:
-            touch, back = (_reach(one.edge(), 3 / rate + 1e-4) for one in posteriors)
+            touch, back = (_reach(posterior.edge(), 3 / rate + 1e-4) for posterior in posteriors)
             release = (-back[1], -back[0])
             # Samples that a filter affects are no background.
             beyond = _spread(rate, window.plate)

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from thud.recordings.plate import Plate
 
-# Shapes of a flank, t in ms since the touch: a jump, a jump that a filter spreads, t**n, a steep
-# rise 1 - exp(-t / STEEP), a parabola, and a walk between knots.
+# Shapes of a flank, t in ms since the touch: a jump, a filtered jump, t**n, a steep rise
+# 1 - exp(-t / STEEP), a parabola, and a random walk between knots.
 POWERS = np.array([1.0, 1.5, 1.75])
 STEEP = 0.6
 KNOTS = np.array([
@@ -31,21 +31,21 @@ N_MEAN = len(POWERS) + 1
 
 
 class _Kind(NamedTuple):
-    """A kind of flank: how its shapes are distributed, over the peak force.
+    """A kind of flank: prior distribution of its shapes, over the peak force.
 
     Attributes
     ----------
     mean, spread : tuple of float
         Means and standard deviations of powers and steep rise.
     walk : float
-        Standard deviation of the steps of the walk: of smooth kinds as a part of the steps of the
-        mean flank, of rough ones after 1 ms.
+        Standard deviation of the steps of the walk: of smooth kinds as a fraction of the steps of
+        the mean flank, of rough ones after 1 ms.
     likely : tuple of float
-        Probability at touch and at release: a body strikes with a jump and lets go softly.
-    left : tuple of float
-        What the shapes leave of first touch, of release, and of begin and end of the contact, s.
+        Probability at touch and at release: a body strikes with a jump and releases softly.
+    error : tuple of float
+        Error of the shapes in first touch, release, and begin and end of the contact, s.
     rough : bool
-        Whether the force may fall again.
+        Whether the force may fall.
     jump, filtered, parabola : float
         Standard deviations of the other shapes.
     """
@@ -54,15 +54,15 @@ class _Kind(NamedTuple):
     spread: tuple[float, float, float, float]
     walk: float
     likely: tuple[float, float]
-    left: tuple[float, float, float]
+    error: tuple[float, float, float]
     rough: bool = False
     jump: float = 0.0
     filtered: float = 0.0
     parabola: float = 0.0
 
 
-# Lines, the soft feet of bodies that touch in a point (Hertz: 3/2 of a sphere) and roll off, flanks
-# that ripple, and those of bodies of which a part is stopped at once. Smooth kinds come first.
+# Lines, soft feet of bodies that touch in a point (Hertz: 3/2 of a sphere) and roll off, rippling
+# flanks, and those of bodies of which a fraction stops at once. Smooth kinds come first.
 _LINE = (0.16, 0.0, 0.0, 0.0), (0.08, 0.0, 0.0, 0.0)
 _SMOOTH, _FOOT, _ROUGH = (5e-6, 60e-6, 5e-6), (30e-6, 60e-6, 20e-6), (40e-6, 140e-6, 20e-6)
 KINDS = (
@@ -78,30 +78,29 @@ KINDS = (
 N_SMOOTH = sum(not kind.rough for kind in KINDS)
 with np.errstate(divide="ignore"):
     PRIOR = np.log([kind.likely for kind in KINDS])
-LEFT = np.array([kind.left for kind in KINDS])
-# What the shapes miss of a flank, as part of the force itself: of smooth kinds and of rough.
-MISSED = (0.005, 0.1)
-# The force is nowhere negative, and that of smooth kinds nowhere falls, by more than this part of
-# the peak; it reaches the threshold within FOOT_TIME ms, and as long after that has left its foot,
-# a part of the peak.
-FALL = 0.002
+ERRORS = np.array([kind.error for kind in KINDS])
+# Relative error of the force by the shapes, of smooth and of rough kinds.
+MISFIT = (0.005, 0.1)
+# The force is never negative, and that of smooth kinds never falls, by more than this fraction of
+# the peak; it reaches the threshold within FOOT_TIME ms, and exceeds FOOT as long after that.
+MAX_FALL = 0.002
 FOOT = 0.03
 FOOT_TIME = 1.0
-# Times of one search, each within REACH standard deviations of the one before.
+# Times of one search, which covers REACH standard deviations of the previous one.
 N_TIME = 33
 REACH = 6.0
-# Draws of each kind of flank; those that have less than a part of the probability are left out.
+# Draws of each kind of flank, and minimum probability of a kind.
 N_DRAW = 128
-LEAST = 1e-6
-# Samples are smoothed by these weights, which take the ringing of an anti-aliasing filter.
+MIN_PROBABILITY = 1e-6
+# Weights that smooth samples, against the ringing of an anti-aliasing filter.
 SMOOTHING = np.array([0.25, 0.5, 0.25])
-# Times at which the shapes are tabulated, ms: distance, and reach before and after the touch.
+# Times at which the shapes are tabulated, ms: step, and range before and after the touch.
 TICK = 1e-3
 BEFORE = 2.0
-BEHIND = 13.0
-# Length on both sides of them that a filter of the shapes may wrap around, ms.
+AFTER = 13.0
+# Margin on both sides, which the filter of the shapes wraps around, ms.
 GUARD = 4.0
-# Times after the touch at which draws are looked at, ms.
+# Times after the touch at which draws are evaluated, ms.
 DELAY = np.concatenate([np.linspace(0, 0.5, 51), np.linspace(0.55, 4, 70)])
 
 
@@ -112,7 +111,7 @@ class Flank:
     Attributes
     ----------
     time : ndarray, shape (n_cell,)
-        Middles of the cells, the means of which are used, s.
+        Middles of the cells, s.
     force : ndarray, shape (n_cell,)
         Mean force of each cell, background removed, N.
     covariance : ndarray, shape (n_cell, n_cell)
@@ -124,7 +123,7 @@ class Flank:
     release : bool
         Whether this is the end of a pulse.
     plate : Plate, optional
-        The plate whose resonance was taken out.
+        The plate whose resonance was corrected.
     """
 
     time: NDArray[np.float64]
@@ -138,18 +137,18 @@ class Flank:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """What a flank tells of its first touch.
+    """Posterior of the first touch of a flank.
 
     Attributes
     ----------
     time : ndarray, shape (n_time,)
-        Even times of first touch, s.
+        Uniform times of first touch, s.
     kinds : ndarray, shape (n_kind,)
-        Kinds of flanks that it may be, as places in `KINDS`.
+        Possible kinds of the flank, as indices of `KINDS`.
     weight : ndarray, shape (n_kind, n_time)
         Probabilities of the times by kind.
     factors : ndarray, shape (n_kind, n_time, n_column, n_column)
-        Factors of the information on the shapes, the last row of which holds the data.
+        Factors of the information on the shapes; their last row is the data.
     release : bool
         Whether this is the end of a pulse.
     """
@@ -163,30 +162,30 @@ class Posterior:
     def edge(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return first touch and begin of the contact, s, with their standard deviations.
 
-        From draws of kind, time and shape; flanks that no force has are left out.
+        From draws of kind, time and shape, without flanks that no force has.
         """
         kind = np.repeat(self.kinds, N_DRAW)
         total = np.repeat(self.weight.sum(axis=1), N_DRAW)
-        places = (np.arange(N_DRAW) + 0.5) / N_DRAW
-        at = np.ravel([np.searchsorted(one.cumsum(), places * one.sum()) for one in self.weight])
+        quantiles = (np.arange(N_DRAW) + 0.5) / N_DRAW
+        at = np.ravel([np.searchsorted(w.cumsum(), quantiles * w.sum()) for w in self.weight])
         at = np.minimum(at, len(self.time) - 1)
         touch = self.time[at]
         path = self._paths(kind, at)
         highest = np.where(kind[:, None] < N_SMOOTH, np.maximum.accumulate(path, axis=1), 0.0)
         delay = _crossing(path, THRESHOLD)
         fast = (delay <= FOOT_TIME) & (_crossing(path, FOOT) <= delay + FOOT_TIME)
-        chance = total * ((highest - path).max(axis=1) <= FALL) * fast
+        chance = total * ((highest - path).max(axis=1) <= MAX_FALL) * fast
         if not chance.any():
             chance = total
         chance /= chance.sum()
         jumps = chance @ (delay == 0)
         results = []
-        for value, cell, left in (
-            (touch, self._cell, LEFT[kind, int(self.release)]),
-            (touch + 1e-3 * delay, self._cell * jumps, LEFT[kind, 2]),
+        for value, cell, error in (
+            (touch, self._cell, ERRORS[kind, int(self.release)]),
+            (touch + 1e-3 * delay, self._cell * jumps, ERRORS[kind, 2]),
         ):
             mean = float(chance @ value)
-            results.append((mean, float(np.sqrt(chance @ ((value - mean) ** 2 + left**2) + cell))))
+            results.append((mean, float(np.sqrt(chance @ ((value - mean) ** 2 + error**2) + cell))))
         return results[0], results[1]
 
     @property
@@ -208,11 +207,11 @@ class Posterior:
 
 
 def find_touch(flank: Flank, low: float, high: float, searches: int) -> Posterior:
-    """Return what a flank tells of its first touch, which lies between two times, s."""
+    """Return the posterior of the first touch of a flank between two times, s."""
     level = flank.force / flank.peak
     whitening = []
-    for part in MISSED:
-        covariance = flank.covariance / flank.peak**2 + np.diag((part * level) ** 2)
+    for misfit in MISFIT:
+        covariance = flank.covariance / flank.peak**2 + np.diag((misfit * level) ** 2)
         factor = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
         inverse = solve_triangular(factor, np.eye(len(level)), lower=True, check_finite=False)
         whitening.append(inverse)
@@ -221,20 +220,20 @@ def find_touch(flank: Flank, low: float, high: float, searches: int) -> Posterio
     for search in range(searches):
         time = np.linspace(low, high, N_TIME)
         columns = _columns(table, 1e3 * (flank.time - time[:, None]), level)
-        found = [
+        evidence = [
             _evidence(columns, inverse, members)
             for inverse, members in zip(
                 whitening, (kinds[kinds < N_SMOOTH], kinds[kinds >= N_SMOOTH]), strict=True
             )
             if members.size
         ]
-        logarithm = np.concatenate([one for one, _ in found])
+        logarithm = np.concatenate([likelihood for likelihood, _ in evidence])
         logarithm += PRIOR[kinds, int(flank.release), None]
         weight = np.exp(logarithm - logarithm.max())
         weight /= weight.sum()
-        likely = weight.sum(axis=1) > LEAST
+        likely = weight.sum(axis=1) > MIN_PROBABILITY
         kinds, weight = kinds[likely], weight[likely]
-        factors = np.concatenate([one for _, one in found])[likely]
+        factors = np.concatenate([factor for _, factor in evidence])[likely]
         posterior = Posterior(time, kinds, weight, factors, flank.release)
         mean, deviation = _moments(time, weight.sum(axis=0))
         reach = REACH * deviation
@@ -245,7 +244,7 @@ def find_touch(flank: Flank, low: float, high: float, searches: int) -> Posterio
 
 
 def _moments(time: NDArray[np.float64], weight: NDArray[np.float64]) -> tuple[float, float]:
-    """Return mean and standard deviation of even times with weights."""
+    """Return mean and standard deviation of uniform times with weights."""
     mean = float(weight @ time)
     return mean, float(np.sqrt(weight @ (time - mean) ** 2 + (time[1] - time[0]) ** 2 / 12))
 
@@ -256,9 +255,9 @@ def _evidence(
     """Return logarithms of the likelihood by kind and time, and factors of the information.
 
     Columns: [n_time, n_cell, n_column], the last the force; the inverse of the factor of the
-    covariance of the noise whitens them. With D of the spreads, the information on shapes X of unit
-    deviation and the force y less its mean is [X y]'[X y] + diag(1, ..., 1, 0), and the last
-    diagonal element of its factor the root of the sum of squares that the shapes leave.
+    covariance of the noise whitens them. The information on shapes X of unit deviation and the
+    force y minus its mean is [X y]'[X y] + diag(1, ..., 1, 0), and the last diagonal element of its
+    factor the root of the residual sum of squares.
     """
     n_time, n_cell, n_column = columns.shape
     flat = np.moveaxis(columns, 1, 0).reshape(n_cell, -1)
@@ -280,23 +279,23 @@ def _crossing(path: NDArray[np.float64], level: float) -> NDArray[np.float64]:
     first = np.where(above.any(axis=1), np.argmax(above, axis=1), len(DELAY) - 1)
     before = np.maximum(first - 1, 0)
     rise = path[rows, first] - path[rows, before]
-    part = np.where(rise > 0, (level - path[rows, before]) / np.where(rise > 0, rise, 1), 1)
-    found = DELAY[before] + np.clip(part, 0, 1) * (DELAY[first] - DELAY[before])
-    return np.asarray(found, dtype=np.float64)
+    fraction = np.where(rise > 0, (level - path[rows, before]) / np.where(rise > 0, rise, 1), 1)
+    delay = DELAY[before] + np.clip(fraction, 0, 1) * (DELAY[first] - DELAY[before])
+    return np.asarray(delay, dtype=np.float64)
 
 
 @lru_cache(maxsize=8)
 def _normal_draws(count: int) -> NDArray[np.float64]:
     """Return normal draws: [N_DRAW, count]."""
     points = qmc.Sobol(count, seed=0).random(N_DRAW)
-    # Their order must not follow that of the times.
+    # Independent of the order of the times.
     return np.asarray(np.random.default_rng(0).permutation(ndtri(points)))
 
 
 @lru_cache(maxsize=4)
 def _table(interval: float, plate: Plate | None) -> NDArray[np.float64]:
     """Return the smoothed shapes of a flank at ticks around the touch: [n_tick, n_column]."""
-    ticks = np.arange(-round((BEFORE + GUARD) / TICK), round((BEHIND + GUARD) / TICK))
+    ticks = np.arange(-round((BEFORE + GUARD) / TICK), round((AFTER + GUARD) / TICK))
     tau = np.asarray(TICK * ticks, dtype=np.float64)
     total = np.zeros((len(tau), SPREADS.shape[1]))
     for weight, shift in zip(SMOOTHING, (-1, 0, 1), strict=True):
@@ -314,9 +313,9 @@ def _columns(
     table: NDArray[np.float64], tau: NDArray[np.float64], level: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the shapes at times since the touch, ms, and the force: [n_time, n_cell, n_column]."""
-    place = np.rint(tau / TICK).astype(int) + round(BEFORE / TICK)
+    index = np.rint(tau / TICK).astype(int) + round(BEFORE / TICK)
     result = np.empty((*tau.shape, table.shape[1] + 1))
-    result[..., :-1] = table[np.clip(place, 0, len(table) - 1)]
+    result[..., :-1] = table[np.clip(index, 0, len(table) - 1)]
     result[..., -1] = level
     return result
 
@@ -346,7 +345,7 @@ def _paths() -> NDArray[np.float64]:
 SPREADS = np.array([_spread(kind) for kind in KINDS])
 MEANS = np.zeros_like(SPREADS)
 MEANS[:, N_JUMP : N_JUMP + N_MEAN] = [kind.mean for kind in KINDS]
-# From shapes and force to shapes of unit deviation and the force less its mean, by kind.
+# From shapes and force to shapes of unit deviation and the force minus its mean, by kind.
 TURNS = np.zeros((len(KINDS), SPREADS.shape[1] + 1, SPREADS.shape[1] + 1))
 TURNS[:, np.arange(SPREADS.shape[1]), np.arange(SPREADS.shape[1])] = SPREADS
 TURNS[:, :-1, -1] = -MEANS

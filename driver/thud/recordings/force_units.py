@@ -1,4 +1,4 @@
-"""Units of recorded values, and their conversion to newtons by a calibration."""
+"""Units of recorded values, and their calibration in newtons."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from thud.base.checks import refuse, refuse_value, shown
 
-# By unit: the unit it is a multiple of, and the multiple.
+# By unit: its base unit, and the factor.
 UNITS: dict[str, tuple[str, float]] = {
     "N": ("N", 1.0), "kN": ("N", 1e3), "MN": ("N", 1e6), "mN": ("N", 1e-3), "daN": ("N", 10.0),
     "kgf": ("N", 9.80665), "kp": ("N", 9.80665), "lbf": ("N", 4.4482216152605),
@@ -19,7 +19,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "pC": ("pC", 1.0), "nC": ("pC", 1e3),
     "counts": ("counts", 1.0), "FS": ("FS", 1.0),
 }  # fmt: skip
-# The unit of values of a file that names none.
+# Assumed unit of values without a unit.
 ASSUMED = "N?"
 # Other spellings, in lower case.
 SPELLINGS = {
@@ -34,13 +34,13 @@ EXAMPLES = "such as 250 (N per unit), '250 N/V', '4.1 pC/N, 10 mV/pC', '10 V/FS,
 FACTOR = re.compile(
     r"(?P<value>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<top>[^\s/]+)\s*/\s*(?P<bottom>.+)"
 )
-# Maximum number of factors of a chain, and sizes of N per unit that any plate has.
-MOST = 8
+# Maximum number of factors of a chain, and range of N per unit.
+MAX_FACTORS = 8
 SIZES = (1e-30, 1e30)
 
 
 class Factor(NamedTuple):
-    """A number of one unit per another, both without multiples."""
+    """A number of one base unit per another."""
 
     value: float
     top: str
@@ -57,9 +57,9 @@ class Calibration:
         Factors from the recorded unit to newtons, in any order: ``"250 N/V"``, or with a charge
         amplifier ``"4.1 pC/N, 10 mV/pC"``.
     uncertainty : float or None
-        Relative standard uncertainty; None where it is not known.
+        Relative standard uncertainty; None if unknown.
     origin : str
-        How it was found, in words.
+        Description of its source.
     """
 
     chain: str
@@ -77,7 +77,7 @@ class Calibration:
 
 
 def find_unit(text: str) -> str:
-    """Return the unit that a text names; empty where it names none.
+    """Return the unit that a text names, or an empty string.
 
     >>> find_unit("Newtons"), find_unit("mmHg")
     ('N', '')
@@ -114,35 +114,34 @@ def read_chain(text: object) -> list[Factor]:
             for side in ("top", "bottom")
         )
         factors.append(Factor(value * over / under, top, bottom))
-    if not 1 <= len(factors) <= MOST:
-        refuse(f"calibration: {len(factors)} factors", f"1 to {MOST}, {EXAMPLES}")
+    if not 1 <= len(factors) <= MAX_FACTORS:
+        refuse(f"calibration: {len(factors)} factors", f"1 to {MAX_FACTORS}, {EXAMPLES}")
     return factors
 
 
 def newtons_per_unit(
     unit: str, calibration: float | str | Calibration | None, counts: float | None, place: str
 ) -> tuple[float, str, float | None]:
-    """Return N per unit of the values, how that was found in words, and its relative uncertainty.
-
-    The uncertainty is None where it is not known.
+    """Return N per unit of the values, its description, and its relative uncertainty or None.
 
     Parameters
     ----------
     unit
-        Unit of the values, `ASSUMED`, or empty where a number of N per value is given.
+        Unit of the values, `ASSUMED`, or empty if the calibration is a number of N per value.
     calibration
-        N per unit, a chain of factors, or None where the values are forces.
+        N per unit, a chain of factors, or None if the values are forces.
     counts
-        Counts of full scale where the values are integers, else None.
+        Counts of full scale if the values are integers, else None.
     place
         File and channel, for messages.
     """
     if unit == ASSUMED:
-        return 1.0, "values taken to be in N", None
+        return 1.0, "values assumed to be in N", None
     base, multiple = UNITS.get(unit, ("", 1.0))
     if calibration is None:
         if base != "N":
-            refuse(f"{place}: the values are in {unit}: a calibration is needed", EXAMPLES)
+            words = {"FS": "full-scale values"}.get(unit, f"values in {unit}")
+            refuse(f"{place}: enter a calibration: the file holds {words}", EXAMPLES)
         return multiple, f"values in {unit}", None
     if isinstance(calibration, int | float | np.number) and not isinstance(calibration, bool):
         if not SIZES[0] < abs(calibration) < SIZES[1]:
@@ -151,14 +150,14 @@ def newtons_per_unit(
     known = calibration if isinstance(calibration, Calibration) else Calibration(str(calibration))
     factors = read_chain(known.chain)
     scale = Factor(counts, "counts", "FS") if counts else None
-    found = _follow(base, factors, scale)
-    if found is None:
+    size = _follow(base, factors, scale)
+    if size is None:
         refuse(
             f"{place}: calibration {known.chain!r} does not lead from {unit} to N by all its "
             "factors",
             EXAMPLES,
         )
-    value = found * multiple
+    value = size * multiple
     if not math.isfinite(value) or not SIZES[0] < abs(value) < SIZES[1]:
         refuse(f"{place}: calibration {known.chain!r} gives {value:g} N per {unit}", EXAMPLES)
     words = f"{known.chain}: {value:.6g} N per {unit}" + (f" ({known.origin})" * bool(known.origin))
@@ -166,12 +165,12 @@ def newtons_per_unit(
 
 
 def _follow(unit: str, factors: list[Factor], scale: Factor | None) -> float | None:
-    """Return N per unit by a path that takes each factor once, that of full scale if need be."""
+    """Return N per unit by a path that uses each factor once, and full scale if necessary."""
     if unit == "N" and not factors:
         return 1.0
     for i, (value, top, bottom) in enumerate(factors):
         others = factors[:i] + factors[i + 1 :]
-        # An amplifier, 10 V/V, is undone.
+        # An amplifier, 10 V/V, is inverted.
         for start, end, step in ((top, bottom, 1 / value), (bottom, top, value)):
             if start == unit and (rest := _follow(end, others, scale)) is not None:
                 return step * rest

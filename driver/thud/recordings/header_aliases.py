@@ -1,4 +1,4 @@
-"""Words of headers: what loggers call sample rate, sampling interval, date, unit and time."""
+"""Aliases in headers for sample rate, sampling interval, date, unit and time."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ NUMBER = re.compile(
     rf"(?P<number>[-+]?[\d.,](?:[\d.,{GROUPING}]*[\d.,])?(?:e[-+]?\d+)?)\s*(?P<unit>.*)",
     re.IGNORECASE,
 )
-# Longer titles and values carry no such words.
-LONGEST = 200
+# Maximum length of a title or value.
+MAX_LENGTH = 200
 
 
 def plain(name: str) -> str:
@@ -63,18 +63,18 @@ def plain(name: str) -> str:
     >>> plain("Sample_Rate ")
     'samplerate'
     """
-    return "".join(c for c in name[:LONGEST].casefold() if c.isalnum())
+    return "".join(c for c in name[:MAX_LENGTH].casefold() if c.isalnum())
 
 
 def split_title(title: str) -> tuple[str, str]:
-    """Return name and unit of a title; the unit is empty where there is none.
+    """Return name and unit of a title; the unit is empty if there is none.
 
     >>> split_title("Force [kN]")
     ('Force', 'kN')
     >>> split_title("time_s")
     ('time', 's')
     """
-    text = title.strip().strip("\"'").strip()[:LONGEST]
+    text = title.strip().strip("\"'").strip()[:MAX_LENGTH]
     bracket, loose = (pattern.fullmatch(text) for pattern in TITLE)
     if bracket:
         return bracket["name"].strip(), bracket["unit"].strip()
@@ -84,17 +84,17 @@ def split_title(title: str) -> tuple[str, str]:
 
 
 def read_number(text: object, decimal: str = "") -> tuple[float, str] | None:
-    """Return a number and the unit after it; None where there is no number.
+    """Return a number and the unit after it; None if there is no number.
 
-    Where both decimal marks fit, the given one is meant. Without one it is the point, and a number
-    such as 51,200, which may have either, is none.
+    If both decimal marks fit, `decimal` decides; without it, the point does, and an ambiguous
+    number such as 51,200 is none.
 
     >>> read_number("51,2 kHz")
     (51.2, 'kHz')
     """
     if isinstance(text, int | float):
         return float(text), ""
-    found = NUMBER.fullmatch(str(text).strip().strip("\"'").strip()[:LONGEST])
+    found = NUMBER.fullmatch(str(text).strip().strip("\"'").strip()[:MAX_LENGTH])
     if not found:
         return None
     values = {mark: to_number(found["number"], mark) for mark in MARKS}
@@ -106,9 +106,9 @@ def read_number(text: object, decimal: str = "") -> tuple[float, str] | None:
 
 
 def find_rate(items: Iterable[tuple[str, object]], decimal: str = "") -> float | None:
-    """Return the sample rate, Hz, from names and values of a header; None where there is none.
+    """Return the sample rate, Hz, from names and values of a header; None if there is none.
 
-    The decimal mark is that of `read_number`.
+    The decimal mark is as for `read_number`.
     """
     for title, value in items:
         name, unit = split_title(title)
@@ -116,31 +116,31 @@ def find_rate(items: Iterable[tuple[str, object]], decimal: str = "") -> float |
         number = read_number(value, decimal) if word in RATE or word in STEP else None
         if number is None or not number[0] > 0:
             continue
-        given = (number[1] or unit).casefold()
-        if word in RATE and given in RATE_UNITS:
-            return number[0] * RATE_UNITS[given]
-        if word in STEP and given in TIME_UNITS:
-            rate = 1 / (number[0] * TIME_UNITS[given])
+        own_unit = (number[1] or unit).casefold()
+        if word in RATE and own_unit in RATE_UNITS:
+            return number[0] * RATE_UNITS[own_unit]
+        if word in STEP and own_unit in TIME_UNITS:
+            rate = 1 / (number[0] * TIME_UNITS[own_unit])
             return rate if math.isfinite(rate) else None
     return None
 
 
 def find_word(items: Iterable[tuple[str, object]], words: frozenset[str]) -> str:
-    """Return the first value of a header whose name is among words; empty where there is none."""
+    """Return the first value of a header whose name is among aliases, or an empty string."""
     for title, value in items:
         if plain(split_title(title)[0]) in words and str(value).strip():
-            return str(value).strip().strip("\"'")[:LONGEST]
+            return str(value).strip().strip("\"'")[:MAX_LENGTH]
     return ""
 
 
 def is_time(title: str) -> bool:
-    """Whether a title is that of a column of times."""
+    """Whether a title names a column of times."""
     name, unit = split_title(title)
     return plain(name) in TIME or (unit.casefold() in TIME_UNITS and unit not in {"", *UNITS})
 
 
 def text_of(value: object) -> str:
-    """Return an attribute as text: bytes, text, a number, or an array with one of these."""
+    """Return an attribute as text: bytes, text, a number, or an array with one element."""
     item: np.ndarray | object = value
     if hasattr(item, "tolist"):
         item = item.tolist()

@@ -9,12 +9,12 @@ from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
+from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from thud.base.checks import refuse
 from thud.base.errors import NumericalError
 from thud.base.processes import no_interrupt_in_processes, process_pool
-from thud.base.threads import limit_threads, one_thread
 from thud.recordings.checkpoint import Checkpoint
 from thud.recordings.drops import find_windows
 from thud.recordings.measured_drop import measure_drop
@@ -88,7 +88,7 @@ def measure_signals(
     uncertainties: list[float | None] = []
     # Threads slow down the many small products.
     keeping = nullcontext(keep) if isinstance(keep, Checkpoint) else Checkpoint(keep)
-    with one_thread(), keeping as kept, _Processes(workers) as processes:
+    with threadpool_limits(1, "blas"), keeping as kept, _Processes(workers) as processes:
         for given in signals:
             signal = given
             if config.calibration_uncertainty is not None:
@@ -145,7 +145,9 @@ class _Processes(ExitStack):
         """Start the processes if they pay off, without waiting for them."""
         if not worth or self.workers < 2 or self._pool:  # noqa: PLR2004 - 1 is this process
             return
-        self._pool = self.enter_context(process_pool(self.workers, limit_threads))
+        self._pool = self.enter_context(
+            process_pool(self.workers, partial(threadpool_limits, 1, "blas"))
+        )
         with no_interrupt_in_processes():
             for _ in range(self.workers):
                 self._pool.submit(int)

@@ -14,17 +14,17 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Probability that any of several drops that differ by chance is marked.
+# Probability that a drop that differs by chance is marked.
 SIGNIFICANCE = 0.05
-# Expanded uncertainty of 95 % over the standard one.
+# Expanded uncertainty (95 %) over the standard uncertainty.
 EXPANDED = 1.96
-# Deviation, in the unit of the values, that is rounding and marks no drop.
+# Deviation due to rounding, in the unit of the values, which marks no drop.
 ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class Outlier:
-    """A drop that differs from the others by more than chance: marked, never left out.
+    """A drop that differs from the others by more than chance: marked, never excluded.
 
     Attributes
     ----------
@@ -60,33 +60,33 @@ def find_outliers(
     """Return the drops whose value differs from that of the others.
 
     Grubbs' two-sided test, exact for three and more normal values; with ten or more values,
-    Rosner's generalisation looks for one outlier in five. A deviation within the expanded
+    Rosner's generalization searches one outlier in five. A deviation within the expanded
     uncertainty (1.96 times the standard one) of the value itself marks no drop.
 
     Parameters
     ----------
     values : array_like, shape (n_drop,)
-        Values; those that are not finite are left out.
+        Values; those that are not finite are excluded.
     names
         Names of the drops.
     quantity
-        What the values are, for the message.
+        Quantity, for the message.
     uncertainty : array_like, shape (n_drop,), optional
-        Standard uncertainties of the values alone.
+        Standard uncertainties of the values.
     significance
-        Probability that any of the drops is marked where all differ by chance.
+        Probability that a drop is marked if all differ by chance.
     """
     data = np.asarray(values, dtype=np.float64)
     own = np.zeros(data.shape) if uncertainty is None else np.nan_to_num(uncertainty)
-    rest = np.flatnonzero(np.isfinite(data))
+    remaining = np.flatnonzero(np.isfinite(data))
     removed: list[Outlier] = []
     last = 0
-    for step in range(max(1, len(rest) // 5)):
-        count = len(rest)
-        if count < 3:  # noqa: PLR2004 - two values lie at the same distance of their mean
+    for step in range(max(1, len(remaining) // 5)):
+        count = len(remaining)
+        if count < 3:  # noqa: PLR2004 - two values have the same distance from their mean
             break
-        mean, deviation = data[rest].mean(), data[rest].std(ddof=1)
-        worst = int(rest[np.argmax(np.abs(data[rest] - mean))])
+        mean, deviation = data[remaining].mean(), data[remaining].std(ddof=1)
+        worst = int(remaining[np.argmax(np.abs(data[remaining] - mean))])
         distance = abs(data[worst] - mean)
         if distance <= ROUNDING:
             break
@@ -94,7 +94,7 @@ def find_outliers(
         critical = (count - 1) / math.sqrt(count) * quantile / math.sqrt(count - 2 + quantile**2)
         score = distance / deviation
         removed.append(Outlier(names[worst], quantity, float(data[worst]), score, critical))
-        rest = rest[rest != worst]
+        remaining = remaining[remaining != worst]
         # Rosner: all up to the last that exceeds its critical value are outliers.
         if score > critical and distance > EXPANDED * own[worst]:
             last = step + 1

@@ -39,7 +39,7 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     workers: int = 1,
     keep: str | os.PathLike[str] | Checkpoint | None = None,
 ) -> Recording:
-    """Read recorded drops of one source, from any number of files with one or many drops each.
+    """Measure recorded drops of one source, from files with one or more drops each.
 
     Parameters
     ----------
@@ -56,20 +56,20 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     channel, unit, calibration, polarity, sample_rate
         As `open_signals` takes them.
     calibration_uncertainty
-        Relative standard uncertainty of the force, wherever its calibration comes from.
+        Relative standard uncertainty of the force.
     low_pass
         Whether levels are those of the force below 1.25 kHz, as in the paper.
     config
-        Configuration of the laboratory, or its file; the other arguments come first.
+        Configuration of the laboratory, or its file; the other arguments have precedence.
     progress
         Show progress bars.
     workers
-        Processes that measure the drops of one file. Scripts that ask for more than one run their
-        own work below ``if __name__ == "__main__":``.
+        Processes that measure the drops of one file. Scripts with more than one need
+        ``if __name__ == "__main__":``.
     keep
-        Directory in which measured drops are kept while others are measured. After an interrupt
-        the same call measures only what is left; files or a configuration that have changed begin
-        again. At the end nothing of them is left; a `Checkpoint` has them until it is closed.
+        Directory of measured drops while others are measured, or a `Checkpoint`. After an interrupt
+        the same call measures the remaining drops, if neither files nor configuration have changed.
+        They are removed at the end, those of a `Checkpoint` when it is closed.
 
     Returns
     -------
@@ -78,29 +78,29 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     Raises
     ------
     InputError
-        One sentence: what cannot be read or measured.
+        Where a file cannot be read or a drop cannot be measured.
     """
-    known = config if isinstance(config, Config) else read_config(config) if config else Config()
-    given: dict[str, Any] = {
+    settings = config if isinstance(config, Config) else read_config(config) if config else Config()
+    stated: dict[str, Any] = {
         "height": height, "mass": mass, "height_uncertainty": height_uncertainty,
         "mass_uncertainty": mass_uncertainty, "source": source, "channel": channel, "unit": unit,
         "calibration": calibration, "calibration_uncertainty": calibration_uncertainty,
         "polarity": polarity, "sample_rate": sample_rate, "low_pass": low_pass,
     }  # fmt: skip
-    given = {key: value for key, value in given.items() if value is not None}
+    stated = {key: value for key, value in stated.items() if value is not None}
     require_whole("workers", workers, 1, MAX_THREADS)
-    known = replace(known, **given)
+    settings = replace(settings, **stated)
     files = [paths] if isinstance(paths, str | os.PathLike) else paths
     signals = (
         signal
         for path in files
         for signal in open_signals(
             path,
-            channel=known.channel,
-            unit=known.unit,
-            calibration=known.calibration,
-            polarity=known.polarity,
-            sample_rate=known.sample_rate,
+            channel=settings.channel,
+            unit=settings.unit,
+            calibration=settings.calibration,
+            polarity=settings.polarity,
+            sample_rate=settings.sample_rate,
         )
     )
-    return Recording.from_signals(signals, known, progress=progress, workers=workers, keep=keep)
+    return Recording.from_signals(signals, settings, progress=progress, workers=workers, keep=keep)

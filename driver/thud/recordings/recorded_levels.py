@@ -24,26 +24,26 @@ if TYPE_CHECKING:
     from thud.recordings.measured_drop import Drop
 
 METHODS = ("exact", "fft", "filter")
-# Level above the background, dB, below which a level is only an upper bound, and below which the
-# standards demand the correction (ISO 10140-4, ISO 16283-2).
+# Levels above the background, dB: below the first a level is an upper bound, below the second the
+# standards require the correction (ISO 10140-4, ISO 16283-2).
 BACKGROUND = (6.0, 15.0)
-# Silence on both sides of the gate for what the low-pass spreads, s: what lies beyond moves no
-# octave by more than 2e-4 dB at 8 kHz and above, 3e-3 dB below.
+# Zeros on both sides of the gate for the response of the low-pass, s: the rest changes an octave by
+# at most 2e-4 dB at 8 kHz and above, 3e-3 dB below.
 MARGIN = 3e-3
 # dB per relative change of an energy.
 ENERGY_DECIBEL = 10 / math.log(10)
-# Contributions that differ from drop to drop, so that the scatter of drops shows them.
+# Contributions that differ from drop to drop, which the scatter of drops includes.
 WITHIN_REPEATABILITY = ("noise",)
 
 
 @dataclass(frozen=True, eq=False)
-class LevelEstimate(Immutable):
+class DropLevels(Immutable):
     """Levels of one drop.
 
     Attributes
     ----------
     name, bands, method : str
-        Name of the drop, ``"octave"`` or ``"third"``, and how the levels were measured.
+        Name of the drop, ``"octave"`` or ``"third"``, and method of the levels.
     level : ndarray, shape (n_band,)
         Force exposure levels, dB, corrected for the background.
     uncertainty : ndarray, shape (n_band,)
@@ -57,7 +57,7 @@ class LevelEstimate(Immutable):
     contributions : dict of ndarray, shape (n_band,)
         Standard uncertainties, dB: noise, method, filter.
     steps : tuple of str
-        What was done, a sentence each.
+        Processing, a sentence each.
     """
 
     name: str
@@ -89,12 +89,12 @@ class AverageLevels(Immutable):
     uncertainty : ndarray, shape (n_band,)
         Combined standard uncertainty, dB.
     flag : ndarray of str, shape (n_band,)
-        As that of a drop, from the mean energies.
+        As for a drop, from the mean energies.
     spread : ndarray, shape (n_band,)
         Standard deviation of the drops' levels, dB; NaN for a single drop.
     contributions : dict of ndarray, shape (n_band,)
         Standard uncertainties of the average, dB. The repeatability, of ``n_drop - 1`` degrees of
-        freedom, holds the noise, which differs from drop to drop, where it is known.
+        freedom, includes the noise, which differs from drop to drop.
     outliers : tuple of Outlier
         Drops that differ from the others.
     """
@@ -118,12 +118,12 @@ def measure_levels(
     method: str = "exact",
     *,
     low_pass: bool = False,
-) -> list[LevelEstimate]:
+) -> list[DropLevels]:
     """Return the levels of drops, corrected for the background, with their uncertainty.
 
-    The force within the gate of each drop is taken; outside, it is zero. All methods read this
-    force: ``"exact"`` its band energy, ``"fft"`` the 1 Hz bins of a window of 1 s, ``"filter"`` the
-    energy behind filters of class 1. The expected energy of the noise is subtracted.
+    The force is zero outside the gate of each drop. ``"exact"`` is its band energy, ``"fft"`` the
+    sum of the 1 Hz bins of a window of 1 s, ``"filter"`` the energy after filters of class 1. The
+    expected energy of the noise is subtracted.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def measure_levels(
     method
         ``"exact"``, ``"fft"`` or ``"filter"``.
     low_pass
-        Whether the force is low-passed at 1.25 kHz before, as in the paper.
+        Low-pass the force at 1.25 kHz before, as in the paper.
 
     Raises
     ------
@@ -144,14 +144,14 @@ def measure_levels(
     require_choice("method", method, METHODS)
     noise = band_noise(drops, get_bands(bands))
     return [
-        _drop_levels(drop, bands, method, one, low_pass=low_pass)
-        for drop, one in zip(drops, noise, strict=True)
+        _drop_levels(drop, bands, method, energies, low_pass=low_pass)
+        for drop, energies in zip(drops, noise, strict=True)
     ]
 
 
 def _drop_levels(
     drop: Drop, bands: BandSet, method: str, noise: NDArray[np.float64], *, low_pass: bool
-) -> LevelEstimate:
+) -> DropLevels:
     """Return the levels of a drop from the energies of its noise, [n_band, 2]."""
     force, steps = _gated(drop, low_pass=low_pass)
     rate, edges = drop.sample_rate, get_bands(bands)
@@ -167,7 +167,7 @@ def _drop_levels(
         "filter": low_pass_attenuation(edges.upper, rate) / math.sqrt(3) * low_pass,
     }
     steps = (*steps, f"levels: {_DESCRIPTIONS[method]}", *_background_steps(edges.nominal, flag))
-    return LevelEstimate(
+    return DropLevels(
         drop.name, bands, method, level, _root_sum(contributions), measured, background, flag,
         contributions, steps,
     )  # fmt: skip
@@ -181,7 +181,7 @@ def compare_methods(
     return {method: _levels(force, drop.sample_rate, bands, method) for method in METHODS}
 
 
-def average_levels(estimates: Sequence[LevelEstimate]) -> AverageLevels:
+def average_levels(estimates: Sequence[DropLevels]) -> AverageLevels:
     """Return the energy average of the levels of drops, their spread and their outliers.
 
     Raises
@@ -202,10 +202,11 @@ def average_levels(estimates: Sequence[LevelEstimate]) -> AverageLevels:
     weights /= weights.sum(axis=0)
     contributions = {}
     for name in first.contributions:
-        parts = weights * np.array([e.contributions[name] for e in estimates])
-        # Relative to the energy of the average, as the energies of the drops add.
-        own = name in WITHIN_REPEATABILITY
-        contributions[name] = np.sqrt((parts**2).sum(axis=0)) if own else parts.sum(axis=0)
+        weighted = weights * np.array([e.contributions[name] for e in estimates])
+        independent = name in WITHIN_REPEATABILITY
+        contributions[name] = (
+            np.sqrt((weighted**2).sum(axis=0)) if independent else weighted.sum(axis=0)
+        )
     if count > 1:
         error = energies.std(axis=0, ddof=1) / math.sqrt(count)
         error *= ENERGY_DECIBEL / 10 ** (level / 10)
@@ -229,7 +230,7 @@ _DESCRIPTIONS = {
 
 
 def _gated(drop: Drop, *, low_pass: bool) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    """Return the force of the gate, low-passed with some silence on both sides, and the steps."""
+    """Return the force of the gate, if low-passed with zeros on both sides, and the steps."""
     first, stop = drop.gate
     force = drop.force[first:stop]
     begin, end = 1e3 * drop.time[[first, stop - 1]]
@@ -255,8 +256,8 @@ def _corrected(
 ) -> tuple[NDArray[np.float64], NDArray[np.str_]]:
     """Return levels corrected for the background, and flags.
 
-    Below 6 dB the correction is that at 6 dB. The standards ask for none above 15 dB; it is made
-    there too, up to 0.14 dB, as the measured energy is too large by that of the noise.
+    Below 6 dB the correction is that at 6 dB. Above 15 dB, where the standards require none, it is
+    applied too, up to 0.14 dB.
     """
     low, high = BACKGROUND
     above = measured - background
@@ -267,25 +268,25 @@ def _corrected(
 
 def _root_sum(contributions: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
     """Return the combined standard uncertainty."""
-    return np.asarray(np.sqrt(np.sum([part**2 for part in contributions.values()], axis=0)))
+    return np.asarray(np.sqrt(np.sum([value**2 for value in contributions.values()], axis=0)))
 
 
 def _background_steps(nominal: NDArray[np.float64], flag: NDArray[np.str_]) -> tuple[str, ...]:
-    """Return sentences on the correction for the background."""
-    words = {
+    """Return notes on the correction for the background."""
+    texts = {
         "corrected": "corrected for the background, 6 to 15 dB below",
         "background": "less than 6 dB above the background, an upper bound",
         "rate": "not measured, the sample rate is too low",
     }
     return tuple(
-        f"{', '.join(f'{f:g}' for f in nominal[flag == key])} Hz: {what}"
-        for key, what in words.items()
+        f"{', '.join(f'{f:g}' for f in nominal[flag == key])} Hz: {text}"
+        for key, text in texts.items()
         if (flag == key).any()
     )
 
 
 def _level_outliers(
-    estimates: Sequence[LevelEstimate], drops: NDArray[np.float64]
+    estimates: Sequence[DropLevels], drops: NDArray[np.float64]
 ) -> tuple[Outlier, ...]:
     """Return the outliers in any band, at 5 % for all bands together (Bonferroni)."""
     nominal = get_bands(estimates[0].bands).nominal

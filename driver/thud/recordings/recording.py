@@ -1,4 +1,4 @@
-"""A recording: drops of one source, measured, and what the standards say of it."""
+"""A recording: measured drops of one source, and their assessment."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ if TYPE_CHECKING:
 class Recording(Displayed):
     """Recorded drops of one source.
 
-    Where one force is asked for (`time`, `force`, comparisons, fits) it is that of the first drop;
-    levels and the other numbers are averages over all drops.
+    `time` and `force`, also in comparisons and fits, are those of the first drop; levels and other
+    numbers are averages over all drops.
 
     Attributes
     ----------
@@ -64,9 +64,9 @@ class Recording(Displayed):
     origins : tuple of Origin
         The files.
     config : Config
-        What the laboratory says; mass, kg, and height, m, may be None.
+        Statements of the laboratory; mass, kg, and height, m, may be None.
     calibration_uncertainty : float or None
-        Relative standard uncertainty of the force; None where it is not known.
+        Relative standard uncertainty of the force; None if unknown.
     """
 
     name: str
@@ -88,7 +88,7 @@ class Recording(Displayed):
         return self.assess().rows()
 
     @classmethod
-    def from_array(  # noqa: PLR0913 - what a laboratory knows
+    def from_array(  # noqa: PLR0913 - keys of the configuration
         cls,
         force: ArrayLike,
         sample_rate: float,
@@ -105,16 +105,16 @@ class Recording(Displayed):
         Parameters
         ----------
         force : array_like, shape (n_sample,)
-            Force, N, positive in compression, with quiet before and after each drop.
+            Force, N, positive in compression, with background before and after each drop.
         sample_rate
             Samples per second, Hz.
         height, mass, height_uncertainty, mass_uncertainty, calibration_uncertainty, name
-            As `read_recording` takes them.
+            As for `read_recording`.
 
         Raises
         ------
         InputError
-            One sentence: what cannot be measured.
+            Where a drop cannot be measured.
         """
         config = Config(
             height=height,
@@ -137,12 +137,12 @@ class Recording(Displayed):
         workers: int = 1,
         keep: str | os.PathLike[str] | Checkpoint | None = None,
     ) -> Recording:
-        """Measure the drops of signals; the other arguments are those of `read_recording`.
+        """Measure the drops of signals; other arguments as for `read_recording`.
 
         Raises
         ------
         InputError
-            One sentence: what cannot be measured.
+            Where a drop cannot be measured.
         """
         drops, origins, uncertainty = measure_signals(
             signals, checked_config(config), progress=progress, workers=workers, keep=keep
@@ -165,7 +165,7 @@ class Recording(Displayed):
         """Time of first touch, s: 0."""
         return 0.0
 
-    def assessed_force(self, force: LevelsForce | None = None) -> LevelsForce:  # noqa: ARG002 - there is one
+    def assessed_force(self, force: LevelsForce | None = None) -> LevelsForce:  # noqa: ARG002 - of the protocol
         """Return the force that a force plate measures: ``"floor"``."""
         return "floor"
 
@@ -210,7 +210,7 @@ class Recording(Displayed):
 
     @property
     def restitution(self) -> float:
-        """Mean coefficient of restitution; NaN where it is not known."""
+        """Mean coefficient of restitution; NaN if unknown."""
         return self.estimates["restitution"].value
 
     @property
@@ -225,7 +225,7 @@ class Recording(Displayed):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is doubtful: of the whole, of files and of drops; a sentence each."""
+        """What may be wrong with the recording, its files and drops, a sentence each."""
         found = [*self.own_warnings, *map(str, self.outliers)]
         found += [warning for one in self.origins for warning in one.warnings]
         found += [f"{drop.name}: {warning}" for drop in self.drops for warning in drop.warnings]
@@ -233,17 +233,19 @@ class Recording(Displayed):
 
     @cached_property
     def own_warnings(self) -> tuple[str, ...]:
-        """What is doubtful of the recording as a whole; a sentence each."""
-        config, found = self.config, list[str]()
+        """What may be wrong with the recording as a whole, a sentence each."""
+        config, warnings = self.config, list[str]()
         if math.isnan(self.estimates["peaks"].value):
-            found.append("the number of peaks is not known: noise may have made some")
+            warnings.append("the number of peaks is unknown: some may be noise")
         known = sum(math.isfinite(drop.restitution.value) for drop in self.drops)
         if 0 < known < len(self.drops):
-            found.append(f"the restitution is known of {known} of {len(self.drops)} drops")
-        found += check_restitution(self.drops, config.conditions(self.calibration_uncertainty))
+            warnings.append(f"the restitution of {known} of {len(self.drops)} drops is known")
+        warnings += check_restitution(self.drops, config.conditions(self.calibration_uncertainty))
         if config.mass is None and math.isfinite(self.estimates["mass"].value):
-            found.append("the mass is not given: the effective mass is judged")
-        found += [f"force plate: {one.sentence}" for one in config.plate_checks if one.met is False]
+            warnings.append("the mass is not stated: the effective mass is assessed")
+        warnings += [
+            f"force plate: {one.sentence}" for one in config.plate_checks if one.met is False
+        ]
         plate = config.resonance
         missing = {
             "calibration": self.calibration_uncertainty is None,
@@ -252,13 +254,13 @@ class Recording(Displayed):
             "drop height": config.height is not None and config.height_uncertainty is None,
         }
         if any(missing.values()):
-            words = ", ".join(what for what in missing if missing[what])
-            found.append(f"uncertainty not stated, and not included: {words}")
-        return tuple(found)
+            names = ", ".join(name for name in missing if missing[name])
+            warnings.append(f"uncertainty not stated, and not included: {names}")
+        return tuple(warnings)
 
     @property
     def steps(self) -> tuple[str, ...]:
-        """What was done to the signals; a sentence each."""
+        """Processing of the signals, a sentence each."""
         found = [f"{one.name}: {step}" for one in self.origins for step in one.steps]
         found += [f"{drop.name}: {step}" for drop in self.drops for step in drop.steps]
         found += self.level_steps
@@ -266,35 +268,30 @@ class Recording(Displayed):
 
     @property
     def level_steps(self) -> tuple[str, ...]:
-        """What was done to the forces before their levels were measured; a sentence each."""
+        """Processing of the forces before their levels were measured, a sentence each."""
         if not self.config.low_pass:
             return ()
         rates = dict.fromkeys(drop.sample_rate for drop in self.drops)
         return tuple(dict.fromkeys(f"levels: {describe_low_pass(rate)}" for rate in rates))
 
-    def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - there is one
+    def quantity(self, name: str) -> float:
+        """Return a quantity of the table by its name, SI units; NaN if unknown."""
+        return float(getattr(self, name, math.nan))
+
+    def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - of the protocol
         """Return the force of the first drop, corrected, N, shape (n_sample,), for any `kind`."""
         return self.drops[0].force
 
-    def peak(self, force: LevelsForce | None = None) -> float:  # noqa: ARG002 - there is one
+    def peak(self, force: LevelsForce | None = None) -> float:  # noqa: ARG002 - of the protocol
         """Return the mean maximum force, N."""
         return self.peak_force
 
     def average(self, bands: BandSet = "octave", method: str = "exact") -> AverageLevels:
-        """Return the energy average of the levels of the drops, with its uncertainty.
-
-        Parameters
-        ----------
-        bands
-            ``"octave"`` or ``"third"``.
-        method
-            ``"exact"``, ``"fft"`` or ``"filter"``.
-        """
-        known = self._averages
-        if (bands, method) not in known:
-            found = measure_levels(self.drops, bands, method, low_pass=self.config.low_pass)
-            known[bands, method] = average_levels(found)
-        return known[bands, method]
+        """Return the energy average of the levels by ``"exact"``, ``"fft"`` or ``"filter"``."""
+        if (bands, method) not in self._averages:
+            levels = measure_levels(self.drops, bands, method, low_pass=self.config.low_pass)
+            self._averages[bands, method] = average_levels(levels)
+        return self._averages[bands, method]
 
     @cached_property
     def _averages(self) -> dict[tuple[str, str], AverageLevels]:
@@ -304,18 +301,18 @@ class Recording(Displayed):
         self,
         bands: BandSet = "octave",
         method: str | None = None,
-        force: LevelsForce | None = None,  # noqa: ARG002 - there is one
+        force: LevelsForce | None = None,  # noqa: ARG002 - of the protocol
     ) -> NDArray[np.float64]:
         """Return the force exposure levels, energy average of the drops, dB, shape (n_band,)."""
         return self.average(bands, method or self.level_method).level.copy()
 
     def agreement(self, bands: BandSet = "octave") -> dict[str, NDArray[np.float64]]:
         """Return the largest deviation of each method from ``"exact"`` in any drop, dB."""
-        low = self.config.low_pass
-        found = [compare_methods(drop, bands, low_pass=low) for drop in self.drops]
+        low_pass = self.config.low_pass
+        levels = [compare_methods(drop, bands, low_pass=low_pass) for drop in self.drops]
         return {
-            method: np.max([np.abs(one[method] - one["exact"]) for one in found], axis=0)
-            for method in found[0]
+            method: np.max([np.abs(one[method] - one["exact"]) for one in levels], axis=0)
+            for method in levels[0]
         }
 
     @cached_property
@@ -327,12 +324,12 @@ class Recording(Displayed):
     def outliers(self) -> tuple[Outlier, ...]:
         """Drops that differ in a level, the contact time, the restitution or the peak.
 
-        None is left out. Levels share a significance of 5 %, and so do the others.
+        They are not excluded. Levels share a significance of 5 %, and so do the others.
         """
         return (*self.average().outliers, *find_deviant(self.drops))
 
     def level_estimates(self, bands: BandSet = "octave") -> tuple[Estimate, ...]:
-        """Return the average levels with all that makes them uncertain, dB, shape (n_band,)."""
+        """Return the average levels with their uncertainty budgets, dB, shape (n_band,)."""
         plate = self.config.resonance
         return level_estimates(
             self.average(bands),
@@ -343,17 +340,9 @@ class Recording(Displayed):
     def assess(
         self,
         source: LimitsSource | None = None,
-        force: LevelsForce | None = None,  # noqa: ARG002 - there is one
+        force: LevelsForce | None = None,  # noqa: ARG002 - of the protocol
     ) -> Verdict:
-        """Return the verdict of the standards at 95 %, with the limits of the configuration.
-
-        Parameters
-        ----------
-        source
-            ``"rubber_ball"`` or ``"tyre"``; by default that of the configuration.
-        force
-            Not used: a force plate measures the force on the floor.
-        """
+        """Assess a source, by default that of the configuration, at 95 % by its limits."""
         return assess(
             self.level_estimates(),
             source=source or self.config.source,

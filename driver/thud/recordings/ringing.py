@@ -1,4 +1,4 @@
-"""Ringing of the plate after a contact, where its resonance is not taken out."""
+"""Ringing of a plate after a contact, if its resonance is not corrected."""
 
 from __future__ import annotations
 
@@ -13,69 +13,69 @@ if TYPE_CHECKING:
     from thud.recordings.contact import Contact
     from thud.recordings.plate import Plate
 
-# Times in which a ringing may fall to 1/e, s.
+# Decay times of a ringing to 1/e, s.
 DECAYS = np.array([0.002, 0.004, 0.008, 0.016, 0.032])
-# Quiet between the gate and what is looked at, s: soft releases end in it; and the least after it.
+# Pause after the gate, in which soft releases end, and minimum length after it, s.
 PAUSE = 1e-3
-LEAST = 4e-3
-# Frequencies of a plate, Hz, up to a part of the rate: filters ring near to half of it.
-LOWEST = 200.0
-HIGHEST = 0.3
-# Energy over that of the noise: of about 6000 places one of noise alone exceeds it once in 1e7.
+MIN_LENGTH = 4e-3
+# Minimum frequency, Hz, and maximum one over the rate: filters ring near half of it.
+MIN_FREQUENCY = 200.0
+MAX_FREQUENCY = 0.3
+# Minimum energy over that of the noise: one of about 6000 points exceeds it by noise once in 1e7.
 CLEAR = 25.0
-# Energy over that of the quiet before, whose tones are no ringing.
+# Minimum energy over that before the contact, where tones are no ringing.
 OVER_BEFORE = 4.0
-# Amplitude that is worth a warning, as part of the peak: of a plate that nothing is said of, and
-# left by the correction; and the fewest oscillations.
+# Minimum amplitude of a warning over the peak, of an unstated plate and after the correction; and
+# minimum number of oscillations.
 NOTABLE = (3e-4, 1e-3)
-OSCILLATIONS = 3.0
+MIN_OSCILLATIONS = 3.0
 
 
 def check_ringing(contact: Contact, plate: Plate | None = None) -> tuple[str, ...]:
     """Return a warning if the plate keeps ringing after the contact, else an empty string.
 
-    A free oscillation A exp(-t/d) cos(2 pi f t + p) is looked for by its matched filter, for some
-    d and all f, in the quiet behind the gate. The density of the noise is that of the quiet, times
-    what the correction of a plate makes of it.
+    A matched filter searches a free oscillation A exp(-t/d) cos(2 pi f t + p) after the gate, for
+    some d and all f. The density of the noise is that of the background, times the gain of the
+    correction of a plate.
     """
     rate, first = contact.sample_rate, contact.span[0]
     pause = int(PAUSE * rate)
     after = contact.force[contact.gate[1] - first + pause :]
     before = contact.force[: max(contact.gate[0] - first - pause, 0)][::-1]
-    if len(after) < LEAST * rate:
+    if len(after) < MIN_LENGTH * rate:
         return ()
     frequency, energy = _matched(after, contact, plate)
-    k, place = np.unravel_index(np.argmax(energy), energy.shape)
-    found, decay = float(frequency[place]), float(DECAYS[k])
+    k, index = np.unravel_index(np.argmax(energy), energy.shape)
+    found, decay = float(frequency[index]), float(DECAYS[k])
     quality = np.pi * found * decay
-    if not (LOWEST <= found <= HIGHEST * rate and energy[k, place] > CLEAR):
+    if not (MIN_FREQUENCY <= found <= MAX_FREQUENCY * rate and energy[k, index] > CLEAR):
         return ()
-    if quality < OSCILLATIONS:
+    if quality < MIN_OSCILLATIONS:
         return ()
-    if len(before) >= LEAST * rate:
+    if len(before) >= MIN_LENGTH * rate:
         usual, same = _matched(before, contact, plate)
         at = int(np.argmin(np.abs(usual - found)))
-        if energy[k, place] < OVER_BEFORE * same[k, max(at - 1, 0) : at + 2].max():
+        if energy[k, index] < OVER_BEFORE * same[k, max(at - 1, 0) : at + 2].max():
             return ()
     density, _ = contact.background.density(found)
     density *= float(_gain(plate, np.array([found]))[0]) if plate else 1.0
     window = np.exp(-2 * np.arange(len(after)) / rate / decay).sum()
-    amplitude = 2 * np.sqrt(energy[k, place] * density * rate / 2 / window)
+    amplitude = 2 * np.sqrt(energy[k, index] * density * rate / 2 / window)
     if amplitude < NOTABLE[plate is not None] * contact.peak:
         return ()
-    # Between the lines of the transform: the vertex of a parabola.
-    low, top, high = np.log(energy[k, place - 1 : place + 2])
+    # Between the frequencies of the transform: the vertex of a parabola.
+    low, top, high = np.log(energy[k, index - 1 : index + 2])
     found += (frequency[1] - frequency[0]) * (low - high) / (2 * (low - 2 * top + high))
     stated = "is not the one of [plate]" if plate else "is in levels, peaks and contact time"
-    told = (
+    warning = (
         f"the plate keeps ringing after the contact, at {found:.0f} Hz with {amplitude:.2g} N: a "
         f"resonance of the plate that {stated}; state it in [plate]"
     )
-    return (told,)
+    return (warning,)
 
 
 def _gain(plate: Plate, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what the correction of a plate makes of the density of noise, where it raises it."""
+    """Return the gain of the density of noise by the correction of a plate, at least 1."""
     return np.asarray(np.maximum(1 / np.abs(plate.response(frequency)) ** 2, 1.0))
 
 

@@ -1,10 +1,10 @@
-"""One recorded channel as a force, read piece by piece."""
+"""One recorded channel as a force."""
 
 from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,12 +24,12 @@ HASHED = 2**20
 
 @dataclass(frozen=True, eq=False)
 class Signal(Immutable):
-    """One channel of one file, in newtons; only what is asked for is read.
+    """One channel of one file, in newtons; only requested samples are read.
 
     Attributes
     ----------
     name : str
-        Name of the file, and of the channel where there are several.
+        Name of the file, and of the channel if there are several.
     path : str
         Path of the file; empty for an array.
     sample_rate : float
@@ -37,17 +37,17 @@ class Signal(Immutable):
     n_sample : int
         Number of samples.
     full_scale : float or None
-        Largest force that the format of the file can hold, N; None where that is not known.
+        Largest force that the format of the file can hold, N; None if unknown.
     date : str
-        Date of the measurement where the file says so, or empty.
+        Date of the measurement; empty if unknown.
     calibration : str
-        How the values of the file became newtons, in words.
+        Description of the calibration.
     calibration_uncertainty : float or None
-        Relative standard uncertainty of the calibration; None where it is not known.
+        Relative standard uncertainty of the calibration; None if unknown.
     steps : tuple of str
-        What reading has done, a sentence each.
+        Processing by the reader, a sentence each.
     warnings : tuple of str
-        What is possible but not plausible, a sentence each.
+        What may be wrong, a sentence each.
     samples : callable
         Returns the force, N, shape (stop - start,), of the samples from start to before stop.
     """
@@ -73,11 +73,11 @@ class Signal(Immutable):
             refuse(f"{name}: sample_rate = {sample_rate:g}", "positive numbers, Hz")
         if not np.isfinite(values).all():
             refuse(f"{name}: a value is not finite", "real numbers")
-        return cls(name, "", float(sample_rate), len(values), ArraySamples(values))
+        return cls(name, "", float(sample_rate), len(values), partial(read_array, values.copy()))
 
     @cached_property
     def checksum(self) -> str:
-        """SHA-256 of the file, of an array that of its values, in hexadecimal digits."""
+        """SHA-256 of the file, or of the values of an array, in hexadecimal digits."""
         digest = hashlib.sha256()
         if not self.path:
             digest.update(self.read(0, self.n_sample).tobytes())
@@ -105,7 +105,7 @@ class Signal(Immutable):
         Raises
         ------
         InputError
-            Where the file has changed, is damaged there, or holds values that are not finite.
+            Where the file has changed, is damaged, or holds values that are not finite.
         """
         if not 0 <= start <= stop <= self.n_sample:
             refuse(f"{self.name}: samples {start} to {stop}", f"samples 0 to {self.n_sample}")
@@ -116,17 +116,11 @@ class Signal(Immutable):
                 "a file that is complete and does not change",
             )
         if not np.isfinite(force).all():
-            place = start + int(np.flatnonzero(~np.isfinite(force))[0])
-            refuse(f"{self.name}: sample {place + 1} is not finite", "real numbers")
+            index = start + int(np.flatnonzero(~np.isfinite(force))[0])
+            refuse(f"{self.name}: sample {index + 1} is not finite", "real numbers")
         return force
 
 
-@dataclass(frozen=True, eq=False)
-class ArraySamples(Immutable):
-    """Samples that are in memory, shape (n_sample,)."""
-
-    values: NDArray[np.float64]
-
-    def __call__(self, start: int, stop: int) -> NDArray[np.float64]:
-        """Return a copy of the samples from start to before stop."""
-        return self.values[start:stop].copy()
+def read_array(values: NDArray[np.float64], start: int, stop: int) -> NDArray[np.float64]:
+    """Return a copy of the samples of an array from start to before stop."""
+    return values[start:stop].copy()

@@ -1,4 +1,4 @@
-"""What a calibration report says, for machines: the content of ``report.json``."""
+"""Content of ``report.json``: a calibration report for machines."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ TIME_FORMATS = ("", " %H:%M:%S", " %H:%M")
 
 
 def report_data(recording: Recording, source: LimitsSource | None = None) -> dict[str, Any]:
-    """Return what the report of a recording says, as JSON has it; what is not known is None.
+    """Return the report of a recording as JSON; unknown values are None.
 
     Numbers are in SI units, uncertainties are standard ones unless named expanded.
     """
     config, verdict = recording.config, recording.assess(source)
-    found: dict[str, Any] = {
+    data: dict[str, Any] = {
         "format": FORMAT,
         "thud": version(),
         "name": recording.name,
@@ -41,7 +41,7 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
         "laboratory": config.laboratory,
         "ball": config.ball,
         "serial": config.serial,
-        "date": _dates([config.date] if config.date else [one.date for one in recording.origins]),
+        "date": _dates([config.date] if config.date else [o.date for o in recording.origins]),
         "temperature": config.temperature,
         "instruments": list(config.instruments),
         "mass": config.mass,
@@ -54,43 +54,43 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
         "criteria": criteria_data(recording, source),
         "levels": {bands: _levels(recording, bands) for bands in BANDWIDTHS},
         "method_differences": {
-            method: found.tolist() for method, found in recording.agreement().items()
+            method: values.tolist() for method, values in recording.agreement().items()
         },
         "drops": [_drop(drop) for drop in recording.drops],
-        "plate": [vars(one) for one in config.plate_checks],
+        "plate": [vars(check) for check in config.plate_checks],
         "steps": list(recording.level_steps),
         "warnings": list(recording.own_warnings),
-        "outliers": [vars(one) for one in recording.outliers],
+        "outliers": [vars(outlier) for outlier in recording.outliers],
         "files": [
             {
-                "name": one.name,
-                "sha256": one.checksum,
-                "date": one.date,
-                "calibration": one.calibration,
-                "sample_rate": one.sample_rate,
-                "drops": one.drops,
-                "steps": list(one.steps),
-                "warnings": list(one.warnings),
+                "name": origin.name,
+                "sha256": origin.checksum,
+                "date": origin.date,
+                "calibration": origin.calibration,
+                "sample_rate": origin.sample_rate,
+                "drops": origin.drops,
+                "steps": list(origin.steps),
+                "warnings": list(origin.warnings),
             }
-            for one in recording.origins
+            for origin in recording.origins
         ],
     }
-    known: dict[str, Any] = _known(found)
-    return known
+    finite: dict[str, Any] = _finite(data)
+    return finite
 
 
 def criteria_data(recording: Recording, source: LimitsSource | None = None) -> list[dict[str, Any]]:
     """Return the criteria of a recording with their budgets, as JSON has them.
 
-    An uncertainty that nobody states is None; so is the margin of an upper bound or a count.
+    An uncertainty that is not stated is None; so is the margin of an upper bound or a count.
     """
     verdict = recording.assess(source)
-    found: list[dict[str, Any]] = _known(_criteria(recording, verdict.source, verdict.criteria))
-    return found
+    finite: list[dict[str, Any]] = _finite(_criteria(recording, verdict.source, verdict.criteria))
+    return finite
 
 
 def read_date(text: str) -> datetime | None:
-    """Return a date as files of many kinds write it; None where it is not understood.
+    """Return a date in one of the formats of recordings; None if it has none of them.
 
     >>> read_date("03.05.2024").date().isoformat()
     '2024-05-03'
@@ -109,12 +109,12 @@ def read_date(text: str) -> datetime | None:
 
 
 def _dates(texts: Iterable[str]) -> str:
-    """Return the date of a measurement, or the first and the last, where files say it."""
-    given = [text for text in dict.fromkeys(texts) if text.strip()]
-    read = [read_date(text) for text in given]
-    days = sorted({one.date().isoformat() for one in read if one})
-    if not days or None in read:
-        days = given
+    """Return the date of a measurement, or the first and the last, if files state it."""
+    stated = [text for text in dict.fromkeys(texts) if text.strip()]
+    dates = [read_date(text) for text in stated]
+    days = sorted({date.date().isoformat() for date in dates if date})
+    if not days or None in dates:
+        days = stated
     return " to ".join(dict.fromkeys([days[0], days[-1]])) if days else ""
 
 
@@ -129,27 +129,29 @@ def _criteria(
     for name in ("contact_time", "restitution"):
         spreads[name] = _spread(getattr(drop, name).value for drop in recording.drops)
     rows = []
-    for i, (one, usual) in enumerate(zip(criteria, standard, strict=True)):
-        is_level, estimate = i < count, one.estimate
+    for i, (criterion, usual) in enumerate(zip(criteria, standard, strict=True)):
+        is_level, estimate = i < count, criterion.estimate
         stated = bool(estimate.contributions)
+        limits = criterion.lower, criterion.upper
+        is_count = criterion.lower == criterion.upper
         rows.append(
             {
-                "name": one.name,
-                "unit": one.unit,
+                "name": criterion.name,
+                "unit": criterion.unit,
                 "band": float(get_bands().nominal[i]) if is_level else None,
-                "value": one.value,
+                "value": criterion.value,
                 "uncertainty": estimate.uncertainty if stated else None,
                 "freedom": estimate.freedom,
                 "coverage_factor": estimate.coverage_factor,
                 "expanded_uncertainty": estimate.expanded if stated else None,
                 "upper_bound": estimate.upper_bound,
-                "lower": one.lower,
-                "upper": one.upper,
-                "limits_of_standard": (one.lower, one.upper) == (usual.lower, usual.upper),
-                "margin": None if estimate.upper_bound or one.lower == one.upper else one.margin,
-                "probability": one.probability,
-                "verdict": one.result,
-                "spread": spreads.get(f"{i}" if is_level else one.name),
+                "lower": criterion.lower,
+                "upper": criterion.upper,
+                "limits_of_standard": limits == (usual.lower, usual.upper),
+                "margin": None if estimate.upper_bound or is_count else criterion.margin,
+                "probability": criterion.probability,
+                "verdict": criterion.result,
+                "spread": spreads.get(f"{i}" if is_level else criterion.name),
                 "background": float(average.background[i]) if is_level else None,
                 "flag": str(average.flag[i]) if is_level else "",
                 "contributions": [vars(part) for part in estimate.contributions],
@@ -165,22 +167,22 @@ def _levels(recording: Recording, bands: BandSet) -> dict[str, Any]:
     return {
         "band": get_bands(bands).nominal.tolist(),
         "method": average.method,
-        "level": [one.value for one in budgets],
-        "uncertainty": [one.uncertainty for one in budgets],
-        "expanded_uncertainty": [one.expanded for one in budgets],
+        "level": [estimate.value for estimate in budgets],
+        "uncertainty": [estimate.uncertainty for estimate in budgets],
+        "expanded_uncertainty": [estimate.expanded for estimate in budgets],
         **{name: getattr(average, name).tolist() for name in columns},
     }
 
 
 def _drop(drop: Drop) -> dict[str, Any]:
-    """Return what one drop tells."""
+    """Return the results of a drop."""
     estimates = ("contact_time", "restitution", "peak_force", "impulse", "effective_mass")
     return {
         "name": drop.name,
         "onset": drop.onset,
         **{name: _estimate(getattr(drop, name)) for name in estimates},
         "restitution_method": drop.restitution_method,
-        "restitutions": {way: _estimate(one) for way, one in drop.restitutions.items()},
+        "restitutions": {name: _estimate(by) for name, by in drop.restitutions.items()},
         "bounces": list(drop.bounces),
         "noise": drop.noise.deviation,
         "steps": list(drop.steps),
@@ -188,20 +190,20 @@ def _drop(drop: Drop) -> dict[str, Any]:
     }
 
 
-def _estimate(one: Estimate) -> dict[str, float]:
-    return {"value": one.value, "uncertainty": one.uncertainty}
+def _estimate(estimate: Estimate) -> dict[str, float]:
+    return {"value": estimate.value, "uncertainty": estimate.uncertainty}
 
 
 def _spread(values: Iterable[float]) -> float:
-    """Return the standard deviation of the values that are known; NaN of less than two."""
+    """Return the standard deviation of the finite values; NaN of fewer than two."""
     known = [value for value in values if math.isfinite(value)]
     return float(np.std(known, ddof=1)) if len(known) > 1 else math.nan
 
 
-def _known(value: Any) -> Any:  # noqa: ANN401 - of JSON
-    """Return a value of JSON, in which numbers that are not finite are None."""
+def _finite(value: Any) -> Any:  # noqa: ANN401 - of JSON
+    """Return a value of JSON; numbers that are not finite are None."""
     if isinstance(value, dict):
-        return {key: _known(one) for key, one in value.items()}
+        return {key: _finite(item) for key, item in value.items()}
     if isinstance(value, list):
-        return [_known(one) for one in value]
+        return [_finite(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 ESTIMATES = {
     "contact_time": ("s", "contact time"),
     "restitution": ("1", "coefficient of restitution"),
-    "peak_force": ("N", "maximum force below 1.25 kHz"),
+    "peak_force": ("N", "maximum force, low-passed at 1.25 kHz"),
     "impulse": ("N s", "impulse of the contact"),
     "effective_mass": ("kg", "impulse over the change of velocity"),
 }
@@ -38,7 +38,7 @@ PROVENANCE = (
 
 
 def netcdf(data: dict[str, Any]) -> bytes:
-    """Return the content of a NetCDF file of what a report says."""
+    """Return a report as the content of a NetCDF file."""
     return bytes(recording_dataset(data).to_netcdf(engine="h5netcdf"))
 
 
@@ -52,47 +52,47 @@ def recording_dataset(data: dict[str, Any]) -> xr.Dataset:
             ("value", "", ""),
             ("uncertainty", "_uncertainty", "standard uncertainty of the "),
         ):
-            values = _numbers(one[name][key] for one in drops)
+            values = _numbers(drop[name][key] for drop in drops)
             about = {"units": unit, "long_name": of + meaning}
             variables[name + suffix] = ("drop", values, about)
-    coordinates: dict[str, Any] = {"drop": ("drop", _texts(one["name"] for one in drops))}
-    for bands, found in data["levels"].items():
+    coordinates: dict[str, Any] = {"drop": ("drop", _texts(drop["name"] for drop in drops))}
+    for bands, levels in data["levels"].items():
         words = {"units": "Hz", "long_name": "nominal frequency"}
-        coordinates[bands] = (bands, np.array(found["band"]), words)
+        coordinates[bands] = (bands, np.array(levels["band"]), words)
         for key, (name, meaning) in LEVELS.items():
             about = {"units": "dB", "long_name": meaning}
-            variables[f"{bands}_{name}"] = (bands, _numbers(found[key]), about)
+            variables[f"{bands}_{name}"] = (bands, _numbers(levels[key]), about)
         flag = {"long_name": "corrected for the background, an upper bound in it, or no level"}
-        variables[f"{bands}_flag"] = (bands, _texts(found["flag"]), flag)
+        variables[f"{bands}_flag"] = (bands, _texts(levels["flag"]), flag)
         about = {"units": "dB", "long_name": "force exposure level of each drop"}
-        levels = np.array([_numbers(row) for row in found["drops"]])
-        variables[f"{bands}_drop_level"] = (("drop", bands), levels, about)
+        of_drops = np.array([_numbers(row) for row in levels["drops"]])
+        variables[f"{bands}_drop_level"] = (("drop", bands), of_drops, about)
     for key, meaning in FILES.items():
         words = {"long_name": f"{meaning} of the file"}
-        variables[f"file_{key}"] = ("file", _texts(one[key] for one in files), words)
+        variables[f"file_{key}"] = ("file", _texts(file[key] for file in files), words)
     return xr.Dataset(variables, coordinates, _attributes(data))
 
 
 def _attributes(data: dict[str, Any]) -> dict[str, Any]:
-    """Return where the numbers come from."""
+    """Return the provenance."""
     known = {key: data[key] for key in PROVENANCE if data[key] not in (None, "")}
-    told = {
+    notes = {
         kind: "\n".join(
             dict.fromkeys(
                 [
                     *data[kind],
                     *(
-                        f"{one['name']}: {sentence}"
+                        f"{one['name']}: {message}"
                         for key in ("files", "drops")
                         for one in data[key]
-                        for sentence in one[kind]
+                        for message in one[kind]
                     ),
                 ]
             )
         )
         for kind in ("steps", "warnings")
     }
-    found = {**known, "instruments": "\n".join(data["instruments"]), **told}
+    found = {**known, "instruments": "\n".join(data["instruments"]), **notes}
     return {k: _plain(one) if isinstance(one, str) else one for k, one in found.items()}
 
 

@@ -1,4 +1,4 @@
-"""Sentences about many drops, in few lines."""
+"""Messages about many drops, those that are alike as one."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 
@@ -60,23 +60,11 @@ def group_places(places: Mapping[str, Sequence[tuple[str, Sequence[str]]]]) -> l
     ]
 
 
-def fit_lines(
-    items: Sequence[str], lines: int, count: Callable[[str], int], rest: str = "in report.json"
-) -> list[str]:
-    """Return the items that fit in a number of lines, and how many more there are.
-
-    `count` returns the lines of a text.
-    """
-    if sum(map(count, items)) <= lines:
+def shorten(items: Sequence[str], count: int) -> list[str]:
+    """Return up to a number of items; of more, the first ones and how many follow."""
+    if len(items) <= count:
         return list(items)
-    kept: list[str] = []
-    used = 1
-    for item in items:
-        used += count(item)
-        if used > lines:
-            break
-        kept.append(item)
-    return [*kept, f"and {len(items) - len(kept)} more, {rest}"]
+    return [*items[: count - 1], f"and {len(items) - count + 1} more, in report.json"]
 
 
 def _range(texts: Sequence[str]) -> str:

@@ -36,14 +36,14 @@ _PAGE = (HTML, PDF, "force.svg", "levels.svg")
 
 
 def drop_table(recording: Recording) -> list[tuple[str, ...]]:
-    """Return rows of text, a drop each: touch, contact, restitution by each way, peak and levels.
+    """Return rows of text, a drop each: touch, contact, restitutions, peak and levels.
 
-    Behind ± is one standard uncertainty of that drop, of its noise.
+    After ± is the standard uncertainty of that drop due to its noise.
     """
     nominal = get_bands().nominal
     levels = recording.average().drops
-    ways = dict.fromkeys(way for drop in recording.drops for way in drop.restitutions)
-    by = [f"restitution by {way} (± u)" for way in ways] or ["restitution"]
+    methods = dict.fromkeys(method for drop in recording.drops for method in drop.restitutions)
+    by = [f"restitution by {method} (± u)" for method in methods] or ["restitution"]
     head = ("drop", "at, s", "contact, ms (± u)", *by, "peak, N")
     rows: list[tuple[str, ...]] = [(*head, *(f"{f:g} Hz, dB" for f in nominal))]
     unknown = Estimate.unknown()
@@ -51,8 +51,8 @@ def drop_table(recording: Recording) -> list[tuple[str, ...]]:
         (
             drop.name,
             f"{drop.onset:.3f}",
-            _with_doubt(drop.contact_time, 1e-3, 2),
-            *(_with_doubt(drop.restitutions.get(way, unknown), 1.0, 3) for way in ways or [""]),
+            _with_u(drop.contact_time, 1e-3, 2),
+            *(_with_u(drop.restitutions.get(m, unknown), 1.0, 3) for m in methods or [""]),
             f"{drop.peak_force.value:.0f}",
             *(f"{level:z.2f}" for level in levels[i]),
         )
@@ -78,34 +78,34 @@ def table(recording: Recording) -> list[tuple[str, ...]]:
     return [tuple(row[i] for i in shown) for row in rows]
 
 
-def _with_doubt(estimate: Estimate, unit: float, decimals: int) -> str:
+def _with_u(estimate: Estimate, unit: float, decimals: int) -> str:
     if math.isnan(estimate.value):
         return NOT_KNOWN
     return f"{estimate.value / unit:.{decimals}f} ± {estimate.uncertainty / unit:.{decimals + 1}f}"
 
 
-def verdict_sentence(recording: Recording) -> str:
-    """Return the verdict in a sentence, and another one where limits are the laboratory's."""
-    found = recording.assess()
-    name = found.source.replace("_", " ")
+def verdict_text(recording: Recording) -> str:
+    """Return the verdict in words, with a note if limits are the laboratory's."""
+    assessment = recording.assess()
+    name = assessment.source.replace("_", " ")
     sentence = {
         "conforms": f"The source conforms to the limits of the {name}",
         "does not conform": f"The source does not conform to the limits of the {name}",
         "inconclusive": f"The result is inconclusive by the limits of the {name}",
-    }[found.result]
+    }[assessment.result]
     own = any(not one["limits_of_standard"] for one in criteria_data(recording))
     more = " Limits marked * are those of the laboratory." if own else ""
-    return f"{sentence} at 95 %: {count_verdicts(d.result for d in found.criteria)}.{more}"
+    return f"{sentence} at 95 %: {count_verdicts(d.result for d in assessment.criteria)}.{more}"
 
 
-def count_verdicts(verdicts: Iterable[str]) -> str:
+def count_verdicts(results: Iterable[str]) -> str:
     """Return how many criteria have each verdict.
 
     >>> count_verdicts(["conforms", "conforms", "does not conform"])
     '2 criteria conform, 1 does not conform'
     """
-    given = list(verdicts)
-    counts = {verdict: given.count(verdict) for verdict in RESULTS if verdict in given}
+    listed = list(results)
+    counts = {verdict: listed.count(verdict) for verdict in RESULTS if verdict in listed}
     parts = [
         f"{count} {verdict if count == 1 else _PLURALS.get(verdict, verdict)}"
         for verdict, count in counts.items()
@@ -116,31 +116,32 @@ def count_verdicts(verdicts: Iterable[str]) -> str:
 
 
 def levels_csv(data: dict[str, Any]) -> str:
-    """Return octave and third levels of a report, with uncertainties and background, as text."""
+    """Return the levels of a report in all bands, with uncertainties and background, as text."""
     head = (
         "bandwidth nominal_Hz level_dB standard_uncertainty_dB expanded_dB background_dB spread_dB "
         "flag"
     )
     keys = ("level", "uncertainty", "expanded_uncertainty", "background", "spread", "flag")
     rows = [
-        [bands, f"{nominal:g}", *(found[key][i] for key in keys)]
-        for bands, found in data["levels"].items()
-        for i, nominal in enumerate(found["band"])
+        [bands, f"{nominal:g}", *(levels[key][i] for key in keys)]
+        for bands, levels in data["levels"].items()
+        for i, nominal in enumerate(levels["band"])
     ]
     return _csv([head.split(), *rows])
 
 
 def criteria_csv(data: dict[str, Any]) -> str:
     """Return value, uncertainty, limits and verdict of each criterion of a report, SI units."""
+    keys = ("expanded_uncertainty", "lower", "upper", "margin", "verdict")
     rows = [
         [
-            one["name"],
-            one["unit"],
-            one["value"],
-            str(one["upper_bound"]).lower(),
-            *(one[key] for key in ("expanded_uncertainty", "lower", "upper", "margin", "verdict")),
+            criterion["name"],
+            criterion["unit"],
+            criterion["value"],
+            str(criterion["upper_bound"]).lower(),
+            *(criterion[key] for key in keys),
         ]
-        for one in data["criteria"]
+        for criterion in data["criteria"]
     ]
     head = "criterion unit value upper_bound uncertainty lower upper margin verdict"
     about = f"# thud {version()}; SI units, levels in dB re 1 N; uncertainty expanded, 95 %\n"
@@ -148,7 +149,7 @@ def criteria_csv(data: dict[str, Any]) -> str:
 
 
 def _csv(rows: Iterable[Iterable[object]]) -> str:
-    """Return rows as text; what is None is empty."""
+    """Return rows as text; None is empty."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()
@@ -160,7 +161,7 @@ def file_names(*, figures: bool = True) -> list[str]:
 
 
 def save(recording: Recording, results: Results, *, figures: bool = True) -> None:
-    """Write levels, criteria and data, and, with figures, pictures and the page to a directory.
+    """Write levels, criteria and data, and, with figures, these and the page to a directory.
 
     All contents are there before the first file is written. Files of an earlier recording that
     this one does not have are removed.
@@ -168,14 +169,14 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
     Raises
     ------
     InputError
-        Where a file is in the way.
+        If a file is in the way.
     OSError
-        Where they cannot be written.
+        If they cannot be written.
 
     Warns
     -----
     ReportWarning
-        Where a file is left out, or the results of another recording are replaced.
+        If a file is left out, or the results of another recording are replaced.
     """
     data = report_data(recording)
     contents = {
@@ -185,7 +186,7 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
         **_dataset(data, results.folder),
     }
     if figures and _has_matplotlib():
-        # It takes its time.
+        # Matplotlib takes its time.
         from thud.plot.files import figure_files
 
         drawn = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
@@ -195,7 +196,7 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
 
 
 def _has_matplotlib() -> bool:
-    """Return whether figures can be drawn at all; warn where they cannot."""
+    """Return whether figures can be drawn; warn if they cannot."""
     with left_out("the page"):
         import matplotlib as mpl
 
@@ -204,7 +205,7 @@ def _has_matplotlib() -> bool:
 
 
 def _dataset(data: dict[str, Any], folder: Path) -> dict[str, bytes]:
-    """Return the content of the NetCDF file by its name; warn where xarray is missing."""
+    """Return the content of the NetCDF file by its name; warn if xarray is missing."""
     try:
         with require_extra("studies"):
             from thud.report.netcdf import netcdf

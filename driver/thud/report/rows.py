@@ -73,11 +73,11 @@ def limits_of(criterion: dict[str, Any]) -> tuple[float, float]:
 
 
 def expanded_text(criterion: dict[str, Any]) -> str:
-    """Return the expanded uncertainty; a dash where there is none, words where it is not given."""
+    """Return the expanded uncertainty; a dash where there is none, words if it is not stated."""
     if criterion["name"] == COUNT or criterion["value"] is None:
         return "–"
     if not criterion["contributions"]:
-        return "not given"
+        return "not stated"
     return _width(style_of(criterion), criterion["expanded_uncertainty"], NOT_KNOWN)
 
 

@@ -47,17 +47,17 @@ PAGE = Template("""<!DOCTYPE html>
 $fonts
 @page { size: A4; margin: 9mm 12mm 8mm; }
 :root { color-scheme: light; }
-html { font: ${size}pt/3.4mm '$family', sans-serif; color: #000; background: #fff; }
+html { font: 7.3pt/3.4mm '$family', sans-serif; color: #000; background: #fff; }
 body { width: 186mm; margin: 0 auto; font-variant-ligatures: none; overflow-wrap: anywhere; }
 @media screen { body { padding: 11mm 12mm; } }
 h1 { font-size: 15pt; line-height: 6mm; margin: 0 0 1mm; }
-h2 { font-size: ${size}pt; line-height: 3.4mm; margin: 2mm 0 0.6mm; }
+h2 { font-size: 7.3pt; line-height: 3.4mm; margin: 2mm 0 0.6mm; }
 header { border-bottom: 0.4mm solid #000; padding-bottom: 1.5mm; margin-bottom: 2mm;
-  height: 13.5mm; }
+  display: flow-root; }
 header p { margin: 0; font-size: 9pt; line-height: 4mm; }
-.verdict { float: right; width: 118mm; height: 12.6mm; box-sizing: border-box; padding: 0.8mm 2mm;
-  border: 0.5mm solid #000; text-align: center; font-size: 0.93em; line-height: 2.9mm;
-  overflow: hidden; }
+.verdict { float: right; width: 118mm; min-height: 12.6mm; box-sizing: border-box;
+  padding: 0.8mm 2mm; border: 0.5mm solid #000; text-align: center; font-size: 0.93em;
+  line-height: 2.9mm; }
 .verdict b { font-size: 11pt; line-height: 4.4mm; text-transform: uppercase; }
 table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
 td, th { padding: 0; vertical-align: top; text-align: left; }
@@ -78,6 +78,7 @@ td, th { padding: 0; vertical-align: top; text-align: left; }
 .rule { margin: 0.8mm 0 1.2mm; }
 .figures { height: 64mm; }
 .figure { display: block; width: 91mm; height: 64mm; }
+li, tr { break-inside: avoid; }
 ul { margin: 0; padding: 0 0 0 3mm; list-style: '–  '; }
 .files { table-layout: auto; }
 .files td:last-child { text-align: right; white-space: nowrap; }

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from scipy.linalg import cho_solve
+from threadpoolctl import threadpool_limits
 
 from thud.base.checks import refuse
 from thud.base.errors import InputError, NumericalError
 from thud.base.extras import require_extra
-from thud.base.threads import one_thread
 from thud.case.keys import find_key
 from thud.impact.quantities import LEVELS, SCALAR_QUANTITIES
 from thud.studies.blocks import read_identity, result_names
@@ -206,7 +206,7 @@ def regress(points: Values, values: Values, assessed: NDArray[np.bool_]) -> dict
     shape = Matern(np.full(points.shape[1], 2.0), (0.05, 50.0), nu=SMOOTHNESS)
     kernel = ConstantKernel(10.0, (1e-2, 1e6)) * shape + WhiteKernel(1e-2, (1e-10, 10.0))
     process = GaussianProcessRegressor(kernel)
-    with warnings.catch_warnings(), one_thread():
+    with warnings.catch_warnings(), threadpool_limits(1, "blas"):
         # A parameter without effect ends at the longest length.
         warnings.simplefilter("ignore", ConvergenceWarning)
         process.fit(points, normal[:, chosen])

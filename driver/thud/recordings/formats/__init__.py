@@ -1,4 +1,4 @@
-"""Formats of recordings: one file each, and one table that finds them by content or suffix."""
+"""Formats of recordings: a module each, and a table that identifies them."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-# Bytes at the begin of a file by which its format is found.
+# Bytes that identify the format, and number of channels that the probe reads.
 HEAD = 4096
-TOUCHED = 8
+MAX_PROBED = 8
 HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
@@ -25,11 +25,11 @@ class Format(NamedTuple):
     Attributes
     ----------
     name, module : str
-        Name for messages, and name of the module that reads it.
+        Name for messages, and name of its module.
     suffixes : tuple of str
-        Suffixes that promise it.
-    begins : callable
-        Whether the first bytes of a file are its own.
+        Suffixes of its files.
+    matches : callable
+        Whether the first bytes of a file are of this format.
     is_probed : bool
         Whether its library may hang, crash or fill memory on damaged files, so that it is probed in
         a subprocess first.
@@ -38,7 +38,7 @@ class Format(NamedTuple):
     name: str
     module: str
     suffixes: tuple[str, ...]
-    begins: Callable[[bytes], bool]
+    matches: Callable[[bytes], bool]
     is_probed: bool = False
 
 
@@ -57,7 +57,7 @@ FORMATS = (
     Format("WAV", "audio", (".wav", ".rf64", ".bwf"),
            lambda head: head[:4] in {b"RIFF", b"RF64", b"BW64"} and head[8:12] == b"WAVE"),
     Format("FLAC", "audio", (".flac",), lambda head: head[:4] == b"fLaC"),
-    Format("TDMS", "tdms", (".tdms",), lambda head: head[:4] == b"TDSm"),
+    Format("TDMS", "tdms", (".tdms",), lambda head: head[:4] == b"TDSm", is_probed=True),
     Format("HDF5", "hdf5", (".h5", ".hdf5", ".hdf", ".nc", ".nc4"),
            lambda head: any(head[at : at + 8] == HDF5 for at in (0, 512, 1024, 2048)),
            is_probed=True),
@@ -66,7 +66,7 @@ FORMATS = (
     Format("universal", "universal", (".uff", ".unv", ".uf"), _is_uff),
     Format("text", "text", (".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm", ".prn"), _is_text),
 )  # fmt: skip
-# Contents of files that are not read, and what to do with them.
+# First bytes of other files, and the advice for each.
 OTHERS = {
     b"CDF": "NetCDF 4, which `nccopy -k nc4` makes of this older NetCDF",
     b"PK\x03\x04": "the file that is in this archive, or the table saved as CSV",
@@ -76,37 +76,37 @@ OTHERS = {
 
 
 def read_channels(path: Path) -> list[Channel]:
-    """Return the channels of a file by its content.
+    """Return the channels of a file; its content shows the format.
 
     Raises
     ------
     InputError
-        Where the format is not known or the file is damaged.
+        Where the format is unknown or the file is damaged.
     """
     with guarded(path, "a file"), path.open("rb") as file:
         head = file.read(HEAD)
     name = shown_path(path)
     if not head:
         refuse(f"{name}: is empty", "a recording")
-    found = next((one for one in FORMATS if one.begins(head)), None)
-    promised = next((one for one in FORMATS if path.suffix.lower() in one.suffixes), None)
-    other = next((hint for start, hint in OTHERS.items() if head.startswith(start)), None)
-    if other:
-        refuse(f"{name}: is of a format that is not read", other)
-    if found is None or (found.module == "text" and promised not in {None, found}):
+    found = next((one for one in FORMATS if one.matches(head)), None)
+    named = next((one for one in FORMATS if path.suffix.lower() in one.suffixes), None)
+    advice = next((text for start, text in OTHERS.items() if head.startswith(start)), None)
+    if advice:
+        refuse(f"{name}: is of a format that is not supported", advice)
+    if found is None or (found.module == "text" and named not in {None, found}):
         kinds = ", ".join(one.name for one in FORMATS)
-        what = f"is no {promised.name} file" if promised else "is of no known format"
-        refuse(f"{name}: {what} by its first bytes", f"{kinds} files")
+        reason = f"is no {named.name} file" if named else "is of no known format"
+        refuse(f"{name}: {reason} by its first bytes", f"{kinds} files")
     module = importlib.import_module(f"{__name__}.{found.module}")
     if found.is_probed:
-        probe_in_subprocess(lambda file: _touch(module.read_channels(file)), path, found.name)
+        probe_in_subprocess(lambda file: _read_ends(module.read_channels(file)), path, found.name)
     with guarded(path, found.name):
         channels: list[Channel] = module.read_channels(path)
         return channels
 
 
-def _touch(channels: list[Channel]) -> None:
+def _read_ends(channels: list[Channel]) -> None:
     """Read the first and the last sample of some channels."""
-    for one in channels[:TOUCHED]:
+    for one in channels[:MAX_PROBED]:
         one.samples(0, 1)
         one.samples(one.n_sample - 1, one.n_sample)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import struct
-from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
@@ -18,37 +18,30 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Counts of full scale by the kind of samples, None for floats.
+# Counts of full scale by subtype, None for floats.
 SUBTYPES = {
     "PCM_S8": 2.0**7, "PCM_U8": 2.0**7, "PCM_16": 2.0**15, "PCM_24": 2.0**23, "PCM_32": 2.0**31,
     "FLOAT": None, "DOUBLE": None,
 }  # fmt: skip
-# Length of a chunk of which only the 64 bit table of a RF64 file, or nobody, knows the length.
+# Length of a chunk whose true length is in the 64 bit table of a RF64 file, or unknown.
 UNKNOWN = 0xFFFFFFFF
 # Maximum number of channels, and of chunks of a file.
-MOST_CHANNELS = 1024
-MOST_CHUNKS = 10000
-# Limit of the number of samples in the header of FLAC.
-FLAC_SAMPLES = 2**36
-# Places of the date and the time in a broadcast chunk, and their lengths.
+MAX_CHANNELS = 1024
+MAX_CHUNKS = 10000
+# Maximum number of samples in the header of FLAC.
+MAX_FLAC = 2**36
+# Positions of the date and the time in a broadcast chunk.
 DATE = slice(320, 330)
 CLOCK = slice(330, 338)
 
 
-@dataclass(frozen=True)
-class AudioSamples:
-    """One channel of an audio file, opened for each piece."""
-
-    path: Path
-    column: int
-
-    def __call__(self, start: int, stop: int) -> NDArray[np.float64]:
-        """Return the samples from start to before stop."""
-        soundfile = library("soundfile", "WAV and FLAC")
-        with guarded(self.path, "an audio file"), soundfile.SoundFile(os.fsencode(self.path)) as f:
-            f.seek(start)
-            block: NDArray[np.float64] = f.read(stop - start, dtype="float64", always_2d=True)
-        return np.ascontiguousarray(block[:, self.column])
+def _read(path: Path, column: int, start: int, stop: int) -> NDArray[np.float64]:
+    """Return the samples of a channel from start to before stop."""
+    soundfile = library("soundfile", "WAV and FLAC")
+    with guarded(path, "an audio file"), soundfile.SoundFile(os.fsencode(path)) as file:
+        file.seek(start)
+        block: NDArray[np.float64] = file.read(stop - start, dtype="float64", always_2d=True)
+    return np.ascontiguousarray(block[:, column])
 
 
 def read_channels(path: Path) -> list[Channel]:
@@ -63,15 +56,15 @@ def read_channels(path: Path) -> list[Channel]:
         rate = float(file.samplerate)
     if kind not in SUBTYPES:
         refuse(f"{name}: samples of the kind {kind}", ", ".join(SUBTYPES))
-    if columns > MOST_CHANNELS:
-        refuse(f"{name}: {columns} channels", f"up to {MOST_CHANNELS}")
-    # The library cannot seek in such a file, and whether it is cut off nobody can tell.
-    if is_flac and count >= FLAC_SAMPLES:
+    if columns > MAX_CHANNELS:
+        refuse(f"{name}: {columns} channels", f"up to {MAX_CHANNELS}")
+    # The library cannot seek in such a file, and a cut is not detectable.
+    if is_flac and count >= MAX_FLAC:
         refuse(
-            f"{name}: its header has no number of samples, as encoders leave it that stream",
+            f"{name}: its header has no number of samples, as of a streaming encoder",
             "FLAC files with their length: encode it again, as by `ffmpeg -i OLD.flac NEW.flac`",
         )
-    # The rest of a lossless file that is cut off is missing at its last sample.
+    # A FLAC file that is cut off lacks its last sample.
     if count < 1 or (is_flac and not _is_complete(path, count)):
         refuse(f"{name}: is cut off or has no samples", "a complete file")
     counts = SUBTYPES[kind]
@@ -80,7 +73,7 @@ def read_channels(path: Path) -> list[Channel]:
             name="",
             number=column + 1,
             n_sample=count,
-            samples=AudioSamples(path, column),
+            samples=partial(_read, path, column),
             unit="FS" if counts else "",
             sample_rate=rate,
             counts=counts,
@@ -92,13 +85,13 @@ def read_channels(path: Path) -> list[Channel]:
 
 def _is_complete(path: Path, count: int) -> bool:
     """Whether the last sample of a file is there."""
-    return AudioSamples(path, 0)(count - 1, count).size == 1
+    return _read(path, 0, count - 1, count).size == 1
 
 
 def _read_chunks(file: BinaryIO, name: str) -> str:
-    """Return the date of a WAV file; raise InputError where its samples are cut off.
+    """Return the date of a WAV file; raise InputError where it is cut off.
 
-    The library reads what is left of a file that is cut off, without a word.
+    The library reads a file that is cut off without an error.
     """
     size = os.fstat(file.fileno()).st_size
     lengths: dict[bytes, int] = {}
@@ -112,10 +105,10 @@ def _read_chunks(file: BinaryIO, name: str) -> str:
         if kind == b"bext":
             file.seek(begin)
             text = file.read(CLOCK.stop)
-            parts = (text[part].strip(b"\0 ").decode("ascii", "replace") for part in (DATE, CLOCK))
-            date = " ".join(part for part in parts if part.isprintable() and part)
+            words = (text[at].strip(b"\0 ").decode("ascii", "replace") for at in (DATE, CLOCK))
+            date = " ".join(word for word in words if word.isprintable() and word)
     if missing is None:
-        refuse(f"{name}: has no samples that can be found", "an undamaged WAV file")
+        refuse(f"{name}: has no chunk of samples", "an undamaged WAV file")
     if missing > 0:
         refuse(f"{name}: is cut off, {missing} bytes are missing", "a complete file")
     return date
@@ -126,7 +119,7 @@ def _chunks(
 ) -> Iterator[tuple[bytes, int, int]]:
     """Yield kind, begin and length of the chunks of a WAV file."""
     begin = 12
-    for _ in range(MOST_CHUNKS):
+    for _ in range(MAX_CHUNKS):
         file.seek(begin)
         head = file.read(8)
         if len(head) < 8 or begin >= size:  # noqa: PLR2004 - of a chunk

@@ -5,14 +5,14 @@ from __future__ import annotations
 import errno
 import math
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from thud.base.checks import refuse
 from thud.recordings.channel import MIB, Channel, guarded, library, shown_path, shown_text
-from thud.recordings.grid import even_grid
 from thud.recordings.header_aliases import (
     DATE,
     TIME_UNITS,
@@ -25,6 +25,8 @@ from thud.recordings.header_aliases import (
     split_title,
     text_of,
 )
+from thud.recordings.uniform_grid import uniform_grid
+from thud.recordings.variables import MAX_COLUMNS, MIN_SAMPLES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -32,20 +34,17 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Maximum numbers of objects and attributes that are looked at, and of groups inside each other.
-MOST_OBJECTS = 10_000
-MOST_ATTRIBUTES = 256
-DEEPEST = 32
-# Maximum numbers of bytes of a header's value and of a chunk.
-LONGEST_WORD = 4096
-LARGEST_CHUNK = 2**26
-# More than this, a packed dataset does not shrink.
-PACKED = 1100
-SHORTEST = 8
-MOST_COLUMNS = 256
-# Longer times are not read.
-MOST_TIMES = 2**22
-# Classes of MATLAB that are vectors of numbers in the file but mean something else.
+# Maximum numbers of objects and attributes, and depth of groups.
+MAX_OBJECTS = 10_000
+MAX_ATTRIBUTES = 256
+MAX_DEPTH = 32
+# Maximum numbers of bytes of a header value and of a chunk, and maximum compression ratio.
+MAX_VALUE = 4096
+MAX_CHUNK = 2**26
+MAX_RATIO = 1100
+# Maximum number of times.
+MAX_TIMES = 2**22
+# Attribute of the MATLAB class, and classes stored as vectors of numbers that are no recording.
 MATLAB_CLASS = frozenset({"matlabclass"})
 MATLAB_OTHERS = {"char", "cell", "struct", "function_handle", "canonical empty"}
 
@@ -53,31 +52,28 @@ MATLAB_OTHERS = {"char", "cell", "struct", "function_handle", "canonical empty"}
 SCALING = {"scalefactor": 1.0, "addoffset": 0.0}
 
 
-@dataclass(frozen=True)
-class Hdf5Samples:
-    """One row or column of a dataset, opened for each piece; scaled as NetCDF says."""
-
-    path: Path
-    dataset: str
-    column: tuple[int, int] | None
-    scale: float = 1.0
-    offset: float = 0.0
-
-    def __call__(self, start: int, stop: int) -> NDArray[np.float64]:
-        """Return the samples from start to before stop."""
-        h5py = library("h5py", "HDF5")
-        with guarded(self.path, "HDF5"), _open(h5py, self.path) as file:
-            piece: Any = slice(start, stop)
-            if self.column is not None:
-                axis, place = self.column
-                piece = (place, piece) if axis == 0 else (piece, place)
-            values = np.asarray(file[self.dataset][piece], dtype=np.float64)
-            return values * self.scale + self.offset
+def _read(  # noqa: PLR0913, PLR0917 - identify a channel and a section of it
+    path: Path,
+    dataset: str,
+    scale: float,
+    offset: float,
+    column: tuple[int, int] | None,
+    start: int,
+    stop: int,
+) -> NDArray[np.float64]:
+    """Return the samples of a scaled row or column of a dataset from start to before stop."""
+    h5py = library("h5py", "HDF5")
+    with guarded(path, "HDF5"), _open(h5py, path) as file:
+        piece: Any = slice(start, stop)
+        if column is not None:
+            axis, index = column
+            piece = (index, piece) if axis == 0 else (piece, index)
+        return np.asarray(file[dataset][piece], dtype=np.float64) * scale + offset
 
 
 @dataclass(frozen=True)
-class _Found:
-    """A numeric dataset that may be a channel, with its names and values of headers."""
+class _Vectors:
+    """A numeric dataset that may hold channels, with names and values of its header."""
 
     key: str
     data: Any
@@ -105,18 +101,20 @@ def read_channels(path: Path) -> list[Channel]:
     name = shown_path(path)
     with _open(h5py, path) as file:
         found = _walk(h5py, file, path)
-        times = [one for one in found if is_time(one.key.rpartition("/")[2])]
+        times = [entry for entry in found if is_time(entry.key.rpartition("/")[2])]
         channels: list[Channel] = []
-        for one in found:
-            if one not in times or len(found) == 1:
-                channels += _channels(path, one, times, len(channels))
+        for entry in found:
+            if entry not in times or len(found) == 1:
+                channels += _channels(path, entry, times, len(channels))
     if not channels:
-        refuse(f"{name}: has no dataset of {SHORTEST} or more real numbers", "a recorded channel")
+        refuse(
+            f"{name}: has no dataset of {MIN_SAMPLES} or more real numbers", "a recorded channel"
+        )
     return channels
 
 
 def _open(h5py: Any, path: Path) -> Any:  # noqa: ANN401 - a library
-    """Open a file, without a lock where the file system has none."""
+    """Open a file, without a lock if the file system has none."""
     try:
         return h5py.File(os.fsencode(path), "r")
     except OSError as error:
@@ -125,39 +123,39 @@ def _open(h5py: Any, path: Path) -> Any:  # noqa: ANN401 - a library
     return h5py.File(os.fsencode(path), "r", locking=False)
 
 
-def _walk(h5py: Any, file: Any, path: Path) -> list[_Found]:  # noqa: ANN401 - a library
-    """Return the datasets that may be channels."""
-    found: list[_Found] = []
+def _walk(h5py: Any, file: Any, path: Path) -> list[_Vectors]:  # noqa: ANN401 - a library
+    """Return the datasets that may hold channels."""
+    found: list[_Vectors] = []
     waiting: list[tuple[str, int, list[tuple[str, object]]]] = [("", 0, [])]
     seen = {h5py.h5o.get_info(file.id).addr}
     while waiting:
-        place, depth, above = waiting.pop()
-        if depth > DEEPEST:
-            refuse(f"{shown_path(path)}: groups more than {DEEPEST} deep", "a recording")
-        group = file[place or "/"]
+        group_path, depth, above = waiting.pop()
+        if depth > MAX_DEPTH:
+            refuse(f"{shown_path(path)}: groups more than {MAX_DEPTH} deep", "a recording")
+        group = file[group_path or "/"]
         header = [*_attributes(h5py, group), *above]
         vectors = []
         for key, entry in _entries(h5py, group, seen, shown_path(path)):
             if isinstance(entry, h5py.Group):
-                waiting.append((f"{place}/{key}", depth + 1, header))
-            elif _is_word(h5py, entry.shape, entry.dtype) and not entry.chunks:
+                waiting.append((f"{group_path}/{key}", depth + 1, header))
+            elif _is_scalar(h5py, entry.shape, entry.dtype) and not entry.chunks:
                 header.insert(0, (key, text_of(entry[()])))
             elif _is_channel(entry, f"{shown_path(path)}: {shown_text(key)}", path):
-                vectors.append((f"{place}/{key}", entry))
+                vectors.append((f"{group_path}/{key}", entry))
         for key, data in vectors:
             own = _attributes(h5py, data)
             if find_word(own, MATLAB_CLASS) not in MATLAB_OTHERS:
-                found.append(_Found(key, data, [*own, *header]))
+                found.append(_Vectors(key, data, [*own, *header]))
     return found
 
 
 def _entries(h5py: Any, group: Any, seen: set[int], name: str) -> Iterator[tuple[str, Any]]:  # noqa: ANN401
-    """Yield groups and datasets of a group; follow hard links only, each object once."""
+    """Yield groups and datasets of a group by hard links, each object once."""
     for key in group:
         link = group.get(key, getlink=True)
         if isinstance(link, h5py.ExternalLink):
             refuse(f"{name}: {shown_text(key)} is a link to another file", "the other file")
-        # MATLAB keeps the contents of cells under this name.
+        # MATLAB stores the contents of cells under this name.
         if not isinstance(link, h5py.HardLink) or key == "#refs#":
             continue
         entry = group[key]
@@ -165,80 +163,80 @@ def _entries(h5py: Any, group: Any, seen: set[int], name: str) -> Iterator[tuple
         if address in seen:
             continue
         seen.add(address)
-        if len(seen) > MOST_OBJECTS:
-            refuse(f"{name}: more than {MOST_OBJECTS} objects", "a recording")
+        if len(seen) > MAX_OBJECTS:
+            refuse(f"{name}: more than {MAX_OBJECTS} objects", "a recording")
         if isinstance(entry, h5py.Group) or getattr(entry, "shape", None) is not None:
             yield key, entry
 
 
 def _attributes(h5py: Any, entry: Any) -> list[tuple[str, object]]:  # noqa: ANN401 - a library
-    """Return the attributes of an object that hold one number or text, and any that scale it."""
+    """Return the scalar attributes of an object, and any that scale it."""
     found: list[tuple[str, object]] = []
     for key in entry.attrs:
         kind = entry.attrs.get_id(key)
-        if _is_word(h5py, kind.shape, kind.dtype):
+        if _is_scalar(h5py, kind.shape, kind.dtype):
             found.append((key, text_of(entry.attrs[key])))
         elif plain(key) in SCALING:
             found.append((key, f"values of shape {kind.shape or ()}"))
-    if len(found) > MOST_ATTRIBUTES:
+    if len(found) > MAX_ATTRIBUTES:
         found = [(key, value) for key, value in found if plain(key) in SCALING]
     return found
 
 
-def _is_word(h5py: Any, shape: tuple[int, ...] | None, dtype: Any) -> bool:  # noqa: ANN401 - a library
-    """Whether a value is one number or text; damaged files claim any number of them."""
+def _is_scalar(h5py: Any, shape: tuple[int, ...] | None, dtype: Any) -> bool:  # noqa: ANN401 - a library
+    """Whether a value is one number or text of limited size."""
     is_text = h5py.check_string_dtype(dtype) is not None
     return (
         shape is not None  # of an empty attribute
         and math.prod(shape) == 1
         and (dtype.kind in "iufSU" or is_text)
-        and dtype.itemsize <= LONGEST_WORD
+        and dtype.itemsize <= MAX_VALUE
     )
 
 
 def _is_channel(data: Any, name: str, path: Path) -> bool:  # noqa: ANN401 - of a library
-    """Whether a dataset may be a channel; raise InputError where it is not plain numbers inside."""
+    """Whether a dataset may hold channels; raise InputError where it is external or too large."""
     if data.dtype.kind not in "iuf" or len(data.shape) not in {1, 2}:
         return False
-    if max(data.shape) < SHORTEST or math.prod(data.shape) // max(data.shape) > MOST_COLUMNS:
+    if max(data.shape) < MIN_SAMPLES or math.prod(data.shape) // max(data.shape) > MAX_COLUMNS:
         return False
     if data.is_virtual or data.external:
         refuse(f"{name}: lies in another file", "the other file")
     size = math.prod(data.shape) * data.dtype.itemsize
-    held = data.id.get_storage_size() * (PACKED if data.chunks else 1)
-    if size > held or (not data.chunks and size > path.stat().st_size):
-        refuse(f"{name}: claims {size} bytes and holds {held} at most", "an undamaged HDF5 file")
-    if data.chunks and math.prod(data.chunks) * data.dtype.itemsize > LARGEST_CHUNK:
+    stored = data.id.get_storage_size() * (MAX_RATIO if data.chunks else 1)
+    if size > stored or (not data.chunks and size > path.stat().st_size):
+        refuse(f"{name}: claims {size} bytes and stores {stored} at most", "an undamaged HDF5 file")
+    if data.chunks and math.prod(data.chunks) * data.dtype.itemsize > MAX_CHUNK:
         refuse(
             f"{name}: chunks of {math.prod(data.chunks) * data.dtype.itemsize / MIB:.0f} MiB",
-            f"chunks of up to {LARGEST_CHUNK // MIB} MiB",
+            f"chunks of up to {MAX_CHUNK // MIB} MiB",
         )
     return True
 
 
-def _channels(path: Path, one: _Found, times: list[_Found], before: int) -> list[Channel]:
+def _channels(path: Path, entry: _Vectors, times: list[_Vectors], before: int) -> list[Channel]:
     """Return the channels of a dataset."""
-    count = math.prod(one.data.shape) // one.n_sample
-    rate, date = find_rate(one.header), find_word(one.header, DATE)
+    count = math.prod(entry.data.shape) // entry.n_sample
+    rate, date = find_rate(entry.header), find_word(entry.header, DATE)
     steps: tuple[str, ...] = ()
     same = next(
-        (t for t in times if t.n_sample == one.n_sample and one.parent.startswith(t.parent)), None
+        (t for t in times if t.n_sample == entry.n_sample and entry.parent.startswith(t.parent)),
+        None,
     )
     if rate is None and same is not None:
         rate, steps, since = _rate_of_times(path, same)
         date = date or since
-    scale, offset = (_scaling(path, one, word) for word in SCALING)
-    title = one.key.strip("/")
-    samples = Hdf5Samples(path, one.key, None, scale, offset)
+    scale, offset = (_scaling(path, entry, word) for word in SCALING)
+    title = entry.key.strip("/")
+    is_vector = len(entry.data.shape) == 1
+    read = partial(_read, path, entry.key, scale, offset)
     return [
         Channel(
             name=title + (f"[{i + 1}]" if count > 1 else ""),
             number=before + i + 1,
-            n_sample=one.n_sample,
-            samples=samples
-            if len(one.data.shape) == 1
-            else replace(samples, column=(1 - one.axis, i)),
-            unit=find_word(one.header, UNIT) or split_title(title.rpartition("/")[2])[1],
+            n_sample=entry.n_sample,
+            samples=partial(read, None if is_vector else (1 - entry.axis, i)),
+            unit=find_word(entry.header, UNIT) or split_title(title.rpartition("/")[2])[1],
             sample_rate=rate,
             date=date,
             steps=steps,
@@ -247,28 +245,26 @@ def _channels(path: Path, one: _Found, times: list[_Found], before: int) -> list
     ]
 
 
-def _scaling(path: Path, one: _Found, word: str) -> float:
-    """Return the factor or offset of a dataset; raise InputError where it is no such number."""
-    title = next((title for title, _ in one.header if plain(title) == word), "")
+def _scaling(path: Path, entry: _Vectors, word: str) -> float:
+    """Return the factor or offset of a dataset; raise InputError where it is no finite number."""
+    title = next((title for title, _ in entry.header if plain(title) == word), "")
     if not title:
         return SCALING[word]
-    value = find_word(one.header, frozenset({word}))
+    value = find_word(entry.header, frozenset({word}))
     number, unit = read_number(value) or (math.nan, "")
     if unit or not math.isfinite(number) or (number == 0 and word == "scalefactor"):
-        name = f"{shown_path(path)}: {shown_text(one.key.strip('/'))}: {shown_text(title)}"
+        name = f"{shown_path(path)}: {shown_text(entry.key.strip('/'))}: {shown_text(title)}"
         refuse(
             f"{name} = {shown_text(value)!r} is not allowed", "a finite number, as a factor not 0"
         )
     return number
 
 
-def _rate_of_times(path: Path, times: _Found) -> tuple[float, tuple[str, ...], str]:
-    """Return the rate of a dataset of times, Hz, what was done, and their begin if it is told."""
+def _rate_of_times(path: Path, times: _Vectors) -> tuple[float, tuple[str, ...], str]:
+    """Return the rate of a dataset of times, Hz, notes, and the date of its origin if stated."""
     name = f"{shown_path(path)}: {shown_text(times.key)}"
-    if times.n_sample > MOST_TIMES:
-        refuse(
-            f"{name}: {times.n_sample} times", f"up to {MOST_TIMES}, or an attribute sample_rate"
-        )
+    if times.n_sample > MAX_TIMES:
+        refuse(f"{name}: {times.n_sample} times", f"up to {MAX_TIMES}, or an attribute sample_rate")
     unit, _, since = find_word(times.header, UNIT).partition(" since ")
     unit = unit or split_title(times.key)[1]
     values = np.asarray(times.data[()], dtype=np.float64).ravel()
@@ -276,5 +272,5 @@ def _rate_of_times(path: Path, times: _Found) -> tuple[float, tuple[str, ...], s
         refuse(
             f"{name}: unit = {shown_text(unit)!r} is no time", ", ".join(filter(None, TIME_UNITS))
         )
-    _, step, steps = even_grid(values * TIME_UNITS[unit.casefold()], name)
+    _, step, steps = uniform_grid(values * TIME_UNITS[unit.casefold()], name)
     return 1 / step, steps, since

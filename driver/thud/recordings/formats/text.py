@@ -1,10 +1,11 @@
-"""Tables of numbers as spreadsheets and data loggers write them."""
+"""Tables of numbers of spreadsheets and data loggers."""
 
 from __future__ import annotations
 
 import itertools
 import re
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
@@ -23,7 +24,6 @@ from thud.base.columns import (
 )
 from thud.recordings.channel import MAX_IN_MEMORY, Channel, require_small, shown_path, shown_text
 from thud.recordings.force_units import find_unit
-from thud.recordings.grid import even_grid
 from thud.recordings.header_aliases import (
     DATE,
     RATE,
@@ -36,7 +36,9 @@ from thud.recordings.header_aliases import (
     plain,
     split_title,
 )
-from thud.recordings.signal import ArraySamples
+from thud.recordings.signal import read_array
+from thud.recordings.uniform_grid import uniform_grid
+from thud.recordings.variables import MAX_COLUMNS, MIN_SAMPLES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -46,23 +48,21 @@ if TYPE_CHECKING:
 
 COMMENTS = "#%!*'/;"
 # Maximum lengths of a header in lines, and of a table in numbers.
-LONGEST_HEADER = 1000
-MOST_NUMBERS = 2**24
-MOST_COLUMNS = 256
+MAX_HEADER = 1000
+MAX_NUMBERS = 2**24
 # Lines that are converted at once.
 BLOCK = 2**14
-SHORTEST = 8
-# What lines have that are split and converted one by one, by their decimal mark.
+# Content of lines that are converted one by one, by their decimal mark.
 UNUSUAL = {
     ".": re.compile(rf'["#{GROUPING.strip(" ")}]'),
     ",": re.compile(rf'["#{GROUPING.strip(" ")}.]|,(?!\d)'),
 }
-# What shows a decimal comma, as 1,05 and -0,5.
+# A decimal comma, as in 1,05 and -0,5.
 DECIMAL_COMMA = re.compile(r"[-+]?\d+,0\d|[-+]0,")
 # Between names and values of a header; lines of titles and units.
 PAIR = re.compile(r"[:=\t;,]")
-MOST_TITLES = 3
-# Relative difference of two statements about the rate.
+MAX_TITLES = 3
+# Relative tolerance of two statements of the rate.
 SAME_RATE = 0.01
 ALLOWED = (
     "columns of numbers, separated by commas, semicolons, tabs or blanks (decimal commas with "
@@ -74,7 +74,7 @@ ALLOWED = (
 class _Table:
     """Lines of a file, sorted into header, titles and numbers.
 
-    Its only column has decimal commas, where it has commas.
+    With `has_commas` its only column has decimal commas.
     """
 
     name: str
@@ -92,12 +92,12 @@ class _Table:
         return split_line(strip_comment(line), self.separator)
 
     def titles_of(self, line: str) -> list[str]:
-        """Return the cells of a line of words."""
+        """Return the cells of a line of titles."""
         return [line.strip()] if self.width == 1 else split_line(line, self.separator)
 
 
 def read_channels(path: Path) -> list[Channel]:
-    """Return the columns of numbers of a text file but that of the times."""
+    """Return the columns of numbers of a text file except the times."""
     require_small(path, "text", MAX_IN_MEMORY)
     with path.open("rb") as file:
         mark = file.read(2)
@@ -122,7 +122,7 @@ def _lines_of_numbers(text: TextIO, table: _Table) -> Iterator[str]:
 
 
 def _rows(lines: Iterator[str], table: _Table) -> Iterator[tuple[int, list[str], bool]]:
-    """Yield number and numeric cells of the lines that may show the decimal mark, and quotes."""
+    """Yield number, numeric cells and quotation of the lines that may show the decimal mark."""
     for number, line in enumerate(lines, table.first):
         if "." in line or "," in line:
             cells = table.cells(line)
@@ -130,16 +130,16 @@ def _rows(lines: Iterator[str], table: _Table) -> Iterator[tuple[int, list[str],
 
 
 def _require_separators(lines: Iterator[str], table: _Table) -> None:
-    """Raise InputError where commas may separate columns as well as be decimal marks."""
+    """Raise InputError where commas may be separators or decimal marks."""
     if table.has_commas:
-        # Nobody writes whole numbers as 05 or -0.
+        # Whole numbers are not written as 05 or -0.
         texts = filter(None, map(strip_comment, lines))
         if any("," not in text or DECIMAL_COMMA.match(text) for text in texts):
             return
     elif table.separator != "," or table.decimal.line or _has_titles(table):
         return
     else:
-        # What begins with a sign is no decimal fraction.
+        # A cell that begins with a sign is no decimal fraction.
         signed = {0}
         for line in lines:
             if '"' in line or "." in line:
@@ -161,12 +161,12 @@ def _has_titles(table: _Table) -> bool:
 def _read_header(lines: Iterator[str], table: _Table) -> None:
     """Sort the lines above the numbers into a table; find its separator and used columns."""
     above: list[str] = []
-    for line in itertools.islice(lines, LONGEST_HEADER):
+    for line in itertools.islice(lines, MAX_HEADER):
         text = strip_comment(line)
         table.separator = find_separator(text)
         cells = table.cells(line)
         used = [i for i, cell in enumerate(cells) if is_number(cell)]
-        # Beside the numbers a table may have words, such as a state.
+        # Other columns may hold words, such as a state.
         if used[:1] == [0] and len(used) > len(cells) / 2:
             table.first, table.width, table.used = len(above) + 1, len(cells), used
             _sort_header(above, table)
@@ -181,7 +181,7 @@ def _read_header(lines: Iterator[str], table: _Table) -> None:
 
 
 def _require_rows(above: list[str], table: _Table) -> None:
-    """Raise InputError where a line above the numbers is one of them that cannot be read."""
+    """Raise InputError where a line above the numbers looks like an unreadable row."""
     for number, line in enumerate(above, 1):
         cells = table.cells(line)
         if line.lstrip()[:1] in COMMENTS or len(cells) != table.width:
@@ -193,18 +193,18 @@ def _require_rows(above: list[str], table: _Table) -> None:
 
 
 def _is_one_column(text: str, table: _Table) -> bool:
-    """Whether a comma does not separate: there is a rate, no time, and no title for each side."""
+    """Whether a comma is no separator: there is a rate, no time, and no title for each side."""
     return is_number(text) and not table.titles and find_rate(table.header) is not None
 
 
 def _sort_header(above: list[str], table: _Table) -> None:
-    """Find names and values, and the titles of the columns, in the lines above the numbers."""
+    """Sort the lines above the numbers into names with values, and titles of the columns."""
     texts = [text for line in above if (text := line.strip().lstrip(COMMENTS).strip())]
-    for place, text in enumerate(texts):
+    for i, text in enumerate(texts):
         cells = table.titles_of(text.rstrip(";"))
         words = plain(split_title(re.split(PAIR, text, maxsplit=1)[0])[0])
         is_pair = words in RATE | STEP | DATE | UNIT and table.width < 3  # noqa: PLR2004
-        is_near = place >= len(texts) - MOST_TITLES and len(cells) == table.width and not is_pair
+        is_near = i >= len(texts) - MAX_TITLES and len(cells) == table.width and not is_pair
         if is_near and not any(map(is_number, cells)):
             table.titles.append(cells)
             continue
@@ -212,14 +212,14 @@ def _sort_header(above: list[str], table: _Table) -> None:
         if len(pair) == 1:
             pair = text.rsplit(maxsplit=1)
         if len(pair) == 2:  # noqa: PLR2004 - name and value
-            # Of values of several channels the first counts.
+            # The first value of several channels.
             table.header.append((pair[0], re.split(r"[\t;]", pair[1].strip(" :=\t;,"))[0]))
 
 
 def _read_numbers(lines: Iterator[str], table: _Table) -> dict[int, NDArray[np.float64]]:
-    """Return the columns of numbers of the lines by their place; columns of words are left out."""
-    if table.width > MOST_COLUMNS:
-        refuse(f"{table.name}: {table.width} columns", f"up to {MOST_COLUMNS}")
+    """Return the columns of numbers by their index, without columns of words."""
+    if table.width > MAX_COLUMNS:
+        refuse(f"{table.name}: {table.width} columns", f"up to {MAX_COLUMNS}")
     blocks: list[NDArray[np.float64]] = []
     number, count = table.first, 0
     words = sorted({*range(table.width)} - {*table.used})
@@ -231,16 +231,16 @@ def _read_numbers(lines: Iterator[str], table: _Table) -> dict[int, NDArray[np.f
             values = _convert_each(block, number, table)
         blocks.append(values)
         number, count = number + len(block), count + values.size
-        if count > MOST_NUMBERS:
+        if count > MAX_NUMBERS:
             refuse(
-                f"{table.name}: more than {MOST_NUMBERS / 1e6:.1f} million numbers as text",
+                f"{table.name}: more than {MAX_NUMBERS / 1e6:.1f} million numbers as text",
                 "longer recordings as WAV, RF64, FLAC, HDF5 or TDMS",
             )
     return {i: np.concatenate([block[:, k] for block in blocks]) for k, i in enumerate(table.used)}
 
 
 def _require_words(block: list[str], first: int, words: list[int], table: _Table) -> None:
-    """Raise InputError where a column that began with a word has a number."""
+    """Raise InputError where a column of words has a number."""
     for number, line in enumerate(block, first):
         cells = table.cells(line)
         found = next((i for i in words if i < len(cells) and is_number(cells[i])), None)
@@ -253,7 +253,7 @@ def _require_words(block: list[str], first: int, words: list[int], table: _Table
 
 
 def _convert(block: list[str], table: _Table) -> NDArray[np.float64] | None:
-    """Return the numbers of some lines; None where one is empty, unusual or wrong."""
+    """Return the numbers of some lines; None if a line is empty, unusual or wrong."""
     separator, decimal = table.separator, table.decimal.mark
     joined = "\n".join(block)
     if separator is None:
@@ -273,7 +273,7 @@ def _convert(block: list[str], table: _Table) -> NDArray[np.float64] | None:
 
 
 def _convert_each(block: list[str], first: int, table: _Table) -> NDArray[np.float64]:
-    """Return the numbers of some lines; raise InputError where one has others or other columns."""
+    """Return the numbers of some lines, read one by one; raise InputError where one is wrong."""
     rows = []
     for number, line in enumerate(block, first):
         if not strip_comment(line):
@@ -292,12 +292,12 @@ def _convert_each(block: list[str], first: int, table: _Table) -> NDArray[np.flo
 
 
 def _channels(table: _Table, values: dict[int, NDArray[np.float64]]) -> list[Channel]:
-    """Return the columns of a table but that of the times."""
+    """Return the columns of a table except the times."""
     numeric = list(values)
     rows = len(values[numeric[0]])
-    if rows < SHORTEST:
+    if rows < MIN_SAMPLES:
         what = f"{rows} rows of {len(numeric)} numbers"
-        refuse(f"{table.name}: {what}", f"{SHORTEST} rows or more of numbers")
+        refuse(f"{table.name}: {what}", f"{MIN_SAMPLES} rows or more of numbers")
     titles, units = _titles(table, table.width)
     rate = find_rate(table.header, table.decimal.mark if table.decimal.line else "")
     steps: tuple[str, ...] = ()
@@ -307,7 +307,7 @@ def _channels(table: _Table, values: dict[int, NDArray[np.float64]]) -> list[Cha
     if time is not None and len(numeric) > 1:
         numeric.remove(time)
         scale = TIME_UNITS.get(units[time].casefold(), 1.0)
-        _, step, steps = even_grid(values[time] * scale, table.name)
+        _, step, steps = uniform_grid(values[time] * scale, table.name)
         if rate is not None and abs(step * rate - 1) > SAME_RATE:
             refuse(
                 f"{table.name}: {rate:.6g} Hz by its header and {1 / step:.6g} Hz by its times",
@@ -319,7 +319,7 @@ def _channels(table: _Table, values: dict[int, NDArray[np.float64]]) -> list[Cha
             name=titles[i],
             number=i + 1,
             n_sample=rows,
-            samples=ArraySamples(values[i]),
+            samples=partial(read_array, values[i]),
             unit=units[i],
             sample_rate=rate,
             date=find_word(table.header, DATE),
@@ -330,13 +330,13 @@ def _channels(table: _Table, values: dict[int, NDArray[np.float64]]) -> list[Cha
 
 
 def _are_times(column: NDArray[np.float64]) -> bool:
-    """Whether a column without a title rises evenly enough to be times."""
+    """Whether a column without a title rises uniformly enough to be times."""
     rise = np.diff(column)
     return bool((rise > 0).all() and rise.max() < 2 * rise.min() + SAME_RATE * rise.mean())
 
 
 def _is_time_unit(unit: str) -> bool:
-    """Whether a unit is one of times."""
+    """Whether a unit is a unit of time."""
     return bool(unit) and unit.casefold() in TIME_UNITS and not find_unit(unit)
 
 

@@ -26,8 +26,8 @@ from thud.studies.fitting.record_noise import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.recordings.force_record import Record
     from thud.recordings.noise import Background
+    from thud.recordings.uniform_grid import Record
     from thud.studies.fitting.force_target import ForceTarget
 
     Array = NDArray[np.float64]

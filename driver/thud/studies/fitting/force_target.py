@@ -11,8 +11,8 @@ from thud.base.checks import refuse, refuse_value, require_choice, require_numbe
 from thud.base.immutable import Immutable
 from thud.impact.impact import Impact
 from thud.level.levels import FORCES, RECORDED_BAND
-from thud.recordings.force_record import MIN_ROWS, Record, read_record
 from thud.recordings.recording import Recording
+from thud.recordings.uniform_grid import MIN_ROWS, Record, read_record
 from thud.studies.fitting.force_misfit import ForceMisfit
 from thud.studies.fitting.misfit import require_positive
 from thud.studies.fitting.record_noise import MIN_HUM, find_pulse, trimmed

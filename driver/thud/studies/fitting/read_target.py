@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from thud.base.checks import refuse, refuse_value, require_number, require_words
 from thud.base.columns import read_table
 from thud.base.units import power_of, scaled
-from thud.recordings.force_record import read_record
 from thud.recordings.formats import FORMATS
 from thud.recordings.read_recording import read_recording
+from thud.recordings.uniform_grid import read_record
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.level_target import LevelTarget
 from thud.studies.parameter import quantity

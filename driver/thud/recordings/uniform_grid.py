@@ -1,0 +1,131 @@
+"""Times of samples on a uniform grid, and records of force over time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from thud.base.checks import refuse
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+# Minimum and maximum sampling interval, s.
+STEPS = (1e-9, 1e3)
+# Tolerances of any times, and of rounded times, as fractions of the sampling interval.
+TOLERANCE = 1e-3
+ROUNDED_TOLERANCE = 0.25
+# Approximate number of times whose digits are counted.
+MAX_COUNTED = 2**16
+# Significant decimal digits of a float.
+FLOAT_DIGITS = 17
+# Minimum number of samples of a record, and maximum force, N: its square is finite.
+MIN_ROWS = 8
+MAX_FORCE = 1e12
+
+
+class Record(NamedTuple):
+    """A force over time.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n_sample,)
+        Time, s, uniformly spaced.
+    force : ndarray, shape (n_sample,)
+        Force, N.
+    sample_rate : float
+        Samples per second, Hz.
+    """
+
+    time: NDArray[np.float64]
+    force: NDArray[np.float64]
+    sample_rate: float
+
+
+def uniform_grid(time: NDArray[np.float64], name: str) -> tuple[float, float, tuple[str, ...]]:
+    """Return start and step, s, of the uniform grid that fits times best, and notes.
+
+    Times, s, shape (n_sample,), may miss it by their rounding to the last written digit: at
+    44.1 kHz, the sixth decimal is a twentieth of a step.
+
+    Raises
+    ------
+    InputError
+        Names the time off the grid, or the step that is not allowed.
+    """
+    if not np.isfinite(time).all():
+        refuse(f"{name}: a time is not finite", "real numbers, s")
+    index = np.arange(len(time)) - (len(time) - 1) / 2
+    with np.errstate(over="ignore", invalid="ignore"):
+        step = float(index @ time / (index @ index))
+    minimum, maximum = STEPS
+    if not minimum <= step <= maximum:
+        refuse(
+            f"{name}: the times rise by {step:.4g} s from row to row",
+            f"{minimum:g} to {maximum:g} s",
+        )
+    miss = np.abs(time - time.mean() - index * step) / step
+    # An odd stride covers all last digits.
+    rounding = last_digit(time[:: len(time) // MAX_COUNTED | 1])
+    allowed = max(TOLERANCE, min(ROUNDED_TOLERANCE, rounding / step))
+    worst = int(np.argmax(miss))
+    if miss[worst] > allowed:
+        refuse(
+            f"{name}: the times are not uniformly spaced: row {worst + 1}, {time[worst]:.9g} s, is "
+            f"{miss[worst]:.2g} steps of {step:.4g} s off a uniform grid",
+            f"one sampling rate, to {allowed:.2g} steps",
+        )
+    begin = float(time.mean() + index[0] * step)
+    if miss[worst] <= TOLERANCE:
+        return begin, step, ()
+    note = f"The times, rounded to {rounding:.1g} s, were replaced by a grid of {1 / step:.7g} Hz."
+    return begin, step, (note,)
+
+
+def last_digit(time: NDArray[np.float64]) -> float:
+    """Return the unit of the last digit of times, s, by decimals or by significant digits."""
+    size = np.abs(time)
+    # Rounding error of numbers of this size.
+    rounding = 4 * np.spacing(size.max())
+    scale = 10.0 ** np.floor(np.log10(np.maximum(size, rounding)))
+    largest = 0.0
+    for unit in (np.full_like(scale, scale.max()), scale):
+        for power in range(FLOAT_DIGITS):
+            digit = unit * 10.0**-power
+            if (np.abs(time - digit * np.rint(time / digit)) <= rounding).all():
+                largest = max(largest, float(digit.max()))
+                break
+    return largest
+
+
+def read_record(table: NDArray[np.float64], name: str = "record") -> Record:
+    """Return the record of a table with the columns time, s, and force, N.
+
+    Raises
+    ------
+    InputError
+        Where it has fewer than eight samples, times that are not uniformly spaced, or a force that
+        is not mainly positive.
+    """
+    rows, columns = table.shape
+    if rows < MIN_ROWS or columns != 2:  # noqa: PLR2004 - time and force
+        refuse(
+            f"{name}: {rows} rows of {columns} numbers",
+            f"{MIN_ROWS} rows or more of time, s, and force, N",
+        )
+    if not np.isfinite(table).all():
+        refuse(f"{name}: a value is not finite", "real numbers")
+    time, force = table.T
+    begin, step, _ = uniform_grid(time, name)
+    if force.max() <= 0 and not force.min() < 0:
+        refuse(f"{name}: the force is nowhere positive", "the force on the floor, N")
+    if -force.min() > force.max():
+        refuse(
+            f"{name}: the force is mostly negative, {force.min():.4g} to {force.max():.4g} N",
+            "the force on the floor, positive in compression (change its sign)",
+        )
+    if force.max() > MAX_FORCE:
+        refuse(f"{name}: the force has a peak of {force.max():.4g} N", f"up to {MAX_FORCE:g} N")
+    uniform = np.asarray(begin + np.arange(rows) * step, dtype=np.float64)
+    return Record(uniform, force.copy(), 1 / step)
