@@ -25,7 +25,7 @@ module thud_force_history
    character(len=8), parameter :: force_names(force_count) = [character(len=8) :: 'elastic', 'floor']
 
    !> Length of the name of a force component.
-   integer, parameter :: part_name_length = 24
+   integer, parameter :: component_name_length = 24
 
    !> Force of one impact and the numbers that describe it.
    type :: force_history_type
@@ -36,9 +36,9 @@ module thud_force_history
       !> Rate of the deflection, m/s: [n_sample].
       real(wp), allocatable :: velocity(:)
       !> Names of the components of the force: [n_component].
-      character(len=part_name_length), allocatable :: part_name(:)
+      character(len=component_name_length), allocatable :: component_name(:)
       !> Components of the force, N: [n_sample, n_component].
-      real(wp), allocatable :: part(:, :)
+      real(wp), allocatable :: component(:, :)
       !> Force without flux of momentum, the paper's ball force, N: [n_sample].
       real(wp), allocatable :: elastic_force(:)
       !> Whole force on the floor, N: [n_sample].
@@ -48,15 +48,15 @@ module thud_force_history
       !> Energy that the source gives to the floor, J.
       real(wp) :: floor_work = 0.0_wp
       !> Names, with units, of further quantities against time: [n_channel].
-      character(len=part_name_length), allocatable :: channel_name(:)
+      character(len=component_name_length), allocatable :: channel_name(:)
       !> Its values: [n_sample, n_channel].
       real(wp), allocatable :: channel(:, :)
-      !> Names of scalar quantities that the model chose or computed: [n_fact].
-      character(len=part_name_length), allocatable :: fact_name(:)
-      !> Their SI units: [n_fact].
-      character(len=8), allocatable :: fact_unit(:)
-      !> These numbers: [n_fact].
-      real(wp), allocatable :: fact(:)
+      !> Names of scalar quantities that the model chose or computed: [n_scalar].
+      character(len=component_name_length), allocatable :: scalar_name(:)
+      !> Their SI units: [n_scalar].
+      character(len=8), allocatable :: scalar_unit(:)
+      !> These numbers: [n_scalar].
+      real(wp), allocatable :: scalar(:)
       !> Velocity towards the floor at first touch, m/s.
       real(wp) :: impact_velocity = 0.0_wp
       !> Snapshots of the deformed source, of models that take some.
@@ -139,24 +139,24 @@ contains
    end subroutine continue_to_zero
 
    !> A history of zero force.
-   pure function new_force_history(sample_rate, n_sample, part_name, channel_name) result(history)
+   pure function new_force_history(sample_rate, n_sample, component_name, channel_name) result(history)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
       integer, intent(in) :: n_sample
       !> Names of the components of the force: [n_component].
-      character(len=*), intent(in) :: part_name(:)
+      character(len=*), intent(in) :: component_name(:)
       !> Names of the channels (default: there are none): [n_channel].
       character(len=*), intent(in), optional :: channel_name(:)
       !> The history, all arrays allocated and zero.
       type(force_history_type) :: history
 
       history%sample_rate = sample_rate
-      allocate (history%part_name(size(part_name)))
-      history%part_name = part_name
+      allocate (history%component_name(size(component_name)))
+      history%component_name = component_name
       allocate (history%deflection(n_sample), history%velocity(n_sample), history%elastic_force(n_sample), &
          history%floor_force(n_sample), source=0.0_wp)
-      allocate (history%part(n_sample, size(part_name)), source=0.0_wp)
-      allocate (history%fact_name(0), history%fact_unit(0), history%fact(0))
+      allocate (history%component(n_sample, size(component_name)), source=0.0_wp)
+      allocate (history%scalar_name(0), history%scalar_unit(0), history%scalar(0))
       if (.not. present(channel_name)) return
       allocate (history%channel_name(size(channel_name)))
       history%channel_name = channel_name

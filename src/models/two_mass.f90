@@ -96,8 +96,7 @@ contains
          real_field('carcass_stiffness', options%carcass_stiffness, 'N/m', &
          'force of the carcass over its deflection at 20 mm', '[0, 1e12]'), &
          real_field('carcass_exponent', options%carcass_exponent, '', 'exponent of the deflection of the carcass', &
-         '[1.5, 5]'), &
-         real_field('contact_damping', options%contact_damping, 's/m', &
+         '[1.5, 5]'), real_field('contact_damping', options%contact_damping, 's/m', &
          'damping of the contact over its elastic force and velocity', '[0, 100]'), &
          real_field('belt_frequency', options%belt_frequency, 'Hz', &
          'natural frequency of the belt on the sidewall, the rim held', '(0, 1000000]'), &
@@ -326,8 +325,8 @@ contains
       if (allocated(history%floor_displacement)) then
          history%channel(i, :) = history%channel(i, :) + history%floor_displacement(i)
       end if
-      history%part(i, :) = get_components(self, state)
-      history%elastic_force(i) = sum(history%part(i, :))
+      history%component(i, :) = get_components(self, state)
+      history%elastic_force(i) = sum(history%component(i, :))
       history%floor_force(i) = history%elastic_force(i)
    end subroutine record_sample
 

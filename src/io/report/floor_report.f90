@@ -80,7 +80,7 @@ contains
 
       text = newline//'&floor_summary'//newline//get_quantity_lines(contact)//line('floor_work', &
          to_text(contact%floor_work), 'J')//'/'//newline
-      if (size(contact%fact) > 0) text = text//newline//get_fact_group('floor_facts', contact)
+      if (size(contact%scalar) > 0) text = text//newline//get_fact_group('floor_facts', contact)
    end subroutine get_floor_summary
 
    !> The drop on the floor beside the blocked one.

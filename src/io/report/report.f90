@@ -31,25 +31,25 @@ contains
       real(wp), allocatable :: values(:, :)
       integer :: n_part, n_own, i
 
-      n_part = size(history%part_name)
+      n_part = size(history%component_name)
       n_own = n_part + 4
       header = 'time_s,deflection_m,velocity_m_per_s'
       do i = 1, n_part
-         header = header//','//trim(history%part_name(i))//'_N'
+         header = header//','//trim(history%component_name(i))//'_N'
       end do
       header = header//',elastic_force_N,floor_force_N'
       if (present(names)) then
          do i = 1, size(names)
             header = header//','//trim(names(i))
          end do
-         allocate (values(size(history%part, 1), n_own + size(names)))
+         allocate (values(size(history%component, 1), n_own + size(names)))
          values(:, n_own + 1:) = columns
       else
-         allocate (values(size(history%part, 1), n_own))
+         allocate (values(size(history%component, 1), n_own))
       end if
       values(:, 1) = history%deflection
       values(:, 2) = history%velocity
-      values(:, 3:n_part + 2) = history%part
+      values(:, 3:n_part + 2) = history%component
       values(:, n_part + 3) = history%elastic_force
       values(:, n_own) = history%floor_force
       text = get_history_csv(header, get_times(history), values)
@@ -121,8 +121,7 @@ contains
       text = '! thud '//version//': results of case '//trim(case%name)//', SI units, levels in dB re 1 N'//newline &
          //newline//'&summary'//newline//line('case', quoted(case%name), '')//line('model', quoted(case%model), '') &
          //get_quantity_lines(history)//'/'//newline//newline//get_fact_group('facts', history)//warning_group(warning) &
-         //'&verdict'//newline &
-         //line('source', quoted(case%source), '') &
+         //'&verdict'//newline //line('source', quoted(case%source), '') &
          //line('level_method', quoted(case%level_method), '') &
          //line('level_force', quoted(case%level_force), '') &
          //line('conforms', to_text(is_conforming(case, assessment)), '')
@@ -160,10 +159,10 @@ contains
       integer :: i
 
       text = ''
-      if (size(history%fact) == 0) return
+      if (size(history%scalar) == 0) return
       text = '&'//name//newline
-      do i = 1, size(history%fact_name)
-         text = text//line(trim(history%fact_name(i)), to_text(history%fact(i)), trim(history%fact_unit(i)))
+      do i = 1, size(history%scalar_name)
+         text = text//line(trim(history%scalar_name(i)), to_text(history%scalar(i)), trim(history%scalar_unit(i)))
       end do
       text = text//'/'//newline//newline
    end function get_fact_group

@@ -15,7 +15,7 @@ module thud_table
    implicit none (type, external)
    private
 
-   public :: get_defaults_line, get_compression_table, get_force_title, get_modes_table, get_span_row, get_table
+   public :: get_compression_table, get_defaults_line, get_force_title, get_modes_table, get_span_row, get_table
    public :: is_peak_of_other
 
 contains
@@ -204,13 +204,13 @@ contains
       integer :: i, power
 
       rows = ''
-      do i = 1, size(history%fact_name)
+      do i = 1, size(history%scalar_name)
          power = 0
-         if (history%fact_unit(i) /= '') power = floor(log10(max(abs(history%fact(i)), tiny(1.0_wp)))/3)
+         if (history%scalar_unit(i) /= '') power = floor(log10(max(abs(history%scalar(i)), tiny(1.0_wp)))/3)
          if (abs(power) > 3) power = 0
          scale = 10.0_wp**(-3*power)
-         rows = rows//row(replaced(trim(history%fact_name(i)), '_', ' '), history%fact(i)*scale, 3, &
-            trim(adjustl(prefixes(power)//history%fact_unit(i))))
+         rows = rows//row(replaced(trim(history%scalar_name(i)), '_', ' '), history%scalar(i)*scale, 3, &
+            trim(adjustl(prefixes(power)//history%scalar_unit(i))))
       end do
    end function facts
 

@@ -128,7 +128,7 @@ contains
          history%deflection = history%deflection - history%floor_displacement
          history%velocity = history%velocity - history%floor_velocity
       end if
-      history%part(:, 1) = history%floor_force
+      history%component(:, 1) = history%floor_force
       history%elastic_force = history%floor_force
       ! Nodes that touch one by one make spikes, the higher the shorter the steps.
       call get_low_pass(history%floor_force, history%sample_rate, recorded_band, recorded)
@@ -137,10 +137,10 @@ contains
       call continue_to_zero(history)
       history%max_deflection = maxval(history%deflection)
       associate (material => run%body%material)
-         history%fact_name = [character(len=24) :: 'shear_modulus', 'bulk_modulus', 'simulated_time', 'minimum_step', &
+         history%scalar_name = [character(len=24) :: 'shear_modulus', 'bulk_modulus', 'simulated_time', 'minimum_step', &
             'maximum_penetration']
-         history%fact_unit = [character(len=8) :: 'Pa', 'Pa', 's', 's', 'm']
-         history%fact = [material%shear_modulus, material%bulk_modulus, run%time, run%shortest_interval, run%penetration]
+         history%scalar_unit = [character(len=8) :: 'Pa', 'Pa', 's', 's', 'm']
+         history%scalar = [material%shear_modulus, material%bulk_modulus, run%time, run%shortest_interval, run%penetration]
       end associate
       gain = ball%mass*(get_mean_velocity(run) + speed + run%gravity*run%time)
       history%impulse_residual = abs(sum(history%floor_force)/history%sample_rate - gain)/gain
