@@ -65,12 +65,9 @@ contains
 
       fields = [ &
          list_field('frequency', options%frequency, 'Hz', 'natural frequencies of the ball on the floor', &
-         '[0.001, 1000000]'), &
-         list_field('damping_ratio', options%damping_ratio, '', 'damping ratios, one per mode', &
-         '[0, 1)'), &
-         list_field('effective_mass', options%effective_mass, 'kg', 'effective masses, one per mode', &
-         '[1e-12, 1000000]'), &
-         logical_field('allow_mass_mismatch', options%allow_mass_mismatch, &
+         '[0.001, 1000000]'), list_field('damping_ratio', options%damping_ratio, '', 'damping ratios, one per mode', &
+         '[0, 1)'), list_field('effective_mass', options%effective_mass, 'kg', 'effective masses, one per mode', &
+         '[1e-12, 1000000]'), logical_field('allow_mass_mismatch', options%allow_mass_mismatch, &
          'effective masses need not add up to the mass of the ball')]
    end function get_fields
 
