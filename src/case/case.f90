@@ -196,7 +196,7 @@ contains
          if (allocated(error) .or. .not. case%has_room) return
          call get_room_bands(bands, error)
          allocate (conductance(size(bands)))
-         call floor%get_radiator(bands%centre, plate, conductance, error)
+         call floor%get_radiator(bands%center, plate, conductance, error)
       end associate
    end subroutine check_floor
 

@@ -273,7 +273,7 @@ contains
       real(wp) :: conductance(size(bands))
 
       associate (floor => case%floors(get_floor_number(case))%model)
-         call floor%get_radiator(bands%centre, plate, conductance, error)
+         call floor%get_radiator(bands%center, plate, conductance, error)
       end associate
       if (.not. allocated(error)) call check_below(plate, case%room, error)
       if (.not. allocated(error)) call get_room_level(plate, conductance, case%room, bands, level, prediction)

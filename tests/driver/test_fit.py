@@ -12,9 +12,10 @@ from conftest import naming
 from scipy import stats
 
 import thud
+from thud.case.keys import with_values
 from thud.studies.fitting import misfit, search
 from thud.studies.fitting.inference import infer, pair_sentences, statement, worst_directions
-from thud.studies.fitting.ranges import Range, bound_parameters, get_ranges, with_values
+from thud.studies.fitting.ranges import Range, bound_parameters, get_ranges
 
 RATE = 44100.0
 TRUTH = thud.Ball(youngs_modulus=1.8e6)

@@ -126,7 +126,7 @@ class BallImpedance(Displayed):
         size = np.log10(np.maximum(np.abs(self.change), 1e-12))
         log_change = math.log10(decibels)
         log_resistance = np.log10(self.resistance)
-        found = np.full(len(self.frequency), np.nan)
+        result = np.full(len(self.frequency), np.nan)
         for band, column in enumerate(size.T):
             above = np.flatnonzero(column >= log_change)
             if len(above) == 0:
@@ -137,10 +137,10 @@ class BallImpedance(Displayed):
                     "decibels", decibels, f"above {10 ** column[i]:.2g}, the change by the heaviest"
                 )
             part = (column[i] - log_change) / (column[i] - column[i + 1])
-            found[band] = 10 ** (
+            result[band] = 10 ** (
                 log_resistance[i] + part * (log_resistance[i + 1] - log_resistance[i])
             )
-        return found
+        return result
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, a band each."""
@@ -247,12 +247,12 @@ def _band_spectra(force: Array, sample_rate: float, bands: BandSet) -> list[NDAr
     time = np.arange(len(force)) / sample_rate
     used = np.flatnonzero(force)
     end = used[-1] + 1 if len(used) else 1
-    found: list[NDArray[np.complex128]] = []
+    result: list[NDArray[np.complex128]] = []
     for low, high in zip(edges.lower, edges.upper, strict=True):
         lines = low + (np.arange(_LINES_PER_BAND) + 0.5) * (high - low) / _LINES_PER_BAND
         waves: NDArray[np.complex128] = np.exp(-2j * np.pi * np.outer(lines, time[:end]))
-        found.append(waves @ force[:end])
-    return found
+        result.append(waves @ force[:end])
+    return result
 
 
 def _tangent(source: Impact) -> tuple[float, float, float]:

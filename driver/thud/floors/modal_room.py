@@ -112,11 +112,11 @@ class ModalRoom(Displayed):
     @property
     def statistical(self) -> Array:
         """Levels and spread of the statistical prediction, dB, shape (2, 9); NaN below 50 Hz."""
-        found = np.full((2, N_BAND), np.nan)
+        result = np.full((2, N_BAND), np.nan)
         there = np.isin(self.frequency, self.prediction.frequency)
         n = there.sum()
-        found[:, there] = self.prediction.level[:n], self.prediction.spread[:n]
-        return found
+        result[:, there] = self.prediction.level[:n], self.prediction.spread[:n]
+        return result
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, a third each."""
@@ -207,12 +207,12 @@ def positions_below(
     receivers = _positions("microphones", microphones, size, generator)
     numbers, plate_frequency = _plate_modes(floor)
     orders, room_frequency = _room_modes(size, room.sound_speed)
-    found = ask(
+    result = ask(
         "radiator",
         case=case_text(Case(floor=floor, room=room)),
         frequency=np.maximum(plate_frequency, 1.0),
     )
-    losses = 2 * np.pi * plate_frequency * found["loss_factor"]
+    losses = 2 * np.pi * plate_frequency * result["loss_factor"]
     decay = 6 * math.log(10) / _times(prediction, room_frequency)
     duration = _duration(min(losses.min(), decay.min()))
     omega, force = _spectrum(prediction.source, duration)
@@ -223,7 +223,7 @@ def positions_below(
             "prediction holds"
         )
         raise ModeCountError(message)
-    mass = found["surface_mass"] * floor.length * floor.width / 4
+    mass = result["surface_mass"] * floor.length * floor.width / 4
     plate = _receptance(omega, plate_frequency, losses) * (1j * omega) / mass
     stiffness = room.air_density * room.sound_speed**2 / (room.volume * _norms(orders))
     air = _receptance(omega, room_frequency, decay) * (1j * omega) * stiffness[:, None]
@@ -270,8 +270,8 @@ def plate_frequencies(floor: Plate, numbers: ArrayLike) -> Array:
     square = (np.pi * np.asarray(numbers) / (floor.length, floor.width)) ** 2
     x, y, ratio = square[..., 0], square[..., 1], math.sqrt(floor.stiffness_ratio)
     root = np.sqrt(x**2 / ratio + 2 * floor.torsion_ratio * x * y + ratio * y**2)
-    found: Array = floor.wave_speed * floor.thickness / math.sqrt(12) * root / (2 * np.pi)
-    return found
+    result: Array = floor.wave_speed * floor.thickness / math.sqrt(12) * root / (2 * np.pi)
+    return result
 
 
 def _plate_modes(floor: Plate) -> tuple[Array, Array]:
@@ -371,8 +371,8 @@ def _spectrum(source: ImpactResult, duration: float) -> tuple[Array, ComplexArra
 def _fast_maxima(spectrum: ComplexArray) -> Array:
     """Return maximum Fast levels of the thirds, dB, shape (n_microphone, 9)."""
     pressure = np.fft.irfft(spectrum, axis=1) * SAMPLE_RATE
-    found: Array = fast_levels(pressure).max(axis=2).T
-    return found
+    result: Array = fast_levels(pressure).max(axis=2).T
+    return result
 
 
 def fast_levels(pressure: Array) -> Array:
@@ -393,8 +393,8 @@ def fast_levels(pressure: Array) -> Array:
 def _times(prediction: RoomPrediction, frequency: Array) -> Array:
     """Return reverberation times at frequencies, s: those of the nearest thirds."""
     distance = abs(np.log(np.maximum(frequency, 1.0)[:, None] / prediction.frequency))
-    found: Array = prediction.reverberation_time[distance.argmin(axis=1)]
-    return found
+    result: Array = prediction.reverberation_time[distance.argmin(axis=1)]
+    return result
 
 
 def _positions(

@@ -143,9 +143,9 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
         return curves[modulus]
 
     def residuals(x: Array) -> Array:
-        found = curve(float(np.exp(x[0])) * start.youngs_modulus)
+        result = curve(float(np.exp(x[0])) * start.youngs_modulus)
         depth = measured - measured[0] - x[1] * span
-        model_force = PchipInterpolator(found.deflection, found.force)(np.maximum(depth, 0))
+        model_force = PchipInterpolator(result.deflection, result.force)(np.maximum(depth, 0))
         return np.asarray(model_force - measured_force)
 
     # The plates may touch a little before the first point.
@@ -162,8 +162,8 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
     deviation = float(np.sqrt(best.fun @ best.fun / (len(measured_force) - _PARAMETERS)))
     scale = np.array([modulus, span])
     covariance = deviation**2 * np.linalg.inv(best.jac.T @ best.jac) * np.outer(scale, scale)
-    found = tuple(_warnings(best.fun, best.x[1], bounds))
-    for text in found:
+    result = tuple(_warnings(best.fun, best.x[1], bounds))
+    for text in result:
         warnings.warn(text, FitWarning, stacklevel=3)
     return CompressionFit(
         names=("youngs_modulus", "touch"),
@@ -174,7 +174,7 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
         confidence=confidence,
         noise=deviation,
         residuals=best.fun,
-        warnings=found,
+        warnings=result,
         deflection=measured,
         force=measured_force,
         curve=curve(modulus),
@@ -222,11 +222,11 @@ def _warnings(
     residuals: Array, relative_touch: float, bounds: tuple[list[float], list[float]]
 ) -> list[str]:
     """Return why the intervals may be wrong."""
-    found = []
+    result = []
     if min(relative_touch - bounds[0][1], bounds[1][1] - relative_touch) < 1e-6:  # noqa: PLR2004 - of the span
-        found.append(
+        result.append(
             "the first touch lies at the limit of the search: give data from first touch on"
         )
     if runs := runs_warning(residuals):
-        found.append(f"{runs}: the model does not explain the curve")
-    return found
+        result.append(f"{runs}: the model does not explain the curve")
+    return result

@@ -137,10 +137,10 @@ class Parameter(Plain):
         # Every whole number has the share between itself and the next.
         high = self.high + 1 if whole else self.high
         if self.scale == "log":
-            found = self.low * (high / self.low) ** fraction
+            result = self.low * (high / self.low) ** fraction
         else:
-            found = self.low + fraction * (high - self.low)
-        return np.minimum(np.floor(found), self.high).astype(int) if whole else found
+            result = self.low + fraction * (high - self.low)
+        return np.minimum(np.floor(result), self.high).astype(int) if whole else result
 
     def trial(self, fraction: float) -> Value | None:
         """Return a value to try a case with: the start, or a quantile, or None."""
@@ -148,8 +148,8 @@ class Parameter(Plain):
             return self.start
         if self.values is None and self.std is None and None in {self.low, self.high}:
             return None
-        found: Value = self.quantile(np.array([fraction])).tolist()[0]
-        return found
+        result: Value = self.quantile(np.array([fraction])).tolist()[0]
+        return result
 
     def __str__(self) -> str:
         """Return the parameter as it would stand in a file."""
@@ -188,17 +188,17 @@ def varied(
     def read(word: str) -> float:
         return float(checked(f"{label}: {word}", key, given[word], power))
 
-    found: dict[str, Any]
+    result: dict[str, Any]
     if form == "values":
         values = given["values"]
         if not isinstance(values, list | tuple) or not values:
             refuse(f"{label}: values = {shown(values)} is empty or no list", "[one, or, more]")
-        found = {"values": tuple(checked(f"{label}: values", key, v, power) for v in values)}
+        result = {"values": tuple(checked(f"{label}: values", key, v, power) for v in values)}
     elif form == "low":
-        found = _between(label, key, given, read)
+        result = _between(label, key, given, read)
     else:
-        found = _normal(label, key, given, read, default_mean)
-    return Parameter(**found, unit=given.get("unit"), name=name, key=key)
+        result = _normal(label, key, given, read, default_mean)
+    return Parameter(**result, unit=given.get("unit"), name=name, key=key)
 
 
 def fitted(name: str, given: object, owners: tuple[str, ...]) -> Parameter:
@@ -221,7 +221,7 @@ def fitted(name: str, given: object, owners: tuple[str, ...]) -> Parameter:
 def _begin(
     name: str, given: object, owners: tuple[str, ...], words: Sequence[str]
 ) -> tuple[str, Key, Mapping[str, Any], int]:
-    """Return place, key, table and power of ten of the unit of a parameter."""
+    """Return label, key, table and power of ten of the unit of a parameter."""
     label = f"[parameters] {name}"
     key, entry = find_key(name, owners)
     if key.kind == "list" and entry is None:
@@ -238,14 +238,14 @@ def checked(label: str, key: Key, value: object, power: int) -> Value:
     number = math.nan
     if isinstance(value, int | float) and not isinstance(value, bool):
         number = scaled(value, power) if -LARGEST < value < LARGEST else math.inf
-    valid, allowed, found = {
+    valid, allowed, result = {
         "choice": (value in key.choices, ", ".join(map(repr, key.choices)), value),
         "flag": (isinstance(value, bool), "true, false", value),
         "whole": (number.is_integer(), "whole numbers", number),
     }.get(key.kind, (math.isfinite(number), "finite numbers", number))
     if not valid:
         refuse_value(label, value, allowed)
-    return int(number) if key.kind == "whole" else found  # type: ignore[return-value]
+    return int(number) if key.kind == "whole" else result  # type: ignore[return-value]
 
 
 def _between(

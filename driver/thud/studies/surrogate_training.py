@@ -182,8 +182,8 @@ def _decibels(name: str, values: Values) -> Values:
         return values
     if (values <= 0).any():
         values = np.full_like(values, np.nan)
-    found: Values = 20 * np.log10(values)[:, np.newaxis]
-    return found
+    result: Values = 20 * np.log10(values)[:, np.newaxis]
+    return result
 
 
 def regress(points: Values, values: Values, assessed: NDArray[np.bool_]) -> dict[str, Any]:

@@ -25,11 +25,10 @@ from thud.base.checks import (
 from thud.base.extras import require_extra
 from thud.base.files import is_failure, read_input, replace_file
 from thud.case.case import Case, case_text
-from thud.case.keys import OF_FILES, put
+from thud.case.keys import OF_FILES, value_in, with_values
 from thud.level.assessment import get_criteria
 from thud.level.levels import get_bands
 from thud.studies.result import StudyResult
-from thud.studies.study import value_in
 
 if TYPE_CHECKING:
     import os
@@ -142,12 +141,12 @@ class Surrogate(StudyResult):
     @property
     def labels(self) -> list[str]:
         """Names of all numbers."""
-        found = []
+        result = []
         for name, count in self.outputs.items():
             words = name.replace("_", " ")
             bands = get_bands("third" if "third" in name else "octave").nominal
-            found += [f"{words} {band:g} Hz" for band in bands] if count > 1 else [words]
-        return found
+            result += [f"{words} {band:g} Hz" for band in bands] if count > 1 else [words]
+        return result
 
     @property
     def assessed(self) -> NDArray[np.bool_]:
@@ -174,14 +173,14 @@ class Surrogate(StudyResult):
     def sentence(self) -> str:
         """How it was trained, its largest assessed error, and what it does not answer."""
         label, error = self.worst
-        found = (
+        result = (
             f"surrogate of {len(self.points)} drops: 95 % of held-out drops within {error:.2g} dB "
             f"({label}; the rest of the verdict closer)"
         )
         if self.withheld:
-            found += f"; not answered, with errors above {self.bound:g} dB: "
-            found += ", ".join(self.withheld)
-        return found
+            result += f"; not answered, with errors above {self.bound:g} dB: "
+            result += ", ".join(self.withheld)
+        return result
 
     @property
     def withheld(self) -> list[str]:
@@ -191,13 +190,13 @@ class Surrogate(StudyResult):
 
     def error_of(self, name: str) -> Values:
         """Return the errors of a quantity, dB, shape (count,)."""
-        found: Values = self._split(self.errors[np.newaxis])[name][0]
-        return found
+        result: Values = self._split(self.errors[np.newaxis])[name][0]
+        return result
 
     def mean_square(self, name: str) -> Values:
         """Return the mean squares of the held-out errors of a quantity, dB2, shape (count,)."""
-        found: Values = self._split(np.mean(self.residuals**2, axis=0)[np.newaxis])[name][0]
-        return found
+        result: Values = self._split(np.mean(self.residuals**2, axis=0)[np.newaxis])[name][0]
+        return result
 
     def _split(self, numbers: Values) -> dict[str, Values]:
         """Return columns of numbers by quantity, shape (n, count)."""
@@ -218,7 +217,7 @@ class Surrogate(StudyResult):
         model = self.case.model.name  # type: ignore[union-attr]
         if case.model is None or case.model.name != model:
             refuse("the surrogate was trained on another model", f"model = {model!r}")
-        before, now = (keys_of(put(one, middle)) for one in (self.case, case))
+        before, now = (keys_of(with_values(one, middle)) for one in (self.case, case))
         if changed := [key for key in before if before[key] != now.get(key)]:
             key = changed[0]
             refuse(f"{key} = {now.get(key)}: the surrogate was trained with {before[key]}", "that")
@@ -269,23 +268,23 @@ class Surrogate(StudyResult):
     ) -> Columns:
         parts = self._split(numbers)
         levels = {name: part for name, part in parts.items() if self.outputs[name] > 1}
-        found: Columns = {n: 10 ** (part[:, 0] / 20) for n, part in parts.items()} | levels
+        result: Columns = {n: 10 ** (part[:, 0] / 20) for n, part in parts.items()} | levels
         names = ("contact_time", "restitution")
         level = f"{case.levels.force}_level"
         rest = [given.get(n, np.asarray(value_in(case, n))) for n in ("mass", "height")]
         exact = [np.zeros(1)] * 3
         verdicts = assess_many(
-            (found[level], *(found[n] for n in names), np.array([self.peaks]), *rest),
+            (result[level], *(result[n] for n in names), np.array([self.peaks]), *rest),
             (
                 self.error_of(level)[np.newaxis],
-                *(found[n] * (10 ** (self.error_of(n) / 20) - 1) for n in names),
+                *(result[n] * (10 ** (self.error_of(n) / 20) - 1) for n in names),
                 *exact,
             ),
             case.limits.source,
         )
         verdicts["doubtful"] &= reasons == ""
         status = np.where(reasons == "", 0, 1).astype("int8")
-        return found | verdicts | {"status": status, "reason": reasons}
+        return result | verdicts | {"status": status, "reason": reasons}
 
     @property
     def is_complete(self) -> bool:
@@ -383,7 +382,7 @@ def _columns(parts: tuple[Values, ...], count: int) -> Values:
 
 
 def keys_of(case: Case) -> dict[str, str]:
-    """Return what the results of a surrogate depend on in a case, as texts by place and key."""
+    """Return what the results of a surrogate depend on in a case, as texts by group and key."""
     groups = case.to_namelist()
     return {
         f"&{group}: {key}": f"{value!r}"
@@ -391,6 +390,11 @@ def keys_of(case: Case) -> dict[str, str]:
         if group not in {"case", "limits", OF_FILES}
         for key, value in keys.items()
     }
+
+
+def get_surrogate(given: Surrogate | str | os.PathLike[str]) -> Surrogate:
+    """Return a surrogate, read where the path of its file is given."""
+    return given if isinstance(given, Surrogate) else read_surrogate(given)
 
 
 def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
@@ -413,8 +417,8 @@ def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
             digest = str(file["digest"])
         header["case"] = Case.from_text(header["case"])
         header["keys"] = tuple(header["keys"])
-        found = Surrogate(**header, **arrays)
-        intact = found.digest == digest and found.is_complete
+        result = Surrogate(**header, **arrays)
+        intact = result.digest == digest and result.is_complete
     except Exception as error:
         if is_failure(error):
             raise
@@ -426,7 +430,7 @@ def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
             f"{path} is damaged: wrong checksum, shapes or numbers",
             "a file that Surrogate.save wrote",
         )
-    return found
+    return result
 
 
 @dataclass(frozen=True)
@@ -449,7 +453,7 @@ class Plan:
 
     @property
     def identity(self) -> dict[str, str]:
-        """What a surrogate depends on besides its drops, as texts by place and key."""
+        """What a surrogate depends on besides its drops, as texts by group and key."""
         with require_extra("surrogate"):
             import sklearn
         return {

@@ -5,7 +5,7 @@ module thud_room_report
    use thud_csv, only: get_table_csv
    use thud_file, only: text_file_type
    use thud_kinds, only: wp
-   use thud_rating, only: get_a_weighted_level, get_grade, get_rounded
+   use thud_rating, only: get_a_weighted_level, get_class, get_rounded
    use thud_room, only: few_modes, room_level_type
    use thud_text, only: fixed, newline, to_text
    implicit none (type, external)
@@ -100,7 +100,7 @@ contains
       integer :: grade
 
       level = get_a_weighted_level(prediction%octaves(1)%set, prediction%octave_level)
-      grade = get_grade(level)
+      grade = get_class(level)
       text = text//': L_iA,Fmax '//fixed(level, 2)//' dB, '
       if (grade > 0) then
          text = text//'class '//to_text(grade)

@@ -145,8 +145,9 @@ class ForceMisfit(Misfit):
 
     def value(self, name: str, own: Array) -> float:
         """Return one of its own parameters, or what it is where it is not fitted."""
-        place = list(self.own).index(name) if name in self.own else None
-        return {SHIFT: 0.0, GAIN: 1.0}[name] if place is None else float(own[place])
+        if name not in self.own:
+            return {SHIFT: 0.0, GAIN: 1.0}[name]
+        return float(own[list(self.own).index(name)])
 
     def residual(self, impact: Impact, own: Array) -> Array:
         """Return model minus target over standard deviation, shape (size,)."""
@@ -210,17 +211,17 @@ class ForceMisfit(Misfit):
         value, covariance = self.weights.estimates(
             self._grid(self.spectrum - self.model_spectrum(impact, own))
         )
-        found = {}
+        result = {}
         if self.offset:
-            found["offset"] = float(value[0]), float(np.sqrt(covariance[0, 0]))
-        for place, tone in enumerate(self.tones, start=int(self.offset)):
-            pair = np.array([place, place + len(self.tones)])
-            found[f"hum of {tone:.4g} Hz"] = wave_size(value[pair], covariance[np.ix_(pair, pair)])
+            result["offset"] = float(value[0]), float(np.sqrt(covariance[0, 0]))
+        for i, tone in enumerate(self.tones, start=int(self.offset)):
+            pair = np.array([i, i + len(self.tones)])
+            result[f"hum of {tone:.4g} Hz"] = wave_size(value[pair], covariance[np.ix_(pair, pair)])
         if self.background is not None and self.target.hum is None:
             mains, size, error = self.background_record.mains(self.background, self.tones)
             if size > NOTABLE * error:
-                found[f"hum of {mains:g} Hz"] = size, error
-        return found
+                result[f"hum of {mains:g} Hz"] = size, error
+        return result
 
     def warnings(self, impact: Impact, own: Array, deviation: float, count: int) -> list[str]:
         """Return what residuals of a deviation show that `count` parameters cannot explain.
@@ -237,16 +238,16 @@ class ForceMisfit(Misfit):
         begin = self.value(SHIFT, own)
         inside = (time >= begin) & (time <= begin + impact.contact_time)
         unit = deviation * self.unit_deviation
-        found = _contact_warning(weighted, inside, count, unit)
-        if not found:
-            found = residual_warnings(weighted, time)
-            found += _change_warning(weighted, time < begin, time > begin + impact.contact_time)
+        result = _contact_warning(weighted, inside, count, unit)
+        if not result:
+            result = residual_warnings(weighted, time)
+            result += _change_warning(weighted, time < begin, time > begin + impact.contact_time)
         if not (self.background_record.known or self.target.offset is not None or self.exact):
-            found.append(
+            result.append(
                 f"the background lasts {1e3 * self.background_record.seconds:.3g} ms: offset, hum "
                 "and color of the noise are not known, and the intervals hold for white noise alone"
             )
-        return found
+        return result
 
     def history(self, spectrum: NDArray[np.complex128]) -> Array:
         """Return the history of a transform, N, shape (n_sample,)."""

@@ -97,13 +97,13 @@ def worst_directions(covariance: Array, maximum: float) -> list[tuple[float, Arr
     """Return directions whose standard deviation exceeds a maximum, with that deviation."""
     finite = np.flatnonzero(np.isfinite(np.diag(covariance)))
     variances, vectors = np.linalg.eigh(covariance[np.ix_(finite, finite)])
-    found = []
+    result = []
     for variance, vector in zip(variances[::-1], vectors.T[::-1], strict=True):
         if variance > maximum**2:
             direction = np.zeros(len(covariance))
             direction[finite] = vector
-            found.append((float(np.sqrt(variance)), direction))
-    return found
+            result.append((float(np.sqrt(variance)), direction))
+    return result
 
 
 def null_sentence(names: Sequence[str], direction: Array) -> str:
@@ -134,15 +134,15 @@ def pair_sentences(names: Sequence[str], correlation: Array, least: float) -> li
     """Return the pairs of parameters whose correlation reaches a size, the strongest first."""
     strong = np.triu(np.nan_to_num(np.abs(correlation)), 1)
     pairs = sorted(np.argwhere(strong >= least).tolist(), key=lambda pair: -strong[*pair])
-    found = []
+    result = []
     for i, j in pairs:
         size = strong[i, j]
         # 1.00 would hide a difference.
         digits = int(np.clip(np.ceil(-np.log10(max(1 - size, 1e-9))), 2, 9))
         words = "cannot be" if size >= INSEPARABLE else "can hardly be"
         value = f"{correlation[i, j]:.{digits}f}".replace("-", "−")
-        found.append(f"{names[i]} and {names[j]} {words} separated: correlation {value}")
-    return found
+        result.append(f"{names[i]} and {names[j]} {words} separated: correlation {value}")
+    return result
 
 
 def statement(names: Sequence[str], covariance: Array, correlation: Array, count: int) -> list[str]:
@@ -150,30 +150,30 @@ def statement(names: Sequence[str], covariance: Array, correlation: Array, count
 
     The first `count` parameters are those of the model.
     """
-    found = []
+    result = []
     directions = worst_directions(covariance[:count, :count], 0.0)
     if len(directions) > 1:
         (worst, direction), (best, _) = directions[0], directions[-1]
         part = _parts(names[:count], direction)
         size = 100 * worst * max(abs(float(value)) for value in direction)
         change = _change(part) if len(part) > 1 else part[0][0]
-        found.append(
+        result.append(
             f"least determined: {change}, standard error {size:.2g} %; a direction that is "
             f"{worst / best:.3g} times as uncertain as the best determined one"
         )
-    return found + pair_sentences(names, correlation, STRONG)
+    return result + pair_sentences(names, correlation, STRONG)
 
 
 def _parts(names: Sequence[str], direction: Array) -> list[tuple[str, float]]:
     """Return names and entries of a direction without negligible ones; the maximum is 1."""
     largest = np.abs(direction).max()
-    found = [
+    result = [
         (name, float(value / largest))
         for name, value in zip(names, direction, strict=True)
         if abs(value) > SMALL * largest
     ]
-    sign = np.sign(found[0][1])
-    return [(name, sign * value) for name, value in found]
+    sign = np.sign(result[0][1])
+    return [(name, sign * value) for name, value in result]
 
 
 def _join(words: Sequence[str]) -> str:
@@ -213,16 +213,16 @@ def residual_warnings(residual: Array, time: Array) -> list[str]:
     """Return what the residuals of equally spaced times, s, show beside independent noise."""
     if len(residual) < MIN_TESTED:
         return []
-    found = (_color_warning(residual), _outlier_warning(residual, time), runs_warning(residual))
-    return [text for text in found if text]
+    result = (_color_warning(residual), _outlier_warning(residual, time), runs_warning(residual))
+    return [text for text in result if text]
 
 
 def _color_warning(residual: Array) -> str:
     """Test the cumulative periodogram (Bartlett): of white noise it is that of uniform numbers."""
     power = np.abs(np.fft.rfft(residual)[1:]) ** 2
     share = np.cumsum(power) / power.sum()
-    found = stats.kstest(share[:-1], "uniform")
-    if found.pvalue > UNLIKELY:
+    result = stats.kstest(share[:-1], "uniform")
+    if result.pvalue > UNLIKELY:
         return ""
     fraction = np.searchsorted(share, 0.5) / len(power)
     side = "low" if fraction < 0.5 else "high"  # noqa: PLR2004 - halves

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from thud.base.errors import NumericalError, ThudError
-from thud.studies.fitting.ranges import with_values
+from thud.case.keys import with_values
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -58,7 +58,7 @@ class Objective:
         """Return the case of a term at a point x."""
         values = x[: self.count] * self.scale[: self.count]
         names = (entry.name for entry in self.ranges)
-        return with_values(term.case, dict(zip(names, values, strict=True)))
+        return with_values(term.case, dict(zip(names, values.tolist(), strict=True)))
 
     def impacts(self, x: Array) -> list[Impact]:
         """Return the impacts of a point, one for each term; none where one is impossible."""

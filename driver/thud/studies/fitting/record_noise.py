@@ -169,10 +169,10 @@ class BackgroundRecord:
         waves = cell_waves(cells, tones)
         left = mean - waves @ np.linalg.lstsq(waves, mean)[0]
         peak = float(self.force.max() - np.median(self.force))
-        found = fit_background(cells, left, peak)
+        result = fit_background(cells, left, peak)
         # What the waves have taken of the noise.
         scale = np.where(np.arange(5) < 3, len(mean) / (len(mean) - waves.shape[1] + 1), 1.0)  # noqa: PLR2004
-        return replace(found, draws=scale * found.draws)
+        return replace(result, draws=scale * result.draws)
 
     def tones(self) -> tuple[float, ...]:
         """Return the frequencies of tones, Hz, which noise and hum of 50 and 60 Hz do not explain.
@@ -186,22 +186,22 @@ class BackgroundRecord:
         # The noise has those of the mains.
         grid = grid[np.abs(grid[:, np.newaxis] - MAINS).min(axis=1) > 2 * step]
         min_gain = float(np.log(len(grid) / UNLIKELY))
-        found: tuple[float, ...] = ()
+        result: tuple[float, ...] = ()
         best = _log_likelihood(self.background())
-        while len(found) < MAX_TONES:
-            waves = cell_waves(cells, found)
+        while len(result) < MAX_TONES:
+            waves = cell_waves(cells, result)
             left = mean - waves @ np.linalg.lstsq(waves, mean)[0]
             tried = [
-                (_log_likelihood(self.background((*found, tone))), tone)
-                for whiten in (_trendless(cells), _whitening(self.background(found)))
+                (_log_likelihood(self.background((*result, tone))), tone)
+                for whiten in (_trendless(cells), _whitening(self.background(result)))
                 for tone, gain in [_strongest(cells, whiten @ left, whiten, grid)]
                 if gain > min_gain
             ]
             likelihood, tone = max(tried, default=(best, 0.0))
             if likelihood < best + min_gain:
                 break
-            best, found = likelihood, (*found, tone)
-        return found
+            best, result = likelihood, (*result, tone)
+        return result
 
     def mains(
         self, background: Background, tones: Sequence[float] = ()

@@ -102,12 +102,12 @@ def _search(objective: Objective, starts: Iterator[Array], max_steps: int) -> tu
     failures: list[ThudError] = []
     for start in starts:
         try:
-            found = _descend(objective, start, max_steps)
+            result = _descend(objective, start, max_steps)
         except ThudError as error:
             failures.append(error)
             continue
-        if best is None or found.cost < best.cost:
-            best = found
+        if best is None or result.cost < best.cost:
+            best = result
     if best is None:
         raise failures[0]
     return best.x, bool(best.status > 0)
@@ -148,7 +148,7 @@ def _conclude(objective: Objective, x: Array, confidence: float, *, converged: b
     terms, count = objective.terms, objective.count
     misfits = [term.misfit for term in terms]
     target_size = float(np.linalg.norm(np.concatenate([m.target_vector() for m in misfits])))
-    # Relative to the values found, a change along a direction reads as one in per cent.
+    # Relative to the result, a change along a direction reads as one in per cent.
     relative = np.where(np.abs(x) > AT_LIMIT, np.abs(x), 1.0)
     relative[count:] = 1.0
     inferred = infer(jacobian * relative, finer * relative, target_size)
@@ -197,27 +197,27 @@ def _warnings(
     objective: Objective, answer: Fit, x: Array, inferred: Inference, covariance: Array
 ) -> list[str]:
     """Return warnings of a fit; `covariance` is that of relative values."""
-    found = []
+    result = []
     if not answer.converged:
-        found.append("the search has not converged; allow more steps, or start elsewhere")
-    found += [null_sentence(answer.names, direction) for direction in inferred.null]
+        result.append("the search has not converged; allow more steps, or start elsewhere")
+    result += [null_sentence(answer.names, direction) for direction in inferred.null]
     factor = coverage_factor(answer.confidence, answer.interval_freedom)
     count = objective.count
     # Of a confidence below rounding the factor is 0, and no interval is wide.
     wide = worst_directions(covariance[:count, :count], WIDE / factor) if factor else []
     for deviation, direction in wide:
-        found.append(
+        result.append(
             weak_sentence(answer.names[:count], direction, factor * deviation, answer.confidence)
         )
     if not inferred.null.size and not wide:
-        found += pair_sentences(answer.names, answer.correlation, INSEPARABLE)
+        result += pair_sentences(answer.names, answer.correlation, INSEPARABLE)
     for entry, value, low, high in zip(
         objective.ranges, x, objective.low, objective.high, strict=False
     ):
         if min(value - low, high - value) < AT_LIMIT:
             limit = (low if value - low < high - value else high) * entry.scale
             unit, factor = display_unit(entry.unit, limit)
-            found.append(
+            result.append(
                 f"{entry.name} ended at its limit, {limit / factor:g} {unit}".rstrip()
                 + ": its interval is cut there, and all intervals hold inside the limits only"
             )
@@ -231,8 +231,8 @@ def _warnings(
         own = _size_warning(misfit, residuals, misfit.size - misfit.absorbed - shared)
         own += misfit.warnings(target.impact, target.own, deviation, len(answer.names))
         prefix = "" if len(answer.targets) == 1 else f"target {number}: "
-        found += [f"{prefix}{text}" for text in own]
-    return found
+        result += [f"{prefix}{text}" for text in own]
+    return result
 
 
 def _size_warning(misfit: Misfit, residuals: Array, freedom: float) -> list[str]:
