@@ -143,8 +143,8 @@ class MobilityFit(Displayed):
         negative = np.mean(self.measured.real < 0)
         if negative > 0:
             result.append(
-                f"the measured real part is negative at {100 * negative:.2g} % of the frequencies, which "
-                "no passive floor has: the fit has none"
+                f"the measured real part is negative at {100 * negative:.2g} % of the frequencies, "
+                "which no passive floor has: the fit has none"
             )
         if self.error > _POOR:
             result.append(f"the fit misses the measurement by {100 * self.error:.0f} %")
