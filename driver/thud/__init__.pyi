@@ -83,7 +83,7 @@ from .level.levels import (
 from .level.rating import (
     Rating as Rating,
     rating as rating,
-    standardised_level as standardised_level,
+    standardized_level as standardized_level,
 )
 from .recordings.read_recording import read_recording as read_recording
 from .recordings.recording import Recording as Recording

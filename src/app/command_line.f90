@@ -103,7 +103,7 @@ contains
       end if
    end subroutine execute
 
-   !> Writes to the screen; a full output is an error, and one that nobody reads is none.
+   !> Writes to the screen; a full disk is an error, a closed pipe is none.
    subroutine write_line(descriptor, text, exit_code)
       !> `standard_output` or `standard_error`.
       integer, intent(in) :: descriptor
@@ -197,7 +197,7 @@ contains
       !> Number of the argument, of the option before and of its value after.
       integer, intent(inout) :: i
       character(len=*), intent(in) :: option
-      !> What it takes.
+      !> Its allowed values.
       character(len=*), intent(in) :: allowed
       character(len=:), allocatable, intent(inout) :: value
       !> There is none.

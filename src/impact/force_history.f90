@@ -1,5 +1,5 @@
-!> The answer of every source model: the force on a floor, sampled from first touch on.
-!> Levels, verdicts and files know this type only, never the model behind it.
+!> The result of every source model: the force on a floor, sampled from first touch on.
+!> Levels, assessments and files know this type only, never the model behind it.
 module thud_force_history
    use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
@@ -15,16 +15,16 @@ module thud_force_history
    !> equation of motion refuse their result; at the default step they have less than 1e-9.
    real(wp), parameter :: max_residual = 1.0e-6_wp
 
-   !> Part of the impulse that samples may miss; those of eight samples of a contact miss up to 0.006.
+   !> Fraction of the impulse that samples may miss; those of eight samples of a contact miss up to 0.006.
    real(wp), parameter :: max_missing = 0.02_wp
 
-   !> Forces that levels and verdicts are made of: without and with the flux of momentum.
+   !> Forces that levels and assessments are made of: without and with the flux of momentum.
    integer, parameter :: force_count = 2
 
    !> Their names.
    character(len=8), parameter :: force_names(force_count) = [character(len=8) :: 'elastic', 'floor']
 
-   !> Length of the name of a part of the force.
+   !> Length of the name of a force component.
    integer, parameter :: part_name_length = 24
 
    !> Force of one impact and the numbers that describe it.
@@ -35,15 +35,15 @@ module thud_force_history
       real(wp), allocatable :: deflection(:)
       !> Rate of the deflection, m/s: [n_sample].
       real(wp), allocatable :: velocity(:)
-      !> Names of the parts of the force: [n_part].
+      !> Names of the components of the force: [n_component].
       character(len=part_name_length), allocatable :: part_name(:)
-      !> Parts of the force, N: [n_sample, n_part].
+      !> Components of the force, N: [n_sample, n_component].
       real(wp), allocatable :: part(:, :)
       !> Force without flux of momentum, the paper's ball force, N: [n_sample].
       real(wp), allocatable :: elastic_force(:)
       !> Whole force on the floor, N: [n_sample].
       real(wp), allocatable :: floor_force(:)
-      !> Displacement and velocity of a floor that moves, under the source and downwards, m and m/s: [n_sample].
+      !> Displacement and velocity of a mobile floor, under the source and downwards, m and m/s: [n_sample].
       real(wp), allocatable :: floor_displacement(:), floor_velocity(:)
       !> Energy that the source gives to the floor, J.
       real(wp) :: floor_work = 0.0_wp
@@ -51,7 +51,7 @@ module thud_force_history
       character(len=part_name_length), allocatable :: channel_name(:)
       !> Its values: [n_sample, n_channel].
       real(wp), allocatable :: channel(:, :)
-      !> Names of numbers that the model chose or found: [n_fact].
+      !> Names of scalar quantities that the model chose or computed: [n_fact].
       character(len=part_name_length), allocatable :: fact_name(:)
       !> Their SI units: [n_fact].
       character(len=8), allocatable :: fact_unit(:)
@@ -67,7 +67,7 @@ module thud_force_history
       real(wp) :: contact_time = 0.0_wp
       !> The same between steps, of models that find it in whole steps, s; 0 where `contact_time` is exact.
       real(wp) :: exact_contact_time = 0.0_wp
-      !> Maximum force on the floor, N; of models whose spikes no force plate records, of the part that it does.
+      !> Maximum force on the floor, N; of models whose spikes no force plate records, low-passed.
       real(wp) :: peak_force = 0.0_wp
       !> Maximum elastic force, N, likewise.
       real(wp) :: peak_elastic_force = 0.0_wp
@@ -143,7 +143,7 @@ contains
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
       integer, intent(in) :: n_sample
-      !> Names of the parts of the force: [n_part].
+      !> Names of the components of the force: [n_component].
       character(len=*), intent(in) :: part_name(:)
       !> Names of the channels (default: there are none): [n_channel].
       character(len=*), intent(in), optional :: channel_name(:)

@@ -43,11 +43,11 @@ module thud_run
 
    !> A warning or a note.
    type :: message_type
-      !> A sentence, with the file that it is about.
+      !> Its text, with the file that it is about.
       character(len=:), allocatable :: text
    end type message_type
 
-   !> What a run leaves for its caller.
+   !> Outcome of a run for its caller.
    type :: outcome_type
       !> Directory that holds the files.
       character(len=:), allocatable :: directory
@@ -56,7 +56,7 @@ module thud_run
       integer :: n_message = 0
       !> Warnings and notes for the user: [n_message].
       type(message_type), allocatable :: messages(:)
-      !> The source conforms to the limits, or there is no impact to judge.
+      !> The source conforms to the limits, or there is no impact to assess.
       logical :: conforms = .true.
    contains
       procedure :: add_message
@@ -67,7 +67,7 @@ contains
    !> Adds a warning or a note.
    subroutine add_message(self, path, text)
       class(outcome_type), intent(inout) :: self
-      !> The file that it is about; a sentence.
+      !> The file that it is about; the message.
       character(len=*), intent(in) :: path, text
       type(message_type), allocatable :: messages(:)
       integer :: i
@@ -90,7 +90,7 @@ contains
       logical, intent(in) :: replace, channels
       type(case_type), target, intent(out) :: case
       type(results_type), intent(out) :: results
-      !> Table, verdict and place of the results.
+      !> Table, verdict and directory of the results.
       type(outcome_type), intent(out) :: outcome
       !> The run failed; nothing was written.
       type(error_type), allocatable, intent(out) :: error
@@ -111,7 +111,7 @@ contains
       !> Files that thud has not written are replaced, too; the channels of the histories are written, too.
       logical, intent(in) :: replace, channels
       type(results_type), intent(out) :: results
-      !> Table, verdict and place of the results.
+      !> Table, verdict and directory of the results.
       type(outcome_type), intent(out) :: outcome
       !> The run failed; nothing was written.
       type(error_type), allocatable, intent(out) :: error

@@ -13,8 +13,10 @@ from conftest import MINIMAL, REPOSITORY, naming, recorded
 
 import thud
 from thud import cli
+from thud.base._schema import QUANTITIES
 from thud.base.errors import PlausibilityWarning
-from thud.comparison.comparison import _cell, _digits, read_all
+from thud.base.quantity import Quantity
+from thud.comparison.comparison import _cell, read_all
 from thud.level.assessment import Criterion
 from thud.level.impact_result import ImpactResult
 from thud.recordings.config import Config
@@ -81,12 +83,14 @@ def test_table_gives_every_criterion_beside_its_limits() -> None:
         "125 Hz, dB": "16.99 low",
         "250 Hz, dB": "7.91 low",
         "500 Hz, dB": "-1.82 low",
-        "contact time, ms": "20.43",
-        "restitution": "0.889",
+        "contact time, ms": "20.426",
+        "restitution": "0.8894",
         "peaks of the force": "1",
         "mass, kg": "2.500",
         "drop height, m": "1.000",
         "peak force, N": "1574.3",
+        "maximum deflection, mm": "29.020",
+        "impulse, N s": "20.923",
         "verdict": "does not conform",
     }
     limits = column(comparison, 2)
@@ -225,24 +229,25 @@ def test_case_that_fails_is_named() -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "uncertainty", "unit", "decimals", "cell"),
+    ("value", "uncertainty", "scale", "decimals", "cell"),
     [
-        (38.1, 0, 0.1, 2, "381.00"), (37.9, 0, 1.0, 1, "37.9 low"), (40.1, 1, 1.0, 1, "40.1 high"),
+        (38.1, 0, 10.0, 2, "381.00"), (37.9, 0, 1.0, 1, "37.9 low"), (40.1, 1, 1.0, 1, "40.1 high"),
         (38.0, 0.1, 1.0, 1, "38.0 open"), (40.0, 0.1, 1.0, 1, "40.0 open"),
         (np.nan, 0, 1.0, 1, "not known"),
     ],
 )  # fmt: skip
 def test_cell_tells_how_a_criterion_is_missed(
-    value: float, uncertainty: float, unit: float, decimals: int, cell: str
+    value: float, uncertainty: float, scale: float, decimals: int, cell: str
 ) -> None:
+    quantity = Quantity("", "", "", "dB", "dB", scale, decimals, "")
     criterion = Criterion("octave_31_5", thud.Estimate(value, uncertainty), 38.0, 40.0)
-    assert _cell(criterion, unit, decimals) == cell
+    assert _cell(criterion, quantity) == cell
 
 
-def test_small_forces_have_three_digits() -> None:
-    assert [_digits(force) for force in (0.12345, 0.9999, 1.0, 1574.26)] == [
-        "0.123", "1", "1.0", "1574.3",
-    ]  # fmt: skip
+def test_small_values_have_three_digits() -> None:
+    peak = QUANTITIES["peak_force"]
+    values = (0.012345, 0.9999, 1574.26, float("nan"))
+    assert [peak.show(value) for value in values] == ["0.0123", "1.0", "1574.3", ""]
 
 
 def test_drops_of_different_speeds_are_refused_and_others_named() -> None:
@@ -261,7 +266,7 @@ def test_drops_of_different_speeds_are_refused_and_others_named() -> None:
     assert rows["computed in, ms"][0] == ""
     expected = f"{1e3 * found.run_times['heavy']:.1f}"
     assert rows["computed in, ms"][1] == expected
-    assert rows["peak force, N"][0] == _digits(impact.peak())
+    assert rows["peak force, N"][0] == QUANTITIES["peak_force"].show(impact.peak())
 
 
 def test_impact_and_recording_answer_the_same_questions() -> None:

@@ -11,6 +11,7 @@ import pytest
 from test_figure_look import assert_clean
 
 import thud
+from thud.base._schema import QUANTITIES
 from thud.comparison.comparison import _cell
 from thud.plot.pages import comparison_html, comparison_page
 
@@ -111,4 +112,4 @@ def test_table_of_any_rows_fits_on_the_picture(count: int) -> None:
 
 def test_no_cell_is_minus_zero() -> None:
     criterion = thud.Criterion("level", thud.Estimate(-0.001), -1.0, 1.0)
-    assert _cell(criterion, 1.0, 2) == "0.00"
+    assert _cell(criterion, QUANTITIES["margin"]) == "0.00"

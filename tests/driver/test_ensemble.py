@@ -454,7 +454,7 @@ def test_numbers_below_a_floor_stand_in_their_columns(bands: Any) -> None:  # no
     below = thud.predict_level(impact)
     assert found.room_level[0] == pytest.approx(below.level)
     assert found.room_rating[0] == pytest.approx(below.rating.a_weighted)
-    assert found.standardized_rating[0] == pytest.approx(below.standardised_rating.a_weighted)
+    assert found.standardized_rating[0] == pytest.approx(below.standardized_rating.a_weighted)
     without = thud.solve_many({"height": [0.9]}, replace(case, room=None))
     assert without.floor_work.tolist() == found.floor_work.tolist()
     assert without.room_level is None

@@ -116,7 +116,7 @@ def test_answer_is_that_of_the_library(client: TestClient) -> None:
     assert answer["levels"]["level"] == pytest.approx(impact.levels(), rel=1e-5)
     assert answer["conforms"] is impact.assess().conforms
     numbers = {name: value for name, value, _ in answer["numbers"]}
-    assert numbers["contact"] == pytest.approx(1e3 * impact.contact_time)
+    assert numbers["contact time"] == pytest.approx(1e3 * impact.contact_time)
     assert max(answer["force"]["value"]) == pytest.approx(impact.floor_force.max(), rel=1e-2)
 
 
@@ -195,7 +195,7 @@ def test_recording_is_judged(client: TestClient) -> None:
 def test_recording_of_a_ball_that_is_not_known_is_shown(client: TestClient) -> None:
     content = (REPOSITORY / "inputs/recordings/drop_1.csv").read_bytes()
     report = last_report(client, "/measure", params={"name": "drop_1.csv"}, content=content)
-    assert ["restitution", None, ""] in report["answer"]["numbers"]
+    assert "restitution" not in [name for name, *_ in report["answer"]["numbers"]]
     warnings = report["answer"]["warnings"]
     # The page puts the name before them.
     assert any("ring" in warning for warning in warnings)

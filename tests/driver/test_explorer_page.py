@@ -178,7 +178,7 @@ def test_two_users_do_not_meet(browser: Browser, server: Served) -> None:
 def test_floor_and_room_are_shown(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
     page.locator("#has_room").check()
-    sync_api.expect(page.locator("#room_words")).to_contain_text("standardised")
+    sync_api.expect(page.locator("#room_words")).to_contain_text("standardized")
     page.locator("#floor").select_option("joist_floor")
     sync_api.expect(page.locator("#floor_title")).to_contain_text("joist floor")
     sync_api.expect(page.locator("#floor_words")).to_contain_text("energy into the floor 2.7")
@@ -278,7 +278,7 @@ def test_page_is_accessible(
     page = new_page(browser, server[0], width, scheme)
     page.locator("#pin").click()
     page.locator("#has_room").check()
-    sync_api.expect(page.locator("#room_words")).to_contain_text("standardised")
+    sync_api.expect(page.locator("#room_words")).to_contain_text("standardized")
     page.screenshot(path=tmp_path / "page.png", full_page=True)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     found = axe.Axe().run(page).response["violations"]

@@ -252,8 +252,8 @@ def test_synthetic_survey_gives_back_what_was_put_into_it(tmp_path: Path) -> Non
     measured = thud.read_room_levels(path, volume=50.0)
     # Backgrounds more than 15 dB below are not subtracted: at most 10 lg(1 + 10**-2.2) = 0.03 dB.
     assert prediction.difference(measured) == pytest.approx(2.0, abs=0.03)
-    assert measured.standardised_rating is not None
-    gap = measured.standardised_rating.a_weighted - prediction.standardised_rating.a_weighted
+    assert measured.standardized_rating is not None
+    gap = measured.standardized_rating.a_weighted - prediction.standardized_rating.a_weighted
     assert gap == pytest.approx(2.0, abs=0.03)
 
 

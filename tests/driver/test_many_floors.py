@@ -42,7 +42,7 @@ def test_each_floor_has_the_numbers_of_a_single_prediction(model: thud.ModelName
         assert many.floor_work is not None
         assert many.room_level[i] == pytest.approx(found.level, abs=1e-9)
         assert many.room_rating[i] == pytest.approx(found.rating.a_weighted, abs=1e-9)
-        expected = found.standardised_rating.a_weighted
+        expected = found.standardized_rating.a_weighted
         assert many.standardized_rating[i] == pytest.approx(expected, abs=1e-9)
         moved = thud.solve(model=model, floor=floor).on_floor
         assert moved is not None
@@ -119,16 +119,16 @@ def test_studies_vary_floors_and_rooms(tmp_path: Path, many: thud.Ensemble) -> N
     found = thud.design(study)
     rating = found.dataset["standardized_rating"]
     assert many.standardized_rating is not None
-    # The volume is standardised away but for what flows back into the floor.
+    # The volume is standardized away but for what flows back into the floor.
     assert rating.values[:, 0] == pytest.approx(rating.values[:, 1], abs=0.1)
     assert rating.values[:, 0] == pytest.approx(many.standardized_rating[2:], abs=0.1)
-    assert ("lowest standardised rating, dB", f"{float(rating.min()):.2f}") in found.rows()
+    assert ("lowest standardized rating, dB", f"{float(rating.min()):.2f}") in found.rows()
     thud.plot.save(thud.plot.draw_design(found), tmp_path / "map.png")
     assert found.dataset["room_level"].dims[-1] == "room_third"
     draws = {"kind": "random", "size": 4}
     parameters = {"reverberation_time": {"low": 0.4, "high": 0.6}}
     spread = thud.uncertainty({"case": str(path), "parameters": parameters, "design": draws})
-    assert any(row[0] == "rating, standardised" for row in spread.rows())
+    assert any(row[0] == "rating, standardized" for row in spread.rows())
     dataset = many.to_xarray()
     assert dataset["room_level"].shape == (4, 12)
     assert dataset["contact_third_level"].shape == (4, 15)

@@ -91,10 +91,10 @@ def test_energy_is_that_of_an_infinite_plate(impact: thud.Impact) -> None:
     )
 
 
-def test_standardisation_takes_room_and_reverberation_out(impact: thud.Impact) -> None:
+def test_standardization_takes_room_and_reverberation_out(impact: thud.Impact) -> None:
     """Of the reference room nothing is left; twice the volume halves the energy of sound."""
     reference = thud.predict_level(impact, thud.Plate(), thud.Room())
-    assert reference.standardised == pytest.approx(reference.level)
+    assert reference.standardized == pytest.approx(reference.level)
     larger = thud.predict_level(impact, thud.Plate(), thud.Room(volume=100.0))
     assert larger.level == pytest.approx(reference.level - 10 * np.log10(2), abs=0.1)
     times = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5)
@@ -349,8 +349,8 @@ def test_single_numbers_are_those_of_the_levels(impact: thud.Impact) -> None:
     found = thud.predict_level(impact, thud.Plate(), room)
     assert found.rating == thud.rating(found.level, "third")
     assert found.octave_rating == thud.rating(found.octave_level)
-    assert found.standardised == pytest.approx(thud.standardised_level(found.level, 0.8, 70.0))
-    assert found.standardised_rating == thud.rating(found.standardised, "third")
+    assert found.standardized == pytest.approx(thud.standardized_level(found.level, 0.8, 70.0))
+    assert found.standardized_rating == thud.rating(found.standardized, "third")
     measured = thud.RoomLevels(
         "more", "third", thud.get_bands("third").nominal, np.linspace(80, 40, 15)[None]
     )

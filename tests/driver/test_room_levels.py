@@ -1,4 +1,4 @@
-"""Levels measured in the room below: mean, background, standardisation, rating."""
+"""Levels measured in the room below: mean, background, standardization, rating."""
 
 from __future__ import annotations
 
@@ -35,20 +35,20 @@ def write(path: Path, text: str) -> Path:
     return file
 
 
-def test_published_measurement_is_standardised_and_rated(oracle: Callable[..., None]) -> None:
+def test_published_measurement_is_standardized_and_rated(oracle: Callable[..., None]) -> None:
     found = thud.read_room_levels(PUBLISHED, volume=41.4)
     printed = [76.3, 57.2, 47.2, 44.8, 38.1, 37.0, 35.3, 30.7, 24.5, 22.2, 16.8, 15.1]
     # Printed to 0.1 dB; its own rounding of the table of g(C) leaves 0.07 dB.
     oracle(
-        "standardised levels of a room (Gurtner)",
+        "standardized levels of a room (Gurtner)",
         "published measurement",
-        found.standardised - printed,
+        found.standardized - printed,
         0.1,
         "dB",
     )
     assert found.rating.a_weighted == pytest.approx(46.97, abs=0.01)
-    assert found.standardised_rating.a_weighted == pytest.approx(46.24, abs=0.01)
-    assert (found.rating.rounded, found.standardised_rating.rounded) == (47, 46)
+    assert found.standardized_rating.a_weighted == pytest.approx(46.24, abs=0.01)
+    assert (found.rating.rounded, found.standardized_rating.rounded) == (47, 46)
     assert found.rating.korean_class is None
 
 
@@ -163,9 +163,9 @@ def test_levels_that_cannot_be_rated_are_refused(arguments: tuple[object, ...], 
 def test_rooms_that_cannot_be_are_refused(time: float, volume: float) -> None:
     name = "volume" if time > 0 else "reverberation_time"
     with pytest.raises(thud.InputError, match=naming(name, 0)):
-        thud.standardised_level([60.0], time, volume)
+        thud.standardized_level([60.0], time, volume)
     with pytest.raises(thud.InputError, match=naming(name, 0)):
-        thud.standardised_level([60.0, 61.0], [0.4, time], volume)
+        thud.standardized_level([60.0, 61.0], [0.4, time], volume)
 
 
 def test_command_rates_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -180,10 +180,10 @@ def test_command_rates_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str
     }  # fmt: skip
     lines = (folder / "room_levels.csv").read_text(encoding="utf-8").splitlines()
     assert len(lines) == 13
-    assert "standardised_dB" in lines[0]
+    assert "standardized_dB" in lines[0]
 
 
-@pytest.mark.parametrize("title", ["mean_dB", "std dev", "Standardised, dB", "EDT"])
+@pytest.mark.parametrize("title", ["mean_dB", "std dev", "Standardized, dB", "EDT"])
 def test_columns_of_no_position_are_refused(tmp_path: Path, title: str) -> None:
     rows = "".join(f"{f},60,55\n" for f in (63, 125, 250, 500))
     (tmp_path / "levels.csv").write_text(f"frequency,first,{title.replace(',', '')}\n{rows}")
@@ -198,11 +198,11 @@ def test_column_that_hardly_is_a_position_raises_a_warning(tmp_path: Path) -> No
     # A known title is no position.
     (tmp_path / "levels.csv").write_text(f"frequency,first,RT60\n{rows}")
     found = thud.read_room_levels(tmp_path / "levels.csv", volume=50.0)
-    assert (len(found.positions), found.standardised is None) == (1, False)
+    assert (len(found.positions), found.standardized is None) == (1, False)
 
 
 @pytest.mark.parametrize("volume", [20.0, 50.0, 180.0])
-def test_standardisation_is_the_formula_of_iso_16283_2(volume: float) -> None:
+def test_standardization_is_the_formula_of_iso_16283_2(volume: float) -> None:
     level, time = np.array([70.0, 61.0, 52.0, 43.0]), np.array([0.3, 0.5, 1.1, 2.4])
 
     def shown(time: np.ndarray) -> np.ndarray:
@@ -211,9 +211,9 @@ def test_standardisation_is_the_formula_of_iso_16283_2(volume: float) -> None:
 
     for times in (time, time[2:3]):
         expected = level + 10 * np.log10(volume / 50 * shown(np.array([0.5])) / shown(times))
-        found = thud.standardised_level(level, times, volume)
+        found = thud.standardized_level(level, times, volume)
         assert found == pytest.approx(expected, abs=1e-9)
-    assert thud.standardised_level(level, 1.1, volume) == pytest.approx(expected, abs=1e-9)
+    assert thud.standardized_level(level, 1.1, volume) == pytest.approx(expected, abs=1e-9)
 
 
 def test_class_is_the_best_one_whose_limit_is_kept() -> None:
@@ -249,10 +249,10 @@ def test_each_weakness_of_a_survey_raises_a_warning(change: dict[str, object], c
 def test_numbers_of_a_survey_are_those_of_its_definitions() -> None:
     deviation = np.sqrt(((GOOD.positions - GOOD.positions.mean(axis=0)) ** 2).sum(axis=0) / 3)
     assert GOOD.spread == pytest.approx(deviation)
-    assert GOOD.standardised == pytest.approx(
-        thud.standardised_level(GOOD.level, GOOD.reverberation_time, 30.0)
+    assert GOOD.standardized == pytest.approx(
+        thud.standardized_level(GOOD.level, GOOD.reverberation_time, 30.0)
     )
-    assert GOOD.standardised_rating == thud.rating(GOOD.standardised)
+    assert GOOD.standardized_rating == thud.rating(GOOD.standardized)
     two = replace(GOOD, positions=GOOD.positions[:2])
     assert two.spread == pytest.approx(abs(np.diff(two.positions, axis=0)[0]) / np.sqrt(2))
     energy = [10 ** (thud.rating(one).a_weighted / 10) for one in two.positions]
@@ -262,8 +262,8 @@ def test_numbers_of_a_survey_are_those_of_its_definitions() -> None:
     assert (one.spread, one.position_uncertainty) == (None, None)
     assert one.level.tolist() == one.measured.tolist()
     assert not one.is_upper_bound.any()
-    assert replace(one, volume=None).standardised_rating is None
-    assert replace(one, reverberation_time=None).standardised is None
+    assert replace(one, volume=None).standardized_rating is None
+    assert replace(one, reverberation_time=None).standardized is None
 
 
 def test_rows_of_a_table_may_have_any_order_and_further_bands(tmp_path: Path) -> None:
@@ -281,7 +281,7 @@ def test_rows_of_a_table_may_have_any_order_and_further_bands(tmp_path: Path) ->
     assert found.background == pytest.approx(10 + order / 50)
     assert found.reverberation_time == pytest.approx(2 - order / 1000)
     assert found.rating == thud.rating(found.level[1:5])
-    assert found.standardised_rating == thud.rating(found.standardised[1:5])
+    assert found.standardized_rating == thud.rating(found.standardized[1:5])
 
 
 @pytest.mark.parametrize(
@@ -335,15 +335,15 @@ def test_tables_hold_the_numbers_of_the_survey() -> None:
     assert columns["nominal_Hz"].tolist() == list(OCTAVES)
     for title, values in (
         ("mean_dB", found.measured), ("spread_dB", found.spread), ("level_dB", found.level),
-        ("background_dB", found.background), ("standardised_dB", found.standardised),
+        ("background_dB", found.background), ("standardized_dB", found.standardized),
         ("reverberation_time_s", found.reverberation_time),
     ):  # fmt: skip
         assert columns[title] == pytest.approx(values, abs=1e-7)
     assert columns["is_upper_bound"].tolist() == [0, 0, 0, 1]
     both, alone = rating_table(found), found.rating.rows()
     assert [row[:2] for row in both[1:]] == alone[1:]
-    assert found.standardised_rating is not None
-    after = found.standardised_rating.rows()
+    assert found.standardized_rating is not None
+    after = found.standardized_rating.rows()
     # The class is that of the levels in the room only.
     assert [row[2] for row in both[1:]] == [after[1][1], "", after[3][1]]
     assert rating_table(replace(found, volume=None)) == alone

@@ -79,7 +79,7 @@ tapping: thud.TappingLevel = thud.tapping_level(floor)
 several: thud.FloorComparison = thud.compare_floors({"thin": below})
 (folder / "levels.csv").write_text("frequency,P1\n63,65\n125,64\n250,58\n500,56\n")
 site: thud.RoomLevels = thud.read_room_levels(folder / "levels.csv", volume=40.0)
-rating: thud.Rating = thud.rating(thud.standardised_level(site.level, 0.6, 40.0))
+rating: thud.Rating = thud.rating(thud.standardized_level(site.level, 0.6, 40.0))
 height = {"height": thud.Parameter(values=[0.5, 1.0])}
 mass = {"mass": thud.Parameter(low=2.4, high=2.6)}
 modulus = {"youngs_modulus": thud.Parameter(values=[1.6, 2.08], unit="MPa")}

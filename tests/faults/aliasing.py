@@ -49,7 +49,7 @@ def calls() -> dict[str, Call]:
             [impact.floor_force], lambda force: thud.force_exposure_levels(force, 44100.0)
         ),
         "rating": Call([levels], thud.rating),
-        "standardised_level": Call([levels], lambda x: thud.standardised_level(x, 0.6, 40.0)),
+        "standardized_level": Call([levels], lambda x: thud.standardized_level(x, 0.6, 40.0)),
         "room levels": Call(
             [bands, [levels, levels], [30.0] * 4, [0.5] * 4],
             lambda *given: thud.RoomLevels("room", "octave", *given, 40.0),

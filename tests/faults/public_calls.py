@@ -69,7 +69,7 @@ def fast_calls(folder: Path) -> Calls:
         "predict_level": lambda: str(thud.predict_level(impact, PLATE, ROOM)),
         "tapping_level": lambda: str(thud.tapping_level(PLATE)),
         "rating": lambda: str(thud.rating([65.0, 64.0, 58.0, 56.0])),
-        "standardised_level": lambda: thud.standardised_level([65.0, 64.0], 0.6, 40.0),
+        "standardized_level": lambda: thud.standardized_level([65.0, 64.0], 0.6, 40.0),
         "read_room_levels": lambda: str(thud.read_room_levels(folder / "levels.csv", volume=40.0)),
         "compress": lambda: thud.compress(points=5).force,
         "fit_compression": lambda: str(

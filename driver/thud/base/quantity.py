@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 
@@ -42,5 +43,8 @@ class Quantity:
         return f"{self.title}, {self.display_unit}".removesuffix(", ")
 
     def show(self, value: float) -> str:
-        """Return a value, in SI units, as tables show it in `display_unit`."""
-        return f"{value * self.display_scale:.{self.decimals}f}"
+        """Return a value, in SI units, as tables show it in `display_unit`; empty if it is NaN."""
+        if math.isnan(value):
+            return ""
+        shown = value * self.display_scale
+        return f"{shown:.{self.decimals}f}" if 10**-self.decimals <= abs(shown) else f"{shown:.3g}"

@@ -28,9 +28,16 @@ from thud.base._schema import (
     Sampling,
 )
 from thud.base.bridge import ask, text
-from thud.base.checks import LARGEST, refuse, require_choice, require_kind, require_words, shown
+from thud.base.checks import (
+    LARGEST,
+    refuse,
+    refuse_value,
+    require_choice,
+    require_kind,
+    require_words,
+    shown,
+)
 from thud.base.display import Displayed
-from thud.base.errors import InputError
 from thud.base.files import replace_file
 from thud.base.key import Group, require_keywords
 
@@ -149,11 +156,11 @@ class Case(Group, Displayed):
                 values = groups.setdefault(group_of(self.model.name, option), {})
                 value = getattr(self.model, option.name)
                 if self.modes and option.name in _MESH and values[option.name] != value:
-                    message = (
+                    refuse(
                         f"&mesh: {option.name} = {value} of the model is not that of the modes, "
-                        f"{values[option.name]}; allowed: one mesh for both"
+                        f"{values[option.name]}",
+                        "one mesh for both",
                     )
-                    raise InputError(message)
                 values[option.name] = value
         if self.floor:
             groups["floor"] = {"name": self.floor.name}
@@ -236,10 +243,7 @@ def _plain(group: str, key: str, value: object) -> float | str | list[float | st
         return [_plain(group, key, entry) for entry in value]  # type: ignore[misc]
     known = isinstance(value, int | float) or (isinstance(value, str) and value.isprintable())
     if not known or (isinstance(value, int) and abs(value) > LARGEST):
-        message = (
-            f"&{group}: {key} = {shown(value)} is not allowed; allowed: a number or plain text"
-        )
-        raise InputError(message)
+        refuse_value(f"&{group}: {key}", value, "a number or plain text")
     return value  # type: ignore[return-value]
 
 

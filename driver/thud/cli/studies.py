@@ -11,6 +11,7 @@ from tqdm import tqdm
 from thud.base.display import left_out
 from thud.base.errors import NumericalError, ThudError
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output, print_notes
+from thud.studies.directory import take
 from thud.studies.kinds import KINDS, get_kind
 
 if TYPE_CHECKING:
@@ -64,14 +65,14 @@ def run_study(options: argparse.Namespace) -> int:
             "backend": options.backend,
             "workers": options.workers,
             "scheduler": options.scheduler,
-            "yes": options.yes,
+            "allow_large": options.yes,
         }
     kind.require(study, **how)
     folder = Path(options.output or Path("outputs", study.name))
     if not options.quiet:
         print(kind.describe(study), file=sys.stderr)
     drawn = not options.no_figures
-    with kind.take(study, folder, replace=options.replace, figures=drawn) as results:
+    with take(folder, kind, study, replace=options.replace, figures=drawn) as results:
         try:
             result = kind.compute(study, results, **how)
         except ThudError as error:

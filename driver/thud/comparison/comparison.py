@@ -15,14 +15,16 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 from tqdm import tqdm
 
+from thud.base._schema import LIMITS, QUANTITIES, SAMPLE_QUANTITIES
 from thud.base.checks import refuse, refuse_value, require_choice, require_kind
 from thud.base.display import Displayed
 from thud.base.errors import InputError, PlausibilityWarning, ThudError
 from thud.base.files import Results
+from thud.base.quantity import Quantity
 from thud.case.case import Case, read_case
 from thud.impact.compute import compute
 from thud.level.impact_result import ImpactResult
-from thud.level.levels import FORCES, SOURCES, get_bands
+from thud.level.levels import FORCES, SOURCES
 from thud.plot.files import page_files
 from thud.plot.impacts import common_source
 from thud.plot.pages import comparison_html, comparison_page
@@ -35,15 +37,6 @@ if TYPE_CHECKING:
 
 # Endings of namelist files; all others are recordings.
 NAMELISTS = (".nml", ".namelist", "")
-
-# Criteria after the octaves: name and unit, size of the unit, decimals.
-_ROWS = (
-    ("contact time, ms", 1e-3, 2),
-    ("restitution", 1.0, 3),
-    ("peaks of the force", 1.0, 0),
-    ("mass, kg", 1.0, 3),
-    ("drop height, m", 1.0, 3),
-)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,31 +74,23 @@ class Comparison(Displayed):
         return self.table()
 
     def table(self) -> list[tuple[str, ...]]:
-        """Return rows of text: names, force, method, criteria, peaks, times, verdicts.
+        """Return rows of text: names, force, method, criteria, quantities, times, verdicts.
 
         Columns are the impacts and, in the last, the limits.
         """
         impacts = self.impacts.values()
         verdicts = [impact.assess(self.source, self.force) for impact in impacts]
-        octaves = [(f"{nominal:g} Hz, dB", 1.0, 2) for nominal in get_bands().nominal]
+        times = [self.run_times.get(name) for name in self.impacts]
+        peak = QUANTITIES["peak_force"]
         rows = [
             ("", *self.impacts, f"limits, {self.source.replace('_', ' ')}"),
             ("force", *(impact.assessed_force(self.force) for impact in impacts), ""),
             ("levels", *(impact.level_method for impact in impacts), ""),
+            *(_criterion_row(row) for row in zip(*(v.criteria for v in verdicts), strict=True)),
+            (peak.label, *(peak.show(impact.peak(self.force)) for impact in impacts), ""),
+            *_quantity_rows(impacts),
         ]
-        together = zip(*(verdict.criteria for verdict in verdicts), strict=True)
-        for (title, unit, decimals), criteria in zip([*octaves, *_ROWS], together, strict=True):
-            ends = [f"{end / unit:g}" for end in (criteria[0].lower, criteria[0].upper)]
-            rows.append(
-                (
-                    title,
-                    *(_cell(criterion, unit, decimals) for criterion in criteria),
-                    " to ".join(dict.fromkeys(ends)),
-                )
-            )
-        rows.append(("peak force, N", *(_digits(i.peak(self.force)) for i in impacts), ""))
-        if self.run_times:
-            times = (self.run_times.get(name) for name in self.impacts)
+        if any(times):
             rows.append(("computed in, ms", *(f"{1e3 * t:.1f}" if t else "" for t in times), ""))
         return [*rows, ("verdict", *(verdict.result for verdict in verdicts), "")]
 
@@ -136,12 +121,18 @@ class Comparison(Displayed):
         return Results(Path(directory), "compare", replace=replace).write(self.files())
 
 
-def _digits(force: float) -> str:
-    """Return a force with a decimal, small ones with three digits."""
-    return f"{force:.1f}" if force >= 1 else f"{force:.3g}"
+def _criterion_row(criteria: tuple[Criterion, ...]) -> tuple[str, ...]:
+    """Return the row of one criterion."""
+    name = criteria[0].name
+    band = name.removeprefix("octave_").replace("_", ".")
+    level = Quantity(name, f"{band} Hz", "", "dB", "dB", 1.0, 2, "")
+    quantity = QUANTITIES.get(name, level)
+    ends = [f"{end * quantity.display_scale:g}" for end in (criteria[0].lower, criteria[0].upper)]
+    cells = [_cell(criterion, quantity) for criterion in criteria]
+    return (quantity.label, *cells, " to ".join(dict.fromkeys(ends)))
 
 
-def _cell(criterion: Criterion, unit: float, decimals: int) -> str:
+def _cell(criterion: Criterion, quantity: Quantity) -> str:
     """Return the value of a criterion, and how it misses its limits."""
     if np.isnan(criterion.value):
         return "not known"
@@ -151,7 +142,18 @@ def _cell(criterion: Criterion, unit: float, decimals: int) -> str:
         word = "low"
     else:
         word = "high" if criterion.value > criterion.upper else "open"
-    return f"{criterion.value / unit:z.{decimals}f} {word}".rstrip()
+    return f"{criterion.value * quantity.display_scale:z.{quantity.decimals}f} {word}".rstrip()
+
+
+def _quantity_rows(impacts: Iterable[ImpactResult]) -> list[tuple[str, ...]]:
+    """Return the rows of the quantities that are no criteria, peaks apart, where one is known."""
+    shown = set(SAMPLE_QUANTITIES) - {name for name, *_ in LIMITS[SOURCES[0]]}
+    rows = []
+    for name in SAMPLE_QUANTITIES:
+        values = [impact.quantity(name) for impact in impacts]
+        if name in shown - {"peak_force", "peak_elastic_force"} and not np.isnan(values).all():
+            rows.append((QUANTITIES[name].label, *map(QUANTITIES[name].show, values), ""))
+    return rows
 
 
 # mypy infers the type of a dictionary of several kinds from the parameter of an overload only.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import FiniteElement
+from thud.base._schema import QUANTITIES, SAMPLE_QUANTITIES, FiniteElement
 from thud.base.checks import refuse, shown
 from thud.base.errors import ThudError
 from thud.case.case import tables_case
@@ -77,7 +78,7 @@ def answer_case(case: Case) -> Answer:
         case = replace(case, model=replace(case.model, snapshot_interval=SNAPSHOT_INTERVAL))
     impact = compute(case)
     force = case.levels.force
-    answer = _answer(impact, *contact_force(impact, force), impact.peak())
+    answer = _answer(impact, *contact_force(impact, force))
     answer["force"]["words"] = FORCE_WORDS[force]
     answer["warnings"] += impact.warnings
     on_floor = impact.on_floor
@@ -110,7 +111,7 @@ def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answe
         times, force = drop.time, drop.force
         kept = (times >= 0) & (times <= MARGIN * recording.contact_time)
         curve = 1e3 * times[kept], 1e-3 * force[kept]
-        answer = _answer(recording, *curve, recording.peak())
+        answer = _answer(recording, *curve)
     except ThudError as error:
         # The user does not know the copy.
         raise type(error)(str(error).replace(path, shown(name))) from error
@@ -124,9 +125,7 @@ def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answe
     return answer
 
 
-def _answer(
-    source: ImpactResult, times: NDArray[np.float64], force: NDArray[np.float64], peak: float
-) -> Answer:
+def _answer(source: ImpactResult, times: NDArray[np.float64], force: NDArray[np.float64]) -> Answer:
     """Return the common part of answers; times in ms, the force in kN."""
     verdict = source.assess()
     return {
@@ -138,13 +137,20 @@ def _answer(
         "criteria": [_criterion(one) for one in verdict.criteria],
         "conforms": bool(verdict.conforms),
         "verdict": verdict.result,
-        "numbers": [
-            ["peak", float(peak), "N"],
-            ["contact", 1e3 * source.contact_time, "ms"],
-            ["restitution", *_plain([source.restitution]), ""],
-        ],
+        "numbers": _numbers(source),
         "warnings": [],
     }
+
+
+def _numbers(source: ImpactResult) -> list[list[Any]]:
+    """Return title, value and unit of the quantities that are known, of the peaks the assessed."""
+    other = "peak_force" if source.assessed_force() == "elastic" else "peak_elastic_force"
+    rows: list[list[Any]] = []
+    for name in SAMPLE_QUANTITIES:
+        value, quantity = source.quantity(name), QUANTITIES[name]
+        if name != other and not math.isnan(value):
+            rows.append([quantity.title, value * quantity.display_scale, quantity.display_unit])
+    return rows
 
 
 def _criterion(criterion: Criterion) -> Answer:
@@ -226,7 +232,7 @@ def _room(impact: Impact) -> Answer:
         "frequency": _plain(prediction.frequency),
         "level": _plain(prediction.level),
         "rating": prediction.rating.rounded,
-        "standardised": prediction.standardised_rating.rounded,
+        "standardized": prediction.standardized_rating.rounded,
         "warnings": list(prediction.warnings),
     }
 

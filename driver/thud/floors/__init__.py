@@ -1,1 +1,1 @@
-"""Rooms below floors: measured levels, their standardisation and rating."""
+"""Rooms below floors: measured levels, their standardization and rating."""

@@ -1,7 +1,7 @@
-"""Levels measured in a room below: mean of positions, background, standardisation, rating.
+"""Levels measured in a room below: mean of positions, background, standardization, rating.
 
 The chain is that of ISO 16283-2 for the rubber ball: energy mean over the positions, correction for
-the background, standardisation by reverberation time and volume, rating of ISO 717-2 annex D.
+the background, standardization by reverberation time and volume, rating of ISO 717-2 annex D.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from thud.base.checks import refuse
 from thud.base.columns import read_titled
 from thud.base.display import Displayed
 from thud.level.levels import BANDWIDTHS
-from thud.level.rating import Rating, rated_bands, rating, require_volume, standardised_level
+from thud.level.rating import Rating, rated_bands, rating, require_volume, standardized_level
 
 if TYPE_CHECKING:
     import os
@@ -55,7 +55,7 @@ UNITS = {"frequency": "Hz", "time": "s", "background": "dB", "level": "dB"}
 OTHERS = {"khz", "ms", "min", "pa", "mpa", "upa", "np"}
 # Words in the title of a column that is no position's where there are others.
 NO_POSITION = {
-    "mean", "average", "median", "standardised", "standardized", "spread", "std", "sd", "stdev",
+    "mean", "average", "median", "standardized", "spread", "std", "sd", "stdev",
     "deviation", "uncertainty", "edt", "nominal",
 }  # fmt: skip
 # Difference of two positions, dB, as the mean over the bands, from which on one hardly is one.
@@ -109,11 +109,11 @@ class RoomLevels(Displayed):
         return self._corrected()[1]
 
     @property
-    def standardised(self) -> Array | None:
+    def standardized(self) -> Array | None:
         """L'_i,Fmax,V,T, dB, shape (n_band,); None without reverberation time or volume."""
         if self.reverberation_time is None or self.volume is None:
             return None
-        return standardised_level(self.level, self.reverberation_time, self.volume)
+        return standardized_level(self.level, self.reverberation_time, self.volume)
 
     @property
     def spread(self) -> Array | None:
@@ -126,9 +126,9 @@ class RoomLevels(Displayed):
         return rating(self.level[self._rated], self.bands)
 
     @property
-    def standardised_rating(self) -> Rating | None:
-        """Single numbers of the standardised levels; None where there are none."""
-        levels = self.standardised
+    def standardized_rating(self) -> Rating | None:
+        """Single numbers of the standardized levels; None where there are none."""
+        levels = self.standardized
         return None if levels is None else rating(levels[self._rated], self.bands)
 
     @property
@@ -148,24 +148,24 @@ class RoomLevels(Displayed):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a reader of the numbers has to know."""
-        found = []
+        """Caveats of the numbers."""
+        result = []
         if len(self.positions) < MIN_POSITIONS:
-            found.append(
+            result.append(
                 f"levels of {self._count}; ISO 16283-2 asks for {MIN_POSITIONS} positions of the "
                 "source or more"
             )
         different = float(np.ptp(self.positions.mean(axis=1)))
         if different > DIFFERENT:
-            found.append(
+            result.append(
                 f"the levels of two positions differ by {different:.0f} dB in the mean: check that "
                 "every column without a known title holds the levels of a position"
             )
         if self.background is None:
-            found.append("the background is not known: levels are not corrected for it")
+            result.append("the background is not known: levels are not corrected for it")
         elif self.is_upper_bound.any():
             bands = ", ".join(f"{f:g}" for f in self.frequency[self.is_upper_bound])
-            found.append(
+            result.append(
                 f"less than 6 dB above the background at {bands} Hz: levels there are maxima, and "
                 "so is what is made of them"
             )
@@ -177,8 +177,8 @@ class RoomLevels(Displayed):
             if value is None
         ]  # fmt: skip
         if missing:
-            found.append(f"not standardised: {' and '.join(missing)} not given")
-        return tuple(found)
+            result.append(f"not standardized: {' and '.join(missing)} not given")
+        return tuple(result)
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, a band each."""
@@ -190,15 +190,15 @@ class RoomLevels(Displayed):
         if self.background is not None:
             titles += ["background, dB", "L_i,Fmax, dB"]
             columns += [self.background, self.level]
-        if (standardised := self.standardised) is not None:
-            titles += ["T, s", "standardised, dB"]
-            columns += [np.asarray(self.reverberation_time), standardised]
+        if (standardized := self.standardized) is not None:
+            titles += ["T, s", "standardized, dB"]
+            columns += [np.asarray(self.reverberation_time), standardized]
         cells = [
             [f"{value:z.{2 if title == 'T, s' else 1}f}" for value in column]
             for title, column in zip(titles[1:], columns, strict=True)
         ]
         for title, column in zip(titles[1:], cells, strict=True):
-            if title in {"L_i,Fmax, dB", "standardised, dB"}:
+            if title in {"L_i,Fmax, dB", "standardized, dB"}:
                 column[:] = [
                     f"< {text}" if low else text
                     for text, low in zip(column, self.is_upper_bound, strict=True)
@@ -206,15 +206,15 @@ class RoomLevels(Displayed):
         return [tuple(titles), *zip((f"{f:g}" for f in self.frequency), *cells, strict=True)]
 
     def plot(self) -> Figure:
-        """Draw the levels of positions, their mean, the standardised ones and the background."""
+        """Draw the levels of positions, their mean, the standardized ones and the background."""
         from thud.plot.rooms import room_levels
 
         return room_levels(self)
 
     def __repr__(self) -> str:
         """Return the single numbers."""
-        after = self.standardised_rating
-        more = "" if after is None else f", standardised {after.rounded} dB"
+        after = self.standardized_rating
+        more = "" if after is None else f", standardized {after.rounded} dB"
         return f"<RoomLevels, {self._count}: L_iA,Fmax {self.rating.rounded} dB{more}>"
 
     @property
@@ -230,8 +230,8 @@ class RoomLevels(Displayed):
     def _corrected(self) -> tuple[Array, NDArray[np.bool_]]:
         if self.background is None:
             return self.measured, np.zeros(len(self.frequency), dtype=bool)
-        found = ask("background", levels=self.measured, background=self.background)
-        return found["levels"], found["is_upper_bound"].astype(bool)
+        result = ask("background", levels=self.measured, background=self.background)
+        return result["levels"], result["is_upper_bound"].astype(bool)
 
 
 def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) -> RoomLevels:
@@ -295,13 +295,13 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     )  # fmt: skip
 
 
-def levels_csv(found: RoomLevels) -> bytes:
+def levels_csv(result: RoomLevels) -> bytes:
     """Return the levels as a table with titles."""
     columns = {
-        "nominal_Hz": found.frequency, "mean_dB": found.measured, "spread_dB": found.spread,
-        "background_dB": found.background, "level_dB": found.level,
-        "is_upper_bound": found.is_upper_bound.astype(int),
-        "reverberation_time_s": found.reverberation_time, "standardised_dB": found.standardised,
+        "nominal_Hz": result.frequency, "mean_dB": result.measured, "spread_dB": result.spread,
+        "background_dB": result.background, "level_dB": result.level,
+        "is_upper_bound": result.is_upper_bound.astype(int),
+        "reverberation_time_s": result.reverberation_time, "standardized_dB": result.standardized,
     }  # fmt: skip
     known = {title: values for title, values in columns.items() if values is not None}
     text = io.StringIO()
@@ -312,13 +312,13 @@ def levels_csv(found: RoomLevels) -> bytes:
     return text.getvalue().encode()
 
 
-def rating_table(found: RoomLevels) -> list[tuple[str, ...]]:
+def rating_table(result: RoomLevels) -> list[tuple[str, ...]]:
     """Return header and rows of the single numbers."""
-    after = found.standardised_rating
-    rows = [*found.rating.rows()]
+    after = result.standardized_rating
+    rows = [*result.rating.rows()]
     if after is not None:
         rows = [(*row, more[1]) for row, more in zip(rows, after.rows(), strict=True)]
-        rows[0] = ("rating", "in the room", "standardised")
+        rows[0] = ("rating", "in the room", "standardized")
         # The classes are meant for levels in the room.
         rows[2:3] = [(*row[:2], "") for row in rows[2:3]]
     return rows

@@ -160,6 +160,10 @@ class Impact(ImpactQuantities, Displayed):
             self.peak_elastic_force if self.assessed_force(force) == "elastic" else self.peak_force
         )
 
+    def quantity(self, name: str) -> float:
+        """Return a quantity of the table by its name, SI units; NaN if unknown."""
+        return float(getattr(self, name, math.nan))
+
     def assessed_force(self, force: LevelsForce | None = None) -> LevelsForce:
         """Return a force, checked, or without it that which the case assesses."""
         chosen = self.case.levels.force if force is None else force

@@ -135,6 +135,9 @@ class ImpactResult(Protocol):
     def on_floor(self) -> FloorImpact | None:
         """The same drop on the mobile floor of the case; None without one."""
 
+    def quantity(self, name: str) -> float:
+        """Return a quantity of the table by its name, SI units; NaN if unknown."""
+
     def assessed_force(self, force: LevelsForce | None = None) -> LevelsForce:
         """Return a kind of force, by default the assessed one."""
 

@@ -124,7 +124,7 @@ def rating(levels: ArrayLike, bands: BandSet = "octave") -> Rating:
     )
 
 
-def standardised_level(
+def standardized_level(
     level: ArrayLike, reverberation_time: ArrayLike, volume: float
 ) -> NDArray[np.float64]:
     """Return levels in a room of 50 m3 with a reverberation time of 0.5 s (ISO 16283-2).
@@ -162,11 +162,11 @@ def standardised_level(
         )
     if (times <= 0).any():
         refuse_value("reverberation_time", float(times.min()), "reverberation_time > 0, s")
-    standardised: NDArray[np.float64]
-    standardised = ask(
+    standardized: NDArray[np.float64]
+    standardized = ask(
         "standardization", levels=values, reverberation_time=times, volume=require_volume(volume)
     )["levels"]
-    return standardised
+    return standardized
 
 
 def require_volume(volume: Any) -> float:  # noqa: ANN401 - of a user

@@ -355,7 +355,7 @@ def _draw_classes(axes: Axes, comparison: FloorComparison) -> None:
     x = np.arange(len(comparison.predictions))
     room = [prediction.octave_rating.a_weighted for prediction in comparison.predictions.values()]
     after = [
-        prediction.standardised_rating.a_weighted for prediction in comparison.predictions.values()
+        prediction.standardized_rating.a_weighted for prediction in comparison.predictions.values()
     ]
     axes.bar(
         x - 0.2, room, 0.36, color=COLORS[5], edgecolor="black", linewidth=0.5,

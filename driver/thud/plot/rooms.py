@@ -44,7 +44,7 @@ def room_levels(room: RoomLevels) -> Figure:
         x, room.level, color=COLORS[0], marker="o", markersize=3.5,
         label=f"in the room: L_iA,Fmax {number} dB",
     )  # fmt: skip
-    standardized, rating = room.standardised, room.standardised_rating
+    standardized, rating = room.standardized, room.standardized_rating
     if standardized is not None and rating is not None:
         axes.plot(
             x, standardized, color=COLORS[1], marker="s", markersize=3.5,
@@ -94,8 +94,8 @@ def draw_prediction(prediction: RoomPrediction, measured: RoomLevels | None = No
     label = f"in the room: L_iA,Fmax {prediction.rating.rounded} dB"
     below.plot([], [], color=COLORS[0], marker="o", markersize=4, label=label)
     below.plot(
-        x, prediction.standardised, color=COLORS[1], marker="s", markersize=3, linewidth=1,
-        linestyle="--", label=f"standardized: {prediction.standardised_rating.rounded} dB",
+        x, prediction.standardized, color=COLORS[1], marker="s", markersize=3, linewidth=1,
+        linestyle="--", label=f"standardized: {prediction.standardized_rating.rounded} dB",
     )  # fmt: skip
     if measured is not None:
         level = prediction.level + prediction.difference(measured)

@@ -1,4 +1,4 @@
-!> The drop on a floor that moves as text: files and the table on the screen.
+!> The drop on a mobile floor as text: files and the table on the screen.
 module thud_floor_report
    use thud_band, only: get_band_name
    use thud_case, only: case_type

@@ -66,7 +66,7 @@ contains
 
       !> Level of a band, by both forces where they differ.
       function level_row(band, criterion) result(line)
-         !> Number of the band.
+         !> Index of the band.
          integer, intent(in) :: band
          !> Its limits, where there are any.
          type(criterion_type), intent(in), optional :: criterion
@@ -99,7 +99,7 @@ contains
       if (case%left_out /= '') line = '  Defaults hold for'//trim(case%left_out)//', which the file leaves out.'//newline
    end function get_defaults_line
 
-   !> Name of a force in words.
+   !> Name of a force for readers.
    pure function get_force_title(force) result(title)
       !> One of `force_names`.
       character(len=*), intent(in) :: force

@@ -53,11 +53,11 @@ contains
 
    !> Writes one sample of everything but the force.
    subroutine record_sample(run, i, start, history)
-      !> The ball, between kick and drift.
+      !> The ball, between updates of velocity and position.
       type(impact_run_type), intent(in) :: run
-      !> Number of the sample.
+      !> Index of the sample.
       integer, intent(in) :: i
-      !> Height of the centre of mass at first touch, m.
+      !> Height of the center of mass at first touch, m.
       real(wp), intent(in) :: start
       type(force_history_type), intent(inout) :: history
 
@@ -68,7 +68,7 @@ contains
          if (.not. any(run%floor_force(:, 2) > 0.0_wp)) history%channel(i, at_radius) = 0.0_wp
       end associate
       history%channel(i, at_pressure:at_floor - 1) = [run%state%gas_pressure, run%kinetic, run%state%strain_energy, &
-         run%state%gas_energy, run%potential, run%spring + run%stopped, run%rubbed, run%dissipated, &
+         run%state%gas_energy, run%potential, run%contact_energy + run%contact_loss, run%friction_loss, run%dissipated, &
          run%state%min_jacobian]
       if (.not. run%floor%moves) return
       history%channel(i, at_floor) = run%floor%work
@@ -81,9 +81,9 @@ contains
    pure subroutine continue_flight(run, last, start, history)
       !> The ball at the end of the computation.
       type(impact_run_type), intent(in) :: run
-      !> Number of the latest sample.
+      !> Index of the latest sample.
       integer, intent(in) :: last
-      !> Height of the centre of mass at first touch, m.
+      !> Height of the center of mass at first touch, m.
       real(wp), intent(in) :: start
       type(force_history_type), intent(inout) :: history
       real(wp) :: mass, speed, rise, time
@@ -140,7 +140,7 @@ contains
          history%fact_name = [character(len=24) :: 'shear_modulus', 'bulk_modulus', 'simulated_time', 'minimum_step', &
             'maximum_penetration']
          history%fact_unit = [character(len=8) :: 'Pa', 'Pa', 's', 's', 'm']
-         history%fact = [material%shear_modulus, material%bulk_modulus, run%time, run%shortest_interval, run%sink]
+         history%fact = [material%shear_modulus, material%bulk_modulus, run%time, run%shortest_interval, run%penetration]
       end associate
       gain = ball%mass*(get_mean_velocity(run) + speed + run%gravity*run%time)
       history%impulse_residual = abs(sum(history%floor_force)/history%sample_rate - gain)/gain

@@ -35,7 +35,7 @@ export function show(variants, remove) {
       y: { title: "Maximum Fast level", unit: "dB", reference: " re 20 µPa" },
     });
     byId("room_words").replaceChildren(...rooms.map((one) => element("li", {}, key(variants, one), "L", element("sub", {}, "iA,Fmax"),
-      ` ${one.answer.room.rating} dB, standardised ${one.answer.room.standardised} dB`)));
+      ` ${one.answer.room.rating} dB, standardized ${one.answer.room.standardized} dB`)));
   }
   showCriteria(variants);
   showVariants(variants, remove);

@@ -10,9 +10,8 @@ import numpy as np
 
 from thud.base._schema import KEYS
 from thud.base.checks import refuse, require_kind, suggestion
-from thud.base.errors import InputError
 from thud.base.units import scaled
-from thud.case.keys import limits, put, users
+from thud.case.keys import key_owners, limits, with_values
 from thud.studies.parameter import fitted
 
 if TYPE_CHECKING:
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     from thud.case.case import Case
     from thud.studies.parameter import Parameter
 
-# A start at a limit is moved away from it by this part of itself.
+# A start at a limit is moved away from it by this fraction of itself.
 INSIDE = 0.01
 # Limits of the library that exceed the start by this factor are ignored.
 FAR = 10.0
@@ -54,21 +53,16 @@ def known_parameters(case: Case) -> dict[str, tuple[Key, float]]:
     model = case.model
     if model is None:
         refuse("&model is missing", "a case with a source model")
-    found: dict[str, tuple[Key, float]] = {}
+    result: dict[str, tuple[Key, float]] = {}
     for key in KEYS:
         if key.group not in {"ball", "drop"} and key.owner != model.name:
             continue
         value = getattr(model if key.owner else getattr(case, key.group), key.name)
         if key.kind == "real":
-            found[key.name] = key, value
+            result[key.name] = key, value
         elif key.kind == "list" and not key.whole:
-            found |= {f"{key.name}({i})": (key, v) for i, v in enumerate(value, start=1)}
-    return found
-
-
-def with_values(case: Case, values: Mapping[str, float]) -> Case:
-    """Return a case with other values of some parameters."""
-    return put(case, {name: float(value) for name, value in values.items()})
+            result |= {f"{key.name}({i})": (key, v) for i, v in enumerate(value, start=1)}
+    return result
 
 
 def fitted_parameter(name: str, given: object, case: Case) -> Parameter:
@@ -81,7 +75,7 @@ def fitted_parameter(name: str, given: object, case: Case) -> Parameter:
             f"{suggestion(name, known)}",
             ", ".join(known),
         )
-    return fitted(name, given, users(case))
+    return fitted(name, given, key_owners(case))
 
 
 def bound_parameters(
@@ -100,10 +94,10 @@ def bound_parameters(
 
 def get_ranges(case: Case, parameters: Iterable[Parameter]) -> list[Range]:
     """Return ranges of parameters. Raises InputError where start and limits do not fit together."""
-    found = list(parameters)
+    result = list(parameters)
     # Ends of ranges that are other keys are those at the start.
-    begin = with_values(case, {p.name: p.start for p in found if p.start is not None})
-    return [_get_range(begin, parameter) for parameter in found]
+    begin = with_values(case, {p.name: p.start for p in result if p.start is not None})
+    return [_get_range(begin, parameter) for parameter in result]
 
 
 def _get_range(case: Case, given: Parameter) -> Range:
@@ -114,17 +108,15 @@ def _get_range(case: Case, given: Parameter) -> Range:
     low = lower if given.low is None else given.low
     high = upper if given.high is None else given.high
     if not lower <= low < high <= upper:
-        message = (
-            f"[parameters] {name}: low = {low:g} and high = {high:g} are not allowed; "
-            f"allowed: {lower:g} <= low < high <= {upper:g} {key.unit}".rstrip()
+        refuse(
+            f"[parameters] {name}: low = {low:g} and high = {high:g} are not allowed",
+            f"{lower:g} <= low < high <= {upper:g} {key.unit}".rstrip(),
         )
-        raise InputError(message)
     if not low <= start <= high:
-        message = (
-            f"[parameters] {name}: start = {start:g} is not allowed; "
-            f"allowed: {low:g} <= start <= {high:g} {key.unit}".rstrip()
+        refuse(
+            f"[parameters] {name}: start = {start:g} is not allowed",
+            f"{low:g} <= start <= {high:g} {key.unit}".rstrip(),
         )
-        raise InputError(message)
     spread = (
         max(low, start - scale / SPREAD) if given.low is None else low,
         min(high, start + scale * (SPREAD - 1)) if given.high is None else high,
