@@ -27,7 +27,7 @@ module thud_finite_element
    use thud_sampling, only: get_step_count, sampling_type
    use thud_source_model, only: typical_contact
    use thud_text, only: to_text
-   use thud_theory_limit, only: get_wave_limit, theory_limit_type
+   use thud_validity_limit, only: get_wave_limit, validity_limit_type
    implicit none (type, external)
    private
 
@@ -63,7 +63,7 @@ module thud_finite_element
       procedure, pass(options) :: solve
       procedure, pass(options) :: get_cost
       procedure, pass(options) :: get_paper_modulus
-      procedure, pass(options) :: get_theory_limits
+      procedure, pass(options) :: get_validity_limits
       procedure, pass(options) :: get_loss_factors
       procedure, pass(options) :: compress
    end type finite_element_type
@@ -115,23 +115,24 @@ contains
    end function get_paper_modulus
 
    !> Limits of what the mesh resolves: beyond them octaves are off by more than about 0.5 dB (docs/finite_elements.md).
-   function get_theory_limits(ball, drop, options, sampling, history) result(limits)
+   function get_validity_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
       class(finite_element_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(force_history_type), intent(in) :: history
-      type(theory_limit_type), allocatable :: limits(:)
+      type(validity_limit_type), allocatable :: limits(:)
       real(wp) :: length
 
       length = pi*ball%outer_radius/options%mesh%polar_elements
       limits = [get_wave_limit(ball, history, 0.5_wp), &
-         theory_limit_type('mesh', 'sqrt(outer_radius wall_thickness) over the length of an element', &
+         validity_limit_type('mesh', 'sqrt(outer_radius wall_thickness) over the length of an element', &
          sqrt(ball%outer_radius*ball%wall_thickness)/length, lowest=6.0_wp, &
          reason='fewer polar_elements do not resolve how a wall so thin bends'), &
-         theory_limit_type('mesh', 'radius of the contact over the length of an element', &
-         maxval(history%channel(:, 1))/length, lowest=4.0_wp, reason='fewer polar_elements do not resolve the contact')]
-   end function get_theory_limits
+         validity_limit_type('mesh', 'radius of the contact over the length of an element', &
+         maxval(history%model_history(:, 1))/length, lowest=4.0_wp, &
+         reason='fewer polar_elements do not resolve the contact')]
+   end function get_validity_limits
 
    !> Loss factor of the material in shear against frequency.
    subroutine get_loss_factors(ball, options, frequency, loss_factor, error)
