@@ -81,7 +81,7 @@ def _draw_histories(history: Axes, motion: Axes, impact: FloorImpact) -> None:
     for i, (name, force) in enumerate(forces.items()):
         recorded = 1e-3 * record_force(force, impact.sample_rate)
         history.plot(time[shown], recorded[shown], label=name, **line_style(i))
-    history.set_ylabel("Force, low-passed\nat 1.25 kHz, kN")
+    history.set_ylabel("Force on the floor,\nlow-passed, kN")
     motion.plot(time[shown], 1e3 * impact.floor_velocity[shown], color=COLORS[2], linewidth=1)
     motion.set_ylabel("Velocity of\nthe floor, mm/s")
     motion.set_xlabel(TIME_LABEL)
