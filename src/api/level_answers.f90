@@ -6,8 +6,8 @@ module thud_level_answers
    use thud_error, only: error_type
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_kinds, only: wp
-   use thud_rating, only: correct_for_background, get_a_weighted_level, get_grade, get_legacy_rating, get_rounded, &
-      get_standardisation
+   use thud_rating, only: correct_for_background, get_a_weighted_level, get_class, get_inverse_a_rating, get_rounded, &
+      get_standardization
    use thud_request, only: request_type
    use thud_source_limits, only: get_peak_count
    use thud_transform, only: get_low_pass
@@ -74,8 +74,8 @@ contains
       a_weighted = get_a_weighted_level(set, levels)
       call bundle%add_number('a_weighted', a_weighted)
       call bundle%add_number('rounded', real(get_rounded(a_weighted), wp))
-      call bundle%add_number('class', real(get_grade(a_weighted), wp))
-      if (set == octave_set) call bundle%add_number('curve', real(get_legacy_rating(levels), wp))
+      call bundle%add_number('class', real(get_class(a_weighted), wp))
+      if (set == octave_set) call bundle%add_number('curve', real(get_inverse_a_rating(levels), wp))
    end subroutine answer_rating
 
    !> `levels`, dB, standardized to the reference room from `reverberation_time`, s, and `volume`, m3.
@@ -85,7 +85,7 @@ contains
       real(wp), allocatable :: levels(:)
 
       levels = request%get_array('levels')
-      levels = levels + get_standardisation(request%get_array('reverberation_time'), request%get_number('volume'))
+      levels = levels + get_standardization(request%get_array('reverberation_time'), request%get_number('volume'))
       call bundle%add_array('levels', shape(levels), levels)
    end subroutine answer_standardization
 

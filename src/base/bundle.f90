@@ -135,7 +135,7 @@ contains
       end do
    end subroutine copy_values
 
-   !> Leaves a bundle to be collected, of an error its sentence alone.
+   !> Leaves a bundle to be collected, or the message of an error alone.
    subroutine leave(bundle, error, status, handle, n_byte, n_value)
       type(bundle_type), pointer, intent(inout) :: bundle
       !> What went wrong.

@@ -25,7 +25,7 @@ module thud_constants
 
 contains
 
-   !> Compiler of the library in use and its options: a constant, or a length of its own, would be that of who calls.
+   !> Compiler of the library and its options; a function, as a constant would hold those of the calling unit.
    pure function get_compiler() result(text)
       !> Name, version and options, then blanks.
       character(len=4000) :: text

@@ -16,11 +16,11 @@ module thud_error
    !> Codes of interrupts, and exit codes of the executable: this plus the number of the signal.
    integer, parameter :: signal_base = 128
 
-   !> An error, in one sentence for the user.
+   !> An error, with its message for the user.
    type :: error_type
       !> `bad_input`, `numerical_failure`, or `signal_base` plus the number of the signal.
       integer :: code = numerical_failure
-      !> One sentence that names the place, the value and what is allowed.
+      !> One sentence that names key or position, value and allowed range.
       character(len=:), allocatable :: message
    end type error_type
 
@@ -28,14 +28,14 @@ contains
 
    !> Error of the user's input.
    pure function input_error(message) result(error)
-      !> One sentence for the user.
+      !> The message for the user.
       character(len=*), intent(in) :: message
       type(error_type) :: error
       character(len=len(message)) :: text
       integer :: i, last
 
       text = message
-      ! Control characters do not print, a zero byte would end the sentence, and bytes that are no characters spoil the
+      ! Control characters do not print, a zero byte would end the message, and bytes that are no characters spoil the
       ! screen; input may hold them, and a character may be cut in two where a value is shortened.
       last = merge(255, 126, is_utf8(text))
       do i = 1, len(text)
@@ -46,7 +46,7 @@ contains
 
    !> Error of a computation that could not be carried through.
    pure function numerical_error(message) result(error)
-      !> One sentence for the user.
+      !> The message for the user.
       character(len=*), intent(in) :: message
       type(error_type) :: error
 
@@ -59,7 +59,7 @@ contains
       type(error_type), allocatable, intent(in) :: error
       !> Its code, or 0.
       integer, intent(out) :: status
-      !> Its sentence, or blanks.
+      !> Its message, or blanks.
       character(len=*), intent(out) :: message
 
       status = 0

@@ -121,7 +121,7 @@ contains
    function get_interval(fields, i) result(interval)
       !> All fields: [n_field].
       type(field_type), intent(in) :: fields(:)
-      !> Number of the field.
+      !> Index of the field.
       integer, intent(in) :: i
       type(interval_type) :: interval
       integer, allocatable :: group(:)
@@ -218,7 +218,7 @@ contains
       list%values(:list%count) = entries(:list%count)
    end subroutine set_list
 
-   !> Value as a number: of a choice its place among the choices, of a flag 0 or 1.
+   !> Value as a number: of a choice its index, of a flag 0 or 1.
    function get_number(self) result(number)
       class(field_type), intent(in) :: self
       !> The number; 0 for free text and lists.

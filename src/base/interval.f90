@@ -89,7 +89,7 @@ contains
    !> Whether values of one key, in many sets of the values of all keys, lie in the interval.
    pure function contains_sets(self, key, keys, values) result(inside)
       class(interval_type), intent(in) :: self
-      !> Number of the key.
+      !> Index of the key.
       integer, intent(in) :: key
       !> Names of the keys: [n_key].
       character(len=*), intent(in) :: keys(:)

@@ -20,7 +20,7 @@ module thud_progress
       end subroutine handler
    end interface
 
-   !> Part of the latest report of this process that is done, 0 to 1; other threads may ask.
+   !> Fraction of the latest report of this process that is done, 0 to 1; other threads may ask.
    real(wp), volatile, protected :: latest_progress = 0.0_wp
 
    !> Procedure that shows it; none unless the executable or the driver sets one.

@@ -1,4 +1,4 @@
-!> Suggestions for misspelt words.
+!> Suggestions for misspelled words.
 module thud_suggestion
    use thud_text, only: lower_case, quoted
    implicit none (type, external)
@@ -6,14 +6,14 @@ module thud_suggestion
 
    public :: get_suggestion
 
-   !> Longer words are no misspelt ones.
+   !> Maximum length of a word that gets a suggestion.
    integer, parameter :: max_length = 64
 
 contains
 
-   !> The known word that a misspelt one probably means.
+   !> The known word that a misspelled one probably means.
    pure subroutine get_suggestion(word, known, suggestion)
-      !> The misspelt word.
+      !> The misspelled word.
       character(len=*), intent(in) :: word
       !> The known words: [n_known].
       character(len=*), intent(in) :: known(:)
@@ -30,7 +30,7 @@ contains
       if (3*distance(i) <= max(len(word), len_trim(known(i)))) suggestion = ' (did you mean '//quoted(known(i))//'?)'
    end subroutine get_suggestion
 
-   !> Number of letters to insert, delete, replace or swap with their neighbours, to make one word of the other
+   !> Number of letters to insert, delete, replace or swap with their neighbors, to make one word of the other
    !> (Damerau and Levenshtein, adjacent swaps only).
    pure function get_distance(one, other) result(distance)
       character(len=*), intent(in) :: one, other

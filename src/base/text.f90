@@ -202,7 +202,7 @@ contains
    pure function replaced(text, set, new) result(changed)
       !> The text; characters to be replaced.
       character(len=*), intent(in) :: text, set
-      !> The character in their place.
+      !> The replacement.
       character(len=1), intent(in) :: new
       character(len=len(text)) :: changed
       integer :: i

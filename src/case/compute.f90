@@ -24,7 +24,7 @@ module thud_compute
    public :: assessment_type, compress_case, compute, compute_floor, compute_impact, drop_on_floor, get_assessed_force
    public :: get_cost, impact_type, is_conforming, predict_room_level, results_type, scope_type
 
-   !> Memory that a sample of a record takes, its transforms and text included, bytes; measured.
+   !> Memory for one sample of a record, its transforms and text included, bytes; measured.
    real(wp), parameter :: sample_memory = 600.0_wp
 
    !> What is computed of that which a case asks for.
@@ -273,7 +273,7 @@ contains
       real(wp) :: conductance(size(bands))
 
       associate (floor => case%floors(get_floor_number(case))%model)
-         call floor%get_radiator(bands%centre, plate, conductance, error)
+         call floor%get_radiator(bands%center, plate, conductance, error)
       end associate
       if (.not. allocated(error)) call check_below(plate, case%room, error)
       if (.not. allocated(error)) call get_room_level(plate, conductance, case%room, bands, level, prediction)

@@ -1,7 +1,7 @@
 !> A source of a few masses of which the first touches the floor: what the marches on rigid and mobile floors need of it.
 !>
 !> Its equations of motion are laid out in pairs, displacement towards the floor (m) and velocity (m/s) of each mass, then
-!> impulse given to the floor (N s) and energy lost (J); further places are its own. On a floor that moves they hold for
+!> impulse given to the floor (N s) and energy lost (J); further components are its own. On a mobile floor they hold for
 !> displacements and velocities relative to the floor, and give accelerations, force and loss all the same.
 module thud_contact_source
    use thud_drop, only: drop_type
@@ -19,10 +19,10 @@ module thud_contact_source
    type, abstract, extends(ode_type) :: contact_source_type
       !> Mass of the source, kg.
       real(wp) :: mass = 0.0_wp
-      !> Masses that move, and places of the state.
+      !> Masses that move, and length of the state.
       integer :: n_mass = 1, n_state = 4
       !> Mass that rests on the floor and moves with it, over the deflection, kg/m.
-      real(wp) :: cap_growth = 0.0_wp
+      real(wp) :: cap_mass_per_deflection = 0.0_wp
       !> The source touches the floor; its deflection grows.
       logical :: touching = .true., compressing = .true.
    contains
@@ -46,7 +46,7 @@ module thud_contact_source
          class(contact_source_type), intent(in) :: self
          !> State, relative to the floor: [n_state].
          real(wp), intent(in) :: state(:)
-         !> Number of the sample.
+         !> Index of the sample.
          integer, intent(in) :: i
          type(force_history_type), intent(inout) :: history
       end subroutine record_sample_interface

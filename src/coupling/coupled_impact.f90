@@ -1,8 +1,8 @@
-!> Impact of a lumped source on a floor that moves: marches through every contact of the record and checks that the
+!> Impact of a lumped source on a mobile floor: marches through every contact of the record and checks that the
 !> source has left for good. Gravity does not act, as on a rigid floor: the bounce that it would end is another impact.
 module thud_coupled_impact
    use thud_contact_source, only: coarse_error, contact_source_type
-   use thud_coupled_phases, only: begin_contact, get_distance, get_event, impact_type, no_event, observe, pass_event
+   use thud_coupled_phases, only: begin_contact, get_distance, get_event, impact_type, no_event, pass_event, update_maxima
    use thud_coupled_step, only: coupled_state_type, get_relative_state, take_coupled_step
    use thud_drop, only: drop_type
    use thud_error, only: error_type, input_error
@@ -13,7 +13,7 @@ module thud_coupled_impact
    use thud_receiver_stages, only: new_receiver_stages
    use thud_sampling, only: sampling_type
    use thud_text, only: to_text
-   use thud_zero_search, only: advance_search, is_found, narrow, new_zero_search, zero_search_type
+   use thud_zero_search, only: advance_search, is_found, new_zero_search, update_bracket, zero_search_type
    implicit none (type, external)
    private
 
@@ -86,31 +86,31 @@ contains
       !> The equations fail.
       type(error_type), allocatable, intent(out) :: error
       type(coupled_state_type) :: end
-      real(wp) :: left
+      real(wp) :: remaining
       integer :: k, event
 
-      left = step
+      remaining = step
       do k = 1, max_events
-         call take_part(source, drop, left, impact, end, error)
+         call take_step(source, drop, remaining, impact, end, error)
          if (allocated(error)) return
          event = get_event(source, end)
-         if (event == no_event .or. impact%caught) then
+         if (event == no_event .or. impact%captured) then
             impact%motion = end
-            impact%time = impact%time + left
-            call observe(source, impact, history)
+            impact%time = impact%time + remaining
+            call update_maxima(source, impact, history)
             return
          end if
-         call go_to_event(source, drop, event, end, left, impact, error)
+         call go_to_event(source, drop, event, end, remaining, impact, error)
          if (allocated(error)) return
          call pass_event(source, event, impact, history, error)
          if (allocated(error)) return
-         if (.not. left > 0.0_wp) return
+         if (.not. remaining > 0.0_wp) return
       end do
       error = coarse_error(to_text(max_events)//' touches, releases and turning points fall into one step')
    end subroutine advance
 
    !> Moves source and floor on to an event.
-   subroutine go_to_event(source, drop, event, end, left, impact, error)
+   subroutine go_to_event(source, drop, event, end, remaining, impact, error)
       class(contact_source_type), intent(in) :: source
       type(drop_type), intent(in) :: drop
       !> The event.
@@ -118,28 +118,28 @@ contains
       !> Motion after the rest of the step.
       type(coupled_state_type), intent(inout) :: end
       !> Length of the rest, s: before and after.
-      real(wp), intent(inout) :: left
+      real(wp), intent(inout) :: remaining
       type(impact_type), intent(inout) :: impact
       !> The equations fail.
       type(error_type), allocatable, intent(out) :: error
       type(zero_search_type) :: search
 
-      search = new_zero_search(get_distance(source, event, impact%motion), left, get_distance(source, event, end))
+      search = new_zero_search(get_distance(source, event, impact%motion), remaining, get_distance(source, event, end))
       do while (.not. is_found(search))
          call advance_search(search)
-         call take_part(source, drop, search%trial, impact, end, error)
+         call take_step(source, drop, search%trial, impact, end, error)
          if (allocated(error)) return
-         call narrow(search, get_distance(source, event, end))
+         call update_bracket(search, get_distance(source, event, end))
       end do
-      call take_part(source, drop, search%right, impact, end, error)
+      call take_step(source, drop, search%right, impact, end, error)
       if (allocated(error)) return
       impact%motion = end
       impact%time = impact%time + search%right
-      left = left - search%right
+      remaining = remaining - search%right
    end subroutine go_to_event
 
    !> Motion after a part of a step.
-   subroutine take_part(source, drop, length, impact, end, error)
+   subroutine take_step(source, drop, length, impact, end, error)
       class(contact_source_type), intent(in) :: source
       type(drop_type), intent(in) :: drop
       !> Length of the part, s.
@@ -162,13 +162,13 @@ contains
          error = coarse_error('the equations of a step '//to_text(1.0e3_wp*impact%time) &
             //' ms after first touch are not solved')
       end if
-   end subroutine take_part
+   end subroutine take_step
 
    !> Writes one instant into the history.
    pure subroutine record(source, impact, i, history)
       class(contact_source_type), intent(in) :: source
       type(impact_type), intent(in) :: impact
-      !> Number of the sample.
+      !> Index of the sample.
       integer, intent(in) :: i
       type(force_history_type), intent(inout) :: history
 
@@ -191,7 +191,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: lowest(2)
 
-      if (impact%caught) return
+      if (impact%captured) return
       if (source%touching) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration) &
             //' s ends while the source is still in contact; allowed: longer than the contact')
@@ -218,14 +218,15 @@ contains
       call clear_flight(history)
       history%floor_work = impact%motion%work
       history%peak_force = impact%peak_force
-      history%fact_name = [character(len=len(history%fact_name)) :: history%fact_name, 'contacts']
-      history%fact_unit = [character(len=len(history%fact_unit)) :: history%fact_unit, '']
-      history%fact = [history%fact, real(impact%n_contact, wp)]
-      if (.not. source%cap_growth > 0.0_wp) return
+      history%model_quantity_name = [character(len=len(history%model_quantity_name)) :: &
+         history%model_quantity_name, 'contacts']
+      history%model_quantity_unit = [character(len=len(history%model_quantity_unit)) :: history%model_quantity_unit, '']
+      history%model_quantity = [history%model_quantity, real(impact%n_contact, wp)]
+      if (.not. source%cap_mass_per_deflection > 0.0_wp) return
       ! The cap that rests on the floor resists its acceleration.
-      n = size(history%part_name)
-      history%part_name = [character(len=len(history%part_name)) :: history%part_name, 'cap_force']
-      history%part = reshape([history%part, history%floor_force - sum(history%part, dim=2)], &
+      n = size(history%component_name)
+      history%component_name = [character(len=len(history%component_name)) :: history%component_name, 'cap_force']
+      history%component = reshape([history%component, history%floor_force - sum(history%component, dim=2)], &
          [size(history%floor_force), n + 1])
    end subroutine finish_record
 

@@ -1,4 +1,4 @@
-!> The phases of a lumped source on a floor that moves: compression, restitution and flight, and the events between them.
+!> The phases of a lumped source on a mobile floor: compression, restitution and flight, and the events between them.
 module thud_coupled_phases
    use thud_contact_source, only: contact_source_type
    use thud_coupled_step, only: coupled_state_type, get_relative_state
@@ -11,20 +11,20 @@ module thud_coupled_phases
    implicit none (type, external)
    private
 
-   public :: begin_contact, get_distance, get_event, impact_type, observe, pass_event
+   public :: begin_contact, get_distance, get_event, impact_type, pass_event, update_maxima
 
-   !> Part of the energy that a source keeps which a light floor has caught: then its contact ends. Of the force, times
-   !> deflection, likewise.
-   real(wp), parameter :: spent_part = 1.0e-12_wp
+   !> Fraction of the initial energy at which a light floor has captured the source and the contact ends; force times
+   !> deflection counts likewise.
+   real(wp), parameter :: capture_tolerance = 1.0e-12_wp
 
-   !> Newton's iterations for the first force, and the relative change of it that is left when it is found.
+   !> Newton's iterations for the first force, and the relative change that ends them.
    integer, parameter :: max_iterations = 50
    real(wp), parameter :: tolerance = 1.0e-12_wp
 
-   !> What ends a part of a step: the turning point between compression and restitution, release, touch.
-   integer, parameter :: turn = 1, release = 2, touch = 3
+   !> Events that end a part of a step: the turning point between compression and restitution, release, touch.
+   integer, parameter :: turning_point = 1, release = 2, touch = 3
 
-   !> Nothing does.
+   !> No event.
    integer, parameter, public :: no_event = 0
 
    !> Impact in progress.
@@ -40,13 +40,13 @@ module thud_coupled_phases
       real(wp) :: peak_force = 0.0_wp
       !> Contacts so far.
       integer :: n_contact = 0
-      !> A floor caught the source.
-      logical :: caught = .false.
+      !> A floor captured the source.
+      logical :: captured = .false.
    end type impact_type
 
 contains
 
-   !> Force and velocity of the floor when the source has just touched: the part of the receiver that answers at once
+   !> Force and velocity of the floor when the source has just touched: the direct part of the receiver
    !> shares the first force with the source, and the cap has no mass yet.
    pure subroutine begin_contact(source, impact, error)
       class(contact_source_type), intent(inout) :: source
@@ -61,7 +61,7 @@ contains
       source%touching = .true.
       source%compressing = .true.
       impact%n_contact = impact%n_contact + 1
-      associate (motion => impact%motion, place => 2*source%n_mass + 1)
+      associate (motion => impact%motion, index => 2*source%n_mass + 1)
          motion%force = 0.0_wp
          length = 1.0e-7_wp*impact%scale
          ! The force grows with the velocity at most by its square: Newton's iterations come from one side.
@@ -72,8 +72,8 @@ contains
             slower(2) = state(2) - length
             call source%get_derivative(impact%time, state, rate, valid)
             call source%get_derivative(impact%time, slower, slower_rate, valid)
-            change = (rate(place) - motion%force) &
-               /(1 + impact%receiver%direct*(rate(place) - slower_rate(place))/(state(2) - slower(2)))
+            change = (rate(index) - motion%force) &
+               /(1 + impact%receiver%direct*(rate(index) - slower_rate(index))/(state(2) - slower(2)))
             if (abs(change) <= epsilon(change)*abs(motion%force)) exit
             motion%force = motion%force + change
          end do
@@ -101,12 +101,12 @@ contains
       if (.not. source%touching) then
          if (state(1) >= 0.0_wp) event = touch
       else if (source%compressing) then
-         if (state(2) <= 0.0_wp) event = turn
+         if (state(2) <= 0.0_wp) event = turning_point
       else if (state(1) <= 0.0_wp) then
          event = release
       else if (state(2) > 0.0_wp) then
          ! The floor comes back.
-         event = turn
+         event = turning_point
       end if
    end function get_event
 
@@ -144,8 +144,8 @@ contains
 
       associate (motion => impact%motion)
          select case (event)
-         case (turn)
-            call observe(source, impact, history)
+         case (turning_point)
+            call update_maxima(source, impact, history)
             source%compressing = .not. source%compressing
          case (release)
             source%touching = .false.
@@ -161,7 +161,7 @@ contains
    end subroutine pass_event
 
    !> Raises the maxima, and ends the contact of a source that has given its energy to the floor.
-   pure subroutine observe(source, impact, history)
+   pure subroutine update_maxima(source, impact, history)
       class(contact_source_type), intent(inout) :: source
       type(impact_type), intent(inout) :: impact
       !> Gets maxima and the contact time.
@@ -173,13 +173,14 @@ contains
       call source%record_peaks(state, history)
       associate (motion => impact%motion)
          impact%peak_force = max(impact%peak_force, motion%force)
-         impact%caught = max(maxval(motion%velocity**2), motion%force*state(1)/source%mass) <= spent_part*impact%scale**2
-         if (.not. impact%caught) return
+         impact%captured = max(maxval(motion%velocity**2), motion%force*state(1)/source%mass) &
+            <= capture_tolerance*impact%scale**2
+         if (.not. impact%captured) return
          source%touching = .false.
          history%contact_time = impact%time
          motion%force = 0.0_wp
          motion%floor_velocity = get_receiver_velocity(impact%receiver, 0.0_wp, motion%motion)
       end associate
-   end subroutine observe
+   end subroutine update_maxima
 
 end module thud_coupled_phases

@@ -1,4 +1,4 @@
-!> One time step of a source in contact with a floor that moves: collocation with the forces on the floor and the
+!> One time step of a source in contact with a mobile floor: collocation with the forces on the floor and the
 !> accelerations of the masses at the stages of `thud_radau` as unknowns.
 !>
 !> The mass of a cap that rests on the floor makes its motion arbitrarily stiff, with the time constant mass over
@@ -39,7 +39,7 @@ module thud_coupled_step
       type(receiver_motion_type) :: motion
    end type coupled_state_type
 
-   !> A trial of the unknowns, and what the source answers.
+   !> Trial values of the unknowns, and the response of the source.
    type :: trial_type
       !> Forces on the floor, N: [n_stage], and accelerations, m/s2: [n_stage, n_mass].
       real(wp), allocatable :: force(:), acceleration(:, :)
@@ -98,7 +98,7 @@ contains
       call get_free_motion(stages, start%motion, trial%free_velocity, trial%free_displacement)
       converged = .false.
       do iteration = 1, max_iterations
-         call try(source, stages, start, trial, valid)
+         call evaluate_stages(source, stages, start, trial, valid)
          if (.not. valid) return
          if (mod(iteration, max_reuse) == 1) then
             call differentiate(source, stages%interval, scale, trial)
@@ -131,8 +131,8 @@ contains
       call advance_stages(stages, trial%force, end%motion)
    end subroutine take_coupled_step
 
-   !> Motion at the stages under the trial's forces and accelerations, and the source's answer.
-   pure subroutine try(source, stages, start, trial, valid)
+   !> Motion at the stages under the trial's forces and accelerations, and the response of the source.
+   pure subroutine evaluate_stages(source, stages, start, trial, valid)
       class(contact_source_type), intent(in) :: source
       type(receiver_stages_type), intent(in) :: stages
       !> Motion at the beginning.
@@ -156,9 +156,9 @@ contains
             if (.not. valid) return
          end do
       end associate
-   end subroutine try
+   end subroutine evaluate_stages
 
-   !> Derivatives of the source's answer.
+   !> Derivatives of the response of the source.
    pure subroutine differentiate(source, interval, scale, trial)
       class(contact_source_type), intent(in) :: source
       !> Length of the step, s; scale of velocities, m/s.
@@ -224,7 +224,7 @@ contains
       real(wp) :: mass(n_stage)
 
       mass = 0.0_wp
-      if (source%touching) mass = source%cap_growth*max(trial%state(1, :), 0.0_wp)
+      if (source%touching) mass = source%cap_mass_per_deflection*max(trial%state(1, :), 0.0_wp)
    end function get_cap_mass
 
    !> Derivative of the unknowns less the equations.
@@ -237,7 +237,7 @@ contains
       real(wp), dimension(n_stage, 2) :: by_force, by_acceleration
       real(wp) :: by_cap(n_stage, n_stage), cap_mass(n_stage)
       real(wp) :: slope
-      integer :: i, j, k, row, column, kind, place
+      integer :: i, j, k, row, column, kind, index
 
       matrix = 0.0_wp
       cap_mass = get_cap_mass(source, trial)
@@ -250,13 +250,13 @@ contains
          do k = 0, source%n_mass
             ! Row 0 is the balance of the cap, the others are the equations of motion.
             row = k*n_stage + i
-            place = merge(2*source%n_mass + 1, 2*k, k == 0)
+            index = merge(2*source%n_mass + 1, 2*k, k == 0)
             matrix(row, row) = 1.0_wp
             do j = 1, 2*source%n_mass
-               slope = trial%derivative(place, j, i)
+               slope = trial%derivative(index, j, i)
                ! The mass of the cap grows with the deflection.
                if (k == 0 .and. j == 1 .and. cap_mass(i) > 0.0_wp) then
-                  slope = slope - source%cap_growth*trial%floor_acceleration(i)
+                  slope = slope - source%cap_mass_per_deflection*trial%floor_acceleration(i)
                end if
                column = (j + 1)/2*n_stage
                kind = 2 - mod(j, 2)

@@ -12,8 +12,8 @@ module thud_energy_flow
       real(wp), allocatable :: mode_density(:)
       !> Rate at which the first subsystems lose energy, 1/s, what flows to others included: [at most n].
       real(wp), allocatable :: total(:)
-      !> Rate that at least goes to none of the others, 1/s: [n].
-      real(wp), allocatable :: own(:)
+      !> Minimum rate of losses that go to no other subsystem, 1/s: [n].
+      real(wp), allocatable :: internal_loss(:)
       !> Rate at which energy of j goes to i, 1/s: [n, n].
       real(wp), allocatable :: rate(:, :)
    end type energy_flow_type
@@ -21,41 +21,41 @@ module thud_energy_flow
 contains
 
    !> Subsystems without flow between them.
-   pure function new_energy_flow(mode_density, total, own) result(flow)
+   pure function new_energy_flow(mode_density, total, internal_loss) result(flow)
       !> Modes per hertz, s: [n].
       real(wp), intent(in) :: mode_density(:)
       !> Rates of all losses, 1/s, of the first subsystems, where they are known: [at most n].
       real(wp), intent(in) :: total(:)
       !> Rates of the losses that go to no other subsystem, 1/s: [n].
-      real(wp), intent(in) :: own(:)
+      real(wp), intent(in) :: internal_loss(:)
       type(energy_flow_type) :: flow
 
       allocate (flow%mode_density, source=mode_density)
       allocate (flow%total, source=total)
-      allocate (flow%own, source=own)
-      allocate (flow%rate(size(own), size(own)), source=0.0_wp)
+      allocate (flow%internal_loss, source=internal_loss)
+      allocate (flow%rate(size(internal_loss), size(internal_loss)), source=0.0_wp)
    end function new_energy_flow
 
    !> Adds a subsystem without flow.
-   pure subroutine add_subsystem(flow, mode_density, own)
+   pure subroutine add_subsystem(flow, mode_density, internal_loss)
       type(energy_flow_type), intent(inout) :: flow
       !> Modes per hertz, s; rate of its losses, 1/s.
-      real(wp), intent(in) :: mode_density, own
+      real(wp), intent(in) :: mode_density, internal_loss
       real(wp), allocatable :: rate(:, :)
 
       call move_alloc(flow%rate, rate)
-      associate (n => size(flow%own))
+      associate (n => size(flow%internal_loss))
          allocate (flow%rate(n + 1, n + 1), source=0.0_wp)
          flow%rate(:n, :n) = rate
       end associate
       flow%mode_density = [flow%mode_density, mode_density]
-      flow%own = [flow%own, own]
+      flow%internal_loss = [flow%internal_loss, internal_loss]
    end subroutine add_subsystem
 
    !> Lets energy flow from one subsystem to another, and back by reciprocity: n1 a12 = n2 a21.
    pure subroutine connect(flow, from, to, rate)
       type(energy_flow_type), intent(inout) :: flow
-      !> Numbers of the subsystems.
+      !> Indices of the subsystems.
       integer, intent(in) :: from, to
       !> Rate at which the energy of the first goes to the second, 1/s.
       real(wp), intent(in) :: rate
@@ -65,18 +65,18 @@ contains
    end subroutine connect
 
    !> Matrix A of dE/dt = -A E. Its columns sum to the losses that go to no subsystem: the total ones less the flow, but at
-   !> least the own ones.
+   !> least the internal ones.
    pure function get_loss(flow) result(loss)
       type(energy_flow_type), intent(in) :: flow
       !> A, 1/s: [n, n].
-      real(wp) :: loss(size(flow%own), size(flow%own))
+      real(wp) :: loss(size(flow%internal_loss), size(flow%internal_loss))
       real(wp) :: leaving
       integer :: i
 
       loss = -flow%rate
-      do i = 1, size(flow%own)
+      do i = 1, size(flow%internal_loss)
          leaving = sum(flow%rate(:, i))
-         loss(i, i) = loss(i, i) + leaving + flow%own(i)
+         loss(i, i) = loss(i, i) + leaving + flow%internal_loss(i)
          if (i <= size(flow%total)) loss(i, i) = max(loss(i, i), flow%total(i))
       end do
    end function get_loss

@@ -22,7 +22,7 @@ module thud_floor_model
 
    !> A floor with its options as components.
    type, abstract :: floor_model_type
-      !> Places of further points whose velocity is wanted, of floors with sides, m.
+      !> Positions of further points whose velocity is output, of rectangular floors, m.
       type(list_type) :: point_x, point_y
    contains
       procedure, pass(options) :: get_point_fields
@@ -67,8 +67,8 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         list_field('point_x', options%point_x, 'm', 'places of further points along the length', '[0, 1000]'), &
-         list_field('point_y', options%point_y, 'm', 'their places along the width', '[0, 1000]')]
+         list_field('point_x', options%point_x, 'm', 'positions of further points along the length', '[0, 1000]'), &
+         list_field('point_y', options%point_y, 'm', 'their positions along the width', '[0, 1000]')]
    end function get_point_fields
 
    !> Refuses points that are not there.
@@ -104,7 +104,7 @@ contains
    !> Velocity of another point over the force of the source, as a receiver; floors without extent refuse.
    subroutine get_transfer(options, x, y, transfer, error)
       class(floor_model_type), intent(in) :: options
-      !> Place of the point on the floor, m.
+      !> Position of the point on the floor, m.
       real(wp), intent(in) :: x, y
       type(receiver_type), intent(out) :: transfer
       !> The floor has no such point.
@@ -134,7 +134,7 @@ contains
       class(floor_model_type), intent(in) :: options
       !> Ends of the band, Hz.
       real(wp), intent(out) :: lowest, highest
-      !> What ends it, as the end of a sentence.
+      !> What ends it, as the end of a message.
       character(len=reason_length), intent(out) :: reason
 
       lowest = 0.0_wp

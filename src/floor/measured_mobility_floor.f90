@@ -78,7 +78,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp), parameter :: rounding = 1.0e-12_wp
       real(wp), allocatable :: omega(:), conductance(:)
-      real(wp) :: lift
+      real(wp) :: regularization
       logical :: failed
       integer :: i
 
@@ -92,8 +92,8 @@ contains
          where (.not. receiver%pole%im > 0.0_wp) receiver%residue = real(receiver%residue, wp)
       end associate
       ! The test needs a constant part; this one is below rounding.
-      lift = rounding*(receiver%direct + sum(abs(receiver%residue/receiver%pole)))
-      call find_violations(receiver%pole, receiver%residue, receiver%direct + lift, omega, failed)
+      regularization = rounding*(receiver%direct + sum(abs(receiver%residue/receiver%pole)))
+      call find_violations(receiver%pole, receiver%residue, receiver%direct + regularization, omega, failed)
       if (failed) then
          error = numerical_error('&measured_mobility: the zeros of the real part were not found')
       else if (size(omega) > 0) then

@@ -1,4 +1,4 @@
-!> From a table of a measured mobility to the floor that has it: vector fit, then the least change that makes it passive.
+!> From a table of a measured mobility to the floor that has it: vector fit, then the smallest change that makes it passive.
 module thud_mobility_fit
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error, numerical_error
@@ -15,26 +15,26 @@ module thud_mobility_fit
 
    public :: fit_mobility
 
-   !> Maximum number of lines: the time of a fit grows with it.
-   integer, parameter :: max_lines = 10000
+   !> Maximum number of frequency points: the time of a fit grows with it.
+   integer, parameter :: max_points = 10000
 
-   !> Least magnitude, over the largest, whose relative error counts in full.
+   !> Minimum magnitude, over the largest, whose relative error counts in full.
    real(wp), parameter :: min_magnitude = 1.0e-6_wp
 
 contains
 
    !> Fits poles to a mobility; errors count relative to its magnitude.
    subroutine fit_mobility(frequency, mobility, order, floor, free_error, error)
-      !> Frequencies, Hz, rising, above 0: [n_line].
+      !> Frequencies, Hz, rising, above 0: [n_point].
       real(wp), intent(in) :: frequency(:)
-      !> The mobility, m/(N s): [n_line].
+      !> The mobility, m/(N s): [n_point].
       complex(wp), intent(in) :: mobility(:)
       !> Number of poles, both of a pair counted.
       integer, intent(in) :: order
       type(measured_mobility_floor_type), intent(out), target :: floor
       !> Relative error before the fit was made passive, root of the mean square.
       real(wp), intent(out) :: free_error
-      !> There are too few lines or too many poles, a line is not allowed, or no passive floor was found.
+      !> There are too few frequency points or too many poles, a point is not allowed, or no passive floor was found.
       type(error_type), allocatable, intent(out) :: error
       complex(wp), allocatable :: pole(:), residue(:)
       real(wp) :: weight(size(mobility))
@@ -74,30 +74,30 @@ contains
 
    !> Refuses tables that cannot be fitted.
    subroutine check_table(frequency, mobility, order, max_poles, error)
-      !> As in `fit_mobility`: [n_line].
+      !> As in `fit_mobility`: [n_point].
       real(wp), intent(in) :: frequency(:)
       complex(wp), intent(in) :: mobility(:)
       integer, intent(in) :: order
       !> Length of a list.
       integer, intent(in) :: max_poles
-      !> Names the line, or what is allowed.
+      !> Names the point, or what is allowed.
       type(error_type), allocatable, intent(out) :: error
       integer :: i
 
       associate (n => size(frequency))
          if (order < 1 .or. order > min(n - 1, max_poles)) then
-            error = input_error('order = '//to_text(order)//' is not allowed with '//to_text(n)//' lines; allowed: 1 to ' &
-               //to_text(min(n - 1, max_poles)))
+            error = input_error('order = '//to_text(order)//' is not allowed with '//to_text(n) &
+               //' frequency points; allowed: 1 to '//to_text(min(n - 1, max_poles)))
             return
          end if
-         if (n > max_lines) then
-            error = input_error('the mobility has '//to_text(n)//' lines; allowed: up to '//to_text(max_lines))
+         if (n > max_points) then
+            error = input_error('the mobility has '//to_text(n)//' frequency points; allowed: up to '//to_text(max_points))
             return
          end if
          do i = 1, n
             if (.not. (frequency(i) > frequency(max(1, i - 1)) .or. (i == 1 .and. frequency(1) > 0.0_wp)) &
                .or. .not. abs(mobility(i)) < huge(1.0_wp) .or. .not. frequency(i) < huge(1.0_wp)) then
-               error = input_error('the mobility: line '//to_text(i)//' at '//to_text(frequency(i)) &
+               error = input_error('the mobility: frequency point '//to_text(i)//' at '//to_text(frequency(i)) &
                   //' Hz is not allowed; allowed: rising frequencies above 0, and finite values')
                return
             end if

@@ -1,5 +1,6 @@
-!> Level of an impact in the room below a floor, by transient statistical energy analysis in thirds: the force gives
-!> energy to the floor, the floor radiates into the room, all of them decay, and the Fast detector shows its maximum.
+!> Level of an impact in the room below a floor, by transient statistical energy analysis in one-third-octave bands: the
+!> force gives energy to the floor, the floor radiates into the room, all of them decay, and the Fast detector shows its
+!> maximum.
 module thud_room
    use thud_band, only: band_type
    use thud_ceiling, only: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_share, get_mass_law
@@ -32,7 +33,7 @@ module thud_room
    !> Attenuation of a reverberation time, 60 dB in neper of energy.
    real(wp), parameter :: decay_of_60_db = 6*log(10.0_wp)
 
-   !> Modes of a third below which its statistical answer is doubtful.
+   !> Modes of a band below which the statistical result is unreliable.
    real(wp), parameter :: few_modes = 5.0_wp
 
    !> Step of a time history, s: the detector moves by 4 % of its time constant.
@@ -44,7 +45,7 @@ module thud_room
       real(wp) :: volume = 50.0_wp
       !> Reverberation time, s.
       real(wp) :: reverberation_time = 0.5_wp
-      !> The same for each third, s.
+      !> The same for each one-third-octave band, s.
       type(list_type) :: reverberation_times
       !> Its air.
       type(air_type) :: air
@@ -54,9 +55,9 @@ module thud_room
       type(ceiling_type) :: ceiling
    end type room_type
 
-   !> A prediction, by thirds.
+   !> A prediction by one-third-octave bands.
    type :: room_level_type
-      !> The thirds: [n_band].
+      !> The one-third-octave bands: [n_band].
       type(band_type), allocatable :: bands(:)
       !> Power that a force of unit mean square gives to the floor, m/(N s): [n_band].
       real(wp), allocatable :: conductance(:)
@@ -68,7 +69,7 @@ module thud_room
       real(wp), allocatable :: radiation_factor(:), loss_factor(:)
       !> Reverberation time of the room, s: [n_band].
       real(wp), allocatable :: reverberation_time(:)
-      !> Modes of the floor and of the room in the third: [n_band].
+      !> Modes of the floor and of the room in the band: [n_band].
       real(wp), allocatable :: floor_modes(:), room_modes(:)
       !> Maximum Fast level in the room, dB re 20 uPa, and its time after the impact, s: [n_band].
       real(wp), allocatable :: level(:), time(:)
@@ -79,7 +80,7 @@ module thud_room
       !> The same for octaves: bands, levels and times: [n_octave].
       type(band_type), allocatable :: octaves(:)
       real(wp), allocatable :: octave_level(:), octave_time(:)
-      !> Instants after the impact, s: [n_time], and what the Fast detector shows in each third then, dB: [n_time, n_band].
+      !> Instants after the impact, s: [n_time], and what the Fast detector shows in each band then, dB: [n_time, n_band].
       real(wp), allocatable :: history_time(:), history(:, :)
    end type room_level_type
 
@@ -104,7 +105,7 @@ contains
          real_field('volume', room%volume, 'm3', 'volume of the room', '[1, 100000]'), &
          real_field('reverberation_time', room%reverberation_time, 's', 'reverberation time of the room', '[0.05, 20]'), &
          list_field('reverberation_times', room%reverberation_times, 's', &
-         'the same for each third from 50 to 630 Hz', '[0.05, 20]'), &
+         'the same for each one-third-octave band from 50 to 630 Hz', '[0.05, 20]'), &
          real_field('air_density', room%air%density, 'kg/m3', 'density of the air', '[0.5, 2]'), &
          real_field('sound_speed', room%air%sound_speed, 'm/s', 'speed of sound in the air', '[200, 500]'), &
          get_wall_fields(room%walls), get_ceiling_fields(room%ceiling)]
@@ -120,7 +121,7 @@ contains
       call get_room_bands(bands, error)
       if (any(room%reverberation_times%count == [0, size(bands)])) return
       error = input_error('&room: reverberation_times has '//to_text(room%reverberation_times%count) &
-         //' values; allowed: '//to_text(size(bands))//', one for each third from 50 to 630 Hz')
+         //' values; allowed: '//to_text(size(bands))//', one for each one-third-octave band from 50 to 630 Hz')
    end subroutine check_room
 
    !> Refuses walls and a ceiling that a floor cannot have below it.
@@ -143,9 +144,9 @@ contains
       end if
    end subroutine check_below
 
-   !> Thirds of a prediction: those of the rating.
+   !> One-third-octave bands of a prediction: those of the rating.
    subroutine get_room_bands(bands, error)
-      !> The thirds: [n_band].
+      !> The one-third-octave bands: [n_band].
       type(band_type), allocatable, intent(out) :: bands(:)
       !> Never.
       type(error_type), allocatable, intent(out) :: error
@@ -163,7 +164,7 @@ contains
       !> Real part of the mobility of the floor, the mean over positions, m/(N s): [n_band].
       real(wp), intent(in) :: conductance(:)
       type(room_type), intent(in) :: room
-      !> Thirds from `get_room_bands`: [n_band].
+      !> Bands from `get_room_bands`: [n_band].
       type(band_type), intent(in) :: bands(:)
       !> Force exposure levels of the force on the floor, dB: [n_band].
       real(wp), intent(in) :: force_level(:)
@@ -177,19 +178,19 @@ contains
       prediction%conductance = conductance
       prediction%surface_mass = get_surface_mass(plate)
       prediction%energy = 10**(force_level/10)*conductance
-      prediction%radiation_factor = get_plate_radiation(plate, room%air, bands%centre)
-      prediction%loss_factor = get_total_loss(plate, room%air, bands%centre)
+      prediction%radiation_factor = get_plate_radiation(plate, room%air, bands%center)
+      prediction%loss_factor = get_total_loss(plate, room%air, bands%center)
       prediction%reverberation_time = get_reverberation_times(room, size(bands))
       prediction%floor_modes = get_mode_density(plate)*width
-      prediction%room_modes = get_room_mode_density(room, bands%centre)*width
+      prediction%room_modes = get_room_mode_density(room, bands%center)*width
       allocate (prediction%level(size(bands)), prediction%time(size(bands)), prediction%spread(size(bands)))
-      floor_decay = 2*pi*bands%centre*prediction%loss_factor
+      floor_decay = 2*pi*bands%center*prediction%loss_factor
       do i = 1, size(bands)
          energies(i) = get_band_energies(plate, room, prediction, i)
          call get_fast_maximum(energies(i)%loss, energies(i)%start, energies(i)%weight, maximum(i), prediction%time(i))
          prediction%spread(i) = get_level_spread([ &
             get_band_variance(2, get_mode_density(plate), floor_decay(i), width(i)), &
-            get_band_variance(3, get_room_mode_density(room, bands(i)%centre), &
+            get_band_variance(3, get_room_mode_density(room, bands(i)%center), &
             decay_of_60_db/prediction%reverberation_time(i), width(i))])
       end do
       prediction%level = 10*log10(maximum/reference_pressure**2)
@@ -198,10 +199,10 @@ contains
       call add_history(energies, prediction)
    end subroutine get_room_level
 
-   !> Levels of the octaves: the detector is linear in the energies, those of an octave are the sums of its thirds', and
-   !> the maximum of the sum is at most the sum of the maxima.
+   !> Levels of the octaves: the detector is linear in the energies, those of an octave are the sums of its thirds of an
+   !> octave, and the maximum of the sum is at most the sum of the maxima.
    subroutine add_octaves(energies, prediction)
-      !> Energies of the thirds, three for each octave: [n_band].
+      !> Energies of the one-third-octave bands, three for each octave: [n_band].
       type(band_energies_type), intent(in) :: energies(:)
       type(room_level_type), intent(inout) :: prediction
       type(error_type), allocatable :: error
@@ -229,9 +230,9 @@ contains
       end do
    end subroutine add_octaves
 
-   !> Level that the Fast detector shows against time, until the slowest third lies about 30 dB below its maximum.
+   !> Level that the Fast detector shows against time, until the slowest band lies about 30 dB below its maximum.
    pure subroutine add_history(energies, prediction)
-      !> Energies of the thirds: [n_band].
+      !> Energies of the bands: [n_band].
       type(band_energies_type), intent(in) :: energies(:)
       type(room_level_type), intent(inout) :: prediction
       real(wp) :: duration
@@ -250,7 +251,7 @@ contains
       end do
    end subroutine add_history
 
-   !> Energies of a third: floor, walls, room and the air above a ceiling, with what flows between them.
+   !> Energies of a band: floor, walls, room and the air above a ceiling, with what flows between them.
    !>
    !> Plates lose omega eta in all; they radiate rho0 c0 sigma/m'' into the room and as much to the other side. The room
    !> loses 6 ln 10/T besides what goes back into them. Of the sound below a floor with a ceiling the stiffness of the air
@@ -262,7 +263,7 @@ contains
       type(room_type), intent(in) :: room
       !> Reverberation times and energies: [n_band].
       type(room_level_type), intent(in) :: prediction
-      !> Number of the third.
+      !> Index of the band.
       integer, intent(in) :: band
       type(band_energies_type) :: energies
       type(energy_flow_type) :: flow
@@ -274,7 +275,7 @@ contains
       plates = [plate, get_walls(room%walls)]
       at_room = size(plates) + 1
       at_cavity = at_room + 1
-      associate (f => prediction%bands(band)%centre, third => prediction%bands(band), air => room%air, &
+      associate (f => prediction%bands(band)%center, third => prediction%bands(band), air => room%air, &
          ceiling => room%ceiling, area => plate%length*plate%width)
          radiated = air%density*air%sound_speed/get_surface_mass(plates)*get_plate_radiation(plates, air, f)
          flow = new_energy_flow([get_mode_density(plates), get_room_mode_density(room, f)], &
@@ -298,7 +299,7 @@ contains
                get_vibration_reduction(room%walls, plate, plates(i)), f))
          end do
          allocate (energies%loss, source=get_loss(flow))
-         allocate (energies%start(size(flow%own)), energies%weight(size(flow%own)), source=0.0_wp)
+         allocate (energies%start(size(flow%internal_loss)), energies%weight(size(flow%internal_loss)), source=0.0_wp)
          energies%start(1) = prediction%energy(band)
          energies%weight(at_room) = air%density*air%sound_speed**2/room%volume
       end associate
@@ -314,7 +315,7 @@ contains
       density = 4*pi*room%volume*frequency**2/room%air%sound_speed**3
    end function get_room_mode_density
 
-   !> Reverberation times of the thirds, s.
+   !> Reverberation times of the bands, s.
    pure function get_reverberation_times(room, n_band) result(times)
       type(room_type), intent(in) :: room
       integer, intent(in) :: n_band

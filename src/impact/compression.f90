@@ -1,4 +1,4 @@
-!> Slow compression of the ball between two rigid plates, as in a press: what is asked for, and its answer.
+!> Quasi-static compression of the ball between two rigid plates, as in a press: its options and its result.
 module thud_compression
    use thud_ball, only: ball_type
    use thud_error, only: error_type, input_error

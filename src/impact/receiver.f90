@@ -6,6 +6,7 @@
 module thud_receiver
    use thud_constants, only: pi
    use thud_kinds, only: wp
+   use thud_zero_search, only: bisection_type
    implicit none (type, external)
    private
 
@@ -192,7 +193,8 @@ contains
       real(wp), intent(in) :: gap, speed
       logical :: yes
       real(wp), dimension(size(motion%amplitude)) :: rate, time
-      real(wp) :: away, early, late, middle
+      type(bisection_type) :: bracket
+      real(wp) :: away
       integer :: k
 
       away = speed
@@ -210,18 +212,12 @@ contains
       yes = gap < 0.0_wp .or. away < 0.0_wp
       if (yes .or. away >= sum(rate)) return
       ! The gap that is left is convex in time. It shrinks as long as the poles whose times are not over are faster than the
-      ! line: until one of the times, which bisection finds.
-      early = 0.0_wp
-      late = maxval(time)
-      do while (late - early > spacing(late))
-         middle = early + (late - early)/2
-         if (away < sum(rate, mask=time > middle)) then
-            early = middle
-         else
-            late = middle
-         end if
+      ! line: until one of the times.
+      bracket%right = maxval(time)
+      do while (bracket%is_open())
+         call bracket%halve(away < sum(rate, mask=time > bracket%get_middle()))
       end do
-      yes = gap + away*late < sum(rate*min(time, late))
+      yes = gap + away*bracket%right < sum(rate*min(time, bracket%right))
    end function can_strike
 
 end module thud_receiver

@@ -116,13 +116,13 @@ contains
       modulus = 0.0_wp
    end function get_paper_modulus
 
-   !> Limits of the theory of the model in an answer; by default gravity, which models leave out.
+   !> Validity limits of the model for a result; by default gravity, which models leave out.
    function get_theory_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
       class(source_model_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> The answer.
+      !> The force.
       type(force_history_type), intent(in) :: history
       !> The limits: [n_limit].
       type(theory_limit_type), allocatable :: limits(:)
@@ -145,7 +145,7 @@ contains
       error = input_error('&model: name: this model has no material with a loss factor; allowed: one that has')
    end subroutine get_loss_factors
 
-   !> Whether the model can drop on a floor that moves; by default it can. The force of others is the blocked one.
+   !> Whether the model can drop on a mobile floor; by default it can. The force of others is the blocked one.
    function couples(options) result(yes)
       class(source_model_type), intent(in) :: options
       logical :: yes
@@ -153,7 +153,7 @@ contains
       yes = .true.
    end function couples
 
-   !> Force on each of two plates that press the ball slowly, of models that have one; others refuse.
+   !> Force on each of two plates in a quasi-static compression, of models that have one; others refuse.
    subroutine compress(ball, options, deflection, force, error)
       !> The ball, with the gas that it has in the press.
       type(ball_type), intent(in) :: ball

@@ -1,4 +1,5 @@
-!> Limits of a theory: a number of an answer, where the theory holds, and why. An answer outside is computed, and warninged.
+!> Validity limits of a theory: a quantity, the range in which the theory holds, and why. Results outside are computed, with
+!> a warning.
 module thud_theory_limit
    use thud_ball, only: ball_type, get_density
    use thud_drop, only: drop_type
@@ -10,7 +11,7 @@ module thud_theory_limit
 
    public :: get_gravity_limit, get_limit_sentence, get_wall_limits, get_wave_limit, is_outside, theory_limit_type
 
-   !> Length of the sentence on a limit.
+   !> Length of the message on a limit.
    integer, parameter :: sentence_length = 240
 
    !> A limit.
@@ -21,13 +22,13 @@ module thud_theory_limit
       character(len=72) :: quantity = ''
       !> What it is, and the range in which the theory holds.
       real(wp) :: value = 0.0_wp, lowest = -huge(1.0_wp), highest = huge(1.0_wp)
-      !> Why, as the end of a sentence.
+      !> Reason, as the end of a message.
       character(len=96) :: reason = ''
    end type theory_limit_type
 
 contains
 
-   !> Whether an answer lies outside.
+   !> Whether a result lies outside.
    pure function is_outside(limit) result(yes)
       type(theory_limit_type), intent(in) :: limit
       logical :: yes
@@ -36,7 +37,7 @@ contains
       yes = .not. (limit%value >= limit%lowest .and. limit%value <= limit%highest)
    end function is_outside
 
-   !> Sentence on an answer that lies outside.
+   !> Message on a result outside the limits.
    pure function get_limit_sentence(limit) result(sentence)
       type(theory_limit_type), intent(in) :: limit
       character(len=sentence_length) :: sentence
@@ -55,7 +56,7 @@ contains
       real(wp) :: near
 
       if (.not. abs(value) < 1.0e300_wp) then
-         ! A quotient may overflow, and no sentence says Infinity.
+         ! A quotient may overflow, and no message says Infinity.
          text = 'beyond 1e300'
          return
       end if
@@ -79,7 +80,7 @@ contains
    pure function get_wave_limit(ball, history, highest) result(limit)
       type(ball_type), intent(in) :: ball
       type(force_history_type), intent(in) :: history
-      !> Part of the velocity of waves up to which the theory holds.
+      !> Fraction of the wave velocity up to which the theory holds.
       real(wp), intent(in) :: highest
       type(theory_limit_type) :: limit
 

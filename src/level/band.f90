@@ -12,13 +12,13 @@ module thud_band
    !> Adjacent bands of one width.
    type :: band_set_type
       character(len=24) :: name
-      !> Width in tenths of a decade: 3 for octaves, 1 for third octaves.
+      !> Width in tenths of a decade: 3 for octaves, 1 for one-third octaves.
       integer :: width
       !> Mid frequencies of the lowest and highest band: distances from 1 kHz in tenths of a decade.
       integer :: first, last
    end type band_set_type
 
-   !> All sets; verdicts use the first, the octaves from 31.5 to 500 Hz.
+   !> All sets; assessments use the first, the octaves from 31.5 to 500 Hz.
    type(band_set_type), parameter :: sets(*) = [ &
       band_set_type('octave', width=3, first=-15, last=-3), &
       band_set_type('third', width=1, first=-16, last=-2)]
@@ -26,7 +26,7 @@ module thud_band
    !> Names of all sets: [n_set].
    character(len=24), parameter :: band_set_names(*) = sets%name
 
-   !> The set that verdicts use.
+   !> The set that assessments use.
    character(len=24), parameter :: octave_set = band_set_names(1)
 
    !> What a case can ask for: one set, or `both` for all: [n_set + 1].
@@ -39,7 +39,7 @@ module thud_band
       !> Name of the band, its rounded mid frequency, Hz.
       real(wp) :: nominal = 0.0_wp
       !> Exact mid frequency, Hz.
-      real(wp) :: centre = 0.0_wp
+      real(wp) :: center = 0.0_wp
       !> Band edges, Hz.
       real(wp) :: lower = 0.0_wp, upper = 0.0_wp
    end type band_type
@@ -61,7 +61,7 @@ module thud_band
 
 contains
 
-   !> The octaves that verdicts use.
+   !> The octaves that assessments use.
    pure function get_octaves() result(bands)
       !> The bands, ascending: [octave_count].
       type(band_type) :: bands(octave_count)
@@ -91,13 +91,13 @@ contains
          //join_quoted(band_set_names))
    end subroutine find_bands
 
-   !> Bands of the levels of a case: the octaves, which verdicts use, then the other bands asked for.
+   !> Bands of the levels of a case: the octaves, which assessments use, then the other bands asked for.
    pure subroutine get_level_bands(choice, bands, first)
       !> One of `band_choices`.
       character(len=*), intent(in) :: choice
       !> The bands, octaves first: [n_band].
       type(band_type), allocatable, intent(out) :: bands(:)
-      !> Number of the first band that is asked for.
+      !> Index of the first band that is asked for.
       integer, intent(out) :: first
 
       bands = [get_octaves(), pack(all_bands, all_bands%set /= octave_set &

@@ -59,11 +59,11 @@ module thud_band_projection
 
 contains
 
-   !> Number of the shortest window that holds the samples.
+   !> Index of the shortest window that holds the samples.
    elemental function get_window_class(n_sample) result(window)
       !> Samples of the record.
       integer, intent(in) :: n_sample
-      !> Number of the window, from 1.
+      !> Index of the window, from 1.
       integer :: window
 
       window = 1
@@ -75,7 +75,7 @@ contains
 
    !> Length of a window.
    elemental function get_class_window(window) result(n_sample)
-      !> Number of the window, from 1.
+      !> Index of the window, from 1.
       integer, intent(in) :: window
       !> Samples, even.
       integer :: n_sample

@@ -69,7 +69,7 @@ contains
       end select
       call check_interrupt(error)
       if (allocated(error)) return
-      ! Rounding errors of a band are about this part of the whole energy, which limits the resolution.
+      ! Rounding errors of a band are about this fraction of the total energy, which limits the resolution.
       resolution = epsilon(1.0_wp)*sum(force(first:last)**2)/sample_rate
       levels = 10*log10(max(energy, resolution)/(reference_force**2*reference_time))
    end subroutine get_force_exposure_levels

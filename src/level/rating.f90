@@ -1,4 +1,4 @@
-!> Levels of heavy impacts in the room below: their standardisation (ISO 16283-2) and the single numbers made of
+!> Levels of heavy impacts in the room below: their standardization (ISO 16283-2) and the single numbers made of
 !> them (ISO 717-2 annex D, KS F 2863-2).
 module thud_rating
    use thud_band, only: band_type, get_bands
@@ -8,8 +8,8 @@ module thud_rating
    implicit none (type, external)
    private
 
-   public :: class_limits, correct_for_background, fast_reverberation, find_rated_bands, get_a_weighted_level, get_grade
-   public :: get_legacy_rating, get_rounded, get_standardisation, rated_set_names
+   public :: class_limits, correct_for_background, fast_reverberation, find_rated_bands, get_a_weighted_level, get_class
+   public :: get_inverse_a_rating, get_rounded, get_standardization, rated_set_names
 
    !> Maximum number of bands of a rating.
    integer, parameter :: max_rated = 12
@@ -25,7 +25,7 @@ module thud_rating
       real(wp) :: a_weighting(max_rated)
    end type rated_set_type
 
-   !> All sets. Thirds are not summed into octaves first: the maximum of a sum is not the sum of maxima.
+   !> All sets. One-third-octave bands are not summed into octaves first: the maximum of a sum is not the sum of maxima.
    type(rated_set_type), parameter :: rated_sets(*) = [ &
       rated_set_type('octave', 63.0_wp, 4, [-26.2_wp, -16.2_wp, -8.7_wp, -3.2_wp, spread(0.0_wp, 1, max_rated - 4)]), &
       rated_set_type('third', 50.0_wp, 12, [-30.3_wp, -26.2_wp, -22.4_wp, -19.1_wp, -16.2_wp, -13.2_wp, -10.8_wp, &
@@ -47,13 +47,14 @@ module thud_rating
    real(wp), parameter :: class_limits(*) = [37.0_wp, 41.0_wp, 45.0_wp, 49.0_wp]
 
    !> Reference curve in the octaves 63 to 500 Hz, dB (KS F 2863-2).
-   real(wp), parameter :: legacy_curve(*) = [83.0_wp, 73.0_wp, 66.0_wp, 60.0_wp]
+   real(wp), parameter :: inverse_a_curve(*) = [83.0_wp, 73.0_wp, 66.0_wp, 60.0_wp]
 
    !> Sum of the excesses over it that is allowed, dB.
    real(wp), parameter :: max_excess = 8.0_wp
 
-   !> Difference to the background, dB, below which a level is corrected, and below which only by that of this difference.
-   real(wp), parameter :: clear_difference = 15.0_wp, least_difference = 6.0_wp
+   !> Difference to the background, dB, below which a level is corrected, and below which the correction is that of this
+   !> difference.
+   real(wp), parameter :: clear_difference = 15.0_wp, min_difference = 6.0_wp
 
 contains
 
@@ -102,18 +103,18 @@ contains
       rounded = floor(level + 0.5_wp)
    end function get_rounded
 
-   !> Class (grade) of an A-weighted level that is not standardised (KS F 2863-2).
-   pure function get_grade(level) result(grade)
+   !> Class of an A-weighted level that is not standardized (KS F 2863-2).
+   pure function get_class(level) result(number)
       !> The level, dB.
       real(wp), intent(in) :: level
       !> 1 to 4; 0 above the last.
-      integer :: grade
+      integer :: number
 
-      grade = findloc(get_rounded(level) <= class_limits, .true., dim=1)
-   end function get_grade
+      number = findloc(get_rounded(level) <= class_limits, .true., dim=1)
+   end function get_class
 
    !> Rating by the inverse A-weighted reference curve (KS F 2863-2, before the A-weighted level replaced it).
-   pure function get_legacy_rating(level) result(rating)
+   pure function get_inverse_a_rating(level) result(rating)
       !> Levels of the octaves 63 to 500 Hz, dB: [4].
       real(wp), intent(in) :: level(:)
       !> Level of the shifted curve at 500 Hz, dB.
@@ -121,18 +122,18 @@ contains
       integer :: shift
 
       ! From where every excess is above its limit.
-      shift = floor(minval(level - legacy_curve) - max_excess) - 1
-      do while (sum(max(0.0_wp, level - legacy_curve - shift)) > max_excess)
+      shift = floor(minval(level - inverse_a_curve) - max_excess) - 1
+      do while (sum(max(0.0_wp, level - inverse_a_curve - shift)) > max_excess)
          shift = shift + 1
       end do
-      rating = nint(legacy_curve(size(legacy_curve))) + shift
-   end function get_legacy_rating
+      rating = nint(inverse_a_curve(size(inverse_a_curve))) + shift
+   end function get_inverse_a_rating
 
-   !> What a standardised level is above the measured one: 10 lg(V/V0) - 10 lg(g(C)/g(C0)) (ISO 16283-2).
+   !> What a standardized level is above the measured one: 10 lg(V/V0) - 10 lg(g(C)/g(C0)) (ISO 16283-2).
    !>
    !> g(C) is the maximum of a decay of reverberation time T as the Fast detector shows it, over that of a decay
    !> without end: C**(-1/(C - 1)) with C = T/1.7275 s; the printed form is the same with more terms.
-   elemental function get_standardisation(reverberation_time, volume) result(difference)
+   elemental function get_standardization(reverberation_time, volume) result(difference)
       !> Reverberation time, s; volume, m3.
       real(wp), intent(in) :: reverberation_time, volume
       !> The difference, dB.
@@ -140,7 +141,7 @@ contains
 
       difference = 10*log10(volume/reference_volume) &
          - 10/log(10.0_wp)*(get_log_gain(reverberation_time) - get_log_gain(reference_time))
-   end function get_standardisation
+   end function get_standardization
 
    !> ln g = -ln C/(C - 1).
    elemental function get_log_gain(reverberation_time) result(log_gain)
@@ -158,20 +159,20 @@ contains
    end function get_log_gain
 
    !> Level without the background (ISO 16283-2): the energy of the background is subtracted where the level is 6 to
-   !> 15 dB above it; below, what 6 dB give is subtracted, and the result is a maximum.
-   elemental subroutine correct_for_background(level, background, corrected, is_maximum)
+   !> 15 dB above it; below, what 6 dB give is subtracted, and the result is an upper bound.
+   elemental subroutine correct_for_background(level, background, corrected, is_upper_bound)
       !> Levels with and of the background, dB.
       real(wp), intent(in) :: level, background
       !> The level without it, dB.
       real(wp), intent(out) :: corrected
       !> The level is less than 6 dB above the background: the true one is at most the corrected one.
-      logical, intent(out) :: is_maximum
+      logical, intent(out) :: is_upper_bound
       real(wp) :: difference
 
       difference = level - background
-      is_maximum = difference < least_difference
+      is_upper_bound = difference < min_difference
       corrected = level
-      if (difference < clear_difference) corrected = level + 10*log10(1 - 10**(-max(difference, least_difference)/10))
+      if (difference < clear_difference) corrected = level + 10*log10(1 - 10**(-max(difference, min_difference)/10))
    end subroutine correct_for_background
 
 end module thud_rating

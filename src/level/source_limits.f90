@@ -16,7 +16,7 @@ module thud_source_limits
    !> Criteria of a verdict: the octaves, contact time, restitution, peaks, mass, drop height.
    integer, parameter :: criterion_count = octave_count + 5
 
-   !> A peak counts where the force falls by more than this part of its maximum on both sides.
+   !> A peak counts where the force falls by more than this fraction of its maximum on both sides.
    !> The standards ask for a single peak without defining one; ripples of a few percent do not
    !> make a second impact.
    real(wp), parameter :: peak_prominence = 0.1_wp

@@ -16,6 +16,7 @@ module thud_hunt_crossley
    use thud_single_mass, only: at_deflection, at_impulse, at_loss, at_velocity, single_mass_type
    use thud_source_model, only: source_model_type
    use thud_text, only: to_text
+   use thud_zero_search, only: bisection_type
    implicit none (type, external)
    private
 
@@ -128,23 +129,16 @@ contains
       real(wp), intent(in) :: restitution, impact_velocity
       !> alpha, s/m.
       real(wp) :: damping
-      real(wp) :: left, right, middle
+      type(bisection_type) :: bracket
 
       damping = 0.0_wp
       if (restitution >= 1.0_wp) return
       ! The root other than zero: the function is positive before it and falls without bound to 1/e.
-      left = 0.0_wp
-      right = 1/restitution
-      do
-         middle = (left + right)/2
-         if (.not. (middle > left .and. middle < right)) exit
-         if (balance(middle) > 0.0_wp) then
-            left = middle
-         else
-            right = middle
-         end if
+      bracket%right = 1/restitution
+      do while (bracket%is_open())
+         call bracket%halve(balance(bracket%get_middle()) > 0.0_wp)
       end do
-      damping = middle/(1.5_wp*impact_velocity)
+      damping = bracket%get_middle()/(1.5_wp*impact_velocity)
 
    contains
 

@@ -15,6 +15,7 @@ module thud_measured_modes
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
    use thud_source_model, only: source_model_type, typical_contact
    use thud_text, only: fixed, to_text
+   use thud_zero_search, only: bisection_type
    implicit none (type, external)
    private
 
@@ -123,7 +124,7 @@ contains
       march: do i = 1, size(history%floor_force)
          call check_interrupt(error)
          if (allocated(error)) return
-         call get_motion(modes, v0, (i - 1)*step, history%deflection(i), history%velocity(i), history%part(i, 1))
+         call get_motion(modes, v0, (i - 1)*step, history%deflection(i), history%velocity(i), history%component(i, 1))
          do j = 1, substeps
             time = (i - 1 + real(j, wp)/substeps)*step
             call get_motion(modes, v0, time, deflection, velocity, force)
@@ -137,9 +138,9 @@ contains
          return
       end if
       ! Dashpots start with a jump; a sample of a jump is the mean of its two sides.
-      history%part(1, 1) = history%part(1, 1)/2
-      history%elastic_force = history%part(:, 1)
-      history%floor_force = history%part(:, 1)
+      history%component(1, 1) = history%component(1, 1)/2
+      history%elastic_force = history%component(:, 1)
+      history%floor_force = history%component(:, 1)
       call finish(modes, release_time(modes, v0, time - step/substeps, time), history, error)
       if (.not. allocated(error)) call check_history(history, sampling, error)
       if (.not. allocated(error)) call check_samples(history, error)
@@ -206,7 +207,7 @@ contains
       type(mode_type), intent(in) :: modes(:)
       !> Velocity at first touch, m/s; time since first touch, s.
       real(wp), intent(in) :: impact_velocity, time
-      !> Deflection of the centre of mass, m; its velocity, m/s; force on the floor, N.
+      !> Deflection of the center of mass, m; its velocity, m/s; force on the floor, N.
       real(wp), intent(out) :: deflection, velocity, force
       !> Power of the dashpots, W; kinetic and elastic energy, J.
       real(wp), intent(out), optional :: power, stored
@@ -235,20 +236,15 @@ contains
       real(wp), intent(in) :: before, after
       !> Time of release, s.
       real(wp) :: time
-      real(wp) :: left, right, deflection, velocity, force
+      type(bisection_type) :: bracket
+      real(wp) :: deflection, velocity, force
 
-      left = before
-      right = after
-      do
-         time = (left + right)/2
-         if (.not. (time > left .and. time < right)) exit
-         call get_motion(modes, impact_velocity, time, deflection, velocity, force)
-         if (force > 0.0_wp) then
-            left = time
-         else
-            right = time
-         end if
+      bracket = bisection_type(before, after)
+      do while (bracket%is_open())
+         call get_motion(modes, impact_velocity, bracket%get_middle(), deflection, velocity, force)
+         call bracket%halve(force > 0.0_wp)
       end do
+      time = bracket%get_middle()
    end function release_time
 
    !> Scalars of the impact. The equation of each mode makes the impulse the change of momentum;

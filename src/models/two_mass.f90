@@ -322,12 +322,12 @@ contains
       center = self%get_center(state)
       history%deflection(i) = center(1)
       history%velocity(i) = center(2)
-      history%channel(i, :) = state([at_belt, at_rim])
+      history%model_history(i, :) = state([at_belt, at_rim])
       if (allocated(history%floor_displacement)) then
-         history%channel(i, :) = history%channel(i, :) + history%floor_displacement(i)
+         history%model_history(i, :) = history%model_history(i, :) + history%floor_displacement(i)
       end if
-      history%part(i, :) = get_components(self, state)
-      history%elastic_force(i) = sum(history%part(i, :))
+      history%component(i, :) = get_components(self, state)
+      history%elastic_force(i) = sum(history%component(i, :))
       history%floor_force(i) = history%elastic_force(i)
    end subroutine record_sample
 

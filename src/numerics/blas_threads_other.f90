@@ -1,4 +1,4 @@
-!> Threads of a BLAS other than OpenBLAS: it keeps its own ways.
+!> Threads of a BLAS other than OpenBLAS: it manages its own threads.
 module thud_blas_threads
    implicit none (type, external)
    private

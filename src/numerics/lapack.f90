@@ -19,7 +19,7 @@ module thud_lapack
          integer, intent(out) :: info
       end subroutine dgeev
 
-      !> Generalised symmetric eigenproblem.
+      !> Generalized symmetric eigenproblem.
       pure subroutine dsygv(itype, jobz, uplo, n, a, lda, b, ldb, w, work, lwork, info)
          import :: wp
          implicit none (type, external)

@@ -9,9 +9,9 @@ module thud_legendre
 
 contains
 
-   !> Legendre polynomials P_0 to P_degree and their first two derivatives at one place.
+   !> Legendre polynomials P_0 to P_degree and their first two derivatives.
    pure subroutine get_legendre(x, value, first, second)
-      !> Place in [-1, 1].
+      !> Argument in [-1, 1].
       real(wp), intent(in) :: x
       !> P_j(x): [0:degree].
       real(wp), intent(out) :: value(0:)
@@ -41,7 +41,7 @@ contains
    !> By their recursion upwards, in which errors grow as |P_n(z)|. Sums over coefficients of a smooth function do not
    !> suffer: these fall as fast.
    pure subroutine get_second_legendre(z, second)
-      !> Place in the upper half of the plane, on [-1, 1] taken as above it.
+      !> Argument in the upper half of the plane, on [-1, 1] taken as above it.
       complex(wp), intent(in) :: z
       !> Q_0(z) and so on: [0:degree].
       complex(wp), intent(out) :: second(0:)

@@ -59,7 +59,7 @@ contains
       border = scale*[0.0_wp, sorted(pack(sqrt(abs(square)), square%re > 0.0_wp))]
       border = [border, 2*max(border(size(border)), scale)]
       do j = 1, size(border) - 1
-         associate (middle => get_least(pole, residue, direct, border(j), border(j + 1)))
+         associate (middle => get_minimum(pole, residue, direct, border(j), border(j + 1)))
             if (get_real_part(pole, residue, direct, middle) < 0.0_wp) omega = [omega, middle]
          end associate
       end do
@@ -67,9 +67,9 @@ contains
 
    !> Changes residues and constant part by as little as possible, by weighted squares at some frequencies, so that the
    !> real part is nowhere negative.
-   subroutine make_passive(line, weight, pole, residue, direct, failed)
-      !> Angular frequencies, rad/s, and weights of the change there: [n_line].
-      real(wp), intent(in) :: line(:), weight(:)
+   subroutine make_passive(frequency, weight, pole, residue, direct, failed)
+      !> Angular frequencies, rad/s, and weights of the change there: [n_frequency].
+      real(wp), intent(in) :: frequency(:), weight(:)
       !> Poles, 1/s: [n].
       complex(wp), intent(in) :: pole(:)
       !> Residues, those of pairs doubled: [n].
@@ -80,10 +80,10 @@ contains
       logical, intent(out) :: failed
       real(wp), allocatable :: normal(:, :), omega(:), held(:), x(:), length(:)
       complex(wp), allocatable :: basis(:, :)
-      real(wp) :: least
+      real(wp) :: minimum
       integer :: i, n
 
-      call get_basis(pole, cmplx(0.0_wp, line, wp), basis)
+      call get_basis(pole, cmplx(0.0_wp, frequency, wp), basis)
       n = size(basis, 2)
       allocate (length(n))
       do i = 1, n
@@ -94,31 +94,31 @@ contains
       do i = 1, n
          normal(i, i) = normal(i, i) + ridge
       end do
-      least = margin*sum(abs([(get_response(pole, residue, direct, line(i)), i=1, size(line))]))/size(line)
+      minimum = margin*sum(abs([(get_response(pole, residue, direct, frequency(i)), i=1, size(frequency))]))/size(frequency)
       allocate (held(0))
       do i = 1, n_round
-         direct = max(direct, least)
+         direct = max(direct, minimum)
          call find_violations(pole, residue, direct, omega, failed)
          failed = failed .or. is_interrupted()
          if (failed .or. size(omega) == 0) return
          held = [held, omega]
-         x = get_correction(pole, residue, direct, held, normal, length, least)
+         x = get_correction(pole, residue, direct, held, normal, length, minimum)
          residue = residue + get_residues(pole, x(:n - 1))
          direct = direct + x(n)
       end do
       ! What is left is within rounding of the corrections; a larger constant part ends it.
       do i = 1, n_round
-         direct = max(direct, least)
+         direct = max(direct, minimum)
          call find_violations(pole, residue, direct, omega, failed)
          failed = failed .or. is_interrupted()
          if (failed .or. size(omega) == 0) return
-         direct = direct + least - minval([(get_real_part(pole, residue, direct, omega(n)), n=1, size(omega))])
+         direct = direct + minimum - minval([(get_real_part(pole, residue, direct, omega(n)), n=1, size(omega))])
       end do
       failed = .true.
    end subroutine make_passive
 
    !> The least change x of the coefficients, x' N x, that makes the real part at least `least` at some frequencies.
-   function get_correction(pole, residue, direct, omega, normal, length, least) result(x)
+   function get_correction(pole, residue, direct, omega, normal, length, minimum) result(x)
       !> Poles, 1/s, and residues: [n].
       complex(wp), intent(in) :: pole(:), residue(:)
       !> Constant part.
@@ -128,7 +128,7 @@ contains
       !> N for coefficients times the lengths: [n_x, n_x].
       real(wp), intent(in) :: normal(:, :), length(:)
       !> The real part to be had.
-      real(wp), intent(in) :: least
+      real(wp), intent(in) :: minimum
       !> Changes of the coefficients and of the constant part: [n_x].
       real(wp) :: x(size(length))
       complex(wp), allocatable :: basis(:, :)
@@ -139,7 +139,7 @@ contains
       call get_basis(pole, cmplx(0.0_wp, omega, wp), basis)
       do i = 1, size(omega)
          rows(:, i) = real(basis(i, :))/length
-         missing(i) = least - get_real_part(pole, residue, direct, omega(i))
+         missing(i) = minimum - get_real_part(pole, residue, direct, omega(i))
       end do
       factor = normal
       solved = rows
@@ -151,8 +151,8 @@ contains
       x = matmul(solved, force)/length
    end function get_correction
 
-   !> The forces of constraints, each not negative, that lift every constraint by at least what it misses, and by just
-   !> that where its force is positive: Hildreth's method.
+   !> The forces of constraints, each not negative, that raise every constraint by at least what it lacks, and by
+   !> just that where its force is positive: Hildreth's method.
    subroutine solve_dual(gram, missing, force, n_sweep)
       !> Lift of each constraint by the unit force of each, symmetric: [n, n].
       real(wp), intent(in), contiguous :: gram(:, :)
@@ -177,7 +177,7 @@ contains
    end subroutine solve_dual
 
    !> Angular frequency between two others at which the real part is least: golden sections.
-   pure function get_least(pole, residue, direct, lower, upper) result(omega)
+   pure function get_minimum(pole, residue, direct, lower, upper) result(omega)
       !> Poles, 1/s, and residues: [n].
       complex(wp), intent(in) :: pole(:), residue(:)
       !> Constant part; the ends, rad/s.
@@ -199,7 +199,7 @@ contains
          end if
       end do
       omega = (low + high)/2
-   end function get_least
+   end function get_minimum
 
    !> Real part at a frequency.
    pure function get_real_part(pole, residue, direct, omega) result(part)

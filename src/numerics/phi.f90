@@ -7,7 +7,7 @@ module thud_phi
 
    public :: get_phi, max_phi
 
-   !> Number of the last function that is offered.
+   !> Index of the last function that is offered.
    integer, parameter :: max_phi = 8
 
    !> Terms of the series of phi_n below |z| = 1: 1/18! is left.
@@ -25,7 +25,7 @@ contains
    pure function get_phi(z, highest) result(phi)
       !> Argument, its real part not large.
       complex(wp), intent(in) :: z
-      !> Number of the last function, up to `max_phi`.
+      !> Index of the last function, up to `max_phi`.
       integer, intent(in) :: highest
       !> Their values: [0:highest].
       complex(wp) :: phi(0:highest)

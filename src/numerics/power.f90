@@ -1,4 +1,4 @@
-!> Powers of whole arrays, as straight-line arithmetic that vectorises: the intrinsic `**` calls
+!> Powers of whole arrays, as straight-line arithmetic that vectorizes: the intrinsic `**` calls
 !> the mathematical library for one number at a time.
 !>
 !> base = 2**k m with m in [sqrt(1/2), sqrt(2)); with s = (m - 1)/(m + 1)
@@ -21,7 +21,7 @@ module thud_power
    implicit none (type, external)
    private
 
-   public :: not_a_number, power_error, raise
+   public :: not_a_number, power_error, vector_power
 
    !> Natural logarithm of 2.
    real(wp), parameter :: ln2 = log(2.0_wp)
@@ -60,7 +60,7 @@ contains
 
    !> Powers base**exponent; NaN where the base is not positive. Limited by the throughput of the
    !> multiply-add units.
-   pure subroutine raise(n, base, exponent, power)
+   pure subroutine vector_power(n, base, exponent, power)
       !> Numbers in the arrays; a multiple of the vector length sends all through the same code.
       integer, intent(in) :: n
       !> The bases, normal numbers: [n].
@@ -91,9 +91,9 @@ contains
          value = transfer(transfer(value, bits) + shiftl(transfer(whole, bits), mantissa), value)
          power(i) = merge(value, not_a_number, base(i) > 0.0_wp)
       end do
-   end subroutine raise
+   end subroutine vector_power
 
-   !> Bound of the relative error of `raise`, see above.
+   !> Bound of the relative error of `vector_power`, see above.
    elemental function power_error(base, exponent) result(bound)
       real(wp), intent(in) :: base, exponent
       !> Maximum relative error.

@@ -8,7 +8,7 @@ module thud_rational
    implicit none (type, external)
    private
 
-   public :: get_basis, get_coefficients, get_eigenvalues, get_order, get_residues, get_state_matrix, get_state_input
+   public :: get_basis, get_coefficients, get_eigenvalues, get_order, get_residues, get_state_input, get_state_matrix
 
 contains
 
@@ -26,9 +26,9 @@ contains
    pure subroutine get_basis(pole, s, basis)
       !> Poles: [n].
       complex(wp), intent(in) :: pole(:)
-      !> Complex frequencies: [n_line].
+      !> Complex frequencies: [n_frequency].
       complex(wp), intent(in) :: s(:)
-      !> The functions: [n_line, order + 1].
+      !> The functions: [n_frequency, order + 1].
       complex(wp), allocatable, intent(out) :: basis(:, :)
       complex(wp), parameter :: i = (0.0_wp, 1.0_wp)
       integer :: j, k

@@ -2,7 +2,7 @@
 !> and the location of events inside a step.
 module thud_rk4
    use thud_kinds, only: wp
-   use thud_zero_search, only: advance_search, is_found, narrow, new_zero_search, zero_search_type
+   use thud_zero_search, only: advance_search, bisection_type, is_found, new_zero_search, update_bracket, zero_search_type
    implicit none (type, external)
    private
 
@@ -80,7 +80,7 @@ contains
       search = new_zero_search(state(component), step, component_after(step))
       do while (.not. is_found(search))
          call advance_search(search)
-         call narrow(search, component_after(search%trial))
+         call update_bracket(search, component_after(search%trial))
       end do
       length = search%right
 
@@ -111,22 +111,16 @@ contains
       real(wp), intent(in) :: step
       !> Length of the longest step that does not.
       real(wp) :: length
+      type(bisection_type) :: bracket
       real(wp) :: new_state(size(state))
-      real(wp) :: middle, outside
       logical :: valid
 
-      length = 0.0_wp
-      outside = step
-      do
-         middle = (length + outside)/2
-         if (.not. (middle > length .and. middle < outside)) exit
-         call rk4_step(ode, time, state, middle, new_state, valid)
-         if (valid) then
-            length = middle
-         else
-            outside = middle
-         end if
+      bracket%right = step
+      do while (bracket%is_open())
+         call rk4_step(ode, time, state, bracket%get_middle(), new_state, valid)
+         call bracket%halve(valid)
       end do
+      length = bracket%left
    end function longest_valid
 
 end module thud_rk4

@@ -23,7 +23,7 @@ module thud_transform
       integer :: length = 0
       !> Threads that use the plans now.
       integer :: users = 0
-      !> Number of the last use, ascending.
+      !> Index of the last use, ascending.
       integer(c_int64_t) :: last_use = 0
       !> From a record to its transform, and back to the record times the length.
       type(c_ptr) :: forward = c_null_ptr, back = c_null_ptr
@@ -57,13 +57,13 @@ contains
       autocorrelation = signal(:size(record))/length
    end subroutine get_autocorrelation
 
-   !> The part of a record below a frequency.
+   !> Low-pass component of a record.
    subroutine get_low_pass(record, sample_rate, edge, low)
       !> Samples: [n].
       real(wp), intent(in) :: record(:)
       !> Samples per second, Hz; the frequency, Hz.
       real(wp), intent(in) :: sample_rate, edge
-      !> Samples of the part: [n].
+      !> Its samples: [n].
       real(wp), intent(out) :: low(:)
       real(wp), allocatable :: signal(:)
       complex(wp), allocatable :: spectrum(:)
@@ -92,7 +92,7 @@ contains
       type(plans_type) :: plans
 
       call transform_padded(record, length, signal, spectrum, plans)
-      call give_back(plans)
+      call release(plans)
       power = real(spectrum)**2 + aimag(spectrum)**2
    end subroutine get_power_spectrum
 
@@ -126,7 +126,7 @@ contains
       type(plans_type), intent(inout) :: plans
 
       call fftw_execute_dft_c2r(plans%back, spectrum, signal)
-      call give_back(plans)
+      call release(plans)
    end subroutine transform_back
 
    !> Plans for arrays, kept or new ones. FFTW's planner is not thread-safe.
@@ -160,7 +160,7 @@ contains
    end subroutine take_plans
 
    !> Ends the use of plans.
-   subroutine give_back(plans)
+   subroutine release(plans)
       type(plans_type), intent(in) :: plans
       integer :: at
 
@@ -169,7 +169,7 @@ contains
       kept(at)%users = kept(at)%users - 1
       if (kept(at)%users == 0 .and. plans%length > max_kept_length) call destroy(kept(at))
       !$omp end critical (thud_fftw_planner)
-   end subroutine give_back
+   end subroutine release
 
    !> Destroys plans, if there are any.
    subroutine destroy(plans)

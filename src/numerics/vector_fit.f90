@@ -10,11 +10,11 @@ module thud_vector_fit
 
    public :: fit_rational
 
-   !> Maximum moves of the poles; with good values some five are needed.
-   integer, parameter :: n_move = 40
+   !> Maximum number of relocations of the poles; with good values some five are needed.
+   integer, parameter :: max_relocations = 40
 
-   !> Moves without a gain after which the poles stay, and the least gain.
-   integer, parameter :: patience = 6
+   !> Relocations without a gain after which the poles stay, and the minimum gain.
+   integer, parameter :: stagnation_limit = 6
    real(wp), parameter :: gain = 1.0e-3_wp
 
    !> Weighted relative error, root of the mean square, below which only rounding is left to fit.
@@ -33,16 +33,16 @@ contains
 
    !> Fits d + sum of r_k/(s - p_k).
    !>
-   !> Each move makes the zeros of a fitted weight function the new poles; those in the right half plane are reflected.
+   !> Each relocation makes the zeros of a fitted weight function the new poles; those in the right half plane are reflected.
    !> The first poles lie at equal steps of the frequency or of its logarithm; the better of both fits is taken.
    subroutine fit_rational(omega, response, weight, order, pole, residue, direct, misfit, failed)
-      !> Angular frequencies, rad/s, rising, above 0: [n_line].
+      !> Angular frequencies, rad/s, rising, above 0: [n_frequency].
       real(wp), intent(in) :: omega(:)
-      !> Values to fit: [n_line].
+      !> Values to fit: [n_frequency].
       complex(wp), intent(in) :: response(:)
-      !> Weights of their errors: [n_line].
+      !> Weights of their errors: [n_frequency].
       real(wp), intent(in) :: weight(:)
-      !> Number of poles, both of a pair counted; at most n_line - 1.
+      !> Number of poles, both of a pair counted; at most n_frequency - 1.
       integer, intent(in) :: order
       !> Poles, 1/s, of pairs one, and residues, those of pairs doubled: [n].
       complex(wp), allocatable, intent(out) :: pole(:), residue(:)
@@ -50,34 +50,34 @@ contains
       real(wp), intent(out) :: direct
       !> Weighted error over the weighted values, root of the mean square.
       real(wp), intent(out) :: misfit
-      !> LAPACK found no solution, or an interrupt ended the search.
+      !> LAPACK finds no solution, or an interrupt ended the search.
       logical, intent(out) :: failed
-      complex(wp), allocatable :: found(:)
+      complex(wp), allocatable :: candidate(:)
       real(wp), allocatable :: coefficient(:), best(:)
       complex(wp) :: s(size(omega))
-      real(wp) :: scale, here
-      integer :: i, kind, idle
+      real(wp) :: scale, candidate_misfit
+      integer :: i, kind, stagnation
 
       scale = omega(size(omega))
       s = cmplx(0.0_wp, omega/scale, wp)
       misfit = huge(misfit)
       failed = .true.
       do kind = 1, 2
-         found = get_first_poles(omega(1)/scale, order, kind == 1)
-         idle = 0
-         do i = 0, n_move
+         candidate = get_first_poles(omega(1)/scale, order, kind == 1)
+         stagnation = 0
+         do i = 0, max_relocations
             if (is_interrupted()) return
-            if (i > 0) call move_poles(s, response, weight, found, failed)
+            if (i > 0) call relocate_poles(s, response, weight, candidate, failed)
             if (i > 0 .and. failed) exit
-            call fit_residues(s, response, weight, found, coefficient, here)
-            idle = idle + 1
-            if (here < (1 - gain)*misfit) idle = 0
-            if (here < misfit) then
-               misfit = here
-               pole = found
+            call fit_residues(s, response, weight, candidate, coefficient, candidate_misfit)
+            stagnation = stagnation + 1
+            if (candidate_misfit < (1 - gain)*misfit) stagnation = 0
+            if (candidate_misfit < misfit) then
+               misfit = candidate_misfit
+               pole = candidate
                best = coefficient
             end if
-            if (misfit < exact .or. idle > patience) exit
+            if (misfit < exact .or. stagnation > stagnation_limit) exit
          end do
          if (misfit < exact) exit
       end do
@@ -88,58 +88,58 @@ contains
       pole = pole*scale
    end subroutine fit_rational
 
-   !> Lightly damped poles over the band of the lines, whose last is at 1.
+   !> Lightly damped poles over the band, whose last frequency is 1.
    pure function get_first_poles(lowest, order, logarithmic) result(pole)
-      !> The first line over the last.
+      !> The first frequency over the last.
       real(wp), intent(in) :: lowest
       integer, intent(in) :: order
       !> At equal steps of the logarithm.
       logical, intent(in) :: logarithmic
       !> The poles: [n].
       complex(wp), allocatable :: pole(:)
-      real(wp) :: part, place
+      real(wp) :: fraction, frequency
       integer :: k, pairs
 
       pairs = order/2
       allocate (pole(pairs + mod(order, 2)))
       do k = 1, pairs
-         part = (k - 0.5_wp)/pairs
-         place = lowest + (1 - lowest)*part
-         if (logarithmic) place = lowest**(1 - part)
-         pole(k) = place*cmplx(-first_damping, 1.0_wp, wp)
+         fraction = (k - 0.5_wp)/pairs
+         frequency = lowest + (1 - lowest)*fraction
+         if (logarithmic) frequency = lowest**(1 - fraction)
+         pole(k) = frequency*cmplx(-first_damping, 1.0_wp, wp)
       end do
       if (mod(order, 2) == 1) pole(pairs + 1) = -sqrt(lowest)
    end function get_first_poles
 
-   !> Moves poles to the zeros of sigma = c.basis + d, where sigma f = rational function with the present poles, and the
+   !> Relocates poles to the zeros of sigma = c.basis + d, where sigma f = rational function with the present poles, and the
    !> real parts of sigma have the mean 1 (relaxed non-triviality, Gustavsen 2006 eq. 8).
-   subroutine move_poles(s, response, weight, pole, failed)
-      !> Complex frequencies, the last at i, and values: [n_line].
+   subroutine relocate_poles(s, response, weight, pole, failed)
+      !> Complex frequencies, the last at i, and values: [n_frequency].
       complex(wp), intent(in) :: s(:), response(:)
-      !> Weights: [n_line].
+      !> Weights: [n_frequency].
       real(wp), intent(in) :: weight(:)
       !> The poles: [n].
       complex(wp), allocatable, intent(inout) :: pole(:)
-      !> LAPACK found no solution.
+      !> LAPACK finds no solution.
       logical, intent(out) :: failed
       complex(wp), allocatable :: basis(:, :), zero(:)
       real(wp), allocatable :: matrix(:, :), right(:), column(:)
-      real(wp) :: size_of_line
-      integer :: j, n, n_line
+      real(wp) :: norm
+      integer :: j, n, n_frequency
 
       n = get_order(pole)
-      n_line = size(s)
+      n_frequency = size(s)
       call get_basis(pole, s, basis)
-      allocate (matrix(2*n_line + 1, 2*n + 2), right(2*n_line + 1), zero(n))
+      allocate (matrix(2*n_frequency + 1, 2*n + 2), right(2*n_frequency + 1), zero(n))
       do j = 1, n + 1
-         matrix(:2*n_line, j) = halves(weight*basis(:, j))
-         matrix(:2*n_line, n + 1 + j) = halves(-weight*response*basis(:, j))
+         matrix(:2*n_frequency, j) = halves(weight*basis(:, j))
+         matrix(:2*n_frequency, n + 1 + j) = halves(-weight*response*basis(:, j))
       end do
-      size_of_line = norm2(weight*abs(response))
-      matrix(2*n_line + 1, :n + 1) = 0.0_wp
-      matrix(2*n_line + 1, n + 2:) = size_of_line*sum(real(basis), dim=1)/n_line
+      norm = norm2(weight*abs(response))
+      matrix(2*n_frequency + 1, :n + 1) = 0.0_wp
+      matrix(2*n_frequency + 1, n + 2:) = norm*sum(real(basis), dim=1)/n_frequency
       right = 0.0_wp
-      right(2*n_line + 1) = size_of_line
+      right(2*n_frequency + 1) = norm
       call solve_least_squares(matrix, right, failed)
       if (failed) return
       associate (c => right(n + 2:2*n + 1), d => right(2*n + 2))
@@ -154,13 +154,13 @@ contains
       call get_eigenvalues(matrix, zero, failed)
       pole = pack(zero, zero%im >= 0.0_wp)
       pole%re = -max(abs(pole%re), min_damping*abs(pole))
-   end subroutine move_poles
+   end subroutine relocate_poles
 
    !> Coefficients of the basis with given poles.
    subroutine fit_residues(s, response, weight, pole, coefficient, misfit)
-      !> Complex frequencies and values: [n_line].
+      !> Complex frequencies and values: [n_frequency].
       complex(wp), intent(in) :: s(:), response(:)
-      !> Weights: [n_line].
+      !> Weights: [n_frequency].
       real(wp), intent(in) :: weight(:)
       !> The poles: [n].
       complex(wp), intent(in) :: pole(:)

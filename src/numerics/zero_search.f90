@@ -1,22 +1,22 @@
-!> Search for the end of the step at which a quantity falls to zero, by the Illinois form of regula falsi, safeguarded by
-!> bisection. Who searches evaluates the quantity: get a trial length, and narrow the search by its value there.
+!> Bracketed root searches: the Illinois method with bisection as safeguard, and bisection alone. The caller evaluates the
+!> function: `advance_search` proposes a trial point, `update_bracket` takes its value.
 module thud_zero_search
    use thud_kinds, only: wp
    implicit none (type, external)
    private
 
-   public :: advance_search, is_found, narrow, new_zero_search, zero_search_type
+   public :: advance_search, bisection_type, is_found, new_zero_search, update_bracket, zero_search_type
 
    !> Trials after which a search ends.
    integer, parameter :: max_trials = 200
 
-   !> A search between lengths at which the quantity is positive and not positive.
+   !> A bracket: the function is positive at the left end and not positive at the right end.
    type :: zero_search_type
-      !> The two lengths.
+      !> Its ends.
       real(wp) :: left = 0.0_wp, right = 0.0_wp
-      !> Length to be tried next.
+      !> Next trial point.
       real(wp) :: trial = 0.0_wp
-      !> The quantity at the two lengths; of an end that stays twice, less.
+      !> Function values at the ends of the bracket; halved for an end that is kept twice (Illinois).
       real(wp), private :: left_value = 0.0_wp, right_value = 0.0_wp
       !> Which end moved last.
       logical, private :: left_moved_last = .false., right_moved_last = .false.
@@ -24,15 +24,25 @@ module thud_zero_search
       integer, private :: n_trial = 0
    end type zero_search_type
 
+   !> Bisection of a bracket to neighboring numbers: `do while (bracket%is_open())`, then `halve` it.
+   type :: bisection_type
+      !> Its ends.
+      real(wp) :: left = 0.0_wp, right = 0.0_wp
+   contains
+      procedure :: get_middle
+      procedure :: is_open
+      procedure :: halve
+   end type bisection_type
+
 contains
 
-   !> A search over a step at whose beginning, or just after it, the quantity is positive.
+   !> A bracket from 0, at or just after which the function is positive, to the end of a step.
    pure function new_zero_search(start_value, step, end_value) result(search)
-      !> The quantity at the beginning.
+      !> Function value at 0.
       real(wp), intent(in) :: start_value
       !> Length of the step.
       real(wp), intent(in) :: step
-      !> The quantity at the end, not positive.
+      !> Function value at its end, not positive.
       real(wp), intent(in) :: end_value
       type(zero_search_type) :: search
 
@@ -49,7 +59,7 @@ contains
       found = search%n_trial == max_trials .or. search%right - search%left <= 2*spacing(search%right)
    end function is_found
 
-   !> Chooses the next trial length.
+   !> Proposes the next trial point.
    pure subroutine advance_search(search)
       type(zero_search_type), intent(inout) :: search
 
@@ -60,13 +70,11 @@ contains
       end associate
    end subroutine advance_search
 
-   !> Takes the quantity at the trial length into account.
-   pure subroutine narrow(search, value)
+   !> Takes the function value at the trial point.
+   pure subroutine update_bracket(search, value)
       type(zero_search_type), intent(inout) :: search
-      !> The quantity.
       real(wp), intent(in) :: value
 
-      ! An end that stays twice has its value halved, or regula falsi would creep.
       if (value > 0.0_wp) then
          search%left = search%trial
          search%left_value = value
@@ -78,6 +86,35 @@ contains
       end if
       search%left_moved_last = value > 0.0_wp
       search%right_moved_last = .not. search%left_moved_last
-   end subroutine narrow
+   end subroutine update_bracket
+
+   !> Middle of a bracket.
+   pure function get_middle(self) result(middle)
+      class(bisection_type), intent(in) :: self
+      real(wp) :: middle
+
+      middle = (self%left + self%right)/2
+   end function get_middle
+
+   !> Whether there is a number between the ends.
+   pure function is_open(self) result(open)
+      class(bisection_type), intent(in) :: self
+      logical :: open
+
+      open = self%get_middle() > self%left .and. self%get_middle() < self%right
+   end function is_open
+
+   !> Keeps one half of a bracket.
+   pure subroutine halve(self, keep_right)
+      class(bisection_type), intent(inout) :: self
+      !> The half to the right of the middle.
+      logical, intent(in) :: keep_right
+
+      if (keep_right) then
+         self%left = self%get_middle()
+      else
+         self%right = self%get_middle()
+      end if
+   end subroutine halve
 
 end module thud_zero_search

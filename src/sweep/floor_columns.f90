@@ -8,7 +8,7 @@ module thud_floor_columns
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
-   use thud_rating, only: get_a_weighted_level, get_standardisation
+   use thud_rating, only: get_a_weighted_level, get_standardization
    use thud_room, only: get_room_bands, room_level_type
    implicit none (type, external)
    private
@@ -60,7 +60,7 @@ contains
       integer, intent(in) :: n_band
       !> Levels were computed; without them all but the energy is NaN.
       logical, intent(in) :: levels
-      !> The drop on a rigid floor, which counts where none on the floor is allocated.
+      !> The drop on a rigid floor, used if there is none on the floor.
       type(impact_type), intent(in) :: impact
       type(force_history_type), intent(in), allocatable :: on_floor
       type(floor_result_type), intent(in) :: floor
@@ -78,7 +78,7 @@ contains
          values(:n_band) = impact%assessment%level(impact%assessment%first_band:, 2)
       end if
       if (case%has_room) values(n_band + 2:) = [room%level, room%a_weighted, get_a_weighted_level(room%bands(1)%set, &
-         room%level + get_standardisation(room%reverberation_time, case%room%volume))]
+         room%level + get_standardization(room%reverberation_time, case%room%volume))]
    end subroutine get_floor_values
 
 end module thud_floor_columns

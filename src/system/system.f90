@@ -71,7 +71,7 @@ module thud_system
    procedure(number_call), bind(c, name='isatty') :: c_isatty
    procedure(number_call), bind(c, name='thud_is_closed') :: c_is_closed
 
-   !> Turns signals of full and closed outputs into errors, and SIGINT and SIGTERM into a sentence.
+   !> Turns signals of full and closed outputs into errors, and SIGINT and SIGTERM into a message.
    procedure(plain_call), bind(c, name='thud_prepare_process') :: prepare_process
    !> Keeps an interrupt from now on; it then stops `write_text`.
    procedure(plain_call), bind(c, name='thud_keep_interrupts') :: keep_interrupts
@@ -185,7 +185,7 @@ module thud_system
 
 contains
 
-   !> The system's sentence of an error.
+   !> The system's message of an error.
    function get_system_message(status) result(text)
       integer, intent(in) :: status
       character(len=:), allocatable :: text

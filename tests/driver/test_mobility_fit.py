@@ -63,6 +63,9 @@ def test_modes_and_their_number_are_found(exact: thud.MobilityFit) -> None:
     assert exact.error < 1e-10
     assert not exact.warnings
     assert max(abs(level) for _, level in exact.band_errors().values()) < 1e-9
+    assert exact.values["damping_ratio(2)"] == exact.floor.damping_ratio[1]
+    table = exact.to_dataframe()
+    np.testing.assert_allclose(table["fitted"], table["measured"], rtol=1e-8)
 
 
 def test_noise_is_not_fitted() -> None:

@@ -146,7 +146,7 @@ def test_record_is_long_enough_for_floor_room_and_detector(
     room = replace(ROOM, reverberation_time=reverberation_time)
     places = {"balls": [BALL], "microphones": [MICROPHONE]}
     level = thud.modal_room(impact, floor, room, **places).level  # type: ignore[arg-type]
-    monkeypatch.setattr(module, "WAITED", 2 * module.WAITED)
+    monkeypatch.setattr(module, "DECAY_RANGE", 2 * module.DECAY_RANGE)
     longer = thud.modal_room(impact, floor, room, **places).level  # type: ignore[arg-type]
     assert level == pytest.approx(longer, abs=2 * 20 * np.log10(1 + 10 ** (-60 / 20)))
 

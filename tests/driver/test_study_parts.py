@@ -395,7 +395,7 @@ class Found:
 
 # What `SurrogateLevels` takes of a comparison with levels.
 MISFIT: dict[str, Any] = {
-    "kind": "floor", "bands": "octave", "known_noise": True, "places": np.array([1, 3]),
+    "kind": "floor", "bands": "octave", "known_noise": True, "indices": np.array([1, 3]),
     "extra": ("contact_time", "restitution"), "target": np.array([40.0, 20.0, 0.02, 0.8]),
     "deviation": np.array([0.1, 0.2, 1e-5, 0.01]),
 }  # fmt: skip
@@ -550,8 +550,8 @@ def test_answers_are_the_verdict_of_what_is_predicted() -> None:
     ],
 )  # fmt: skip
 def test_surrogate_whose_parts_do_not_fit_is_not_whole(change: dict[str, Any]) -> None:
-    assert answering().is_whole
-    assert not replace(answering(), **change).is_whole
+    assert answering().is_complete
+    assert not replace(answering(), **change).is_complete
 
 
 def test_quantity_that_varies_by_rounding_only_is_its_mean() -> None:

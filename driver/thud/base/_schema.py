@@ -171,7 +171,7 @@ class Levels(Group):
     bands : str
         Bands of levels.csv; "octave", "third", "both".
     force : str
-        Force whose levels, peak and verdict count; "floor", "elastic".
+        Assessed force: levels, peak force and verdict are of it; "floor", "elastic".
     """
 
     method: LevelsMethod = "exact"
@@ -241,7 +241,8 @@ class Room(Group):
     reverberation_time : float
         Reverberation time of the room, s; 0.05 <= reverberation_time <= 20.
     reverberation_times : sequence of float
-        The same for each third from 50 to 630 Hz, s; 0.05 <= reverberation_times <= 20.
+        The same for each one-third-octave band from 50 to 630 Hz, s; 0.05 <= reverberation_times
+        <= 20.
     air_density : float
         Density of the air, kg/m3; 0.5 <= air_density <= 2.
     sound_speed : float
@@ -589,9 +590,9 @@ class Plate(Group):
     source_y : float
         Relative source position along the width; 0 < source_y < 1.
     point_x : sequence of float
-        Places of further points along the length, m; 0 <= point_x <= 1000.
+        Positions of further points along the length, m; 0 <= point_x <= 1000.
     point_y : sequence of float
-        Their places along the width, m; 0 <= point_y <= 1000.
+        Their positions along the width, m; 0 <= point_y <= 1000.
     """
 
     name: ClassVar[FloorName] = "plate"
@@ -658,9 +659,9 @@ class FloatingFloor(Group):
     source_y : float
         Relative source position along the width; 0 < source_y < 1.
     point_x : sequence of float
-        Places of further points along the length, m; 0 <= point_x <= 1000.
+        Positions of further points along the length, m; 0 <= point_x <= 1000.
     point_y : sequence of float
-        Their places along the width, m; 0 <= point_y <= 1000.
+        Their positions along the width, m; 0 <= point_y <= 1000.
     """
 
     name: ClassVar[FloorName] = "floating_floor"
@@ -724,9 +725,9 @@ class JoistFloor(Group):
     source_on : str
         Impact location: sheathing between joists, or a joist; "sheathing", "joist".
     point_x : sequence of float
-        Places of further points along the length, m; 0 <= point_x <= 1000.
+        Positions of further points along the length, m; 0 <= point_x <= 1000.
     point_y : sequence of float
-        Their places along the width, m; 0 <= point_y <= 1000.
+        Their positions along the width, m; 0 <= point_y <= 1000.
     """
 
     name: ClassVar[FloorName] = "joist_floor"
@@ -1019,7 +1020,7 @@ KEYS = (
     Key("", "sampling", "substeps", "whole", "", "integration steps per sampling interval", (), 1.0, 10000.0, True),
     Key("", "levels", "method", "choice", "", "method of the levels", ('exact', 'fft')),
     Key("", "levels", "bands", "choice", "", "bands of levels.csv", ('octave', 'third', 'both')),
-    Key("", "levels", "force", "choice", "", "force whose levels, peak and verdict count", ('floor', 'elastic')),
+    Key("", "levels", "force", "choice", "", "assessed force: levels, peak force and verdict are of it", ('floor', 'elastic')),
     Key("", "limits", "source", "choice", "", "source whose limits apply", ('rubber_ball', 'tyre')),
     Key("floor", "floor", "name", "choice", "", "floor under the source", ('rigid', 'infinite_plate', 'oscillator', 'plate', 'floating_floor', 'joist_floor', 'measured_mobility')),
     Key("infinite_plate", "infinite_plate", "resistance", "real", "N s/m", "force over velocity", (), 1.0, 1000000000000000.0),
@@ -1038,8 +1039,8 @@ KEYS = (
     Key("plate", "plate", "edge_absorption", "real", "m", "sum of lengths times absorption coefficients of the edges, of absorption", (), 0.0, 1000.0),
     Key("plate", "plate", "source_x", "real", "", "relative source position along the length", (), 0.0, 1.0),
     Key("plate", "plate", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
-    Key("plate", "plate", "point_x", "list", "m", "places of further points along the length", (), 0.0, 1000.0),
-    Key("plate", "plate", "point_y", "list", "m", "their places along the width", (), 0.0, 1000.0),
+    Key("plate", "plate", "point_x", "list", "m", "positions of further points along the length", (), 0.0, 1000.0),
+    Key("plate", "plate", "point_y", "list", "m", "their positions along the width", (), 0.0, 1000.0),
     Key("floating_floor", "floating_floor", "length", "real", "m", "length of the floor", (), 0.5, 100.0),
     Key("floating_floor", "floating_floor", "width", "real", "m", "width of the floor", (), 0.5, 100.0),
     Key("floating_floor", "floating_floor", "thickness", "real", "m", "thickness of the floor", (), 0.001, 2.0),
@@ -1058,8 +1059,8 @@ KEYS = (
     Key("floating_floor", "floating_floor", "layer_loss_factor", "real", "", "loss factor of the resilient layer", (), 0.0, 1.0),
     Key("floating_floor", "floating_floor", "source_x", "real", "", "relative source position along the length", (), 0.0, 1.0),
     Key("floating_floor", "floating_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
-    Key("floating_floor", "floating_floor", "point_x", "list", "m", "places of further points along the length", (), 0.0, 1000.0),
-    Key("floating_floor", "floating_floor", "point_y", "list", "m", "their places along the width", (), 0.0, 1000.0),
+    Key("floating_floor", "floating_floor", "point_x", "list", "m", "positions of further points along the length", (), 0.0, 1000.0),
+    Key("floating_floor", "floating_floor", "point_y", "list", "m", "their positions along the width", (), 0.0, 1000.0),
     Key("joist_floor", "joist_floor", "length", "real", "m", "span of the joists", (), 0.5, 100.0),
     Key("joist_floor", "joist_floor", "width", "real", "m", "width of the floor across the joists", (), 0.5, 100.0),
     Key("joist_floor", "joist_floor", "sheathing_thickness", "real", "m", "thickness of the sheathing", (), 0.003, 0.3),
@@ -1075,8 +1076,8 @@ KEYS = (
     Key("joist_floor", "joist_floor", "source_x", "real", "", "relative source position along the length", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_on", "choice", "", "impact location: sheathing between joists, or a joist", ('sheathing', 'joist')),
-    Key("joist_floor", "joist_floor", "point_x", "list", "m", "places of further points along the length", (), 0.0, 1000.0),
-    Key("joist_floor", "joist_floor", "point_y", "list", "m", "their places along the width", (), 0.0, 1000.0),
+    Key("joist_floor", "joist_floor", "point_x", "list", "m", "positions of further points along the length", (), 0.0, 1000.0),
+    Key("joist_floor", "joist_floor", "point_y", "list", "m", "their positions along the width", (), 0.0, 1000.0),
     Key("measured_mobility", "measured_mobility", "direct", "real", "m/(N s)", "mobility at high frequencies", (), 0.0, 1000.0),
     Key("measured_mobility", "measured_mobility", "pole_frequency", "list", "Hz", "magnitudes of the poles over 2 pi", (), 1e-06, 10000000.0),
     Key("measured_mobility", "measured_mobility", "damping_ratio", "list", "", "damping ratios of the poles, 1 of a real pole", (), 1e-12, 1.0),
@@ -1086,7 +1087,7 @@ KEYS = (
     Key("measured_mobility", "measured_mobility", "highest_frequency", "real", "Hz", "last frequency of the measurement", (), 0.0, 10000000.0),
     Key("room", "room", "volume", "real", "m3", "volume of the room", (), 1.0, 100000.0),
     Key("room", "room", "reverberation_time", "real", "s", "reverberation time of the room", (), 0.05, 20.0),
-    Key("room", "room", "reverberation_times", "list", "s", "the same for each third from 50 to 630 Hz", (), 0.05, 20.0),
+    Key("room", "room", "reverberation_times", "list", "s", "the same for each one-third-octave band from 50 to 630 Hz", (), 0.05, 20.0),
     Key("room", "room", "air_density", "real", "kg/m3", "density of the air", (), 0.5, 2.0),
     Key("room", "room", "sound_speed", "real", "m/s", "speed of sound in the air", (), 200.0, 500.0),
     Key("room", "room", "wall_lengths", "list", "m", "lengths of the flanking walls along the floor (default: no walls)", (), 0.1, 100.0),

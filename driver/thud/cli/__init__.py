@@ -59,7 +59,7 @@ COMMANDS = {
             argument(
                 "--all",
                 action="store_true",
-                help="write also the quantities of the model against time (channels.csv), and "
+                help="write also quantities of the model against time (model_histories.csv) and "
                 "every figure",
             ),
             argument(

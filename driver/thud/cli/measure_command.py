@@ -57,7 +57,7 @@ def measure(options: argparse.Namespace) -> int:
             config=options.config,
             progress=not options.quiet and sys.stderr.isatty(),
             workers=len(os.sched_getaffinity(0)) if options.workers is None else options.workers,
-            keep=kept,
+            checkpoint=kept,
         )
         verdict = recording.assess()
         recording_files.save(recording, files, figures=figures)

@@ -64,7 +64,7 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
     options.done[case.name] = path
     answer = ask(
         "run", path=os.fsencode(path), output=os.fsencode(output), replace=options.replace,
-        channels=options.all, progress=not options.quiet,
+        all=options.all, progress=not options.quiet,
     )  # fmt: skip
     for warning in answer.get("messages", {}).values():
         tqdm.write(f"thud-driver: {text(warning)}", file=sys.stderr)

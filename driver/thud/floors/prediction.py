@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 THIRDS = BANDWIDTHS[1]
-# Change of the force by a floor that gives way, dB, that raises a warning.
-NOTICED = 0.1
+# Change of the force by a yielding floor, dB, that raises a warning.
+MIN_CHANGE = 0.1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -142,23 +142,23 @@ class RoomPrediction(Displayed):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a reader of the numbers has to know."""
+        """Caveats of the numbers."""
         few = self.has_few_modes
-        found = [*self.floor_warnings]
+        result = [*self.floor_warnings]
         if few.any():
             bands = ", ".join(f"{f:g}" for f in self.frequency[few])
-            found.append(
+            result.append(
                 f"fewer than {self.few_modes:g} modes of floor or room at {bands} Hz: levels there "
                 "are means over many floors and rooms; single positions are expected to differ "
                 f"with a standard deviation of {self.spread[few].max():.1f} to "
                 f"{self.spread[few].min():.1f} dB"
             )
-        if self.force == "blocked" and abs(self.force_change) > NOTICED:
-            found.append(
-                f"the floor gives way: the peak of the force would change by about "
+        if self.force == "blocked" and abs(self.force_change) > MIN_CHANGE:
+            result.append(
+                f"the floor yields: the peak of the force would change by about "
                 f"{self.force_change:.1f} dB, and the force on a rigid floor is used"
             )
-        return tuple(found)
+        return tuple(result)
 
     def difference(self, measured: RoomLevels) -> Array:
         """Return measured less predicted level, dB, shape (12,), in the room as it is.
@@ -232,8 +232,8 @@ def predict_level(
     moved = _on_floor(source, asked)
     levels = (moved or source).levels(THIRDS, force="floor")
     rated = np.isin(get_bands(THIRDS).nominal, rated_bands(THIRDS))
-    found = ask("room_level", case=case_text(asked), levels=levels[rated])
-    bands = found["room_bands"]
+    result = ask("room_level", case=case_text(asked), levels=levels[rated])
+    bands = result["room_bands"]
     if moved:
         blocked = (
             source.blocked_force.max() if isinstance(source, FloorImpact) else source.peak("floor")
@@ -247,14 +247,14 @@ def predict_level(
         source=moved or source,
         force="contact" if moved else "blocked",
         force_change=change,
-        floor_warnings=tuple(map(text, found.get("warnings", {}).values())),
+        floor_warnings=tuple(map(text, result.get("warnings", {}).values())),
         time_of_maximum=bands.pop("time"),
-        few_modes=found["room"]["few_modes"],
-        mass_per_area=found["room"]["surface_mass"],
-        octave_level=found["room_octaves"]["level"],
-        octave_time=found["room_octaves"]["time"],
-        history_time=found["room_history"]["time"],
-        history=found["room_history"]["level"],
+        few_modes=result["room"]["few_modes"],
+        mass_per_area=result["room"]["surface_mass"],
+        octave_level=result["room_octaves"]["level"],
+        octave_time=result["room_octaves"]["time"],
+        history_time=result["room_history"]["time"],
+        history=result["room_history"]["level"],
         **bands,
     )
 

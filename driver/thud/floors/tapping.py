@@ -36,7 +36,7 @@ CONCRETE, WITHIN = 3500 / 2300, 1.26
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TappingLevel(Displayed):
-    """Normalised level of the tapping machine below a homogeneous floor, in thirds.
+    """Normalized level of the tapping machine below a homogeneous floor, in thirds.
 
     Attributes
     ----------
@@ -74,8 +74,8 @@ class TappingLevel(Displayed):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, a third each."""
-        found = zip(self.frequency, self.level, strict=True)
-        return [("third, Hz", "L_n, dB"), *((f"{f:g}", f"{level:.1f}") for f, level in found)]
+        result = zip(self.frequency, self.level, strict=True)
+        return [("third, Hz", "L_n, dB"), *((f"{f:g}", f"{level:.1f}") for f, level in result)]
 
     def __repr__(self) -> str:
         """Return the single numbers."""
@@ -122,10 +122,10 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
             "1 and 1",
         )
     case = Case(floor=floor, room=require_room(room))
-    found = ask("radiator", case=case_text(case), frequency=THIRDS)
-    time = 2.2 / (THIRDS * found["loss_factor"])
-    radiated = time * found["radiation_factor"] * THIRDS / 1000
-    level = 155 - 30 * np.log10(found["surface_mass"]) + 10 * np.log10(radiated)
+    result = ask("radiator", case=case_text(case), frequency=THIRDS)
+    time = 2.2 / (THIRDS * result["loss_factor"])
+    radiated = time * result["radiation_factor"] * THIRDS / 1000
+    level = 155 - 30 * np.log10(result["surface_mass"]) + 10 * np.log10(radiated)
     return TappingLevel(THIRDS, level)
 
 

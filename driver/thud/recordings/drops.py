@@ -114,12 +114,8 @@ class _Pulse:
 def find_windows(signal: Signal, *, progress: bool = False) -> list[Window]:
     """Return the windows of the drops in a signal, in order.
 
-    The signal is read twice: in blocks for the search, then around each drop.
-
-    Raises
-    ------
-    InputError
-        Where there is no impact, or the rate is too low.
+    The signal is read twice: in blocks for the search, then around each drop. Raise InputError
+    where there is no impact, or the rate is too low.
     """
     rate, name = signal.sample_rate, signal.name
     if not rate >= MIN_RATE:

@@ -85,11 +85,11 @@ class Blocks:
         """Return whether the block that begins with a sample is finished."""
         return self._block(start).exists()
 
-    def keep(self, block: Block, found: Columns) -> None:
+    def keep(self, block: Block, result: Columns) -> None:
         """Write the results of a block atomically."""
-        stop = block.start + len(found["status"])
+        stop = block.start + len(result["status"])
         columns = self._study.parameter_columns(block.start, stop)
-        _write(new_dataset(self._study, columns, found), self._block(block.start))
+        _write(new_dataset(self._study, columns, result), self._block(block.start))
 
     def finish(self) -> None:
         """Join all blocks, then remove them."""
@@ -114,8 +114,8 @@ class Blocks:
         try:
             with _named(self.path):
                 for i in range(0, len(names), together):
-                    found = _join(paths, names[i : i + together], known_whole=i > 0)
-                    grid = grid_of(self._study, found)
+                    result = _join(paths, names[i : i + together], known_whole=i > 0)
+                    grid = grid_of(self._study, result)
                     grid.to_zarr(part, mode="a" if i else "w", consolidated=False)
                 part.rename(self.path)
         finally:

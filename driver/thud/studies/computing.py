@@ -40,12 +40,12 @@ def compute_samples(study: SampleStudy, folder: Path | None, how: RunOptions) ->
     blocks = Blocks(folder, study, size) if folder else None
     memory: dict[int, Columns] = {}
 
-    def keep(block: Block, found: Columns) -> None:
+    def keep(block: Block, result: Columns) -> None:
         if blocks:
-            blocks.keep(block, found)
+            blocks.keep(block, result)
         else:
-            memory[block.start] = found
-        bar.update(len(found["status"]))
+            memory[block.start] = result
+        bar.update(len(result["status"]))
 
     if not (blocks and blocks.complete):
         if blocks:

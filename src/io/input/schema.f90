@@ -40,7 +40,7 @@ contains
       do i = 1, size(band_set_names)
          bands = get_bands(band_set_names(i))
          text = text//newline//text_value(band_set_names(i))//': {"nominal": '//numbers(bands%nominal)//', "centre": ' &
-            //numbers(bands%centre)//', "lower": '//numbers(bands%lower)//', "upper": '//numbers(bands%upper)//'}' &
+            //numbers(bands%center)//', "lower": '//numbers(bands%lower)//', "upper": '//numbers(bands%upper)//'}' &
             //trim(merge(',', ' ', i < size(band_set_names)))
       end do
       text = text//'},'//newline//'"rated_bands": {'

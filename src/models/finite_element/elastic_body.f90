@@ -12,8 +12,8 @@ module thud_elastic_body
    implicit none (type, external)
    private
 
-   public :: body_state_type, elastic_body_type, get_internal_forces, new_elastic_body, no_failure, cavity_closed, &
-      element_inverted
+   public :: body_state_type, cavity_closed, elastic_body_type, element_inverted, get_internal_forces, new_elastic_body, &
+      no_failure
 
    !> Why forces cannot be computed.
    integer, parameter :: no_failure = 0, element_inverted = 1, cavity_closed = 2
@@ -28,8 +28,8 @@ module thud_elastic_body
       type(cavity_type) :: cavity
       !> Masses of the nodes, kg.
       real(wp), allocatable :: mass(:, :)
-      !> Flow of each Maxwell branch: [n_polar, symmetric, point, branch, n_radial].
-      real(wp), allocatable :: flow(:, :, :, :, :)
+      !> Viscous tensor of each Maxwell branch: [n_polar, symmetric, point, branch, n_radial].
+      real(wp), allocatable :: viscous(:, :, :, :, :)
    end type elastic_body_type
 
    !> What the forces come with.
@@ -74,13 +74,13 @@ contains
       end do
       ! The mesh is a little smaller than the sphere; the mass is that of the ball.
       body%mass = body%mass*(ball%mass/sum(body%mass))
-      allocate (body%flow(n, n_symmetric, n_point, size(material%branch_time), mesh%n_radial), source=0.0_wp)
-      body%flow(:, 1:3, :, :, :) = 1.0_wp
+      allocate (body%viscous(n, n_symmetric, n_point, size(material%branch_time), mesh%n_radial), source=0.0_wp)
+      body%viscous(:, 1:3, :, :, :) = 1.0_wp
    end function new_elastic_body
 
    !> Forces of stress and gas.
-   pure subroutine get_internal_forces(body, position, velocity, interval, keep, force, state)
-      !> The body; its flow goes on if it is kept.
+   pure subroutine get_internal_forces(body, position, velocity, interval, commit, force, state)
+      !> The body; its viscous tensors are updated on commit.
       type(elastic_body_type), intent(inout) :: body
       !> Positions of the nodes, m: [0:n_polar, 0:n_radial, 2].
       real(wp), intent(in), contiguous :: position(0:, 0:, :)
@@ -88,8 +88,8 @@ contains
       real(wp), intent(in), contiguous :: velocity(0:, 0:, :)
       !> Length of the step, s.
       real(wp), intent(in) :: interval
-      !> The flow of the branches is taken to the end of the step.
-      logical, intent(in) :: keep
+      !> The viscous tensors are taken to the end of the step.
+      logical, intent(in) :: commit
       !> Forces, N: the same shape as the positions.
       real(wp), intent(out), contiguous :: force(0:, 0:, :)
       !> Energies and power.
@@ -119,8 +119,8 @@ contains
                   state%dissipation)
             end if
             if (size(material%branch_time) > 0) call add_branch_stress(n, material%branch_modulus, material%branch_time, &
-               interval, keep, row%weight, f, cofactor, jacobian, body%flow(:, :, :, :, i), stress, state%strain_energy, &
-               state%dissipation)
+               interval, commit, row%weight, f, cofactor, jacobian, body%viscous(:, :, :, :, i), stress, &
+               state%strain_energy, state%dissipation)
             call add_nodal_forces(row, n, stress, force(:, i - 1:i, 1), force(:, i - 1:i, 2))
          end associate
       end do

@@ -2,7 +2,7 @@
 !> does not lock (Simo, Taylor and Pister 1985, Comput. Methods Appl. Mech. Eng. 51, 177-208).
 !>
 !> The elements of one ring of the mesh are worked on together, lane by lane: nothing is gathered or
-!> scattered, since neighbours lie side by side in memory. Arithmetic is the limit, then the first
+!> scattered, since neighbors lie side by side in memory. Arithmetic is the limit, then the first
 !> level of cache. Tensors with two axes and the hoop direction have the components
 !> 1 = rr, 2 = rz, 3 = zr, 4 = zz, 5 = hoop; symmetric ones 1 = rr, 2 = zz, 3 = hoop, 4 = rz.
 module thud_element_row
@@ -41,7 +41,7 @@ contains
    !> line nearer to the lowest point, 1 and 3 on the inner ring.
    pure function new_element_row(mesh, i) result(row)
       type(mesh_type), intent(in) :: mesh
-      !> Number of the inner ring, from 0.
+      !> Index of the inner ring, from 0.
       integer, intent(in) :: i
       type(element_row_type) :: row
       real(wp) :: point(2), weight(2), value(4), slope(4, 2), jacobian(2, 2), inverse(2, 2), r(4), z(4)

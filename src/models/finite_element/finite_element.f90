@@ -13,8 +13,8 @@ module thud_finite_element
    use thud_finite_element_options, only: finite_element_options_type, get_frame_count, get_stride
    use thud_force_history, only: force_history_type
    use thud_impact_record, only: continue_flight, finish_record, new_impact_record, record_sample
-   use thud_impact_run, only: choose_step, drift, get_energy, get_mean_height, get_mean_velocity, impact_run_type, kick, &
-      max_steps, new_impact_run
+   use thud_impact_run, only: choose_step, get_energy, get_mean_height, get_mean_velocity, impact_run_type, max_steps, &
+      new_impact_run, update_position, update_velocity
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_material, only: get_material_loss_factor, material_type, new_material
@@ -36,8 +36,8 @@ module thud_finite_element
    !> Residual of the energy at which a run is stopped as unstable.
    real(wp), parameter :: unstable_residual = 0.05_wp
 
-   !> Part of the wall that the surface may sink into the layer on the floor: the layer is thin.
-   real(wp), parameter :: max_sink = 0.1_wp
+   !> Fraction of the wall that the surface may sink into the layer on the floor: the layer is thin.
+   real(wp), parameter :: max_penetration = 0.1_wp
 
    !> Maximum number of steps of elements in a run; they take about half an hour.
    real(wp), parameter :: max_work = 2.0e10_wp
@@ -130,7 +130,8 @@ contains
          sqrt(ball%outer_radius*ball%wall_thickness)/length, lowest=6.0_wp, &
          reason='fewer polar_elements do not resolve how a wall so thin bends'), &
          theory_limit_type('mesh', 'radius of the contact over the length of an element', &
-         maxval(history%channel(:, 1))/length, lowest=4.0_wp, reason='fewer polar_elements do not resolve the contact')]
+         maxval(history%model_history(:, 1))/length, lowest=4.0_wp, &
+         reason='fewer polar_elements do not resolve the contact')]
    end function get_theory_limits
 
    !> Loss factor of the material in shear against frequency.
@@ -149,7 +150,7 @@ contains
       loss_factor = [(get_material_loss_factor(material, frequency(i)), i=1, size(frequency))]
    end subroutine get_loss_factors
 
-   !> Force on each of two plates that press the ball slowly, at its long-term modulus.
+   !> Force on each of two plates in a quasi-static compression, at its long-term modulus.
    subroutine compress(ball, options, deflection, force, error)
       type(ball_type), intent(in) :: ball
       class(finite_element_type), intent(in) :: options
@@ -217,7 +218,7 @@ contains
    !> Marches until the ball has left for good.
    subroutine march(run, start, contacts, options, sampling, history, error)
       type(impact_run_type), intent(inout) :: run
-      !> Height of its centre of mass at first touch, m.
+      !> Height of its center of mass at first touch, m.
       real(wp), intent(in) :: start
       type(contacts_type), intent(inout) :: contacts
       !> Bounces, flight, step.
@@ -244,7 +245,7 @@ contains
             time = (i - 1)*interval + k*(interval/n_step)
             ! No further contact is wanted.
             if (contacts%n_over >= options%bounces .and. will_touch(run, interval/n_step)) exit samples
-            call kick(run, interval/n_step)
+            call update_velocity(run, interval/n_step)
             if (i + k == 1) first_energy = get_energy(run)
             call check_run(run, time, first_energy, history, error)
             if (allocated(error)) return
@@ -258,7 +259,7 @@ contains
             end if
             call add_impulse(run%impulse, interval, i, min(1.0_wp, max(0.0_wp, k + 0.5_wp - n_step/2.0_wp)), history)
             call follow_contact(run, contacts, time, interval/n_step, history)
-            call drift(run, interval/n_step)
+            call update_position(run, interval/n_step)
          end do
          if (contacts%n_over < options%bounces) cycle samples
          if (time > contacts%latest + max(contacts%quiet, options%flight_after)) exit samples
@@ -304,9 +305,9 @@ contains
    pure subroutine add_impulse(impulse, interval, i, share, history)
       !> The impulse, N s; sampling interval, s.
       real(wp), intent(in) :: impulse, interval
-      !> Number of the sample before it.
+      !> Index of the sample before it.
       integer, intent(in) :: i
-      !> Part of the step that lies nearer to the next sample.
+      !> Fraction of the step that lies nearer to the next sample.
       real(wp), intent(in) :: share
       !> Gets the impulse.
       type(force_history_type), intent(inout) :: history
@@ -344,7 +345,7 @@ contains
       end associate
    end function get_contact_stress
 
-   !> Beginning of a sentence with the time of an event.
+   !> Beginning of a message with the time of an event.
    function place(time) result(text)
       !> Time since the record began, s.
       real(wp), intent(in) :: time
@@ -378,7 +379,7 @@ contains
       end if
    end subroutine follow_contact
 
-   !> Refuses a ball that cannot, or need not, be computed any further.
+   !> Refuses a ball that cannot be computed any further.
    subroutine check_run(run, time, first_energy, history, error)
       type(impact_run_type), intent(in) :: run
       !> Time since the record began, s; energy of the first sample, J.
@@ -398,10 +399,10 @@ contains
          error = numerical_error(trim(place(time))//' an element is turned inside out (ratio of volumes ' &
             //to_text(run%state%min_jacobian)//'); allowed: a lower height, a stiffer ball, more polar_elements')
       else if (run%contact%layer_stiffness > 0.0_wp &
-         .and. run%sink > max_sink*(run%body%mesh%z(0, 0) - run%body%mesh%z(0, run%body%mesh%n_radial))) then
+         .and. run%penetration > max_penetration*(run%body%mesh%z(0, 0) - run%body%mesh%z(0, run%body%mesh%n_radial))) then
          error = numerical_error('&contact: layer_stiffness = '//to_text(run%contact%layer_stiffness) &
-            //' N/m3 lets the surface sink '//to_text(1.0e3_wp*run%sink)//' mm into the layer; allowed: up to ' &
-            //to_text(max_sink)//' of the wall, by a higher layer_stiffness')
+            //' N/m3 lets the surface sink '//to_text(1.0e3_wp*run%penetration)//' mm into the layer; allowed: up to ' &
+            //to_text(max_penetration)//' of the wall, by a higher layer_stiffness')
       else
          residual = abs(get_energy(run) - first_energy)/(sum(run%mass(:, :, 2))/2*history%impact_velocity**2)
          if (.not. residual < unstable_residual) then

@@ -10,7 +10,7 @@
 !> before it touches; without that share the force jumps from ring to ring. Beside the edge, at the
 !> radius a, a smooth frictionless contact has the pressure p = C sqrt(s) at the distance s inside and the
 !> gap 4/3 C/E* s**(3/2) outside (Johnson 1985, Contact Mechanics, section 5.1), with C = 2 E* sqrt(2 a)/(pi R)
-!> by Hertz. With an edge at the distance e from the inner neighbour, a linear shape function of the
+!> by Hertz. With an edge at the distance e from the inner neighbor, a linear shape function of the
 !> width h gives the node the force per area 4/15 C e**(5/2)/h**2 at the gap 4/3 C/E* (h - e)**(3/2). A parabola of the
 !> same force at the floor, 4/15 C sqrt(h), and the same work, 0.1840 times that force and the gap of e = 0,
 !> replaces this relation, with a in the middle of the element. Both vanish with the elements.
@@ -85,7 +85,7 @@ contains
             ! The work of a parabola is a third of force and height.
             contact%edge_height(j) = 3*fullness*4*strength*width**1.5_wp/(3*modulus)
             if (.not. options%layer_stiffness > 0.0_wp) cycle
-            ! A layer gives way first, the more the softer it is to the element's edge.
+            ! A layer yields first, the more the softer it is to the element's edge.
             contact%edge_force(j) = contact%edge_force(j)/(1 + modulus/(width*options%layer_stiffness))
          end do
       end associate

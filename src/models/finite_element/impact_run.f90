@@ -9,13 +9,14 @@ module thud_impact_run
    use thud_kinds, only: wp
    use thud_material, only: material_type
    use thud_mesh, only: new_mesh
-   use thud_moving_floor, only: find_floor, look_ahead, moving_floor_type, new_moving_floor, push_floor
+   use thud_moving_floor, only: advance_floor, find_floor, moving_floor_type, new_moving_floor, predict
    use thud_receiver, only: receiver_type
-   use thud_stable_step, only: find_growth, get_first_direction, max_growth
+   use thud_stable_step, only: find_stability_ratio, get_first_direction, max_stability_ratio
    implicit none (type, external)
    private
 
-   public :: choose_step, drift, get_energy, get_mean_height, get_mean_velocity, impact_run_type, kick, max_steps
+   public :: choose_step, get_energy, get_mean_height, get_mean_velocity, impact_run_type, max_steps, update_position, &
+      update_velocity
    public :: new_impact_run
 
    !> Steps of the power iteration at the start, and at each later check of the step.
@@ -31,7 +32,7 @@ module thud_impact_run
       type(moving_floor_type) :: floor
       !> Gravity, m/s2.
       real(wp) :: gravity = 0.0_wp
-      !> Positions over the floor's first place, m.
+      !> Positions over the undisplaced floor, m.
       real(wp), allocatable :: position(:, :, :)
       !> Velocities half a step before, m/s; at the very start, those of the start.
       real(wp), allocatable :: velocity(:, :, :)
@@ -45,22 +46,22 @@ module thud_impact_run
       real(wp) :: impulse = 0.0_wp
       !> Energies, power and failure of the latest step.
       type(body_state_type) :: state
-      !> Energies of the latest step: of motion, in what the floor does by its place, in the field of gravity, J.
-      real(wp) :: kinetic = 0.0_wp, spring = 0.0_wp, potential = 0.0_wp
+      !> Energies of the latest step: of motion, of the contact, in the field of gravity, J.
+      real(wp) :: kinetic = 0.0_wp, contact_energy = 0.0_wp, potential = 0.0_wp
       !> Energies lost so far: by viscosity, by nodes that the floor stopped, and by friction, J.
-      real(wp) :: dissipated = 0.0_wp, stopped = 0.0_wp, rubbed = 0.0_wp
+      real(wp) :: dissipated = 0.0_wp, contact_loss = 0.0_wp, friction_loss = 0.0_wp
       !> Time that the velocities have been driven for, s.
       real(wp) :: time = 0.0_wp
       !> Energies lost by stopped nodes and by friction that the next step adds, J.
-      real(wp) :: half_stop = 0.0_wp, half_rub = 0.0_wp
+      real(wp) :: pending_contact_loss = 0.0_wp, pending_friction_loss = 0.0_wp
       !> Impulses of the floor on the nodes of the outer surface since the latest sample, N s: [0:n_polar, 2].
       real(wp), allocatable :: node_impulse(:, :)
       !> Length of the step before, s; 0 at the start.
       real(wp) :: last_interval = 0.0_wp
       !> Shortest step, s.
       real(wp) :: shortest_interval = huge(1.0_wp)
-      !> Deepest that a node has sunk into the floor, m.
-      real(wp) :: sink = 0.0_wp
+      !> Maximum penetration of a node into the floor, m.
+      real(wp) :: penetration = 0.0_wp
    end type impact_run_type
 
 contains
@@ -96,13 +97,13 @@ contains
    !> Number of steps in a sampling interval that keeps the run stable; it never falls during a run.
    subroutine choose_step(run, interval, safety, min_steps, n_step)
       type(impact_run_type), intent(inout) :: run
-      !> Sampling interval, s; part of the limit of stability to be used.
+      !> Sampling interval, s; fraction of the stability limit to use.
       real(wp), intent(in) :: interval, safety
       integer, intent(in) :: min_steps
       !> The number so far, 0 at the start; the number to go on with, `max_steps` or more where there
       !> would have to be too many.
       integer, intent(inout) :: n_step
-      real(wp) :: growth, ratio, wave, width
+      real(wp) :: stability_ratio, ratio, wave, width
       integer :: n_iteration, iteration
       logical :: starts
 
@@ -120,11 +121,11 @@ contains
       end if
       do iteration = 1, 20
          if (n_step > max_steps) exit
-         call find_growth(run%body, run%contact, run%position, run%velocity, interval/n_step, n_iteration, &
-            run%direction, growth)
+         call find_stability_ratio(run%body, run%contact, run%position, run%velocity, interval/n_step, n_iteration, &
+            run%direction, stability_ratio)
          ! The next step reports why there are no forces.
-         if (growth >= huge(growth)) exit
-         ratio = growth/(safety*max_growth)
+         if (stability_ratio >= huge(stability_ratio)) exit
+         ratio = stability_ratio/(safety*max_stability_ratio)
          ! Growth rises with the first to the second power of the step: take the higher.
          if (ratio <= 1.0_wp) then
             ! Later on no step is taken back: the direction follows the deforming ball late.
@@ -136,7 +137,7 @@ contains
    end subroutine choose_step
 
    !> First half of a step: forces and energies where the ball is, and velocities half a step on.
-   pure subroutine kick(run, interval)
+   pure subroutine update_velocity(run, interval)
       type(impact_run_type), intent(inout) :: run
       !> Length of the step, s.
       real(wp), intent(in) :: interval
@@ -154,12 +155,12 @@ contains
       before = run%velocity
       surface = run%position(:, last, :)
       if (run%floor%moves) then
-         call look_ahead(run%floor, run%last_interval, interval)
+         call predict(run%floor, run%last_interval, interval)
          call find_floor(run%floor, run%contact, run%mass(:, last, 2), surface, &
             before(:, last, 2) + span*(force(:, last, 2)/run%mass(:, last, 2) - run%gravity), sum(run%floor_force(:, 2)))
       end if
       surface(:, 2) = surface(:, 2) + run%floor%displacement
-      call get_contact_forces(run%contact, surface, run%floor_force, run%spring)
+      call get_contact_forces(run%contact, surface, run%floor_force, run%contact_energy)
       force(:, last, :) = force(:, last, :) + run%floor_force
       run%time = run%time + span
       run%velocity = before + span*force/run%mass
@@ -171,20 +172,22 @@ contains
       run%floor_force = run%floor_force + impulse/span
       run%impulse = span*sum(run%floor_force(:, 2))
       run%node_impulse = run%node_impulse + span*run%floor_force
-      if (run%floor%moves) call push_floor(run%floor, sum(run%floor_force(:, 2)))
+      if (run%floor%moves) call advance_floor(run%floor, sum(run%floor_force(:, 2)))
       starts = .not. run%last_interval > 0.0_wp
-      ! Of what a node loses, the floor that moves gets a part.
+      ! Of what a node loses, a mobile floor gets a part.
       call add_lost_work(impulse(:, 2), before(:, last, 2) + run%floor%velocity_before, &
-         run%velocity(:, last, 2) + run%floor%velocity_after, starts, run%stopped, run%half_stop)
-      call add_lost_work(impulse(:, 1), before(:, last, 1), run%velocity(:, last, 1), starts, run%rubbed, run%half_rub)
+         run%velocity(:, last, 2) + run%floor%velocity_after, starts, run%contact_loss, run%pending_contact_loss)
+      call add_lost_work(impulse(:, 1), before(:, last, 1), run%velocity(:, last, 1), starts, run%friction_loss, &
+         run%pending_friction_loss)
       run%kinetic = sum(run%mass*before*run%velocity)/2
       ! The velocities of the start are not half a step late.
       if (starts) run%kinetic = sum(run%mass*before**2)/2
       run%potential = run%gravity*sum(run%mass(:, :, 2)*run%position(:, :, 2))
       run%dissipated = run%dissipated + span*run%state%dissipation
       ! Nodes rest where they stopped; the force that comes anew moves a floor on.
-      if (run%floor%moves .or. run%contact%layer_stiffness > 0.0_wp) run%sink = max(run%sink, -minval(surface(:, 2)))
-   end subroutine kick
+      if (run%floor%moves .or. run%contact%layer_stiffness > 0.0_wp) run%penetration = max(run%penetration, &
+         -minval(surface(:, 2)))
+   end subroutine update_velocity
 
    !> Adds the work that impulses of the floor take from nodes. Half of it comes with the velocities after them, in the
    !> next step; of the first step all.
@@ -208,7 +211,7 @@ contains
    end subroutine add_lost_work
 
    !> Second half of a step: positions a step on.
-   pure subroutine drift(run, interval)
+   pure subroutine update_position(run, interval)
       type(impact_run_type), intent(inout) :: run
       !> Length of the step, s.
       real(wp), intent(in) :: interval
@@ -216,7 +219,7 @@ contains
       run%position = run%position + interval*run%velocity
       run%last_interval = interval
       run%shortest_interval = min(run%shortest_interval, interval)
-   end subroutine drift
+   end subroutine update_position
 
    !> Energy of the latest step, with all that was lost; it should not change.
    pure function get_energy(run) result(energy)
@@ -224,11 +227,11 @@ contains
       !> The energy, J.
       real(wp) :: energy
 
-      energy = run%kinetic + run%state%strain_energy + run%state%gas_energy + run%potential + run%spring + run%dissipated &
-         + run%stopped + run%rubbed + run%floor%work
+      energy = run%kinetic + run%state%strain_energy + run%state%gas_energy + run%potential + run%contact_energy + &
+         run%dissipated + run%contact_loss + run%friction_loss + run%floor%work
    end function get_energy
 
-   !> Height of the centre of mass.
+   !> Height of the center of mass.
    pure function get_mean_height(run) result(height)
       type(impact_run_type), intent(in) :: run
       !> The height, m.
@@ -237,7 +240,7 @@ contains
       height = sum(run%mass(:, :, 2)*run%position(:, :, 2))/sum(run%mass(:, :, 2))
    end function get_mean_height
 
-   !> Velocity of the centre of mass.
+   !> Velocity of the center of mass.
    pure function get_mean_velocity(run) result(velocity)
       type(impact_run_type), intent(in) :: run
       !> The velocity upwards, m/s.

@@ -23,7 +23,7 @@ module thud_material
    type :: material_options_type
       !> Law of elasticity: `neo_hookean` or `mooney_rivlin`.
       character(len=name_length) :: law = 'neo_hookean'
-      !> Part of the shear modulus that goes with the second invariant of a Mooney-Rivlin solid.
+      !> Fraction of the shear modulus that goes with the second invariant of a Mooney-Rivlin solid.
       real(wp) :: mooney_share = 0.2_wp
       !> Maximum bulk modulus over shear modulus: Poisson's ratio counts as at most that of this ratio.
       real(wp) :: bulk_ratio = 200.0_wp
@@ -47,7 +47,7 @@ module thud_material
       real(wp) :: density = 0.0_wp
       !> Long-term shear modulus, Pa.
       real(wp) :: shear_modulus = 0.0_wp
-      !> Part of it that goes with the second invariant.
+      !> Second-invariant fraction of it.
       real(wp) :: mooney_share = 0.0_wp
       !> Bulk modulus, Pa.
       real(wp) :: bulk_modulus = 0.0_wp

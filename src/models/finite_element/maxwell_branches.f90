@@ -1,9 +1,9 @@
 !> Stresses of the Maxwell branches of rubber at large strain, for the elements of one ring together.
 !>
-!> Branches have the energy mu_i/2 (tr(Cbar Cv^-1) - 3) and the flow Cv' = (Cbar - tr(Cbar Cv^-1)/3 Cv)/tau_i (Simo and
-!> Miehe 1992), stepped in closed form after Shutov, Landgraf and Ihlemann (2013, Comput. Methods Appl. Mech.
-!> Eng. 265, 213-225), with exp(step/tau) - 1 for their step/tau, which is exact at small strain: Cv stays
-!> symmetric, positive definite and of determinant 1 with any step.
+!> Branches have the energy mu_i/2 (tr(Cbar Cv^-1) - 3) and the viscous flow Cv' = (Cbar - tr(Cbar Cv^-1)/3 Cv)/tau_i (Simo
+!> and Miehe 1992), stepped in closed form after Shutov, Landgraf and Ihlemann (2013, Comput. Methods Appl. Mech. Eng. 265,
+!> 213-225), with exp(step/tau) - 1 for their step/tau, which is exact at small strain: Cv stays symmetric, positive
+!> definite and of determinant 1 with any step.
 !>
 !> Components as in `thud_element_row`.
 module thud_maxwell_branches
@@ -20,21 +20,21 @@ module thud_maxwell_branches
 
 contains
 
-   !> Adds the mean stresses of the Maxwell branches over a step, and takes their flow to its end.
+   !> Adds the mean stresses of the Maxwell branches over a step, and updates their viscous tensors.
    !>
-   !> The flow is known at the middles between the instants of the displacements, as velocities are:
+   !> The viscous tensors are known at the middles between the instants of the displacements, as velocities are:
    !> the step is of second order. A branch that relaxes within a step is a viscosity.
-   pure subroutine add_branch_stress(n, modulus, time, interval, keep, weight, f, cofactor, jacobian, flow, stress, energy, &
-      power)
+   pure subroutine add_branch_stress(n, modulus, time, interval, commit, weight, f, cofactor, jacobian, viscous, stress, &
+      energy, power)
       !> Number of elements.
       integer, intent(in) :: n
       !> Shear moduli of the branches, Pa; relaxation times, s: [n_branch].
       real(wp), intent(in) :: modulus(:), time(:)
       !> Length of the step, s.
       real(wp), intent(in) :: interval
-      !> The flow is taken to the end of the step; otherwise it stays, and the stresses are those that the
-      !> fastest motion meets, which turns round in each step, and the flow with it.
-      logical, intent(in) :: keep
+      !> The viscous tensors are taken to the end of the step; otherwise they stay, and the stresses are those of the
+      !> fastest motion, which reverses in each step, with its tensors.
+      logical, intent(in) :: commit
       !> Volumes of the points, undeformed, m3: [n, point].
       real(wp), intent(in) :: weight(n, n_point)
       !> Deformation gradients: [n, component, point].
@@ -43,14 +43,14 @@ contains
       real(wp), intent(in) :: cofactor(n, n_component, n_point)
       !> Their determinants: [n, point].
       real(wp), intent(in) :: jacobian(n, n_point)
-      !> Flow Cv from half a step before to half a step after: [n, symmetric, point, branch].
-      real(wp), intent(inout) :: flow(n, n_symmetric, n_point, size(time))
+      !> Viscous tensors Cv from half a step before to half a step after: [n, symmetric, point, branch].
+      real(wp), intent(inout) :: viscous(n, n_symmetric, n_point, size(time))
       !> Stresses, Pa: [n, component, point].
       real(wp), intent(inout) :: stress(n, n_component, n_point)
       !> Gets the energy of the branches added, J; gets the power dissipated added, W.
       real(wp), intent(inout) :: energy, power
-      real(wp) :: shrink(n)
-      real(wp), dimension(n, n_symmetric) :: c, pull
+      real(wp) :: isochoric_factor(n)
+      real(wp), dimension(n, n_symmetric) :: c, branch_stress
       real(wp), dimension(size(time)) :: ratio, part, effective
       real(wp) :: stored
       integer :: b, g
@@ -58,18 +58,19 @@ contains
       ratio = interval/time
       part = get_part_to_mean(ratio)
       effective = modulus
-      if (.not. keep) effective = modulus*(1 + tanh(ratio/2))
+      if (.not. commit) effective = modulus*(1 + tanh(ratio/2))
       do g = 1, n_point
-         call get_isochoric(n, f(:, :, g), jacobian(:, g), shrink, c)
-         pull = 0.0_wp
+         call get_isochoric(n, f(:, :, g), jacobian(:, g), isochoric_factor, c)
+         branch_stress = 0.0_wp
          do b = 1, size(time)
             stored = 0.0_wp
-            call take_branch_step(n, effective(b), time(b), ratio(b), part(b), keep, weight(:, g), c, flow(:, :, g, b), &
-               pull, stored, power)
+            call take_branch_step(n, effective(b), time(b), ratio(b), part(b), commit, weight(:, g), c, viscous(:, :, g, &
+               b), branch_stress, stored, power)
             ! Of the mean stress: so work, energy and loss of a linear branch add up over the steps.
             energy = energy + stored*(1 + part(b))*(1 + exp(-ratio(b)))/2
          end do
-         call add_pull(n, shrink, c, pull, f(:, :, g), cofactor(:, :, g), jacobian(:, g), stress(:, :, g))
+         call add_branch_stresses(n, isochoric_factor, c, branch_stress, f(:, :, g), cofactor(:, :, g), jacobian(:, g), &
+            stress(:, :, g))
       end do
    end subroutine add_branch_stress
 
@@ -89,7 +90,7 @@ contains
    end function get_part_to_mean
 
    !> Isochoric right Cauchy-Green tensors at one Gauss point.
-   pure subroutine get_isochoric(n, f, jacobian, shrink, c)
+   pure subroutine get_isochoric(n, f, jacobian, isochoric_factor, c)
       !> Number of elements.
       integer, intent(in) :: n
       !> Deformation gradients: [n, component].
@@ -97,50 +98,49 @@ contains
       !> Their determinants: [n].
       real(wp), intent(in) :: jacobian(n)
       !> Determinants to the power -2/3: [n].
-      real(wp), intent(out) :: shrink(n)
+      real(wp), intent(out) :: isochoric_factor(n)
       !> The tensors: [n, symmetric].
       real(wp), intent(out) :: c(n, n_symmetric)
       real(wp) :: root(n)
       integer :: j
 
       call get_inverse_cube_root(n, jacobian, root)
-      shrink = root**2
+      isochoric_factor = root**2
       !$omp simd
       do j = 1, n
-         c(j, 1) = shrink(j)*(f(j, 1)**2 + f(j, 3)**2)
-         c(j, 2) = shrink(j)*(f(j, 2)**2 + f(j, 4)**2)
-         c(j, 3) = shrink(j)*f(j, 5)**2
-         c(j, 4) = shrink(j)*(f(j, 1)*f(j, 2) + f(j, 3)*f(j, 4))
+         c(j, 1) = isochoric_factor(j)*(f(j, 1)**2 + f(j, 3)**2)
+         c(j, 2) = isochoric_factor(j)*(f(j, 2)**2 + f(j, 4)**2)
+         c(j, 3) = isochoric_factor(j)*f(j, 5)**2
+         c(j, 4) = isochoric_factor(j)*(f(j, 1)*f(j, 2) + f(j, 3)*f(j, 4))
       end do
    end subroutine get_isochoric
 
-   !> Adds the pull of one Maxwell branch at one Gauss point, its energy and its loss, and takes its flow to the end of
-   !> the step.
-   pure subroutine take_branch_step(n, modulus, time, ratio, part, keep, weight, c, flow, pull, energy, power)
+   !> Adds the stress of one Maxwell branch at one Gauss point, its energy and its loss, and updates its viscous tensor.
+   pure subroutine take_branch_step(n, modulus, time, ratio, part, commit, weight, c, viscous, branch_stress, energy, power)
       !> Number of elements.
       integer, intent(in) :: n
       !> Shear modulus, Pa; relaxation time, s; length of the step over it.
       real(wp), intent(in) :: modulus, time, ratio
-      !> Weight of the deformation beside the flow, for the flow within the step.
+      !> Weight of the deformation beside the viscous tensor, for that within the step.
       real(wp), intent(in) :: part
-      !> The flow is taken to the end of the step; otherwise it stays.
-      logical, intent(in) :: keep
+      !> The viscous tensors are taken to the end of the step; otherwise they stay.
+      logical, intent(in) :: commit
       !> Volumes of the points, undeformed, m3: [n].
       real(wp), intent(in) :: weight(n)
       !> Isochoric right Cauchy-Green tensors: [n, symmetric].
       real(wp), intent(in) :: c(n, n_symmetric)
-      !> Flow Cv: [n, symmetric].
-      real(wp), intent(inout) :: flow(n, n_symmetric)
-      !> Gets the modulus times the inverse of the flow within the step added, Pa: [n, symmetric].
-      real(wp), intent(inout) :: pull(n, n_symmetric)
+      !> Viscous tensors Cv: [n, symmetric].
+      real(wp), intent(inout) :: viscous(n, n_symmetric)
+      !> Gets the modulus times the inverse of the viscous tensor within the step added, Pa: [n, symmetric].
+      real(wp), intent(inout) :: branch_stress(n, n_symmetric)
       !> Gets the energy added, J; gets the power dissipated added, W.
       real(wp), intent(inout) :: energy, power
-      real(wp) :: determinant(n), root(n), share(n), trace(n), tensor(n, n_symmetric)
+      real(wp) :: determinant(n), root(n), strain_weight(n), trace(n), tensor(n, n_symmetric)
       real(wp) :: scale, square, i1, i2, i3, i4
       integer :: j
 
-      share = part
-      call mix(n, part, share, c, flow, tensor, determinant)
+      strain_weight = part
+      call mix(n, part, strain_weight, c, viscous, tensor, determinant)
       call get_inverse_cube_root(n, determinant, root)
       !$omp simd private(scale, square, i1, i2, i3, i4) reduction(+:energy, power)
       do j = 1, n
@@ -153,54 +153,54 @@ contains
          trace(j) = c(j, 1)*i1 + c(j, 2)*i2 + c(j, 3)*i3 + 2*c(j, 4)*i4
          square = (c(j, 1)*i1 + c(j, 4)*i4)**2 + (c(j, 2)*i2 + c(j, 4)*i4)**2 + (c(j, 3)*i3)**2 &
             + 2*(c(j, 1)*i4 + c(j, 4)*i2)*(c(j, 4)*i1 + c(j, 2)*i4)
-         pull(j, 1) = pull(j, 1) + modulus*i1
-         pull(j, 2) = pull(j, 2) + modulus*i2
-         pull(j, 3) = pull(j, 3) + modulus*i3
-         pull(j, 4) = pull(j, 4) + modulus*i4
+         branch_stress(j, 1) = branch_stress(j, 1) + modulus*i1
+         branch_stress(j, 2) = branch_stress(j, 2) + modulus*i2
+         branch_stress(j, 3) = branch_stress(j, 3) + modulus*i3
+         branch_stress(j, 4) = branch_stress(j, 4) + modulus*i4
          energy = energy + weight(j)*modulus/2*(trace(j) - 3)
          power = power + weight(j)*modulus/(2*time)*(square - trace(j)**2/3)
       end do
-      if (keep) call let_flow(n, min(ratio, max_steps_over_time), c, trace, flow)
+      if (commit) call update_internal_variables(n, min(ratio, max_steps_over_time), c, trace, viscous)
    end subroutine take_branch_step
 
-   !> Takes the flow of one Maxwell branch at one Gauss point to the end of a step.
-   pure subroutine let_flow(n, ratio, c, trace, flow)
+   !> Takes the viscous tensors of one Maxwell branch at one Gauss point to the end of a step.
+   pure subroutine update_internal_variables(n, ratio, c, trace, viscous)
       !> Number of elements.
       integer, intent(in) :: n
       !> Length of the step over the relaxation time.
       real(wp), intent(in) :: ratio
       !> Isochoric right Cauchy-Green tensors: [n, symmetric].
       real(wp), intent(in) :: c(n, n_symmetric)
-      !> Traces of their products with the inverse of the flow Cv within the step: [n].
+      !> Traces of their products with the inverses of the viscous tensors Cv within the step: [n].
       real(wp), intent(in) :: trace(n)
-      !> Flow Cv: [n, symmetric].
-      real(wp), intent(inout) :: flow(n, n_symmetric)
-      real(wp) :: determinant(n), root(n), share(n), mixed(n, n_symmetric)
+      !> Viscous tensors Cv: [n, symmetric].
+      real(wp), intent(inout) :: viscous(n, n_symmetric)
+      real(wp) :: determinant(n), root(n), strain_weight(n), mixed(n, n_symmetric)
       real(wp) :: growth
       integer :: j
 
       growth = exp(ratio) - 1
       ! At large strain the rate of the norm, tr(Cbar Cv^-1)/3 - 1, counts too, in the second order of the step.
-      share = growth + (trace/3 - 1)*ratio**2/2
-      call mix(n, growth, share, c, flow, mixed, determinant)
+      strain_weight = growth + (trace/3 - 1)*ratio**2/2
+      call mix(n, growth, strain_weight, c, viscous, mixed, determinant)
       call get_inverse_cube_root(n, determinant, root)
       do j = 1, n_symmetric
-         flow(:, j) = mixed(:, j)*root
+         viscous(:, j) = mixed(:, j)*root
       end do
-   end subroutine let_flow
+   end subroutine update_internal_variables
 
-   !> Mixtures of flow and deformation at one Gauss point, and their determinants, which are near 1.
-   pure subroutine mix(n, usual_share, share, c, flow, tensor, determinant)
+   !> Mixtures of viscous tensor and deformation at one Gauss point, and their determinants, which are near 1.
+   pure subroutine mix(n, usual_share, strain_weight, c, viscous, tensor, determinant)
       !> Number of elements.
       integer, intent(in) :: n
-      !> Weight of the deformation beside the flow by which the norm is taken off.
+      !> Weight of the deformation beside the viscous tensor by which the norm is taken off.
       real(wp), intent(in) :: usual_share
       !> Weights of the deformation: [n].
-      real(wp), intent(in) :: share(n)
+      real(wp), intent(in) :: strain_weight(n)
       !> Isochoric right Cauchy-Green tensors: [n, symmetric].
       real(wp), intent(in) :: c(n, n_symmetric)
-      !> Flow Cv: [n, symmetric].
-      real(wp), intent(in) :: flow(n, n_symmetric)
+      !> Viscous tensors Cv: [n, symmetric].
+      real(wp), intent(in) :: viscous(n, n_symmetric)
       !> The mixtures: [n, symmetric].
       real(wp), intent(out) :: tensor(n, n_symmetric)
       !> Their determinants: [n].
@@ -212,22 +212,22 @@ contains
       !$omp simd
       do j = 1, n
          do i = 1, n_symmetric
-            tensor(j, i) = scale*(flow(j, i) + share(j)*c(j, i))
+            tensor(j, i) = scale*(viscous(j, i) + strain_weight(j)*c(j, i))
          end do
          determinant(j) = (tensor(j, 1)*tensor(j, 2) - tensor(j, 4)**2)*tensor(j, 3)
       end do
    end subroutine mix
 
    !> Adds the stresses of all branches at one Gauss point.
-   pure subroutine add_pull(n, shrink, c, pull, f, cofactor, jacobian, stress)
+   pure subroutine add_branch_stresses(n, isochoric_factor, c, branch_stress, f, cofactor, jacobian, stress)
       !> Number of elements.
       integer, intent(in) :: n
       !> Determinants to the power -2/3: [n].
-      real(wp), intent(in) :: shrink(n)
+      real(wp), intent(in) :: isochoric_factor(n)
       !> Isochoric right Cauchy-Green tensors: [n, symmetric].
       real(wp), intent(in) :: c(n, n_symmetric)
-      !> Sum of moduli times inverses of the flow, Pa: [n, symmetric].
-      real(wp), intent(in) :: pull(n, n_symmetric)
+      !> Sum of moduli times inverses of the viscous tensors, Pa: [n, symmetric].
+      real(wp), intent(in) :: branch_stress(n, n_symmetric)
       !> Deformation gradients: [n, component].
       real(wp), intent(in) :: f(n, n_component)
       !> Their cofactors: [n, component].
@@ -241,7 +241,8 @@ contains
 
       !$omp simd private(factor)
       do j = 1, n
-         associate (p1 => pull(j, 1), p2 => pull(j, 2), p3 => pull(j, 3), p4 => pull(j, 4), scale => shrink(j))
+         associate (p1 => branch_stress(j, 1), p2 => branch_stress(j, 2), p3 => branch_stress(j, 3), p4 => &
+            branch_stress(j, 4), scale => isochoric_factor(j))
             factor = -(c(j, 1)*p1 + c(j, 2)*p2 + c(j, 3)*p3 + 2*c(j, 4)*p4)/(3*jacobian(j))
             stress(j, 1) = stress(j, 1) + scale*(f(j, 1)*p1 + f(j, 2)*p4) + factor*cofactor(j, 1)
             stress(j, 2) = stress(j, 2) + scale*(f(j, 1)*p4 + f(j, 2)*p2) + factor*cofactor(j, 2)
@@ -250,6 +251,6 @@ contains
             stress(j, 5) = stress(j, 5) + scale*f(j, 5)*p3 + factor*cofactor(j, 5)
          end associate
       end do
-   end subroutine add_pull
+   end subroutine add_branch_stresses
 
 end module thud_maxwell_branches

@@ -34,7 +34,7 @@ module thud_mesh
       integer :: n_polar = 0
       !> Distance from the axis, m: [0:order*n_polar, 0:order*n_radial].
       real(wp), allocatable :: r(:, :)
-      !> Height over the centre, m: the same shape.
+      !> Height over the center, m: the same shape.
       real(wp), allocatable :: z(:, :)
    end type mesh_type
 

@@ -1,7 +1,7 @@
 !> Stiffness and mass of the ball as banded matrices, and the operator of shift and invert on them.
 !>
 !> Below Poisson's ratio 1/2 the pressure is condensed in each element. At 1/2 every solution has to
-!> keep the mean dilatations at zero: an augmented Lagrangian does that with one factorisation
+!> keep the mean dilatations at zero: an augmented Lagrangian does that with one factorization
 !> of a positive definite matrix; each iteration reduces the dilatations by about 1e-4.
 module thud_mode_matrices
    use thud_ball, only: ball_type, get_density
@@ -20,7 +20,7 @@ module thud_mode_matrices
    !> Bulk modulus over shear modulus that stands for an infinite one while the constraint is met.
    real(wp), parameter :: augmented_ratio = 1.0e4_wp
 
-   !> Change of the pressures, relative, at which the constraint counts as met: what is left of the
+   !> Change of the pressures, relative, at which the constraint counts as met: the remaining
    !> dilatations is then that of a bulk modulus 1e7 times the shear modulus or more, and the
    !> frequencies are off by less than 1e-8.
    real(wp), parameter :: constraint_tolerance = 1.0e-3_wp
@@ -78,7 +78,7 @@ contains
          'lower radial_elements or polar_elements', error)
       if (allocated(error)) return
       call assemble(mesh, shear_modulus, density, matrices)
-      call factorise(matrices%n, matrices%n_band, matrices%factor, info)
+      call factorize(matrices%n, matrices%n_band, matrices%factor, info)
       call check_interrupt(error)
       if (allocated(error)) return
       if (info /= 0) error = numerical_error('&ball: poisson_ratio or wall_thickness make the stiffness of the ball ' &
@@ -168,7 +168,7 @@ contains
 
    !> Cholesky factor of a banded matrix. Wide bands take LAPACK minutes without a pause: they are factored by the
    !> algorithm of its dpbtrf, block after block.
-   subroutine factorise(n, n_band, a, info)
+   subroutine factorize(n, n_band, a, info)
       !> Numbers of unknowns and of diagonals below the main one.
       integer, intent(in) :: n, n_band
       !> The matrix, then the factor, lower band: [n_band + 1, n].
@@ -207,7 +207,7 @@ contains
             a(n_band + 2 - j:n_band + 1 - j + min(j, cut), i + j - 1) = corner(:min(j, cut), j)
          end do
       end do
-   end subroutine factorise
+   end subroutine factorize
 
    !> Mass times displacements.
    pure subroutine apply_mass(matrices, x, y)

@@ -3,7 +3,7 @@
 !> The force of a step is that at its instant, constant from half a step before to half a step after; so the floor's
 !> displacement is known at the middles between the instants, as velocities are. Where the floor is at the instant, and
 !> where at the next, if the force went on, depends on the force, and the force on both: what presses depends on the
-!> first, and nodes stop at the second. As neither force grows where the floor gives way, there is one solution.
+!> first, and nodes stop at the second. As neither force grows where the floor yields, there is one solution.
 module thud_moving_floor
    use thud_floor_contact, only: floor_contact_type, get_contact_forces
    use thud_kinds, only: wp
@@ -12,7 +12,7 @@ module thud_moving_floor
    implicit none (type, external)
    private
 
-   public :: continue_freely, find_floor, look_ahead, moving_floor_type, new_moving_floor, push_floor
+   public :: advance_floor, continue_freely, find_floor, moving_floor_type, new_moving_floor, predict
 
    !> Instants of a step: its own, the middle after it, the next.
    integer, parameter :: here = 1, after = 2, next = 3
@@ -39,8 +39,8 @@ module thud_moving_floor
       real(wp) :: work = 0.0_wp, work_after = 0.0_wp
       !> Lengths of the step before and of this one that the factors below are of, s; below 0 for none.
       real(wp) :: last_interval = -1.0_wp, interval = -1.0_wp
-      !> Displacements without force at the instants, m; what a newton adds, m/N: [3].
-      real(wp) :: free(3) = 0.0_wp, give(3) = 0.0_wp
+      !> Displacements without force at the instants, m; compliances, m/N: [3].
+      real(wp) :: free(3) = 0.0_wp, compliance(3) = 0.0_wp
       !> Displacement that an amplitude gives up to the instants, m/(N s): [n_pole, 3].
       complex(wp), allocatable :: part(:, :)
       !> The step from middle to middle.
@@ -61,8 +61,8 @@ contains
       floor%motion = new_receiver_motion(receiver)
    end function new_moving_floor
 
-   !> Finds where a floor goes in a step without force, and how it gives way to one.
-   pure subroutine look_ahead(floor, last_interval, interval)
+   !> Predicts the displacements in a step without force, and the compliances.
+   pure subroutine predict(floor, last_interval, interval)
       type(moving_floor_type), intent(inout) :: floor
       !> Lengths of the step before, 0 at the start, and of this one, s.
       real(wp), intent(in) :: last_interval, interval
@@ -74,7 +74,7 @@ contains
       do i = 1, 3
          floor%free(i) = floor%motion%displacement + get_real_sum(floor%part(:, i), floor%motion%amplitude)
       end do
-   end subroutine look_ahead
+   end subroutine predict
 
    !> Real part of a sum of products.
    pure function get_real_sum(a, b) result(total)
@@ -106,10 +106,10 @@ contains
       allocate (floor%part(size(floor%motion%amplitude), 3))
       do i = 1, 3
          step = new_receiver_step(floor%receiver, length(i))
-         floor%give(i) = length(i)*floor%receiver%direct
+         floor%compliance(i) = length(i)*floor%receiver%direct
          if (size(floor%part, 1) > 0) then
             floor%part(:, i) = floor%receiver%residue*step%gain
-            floor%give(i) = floor%give(i) + sum(real(floor%receiver%residue*step%travel, wp))
+            floor%compliance(i) = floor%compliance(i) + sum(real(floor%receiver%residue*step%travel, wp))
          end if
          if (i == after) floor%step = step
       end do
@@ -117,45 +117,45 @@ contains
 
    !> Finds where a floor is at an instant, and where its nodes stop, by Newton's method within bounds.
    pure subroutine find_floor(floor, contact, mass, position, velocity, guess)
-      !> The floor, looked ahead; gets displacement and stop.
+      !> The floor, predicted; gets displacement and stop.
       type(moving_floor_type), intent(inout) :: floor
       type(floor_contact_type), intent(in) :: contact
       !> Masses of the nodes of the outer surface, kg: [0:n_polar].
       real(wp), intent(in) :: mass(0:)
-      !> Their positions over the floor's first place, m: [0:n_polar, 2].
+      !> Their positions over the undisplaced floor, m: [0:n_polar, 2].
       real(wp), intent(in) :: position(0:, :)
       !> Their velocities upwards half a step on, if the floor did nothing, m/s: [0:n_polar].
       real(wp), intent(in) :: velocity(0:)
       !> Force near to that on the floor, N.
       real(wp), intent(in) :: guess
-      real(wp) :: force, answer, slope, lower, upper, change
+      real(wp) :: force, reaction, slope, lower, upper, change
       integer :: iteration
 
       lower = 0.0_wp
       upper = huge(upper)
       force = guess
       do iteration = 1, max_iterations
-         floor%displacement = floor%free(here) + floor%give(here)*force
-         floor%stop = floor%free(next) + floor%give(next)*force
-         call get_answer(floor, contact, mass, position, velocity, answer, slope)
+         floor%displacement = floor%free(here) + floor%compliance(here)*force
+         floor%stop = floor%free(next) + floor%compliance(next)*force
+         call get_contact_reaction(floor, contact, mass, position, velocity, reaction, slope)
          ! The answer falls as the force rises: the solution lies between the two.
-         lower = max(lower, min(force, answer))
-         upper = min(upper, max(force, answer))
-         change = (answer - force)/(1 + slope)
-         if (abs(change) <= small_change*max(force, answer)) return
+         lower = max(lower, min(force, reaction))
+         upper = min(upper, max(force, reaction))
+         change = (reaction - force)/(1 + slope)
+         if (abs(change) <= small_change*max(force, reaction)) return
          force = force + change
          if (force < lower .or. force > upper) force = lower + (upper - lower)/2
       end do
    end subroutine find_floor
 
    !> Force on a floor that is where some force takes it.
-   pure subroutine get_answer(floor, contact, mass, position, velocity, answer, slope)
+   pure subroutine get_contact_reaction(floor, contact, mass, position, velocity, reaction, slope)
       type(moving_floor_type), intent(in) :: floor
       type(floor_contact_type), intent(in) :: contact
       !> As in `find_floor`.
       real(wp), intent(in) :: mass(0:), position(0:, :), velocity(0:)
       !> The force, N; what it loses where the force that takes the floor there grows, N/N.
-      real(wp), intent(out) :: answer, slope
+      real(wp), intent(out) :: reaction, slope
       real(wp), dimension(0:ubound(mass, 1)) :: stiffness
       real(wp), dimension(0:ubound(mass, 1), 2) :: over, force
       real(wp) :: energy, span, needed
@@ -164,23 +164,23 @@ contains
       over(:, 1) = position(:, 1)
       over(:, 2) = position(:, 2) + floor%displacement
       call get_contact_forces(contact, over, force, energy, stiffness)
-      answer = 0.0_wp
+      reaction = 0.0_wp
       slope = 0.0_wp
       span = (floor%last_interval + floor%interval)/2
       do j = 0, ubound(mass, 1)
          needed = -((position(j, 2) + floor%stop)/floor%interval + velocity(j))*mass(j)/span
          if (needed > force(j, 2) .and. .not. contact%layer_stiffness > 0.0_wp) then
-            answer = answer + needed
-            slope = slope + floor%give(next)*mass(j)/(floor%interval*span)
+            reaction = reaction + needed
+            slope = slope + floor%compliance(next)*mass(j)/(floor%interval*span)
          else
-            answer = answer + force(j, 2)
-            slope = slope + floor%give(here)*stiffness(j)
+            reaction = reaction + force(j, 2)
+            slope = slope + floor%compliance(here)*stiffness(j)
          end if
       end do
-   end subroutine get_answer
+   end subroutine get_contact_reaction
 
    !> Takes a floor to the middle after an instant.
-   pure subroutine push_floor(floor, force)
+   pure subroutine advance_floor(floor, force)
       !> The floor, found.
       type(moving_floor_type), intent(inout) :: floor
       !> Force downwards, N.
@@ -188,7 +188,7 @@ contains
       real(wp) :: before
 
       before = floor%motion%displacement
-      floor%motion%displacement = floor%free(after) + floor%give(after)*force
+      floor%motion%displacement = floor%free(after) + floor%compliance(after)*force
       floor%motion%amplitude = floor%step%decay*floor%motion%amplitude + floor%step%gain*force
       associate (span => floor%step%interval, displacement => floor%displacement)
          floor%velocity_before = 2*(displacement - before)/span
@@ -197,14 +197,14 @@ contains
          floor%work = floor%work_after + force*(displacement - before)
          floor%work_after = floor%work_after + force*(floor%motion%displacement - before)
       end associate
-   end subroutine push_floor
+   end subroutine advance_floor
 
    !> Motion of a floor that nothing touches any more, at the samples of a record.
    pure subroutine continue_freely(floor, time, sample_rate, first, displacement, velocity)
       type(moving_floor_type), intent(in) :: floor
       !> Time of the middle that the floor is at, s; samples per second, Hz.
       real(wp), intent(in) :: time, sample_rate
-      !> Number of the first sample after it.
+      !> Index of the first sample after it.
       integer, intent(in) :: first
       !> Displacement, m, and velocity, m/s; those from the first sample on are set: [n_sample].
       real(wp), intent(inout) :: displacement(:), velocity(:)

@@ -1,4 +1,4 @@
-!> Slow compression of the ball by finite elements: the elements of the impact at rest, between two rigid plates
+!> Quasi-static compression of the ball by finite elements: the elements of the impact at rest, between two rigid plates
 !> without friction, one at height 0 and one coming down on the ball.
 !>
 !> Newton's method, with the nodes that touch found on the way (a primal-dual active set): nodes below a plate are put
@@ -57,7 +57,7 @@ module thud_pressed_ball
 
 contains
 
-   !> The ball at rest between plates that just touch it. A slow press finds the long-term modulus.
+   !> The ball at rest between plates that just touch it. A quasi-static press sees the long-term modulus.
    pure function new_pressed_ball(ball, mesh, material) result(pressed)
       type(ball_type), intent(in) :: ball
       !> Mesh of order 1, whose nodes are moved along the meridians.
@@ -269,7 +269,7 @@ contains
 
       change = 0.0_wp
       n = size(force)
-      ! Nodes of neighbouring lines and rings, two coordinates each.
+      ! Nodes of neighboring lines and rings, two coordinates each.
       width = 2*size(force, 2) + 3
       allocate (band(3*width + 1, n), solution(n, 2), pivot(n))
       call get_tangent(pressed, fixed, width, band, failed)

@@ -54,7 +54,7 @@ contains
       real(wp) :: rest, n_not_near, n_not_far
       integer :: j, iteration
 
-      ! As sums: gfortran does not vectorise minimum and maximum.
+      ! As sums: gfortran does not vectorize minimum and maximum.
       n_not_near = 0.0_wp
       n_not_far = 0.0_wp
       !$omp simd reduction(+:n_not_near, n_not_far)

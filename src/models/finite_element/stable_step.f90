@@ -1,8 +1,8 @@
-!> The limit of stability of the central differences, found on the equations of motion themselves.
+!> The limit of stability of the central differences, from the equations of motion themselves.
 !>
 !> With velocities half a step behind, the step dt is stable while dt**2 K + 2 dt C <= 4 M for the
 !> tangents K and C of elasticity and viscosity: the maximum eigenvalue of the left side over M, here
-!> the growth, may reach 4. Power iteration finds it; each iteration takes one evaluation of the
+!> the stability ratio, may reach 4. Power iteration finds it; each iteration takes one evaluation of the
 !> forces. The direction is kept between calls, so that a few iterations follow the deforming ball.
 module thud_stable_step
    use thud_elastic_body, only: body_state_type, elastic_body_type, get_internal_forces, no_failure
@@ -12,10 +12,10 @@ module thud_stable_step
    implicit none (type, external)
    private
 
-   public :: find_growth, get_first_direction, max_growth
+   public :: find_stability_ratio, get_first_direction, max_stability_ratio
 
-   !> Growth at the limit of stability.
-   real(wp), parameter :: max_growth = 4.0_wp
+   !> Stability ratio at the limit.
+   real(wp), parameter :: max_stability_ratio = 4.0_wp
 
    !> Maximum displacement that the forces are evaluated with, over the thickness of an element.
    real(wp), parameter :: trial = 1.0e-6_wp
@@ -41,8 +41,8 @@ contains
       direction(body%mesh%n_polar, :, 1) = 0.0_wp
    end function get_first_direction
 
-   !> Growth of a step, by some iterations of the power iteration.
-   subroutine find_growth(body, contact, position, velocity, interval, n_iteration, direction, growth)
+   !> Stability ratio of a step, by some iterations of the power iteration.
+   subroutine find_stability_ratio(body, contact, position, velocity, interval, n_iteration, direction, stability_ratio)
       !> The body; it stays as it is.
       type(elastic_body_type), intent(inout) :: body
       type(floor_contact_type), intent(in) :: contact
@@ -55,9 +55,9 @@ contains
       integer, intent(in) :: n_iteration
       !> Direction of the fastest motion, better after each call: the same shape.
       real(wp), intent(inout), contiguous :: direction(0:, 0:, :)
-      !> The growth; of the body from below, close after tens of iterations; of the floor from above. Huge where
+      !> The ratio; of the body from below, close after tens of iterations; of the floor from above. Huge where
       !> there are no forces, or after an interrupt.
-      real(wp), intent(out) :: growth
+      real(wp), intent(out) :: stability_ratio
       real(wp), dimension(0:body%mesh%n_polar, 0:body%mesh%n_radial, 2) :: here, there, product
       real(wp) :: step, thickness
       real(wp) :: mass(0:body%mesh%n_polar, 0:body%mesh%n_radial, 2)
@@ -67,7 +67,7 @@ contains
       last = body%mesh%n_radial
       mass = spread(body%mass, 3, 2)
       thickness = body%mesh%z(0, 0) - body%mesh%z(0, 1)
-      growth = huge(growth)
+      stability_ratio = huge(stability_ratio)
       call get_internal_forces(body, position, velocity, interval, .false., here, state)
       if (state%failure /= no_failure) return
       do iteration = 1, n_iteration
@@ -76,15 +76,16 @@ contains
          call get_internal_forces(body, position + step*direction, velocity + 2*step/interval*direction, interval, .false., &
             there, state)
          if (state%failure /= no_failure .or. is_interrupted()) then
-            growth = huge(growth)
+            stability_ratio = huge(stability_ratio)
             return
          end if
          product = (here - there)*(interval**2/step)
-         growth = sum(direction*product)
+         stability_ratio = sum(direction*product)
          direction = product/mass
       end do
       ! The floor, by its maximum: some node may touch it at any time.
-      growth = growth + interval**2*maxval(get_contact_stiffness(contact, position(:, last, 1))/body%mass(:, last))
-   end subroutine find_growth
+      stability_ratio = stability_ratio + interval**2*maxval(get_contact_stiffness(contact, position(:, last, &
+         1))/body%mass(:, last))
+   end subroutine find_stability_ratio
 
 end module thud_stable_step

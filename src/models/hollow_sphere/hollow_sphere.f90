@@ -99,7 +99,7 @@ contains
          get_wall_limits(ball, history), get_gravity_limit(drop, history)]
    end function get_theory_limits
 
-   !> Force on each of two plates that press the shell slowly: each flattens a cap of half their approach.
+   !> Force on each of two plates in a quasi-static compression: each flattens a cap of half their approach.
    subroutine compress(ball, options, deflection, force, error)
       type(ball_type), intent(in) :: ball
       class(hollow_sphere_type), intent(in) :: options
@@ -130,7 +130,7 @@ contains
       shell%closing_deflection = 2*(ball%outer_radius - ball%wall_thickness)
       shell%mass = ball%mass
       ! m = M (1 - deflection/2R): the rest of the wall lies on the floor.
-      shell%cap_growth = ball%mass/(2*ball%outer_radius)
+      shell%cap_mass_per_deflection = ball%mass/(2*ball%outer_radius)
       shell%stiffness = get_shell_stiffness(ball)
       shell%initial_pressure = ball%ambient_pressure + ball%gauge_pressure
       shell%ambient_pressure = ball%ambient_pressure

@@ -6,7 +6,7 @@ module thud_impact_batch
    use thud_kinds, only: wp
    use thud_rk4, only: rk4_step
    use thud_shell_batch, only: batch_size, shell_batch_type, state_batch_type
-   use thud_shell_series, only: get_flows, place_series, series_batch_type, take_step
+   use thud_shell_series, only: expand_series, get_flows, series_batch_type, take_step
    use thud_single_mass, only: at_deflection, at_velocity
    implicit none (type, external)
    private
@@ -20,7 +20,7 @@ module thud_impact_batch
       type(series_batch_type) :: series
       !> Velocity at first touch: [batch_size].
       real(wp) :: impact_velocity(batch_size)
-      !> The present state and, in the other place, that at the end of the step under way.
+      !> The present state and, in the other slot, that at the end of the step under way.
       type(state_batch_type) :: states(2)
       !> Ones, the length of whole steps: [batch_size].
       real(wp) :: whole_step(batch_size)
@@ -35,7 +35,7 @@ module thud_impact_batch
       type(shell_batch_type) :: shell
       !> Factor s of the flux term in restitution.
       real(wp) :: restitution_weight
-      !> Place of the present state: that at release or, where a lane did not get there, at the beginning of
+      !> Slot of the present state: that at release or, where a lane did not get there, at the beginning of
       !> its last step.
       integer :: now
       !> The ball was released: [batch_size].
@@ -43,18 +43,18 @@ module thud_impact_batch
       !> A stage has left the domain of the equation: [batch_size].
       logical(c_bool) :: left(batch_size)
       !> The last step led beyond the reach of the series: [batch_size].
-      logical(c_bool) :: strayed(batch_size)
+      logical(c_bool) :: out_of_range(batch_size)
    end type impact_batch_type
 
 contains
 
-   !> Takes a step, or part of one, from the present state to the other place. Lanes that go beyond the
+   !> Takes a step, or part of one, from the present state to the other slot. Lanes that go beyond the
    !> reach of their series take it one by one as the single solver does, powers and all.
-   pure subroutine advance(impacts, goes, length, elastic_force, floor_force, missed)
+   pure subroutine advance(impacts, active, length, elastic_force, floor_force, missed)
       !> The impacts; the new velocity is NaN where a stage has left the domain of the equation.
       type(impact_batch_type), intent(inout) :: impacts
       !> The result for the lane matters: [batch_size].
-      logical, intent(in) :: goes(batch_size)
+      logical, intent(in) :: active(batch_size)
       !> Length of the step: [batch_size].
       real(wp), intent(in) :: length(batch_size)
       !> Elastic force at the beginning, N: [batch_size].
@@ -70,8 +70,8 @@ contains
          elastic_force, floor_force, missed)
       if (.not. missed) return
       do i = 1, batch_size
-         impacts%strayed(i) = goes(i) .and. .not. is_finite(impacts%states(then)%velocity(i))
-         if (impacts%strayed(i)) call take_single_step(impacts, i, length(i))
+         impacts%out_of_range(i) = active(i) .and. .not. is_finite(impacts%states(then)%velocity(i))
+         if (impacts%out_of_range(i)) call take_single_step(impacts, i, length(i))
       end do
    end subroutine advance
 
@@ -79,7 +79,7 @@ contains
    pure subroutine take_single_step(impacts, i, length)
       !> The impacts; the new velocity stays NaN where a stage leaves the domain of the equation.
       type(impact_batch_type), intent(inout) :: impacts
-      !> Number of the lane.
+      !> Index of the ball.
       integer, intent(in) :: i
       real(wp), intent(in) :: length
       real(wp), dimension(4) :: state, new
@@ -97,7 +97,7 @@ contains
    !> The equation of one lane as the single solver has it, in the units of the lanes.
    pure function get_single(shell, i) result(single)
       type(shell_batch_type), intent(in) :: shell
-      !> Number of the lane.
+      !> Index of the ball.
       integer, intent(in) :: i
       !> A ball of unit diameter and mass in the present phase.
       type(shell_type) :: single
@@ -137,7 +137,7 @@ contains
       logical, dimension(batch_size) :: open, left_moved, right_moved
       integer :: iteration
 
-      call place_series(impacts%shell, impacts%states(impacts%now), ends, impacts%series)
+      call expand_series(impacts%shell, impacts%states(impacts%now), ends, impacts%series)
       left = 0.0_wp
       left_value = get_watched(impacts%states(impacts%now), compressing)
       right = 1.0_wp
@@ -173,13 +173,13 @@ contains
    end subroutine locate
 
    !> Where a part of the step would lead.
-   subroutine try_length(impacts, compressing, goes, length, value)
+   subroutine try_length(impacts, compressing, active, length, value)
       !> The impacts, at the beginning of the step.
       type(impact_batch_type), intent(inout) :: impacts
       !> The phase ends with the velocity, not with the deflection.
       logical, intent(in) :: compressing
       !> The result for the ball matters: [batch_size].
-      logical, intent(in) :: goes(batch_size)
+      logical, intent(in) :: active(batch_size)
       !> The part: [batch_size].
       real(wp), intent(in) :: length(batch_size)
       !> What the end of the phase brings to zero: [batch_size].
@@ -187,7 +187,7 @@ contains
       real(wp), dimension(batch_size) :: elastic_force, floor_force
       logical :: missed
 
-      call advance(impacts, goes, length, elastic_force, floor_force, missed)
+      call advance(impacts, active, length, elastic_force, floor_force, missed)
       value = get_watched(impacts%states(3 - impacts%now), compressing)
    end subroutine try_length
 
@@ -204,11 +204,11 @@ contains
    end function get_watched
 
    !> Takes a part of a step in some of the lanes.
-   subroutine finish_step(impacts, goes, length, elastic_force, floor_force)
-      !> The impacts; their series are placed at the end.
+   subroutine finish_step(impacts, active, length, elastic_force, floor_force)
+      !> The impacts; their series are expanded at the end.
       type(impact_batch_type), intent(inout) :: impacts
       !> The lane takes the step: [batch_size].
-      logical, intent(in) :: goes(batch_size)
+      logical, intent(in) :: active(batch_size)
       !> Its length: [batch_size].
       real(wp), intent(in) :: length(batch_size)
       !> Elastic force at its beginning, N: [batch_size].
@@ -218,26 +218,26 @@ contains
       logical :: missed
 
       associate (state => impacts%states(impacts%now), new => impacts%states(3 - impacts%now))
-         call place_series(impacts%shell, state, goes, impacts%series)
-         call add_end(impacts, goes, length/2, length**2/12)
-         call advance(impacts, goes, length, elastic_force, floor_force, missed)
-         where (goes)
+         call expand_series(impacts%shell, state, active, impacts%series)
+         call add_end(impacts, active, length/2, length**2/12)
+         call advance(impacts, active, length, elastic_force, floor_force, missed)
+         where (active)
             state%deflection = new%deflection
             state%velocity = new%velocity
          end where
-         call place_series(impacts%shell, state, goes, impacts%series)
-         call add_end(impacts, goes, length/2, -length**2/12)
+         call expand_series(impacts%shell, state, active, impacts%series)
+         call add_end(impacts, active, length/2, -length**2/12)
       end associate
    end subroutine finish_step
 
    !> Adds one end of an interval to the sums of impulse and loss. With the sums of the values at the
    !> beginnings of all steps these are the integrals by the trapezoidal rule with its first correction
    !> (Euler and Maclaurin), of fourth order as the steps are.
-   pure subroutine add_end(impacts, goes, value_factor, rate_factor)
+   pure subroutine add_end(impacts, active, value_factor, rate_factor)
       !> The impacts, in reach of their series.
       type(impact_batch_type), intent(inout) :: impacts
       !> The lane takes part: [batch_size].
-      logical, intent(in) :: goes(batch_size)
+      logical, intent(in) :: active(batch_size)
       !> Factor of the values at the end: [batch_size].
       real(wp), intent(in) :: value_factor(batch_size)
       !> Factor of their rates of change: [batch_size].
@@ -246,7 +246,7 @@ contains
 
       associate (state => impacts%states(impacts%now))
          call get_flows(impacts%shell, impacts%series, state, force, force_rate, power, power_rate)
-         where (goes)
+         where (active)
             state%impulse = state%impulse + value_factor*force + rate_factor*force_rate
             state%loss = state%loss + value_factor*power + rate_factor*power_rate
          end where

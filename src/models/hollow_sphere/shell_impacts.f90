@@ -3,13 +3,13 @@
 !>
 !> Lanes run in step, so that sample i of all forces is written at once. A lane that has reached its
 !> turning point waits until all others have, or closed; then the turning points are located
-!> together, and each lane goes on at its own time.
+!> together, and each lane active on at its own time.
 module thud_shell_impacts
    use thud_impact_batch, only: add_end, advance, finish_step, get_watched, impact_batch_type, is_finite, locate
    use thud_interrupt, only: is_interrupted
    use thud_kinds, only: wp
    use thud_shell_batch, only: batch_size, state_batch_type
-   use thud_shell_series, only: place_series, series_steps, will_last
+   use thud_shell_series, only: expand_series, series_steps, will_last
    implicit none (type, external)
    private
 
@@ -27,10 +27,10 @@ contains
       integer, intent(in) :: n_sample, substeps
       !> Elastic forces, then floor forces, N, up to the last contact: [2 batch_size, n_sample].
       real(wp), intent(inout) :: force(2*batch_size, n_sample)
-      !> Number of the last sample that was written.
+      !> Index of the last sample that was written.
       integer, intent(out) :: last_sample
       real(wp), dimension(batch_size) :: start, last, length, elastic_force, floor_force
-      logical :: turns(batch_size), released(batch_size)
+      logical :: turning(batch_size), released(batch_size)
       integer :: n_step, last_step
 
       n_step = (n_sample - 1)*substeps
@@ -45,9 +45,9 @@ contains
 
       start = 0.0_wp
       call march(impacts, .true., start, last, n_step, substeps, n_sample, force, last_step)
-      turns = last < never .and. .not. impacts%left
-      call turn(impacts, turns)
-      start = merge(last + 1, never, turns)
+      turning = last < never .and. .not. impacts%left
+      call turn(impacts, turning)
+      start = merge(last + 1, never, turning)
       call march(impacts, .false., start, last, n_step, substeps, n_sample, force, last_step)
       released = last < never .and. .not. impacts%left
       impacts%released = released
@@ -78,56 +78,56 @@ contains
       real(wp), dimension(batch_size) :: elastic_force, floor_force
       real(wp) :: latest
       integer :: n, first, sample
-      logical :: done, undisturbed, strayed
-      logical :: goes(batch_size)
+      logical :: done, undisturbed, out_of_range
+      logical :: active(batch_size)
 
       undisturbed = .false.
-      strayed = .false.
-      impacts%strayed = .false.
+      out_of_range = .false.
+      impacts%out_of_range = .false.
       latest = maxval(start, mask=start < never)
       last = merge(never, -1.0_wp, start < never)
       first = int(min(minval(start), real(n_step, wp)))
-      call place_series(impacts%shell, impacts%states(impacts%now), start < never, impacts%series)
+      call expand_series(impacts%shell, impacts%states(impacts%now), start < never, impacts%series)
       call add_end(impacts, start < never, -0.5_wp*impacts%whole_step, impacts%whole_step/12)
       do n = first, n_step - 1
-         if (n <= latest .or. mod(n, series_steps) == 0 .or. strayed) call renew_series(impacts, start, n)
-         if (.not. undisturbed) goes = start <= n .and. last > n
+         if (n <= latest .or. mod(n, series_steps) == 0 .or. out_of_range) call renew_series(impacts, start, n)
+         if (.not. undisturbed) active = start <= n .and. last > n
          sample = n/substeps + 1
          if (undisturbed .and. mod(n, substeps) == 0) then
-            call advance(impacts, goes, impacts%whole_step, force(:batch_size, sample), force(batch_size + 1:, sample), &
-               strayed)
+            call advance(impacts, active, impacts%whole_step, force(:batch_size, sample), force(batch_size + 1:, sample), &
+               out_of_range)
          else
-            call advance(impacts, goes, impacts%whole_step, elastic_force, floor_force, strayed)
+            call advance(impacts, active, impacts%whole_step, elastic_force, floor_force, out_of_range)
             if (mod(n, substeps) == 0) call record(elastic_force, floor_force, real(n, wp), start, last, force(:, sample))
          end if
          if (n == nint(latest)) undisturbed = all(start < never .and. last >= never)
-         call settle(impacts, compressing, real(n, wp), start, last, undisturbed, done)
+         call commit_step(impacts, compressing, real(n, wp), start, last, undisturbed, done)
          last_step = n
          if (mod(n, series_steps) == 0) done = done .or. is_interrupted()
          if (done) exit
       end do
-      call place_series(impacts%shell, impacts%states(impacts%now), start < never, impacts%series)
+      call expand_series(impacts%shell, impacts%states(impacts%now), start < never, impacts%series)
       call add_end(impacts, start < never, 0.5_wp*impacts%whole_step, -impacts%whole_step/12)
       where (.not. start < never) last = never
    end subroutine march
 
-   !> A new series for each lane that begins or strayed and, asked at fixed times, where the old one will
+   !> A new series for each lane that begins or out_of_range and, asked at fixed times, where the old one will
    !> not last: nothing that depends on other lanes.
    pure subroutine renew_series(impacts, start, n)
       type(impact_batch_type), intent(inout) :: impacts
       !> Step with which each lane begins: [batch_size].
       real(wp), intent(in) :: start(batch_size)
-      !> Number of the step.
+      !> Index of the step.
       integer, intent(in) :: n
       logical :: wanted(batch_size)
 
-      wanted = abs(start - n) < 0.5_wp .or. impacts%strayed
+      wanted = abs(start - n) < 0.5_wp .or. impacts%out_of_range
       associate (state => impacts%states(impacts%now), series => impacts%series)
          if (mod(n, series_steps) == 0) wanted = wanted &
-            .or. .not. will_last(series%place, series%reach, state%deflection, state%velocity)
-         if (any(wanted)) call place_series(impacts%shell, state, wanted, series)
+            .or. .not. will_last(series%expansion_point, series%reach, state%deflection, state%velocity)
+         if (any(wanted)) call expand_series(impacts%shell, state, wanted, series)
       end associate
-      impacts%strayed = .false.
+      impacts%out_of_range = .false.
    end subroutine renew_series
 
    !> Forces of one sample: those of moving lanes, none after the contact; lanes whose turn is still to
@@ -137,7 +137,7 @@ contains
       real(wp), intent(in) :: elastic_force(batch_size)
       !> Forces on the floor, N: [batch_size].
       real(wp), intent(in) :: floor_force(batch_size)
-      !> Number of the step.
+      !> Index of the step.
       real(wp), intent(in) :: n
       !> Step with which each lane begins: [batch_size].
       real(wp), intent(in) :: start(batch_size)
@@ -150,11 +150,11 @@ contains
    end subroutine record
 
    !> Takes over a step where it stays inside the phase; other lanes stop in front of it.
-   pure subroutine settle(impacts, compressing, n, start, last, undisturbed, done)
+   pure subroutine commit_step(impacts, compressing, n, start, last, undisturbed, done)
       type(impact_batch_type), intent(inout) :: impacts
       !> The phase ends with the velocity, not with the deflection.
       logical, intent(in) :: compressing
-      !> Number of the step.
+      !> Index of the step.
       real(wp), intent(in) :: n
       !> Step with which each lane begins: [batch_size].
       real(wp), intent(in) :: start(batch_size)
@@ -184,7 +184,7 @@ contains
          end if
       end associate
       impacts%now = 3 - impacts%now
-   end subroutine settle
+   end subroutine commit_step
 
    !> Whether all lanes stay inside the phase.
    pure function all_stay(state, compressing) result(all_do)
@@ -195,7 +195,7 @@ contains
       real(wp) :: lost
       integer :: i
 
-      ! Sums of zeros, which compilers vectorise; velocities are NaN where a stage has left the domain.
+      ! Sums of zeros, which compilers vectorize; velocities are NaN where a stage has left the domain.
       lost = 0.0_wp
       if (compressing) then
          !$omp simd reduction(+: lost)
@@ -212,18 +212,18 @@ contains
    end function all_stay
 
    !> To the turning point and on to the end of its step, with the flux term of restitution.
-   subroutine turn(impacts, turns)
+   subroutine turn(impacts, turning)
       type(impact_batch_type), intent(inout) :: impacts
       !> The lane has a turning point: [batch_size].
-      logical, intent(in) :: turns(batch_size)
+      logical, intent(in) :: turning(batch_size)
       real(wp), dimension(batch_size) :: length, elastic_force, floor_force
 
-      call locate(impacts, .true., turns, length)
-      call finish_step(impacts, turns, length, elastic_force, floor_force)
-      where (turns) impacts%states(impacts%now)%velocity = 0.0_wp
+      call locate(impacts, .true., turning, length)
+      call finish_step(impacts, turning, length, elastic_force, floor_force)
+      where (turning) impacts%states(impacts%now)%velocity = 0.0_wp
       impacts%shell%weight = impacts%restitution_weight
       impacts%max_deflection = impacts%states(impacts%now)%deflection
-      call finish_step(impacts, turns, 1 - length, elastic_force, floor_force)
+      call finish_step(impacts, turning, 1 - length, elastic_force, floor_force)
       ! Those at the turning point.
       impacts%peak_elastic_force = elastic_force
       impacts%peak_force = floor_force

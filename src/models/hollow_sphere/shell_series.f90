@@ -1,7 +1,7 @@
 !> The Runge-Kutta step of `thud_shell_batch`, its forces taken from Taylor series.
 !>
-!> Powers and quotients are slow and a ball moves little from step to step: each lane has a place, a
-!> deflection about which c and 1/(1 - y) are expanded, and needs nothing but multiplications and
+!> Powers and quotients are slow and a ball moves little from step to step: each lane has an expansion
+!> point, a deflection about which c and 1/(1 - y) are expanded, and needs nothing but multiplications and
 !> additions while it stays near.
 !>
 !> The terms: x, a cubic with a double root at 1 and one at -1/2, has the power
@@ -14,12 +14,12 @@
 !> where balls from 1 m stay at the default step, 1.3e-14.
 module thud_shell_series
    use thud_kinds, only: wp
-   use thud_power, only: not_a_number, raise
+   use thud_power, only: not_a_number, vector_power
    use thud_shell_batch, only: batch_size, shell_batch_type, state_batch_type
    implicit none (type, external)
    private
 
-   public :: get_flows, place_series, series_batch_type, series_steps, take_step, will_last
+   public :: expand_series, get_flows, series_batch_type, series_steps, take_step, will_last
 
    !> Highest power of the series.
    integer, parameter :: degree = 7
@@ -27,7 +27,7 @@ module thud_shell_series
    !> Farthest that a series is used, in distances to the next root of x.
    real(wp), parameter :: near = 1.0_wp/64
 
-   !> Part of the reach that is used as long as the steps are short.
+   !> Fraction of the reach that is used as long as the steps are short.
    real(wp), parameter :: inner = 0.6_wp
 
    !> Steps between two checks of the series. At the default step a ball from 2.7 m stays in
@@ -37,7 +37,7 @@ module thud_shell_series
    !> The series.
    type, bind(c) :: series_batch_type
       !> Deflection about which a lane is expanded: [batch_size].
-      real(wp) :: place(batch_size)
+      real(wp) :: expansion_point(batch_size)
       !> Distance up to which the series is used: [batch_size].
       real(wp) :: reach(batch_size)
       !> 1/(1 - y) there: [batch_size].
@@ -49,23 +49,24 @@ module thud_shell_series
 contains
 
    !> Whether the series of a lane lasts for the next `series_steps`, in the inner part of its reach.
-   elemental function will_last(place, reach, deflection, velocity) result(lasts)
-      real(wp), intent(in) :: place
+   elemental function will_last(expansion_point, reach, deflection, velocity) result(lasts)
+      real(wp), intent(in) :: expansion_point
       !> Its reach; y; z.
       real(wp), intent(in) :: reach, deflection, velocity
       logical :: lasts
 
-      lasts = max(abs(deflection - place), abs(deflection + series_steps*velocity - place)) <= inner*reach
+      lasts = max(abs(deflection - expansion_point), abs(deflection + series_steps*velocity - expansion_point)) <= &
+         inner*reach
    end function will_last
 
    !> Expands lanes about the middle of the way that lies before them; the present deflection is in reach.
-   pure subroutine place_series(shell, state, wanted, series)
+   pure subroutine expand_series(shell, state, wanted, series)
       type(shell_batch_type), intent(in) :: shell
       type(state_batch_type), intent(in) :: state
       !> The lane is expanded again: [batch_size].
       logical, intent(in) :: wanted(batch_size)
       type(series_batch_type), intent(inout) :: series
-      real(wp), dimension(batch_size) :: place, inverse, power
+      real(wp), dimension(batch_size) :: expansion_point, inverse, power
       real(wp) :: term(batch_size, 0:degree)
       real(wp) :: x1, x2, x3, lead, p0, p1, p2, p3, p4, p5, p6, p7
       integer :: i
@@ -75,18 +76,18 @@ contains
          associate (y => state%deflection(i), z => state%velocity(i))
             lead = min(max(0.5_wp*series_steps*abs(z), 0.5_wp*get_reach(y)), 0.9_wp*get_reach(y), &
                0.4_wp*(shell%closing(i) - y))
-            place(i) = y + sign(lead, z)
+            expansion_point(i) = y + sign(lead, z)
          end associate
       end do
-      call raise(batch_size, get_ratio(place), shell%exponent, power)
+      call vector_power(batch_size, get_ratio(expansion_point), shell%exponent, power)
       !$omp simd private(x1, x2, x3, p0, p1, p2, p3, p4, p5, p6, p7)
       do i = 1, batch_size
-         inverse(i) = 1/(1 - place(i))
+         inverse(i) = 1/(1 - expansion_point(i))
          associate (e => shell%exponent(i), r => inverse(i), k => shell%stiffness(i))
             ! Taylor coefficients of x over x itself.
-            x3 = 2/get_ratio(place(i))
-            x1 = -3*place(i)*(1 - place(i))*x3
-            x2 = (3*place(i) - 1.5_wp)*x3
+            x3 = 2/get_ratio(expansion_point(i))
+            x1 = -3*expansion_point(i)*(1 - expansion_point(i))*x3
+            x2 = (3*expansion_point(i) - 1.5_wp)*x3
             p0 = shell%gas_pressure(i)*power(i)
             p1 = e*x1*p0
             p2 = ((e - 1)*x1*p1 + 2*e*x2*p0)*(1/2.0_wp)
@@ -108,10 +109,10 @@ contains
       do i = 0, degree
          series%term(:, i) = merge(term(:, i), series%term(:, i), wanted)
       end do
-      series%place = merge(place, series%place, wanted)
+      series%expansion_point = merge(expansion_point, series%expansion_point, wanted)
       series%inverse = merge(inverse, series%inverse, wanted)
-      series%reach = merge(min(get_reach(place), shell%closing - place), series%reach, wanted)
-   end subroutine place_series
+      series%reach = merge(min(get_reach(expansion_point), shell%closing - expansion_point), series%reach, wanted)
+   end subroutine expand_series
 
    !> Ratio of volumes x; private as the functions below, so that compilers put them into the loops.
    elemental function get_ratio(deflection) result(ratio)
@@ -132,29 +133,29 @@ contains
    end function get_reach
 
    !> Deceleration y c by shell and gas.
-   elemental function get_pull(y, d, c0, c1, c2, c3, c4, c5, c6, c7) result(pull)
-      !> y, its distance from the place of the series, and the terms of the series.
+   elemental function get_deceleration(y, d, c0, c1, c2, c3, c4, c5, c6, c7) result(acceleration)
+      !> y, its distance from the expansion point, and the terms of the series.
       real(wp), intent(in) :: y, d, c0, c1, c2, c3, c4, c5, c6, c7
-      real(wp) :: pull
+      real(wp) :: acceleration
 
-      pull = y*(c0 + d*(c1 + d*(c2 + d*(c3 + d*(c4 + d*(c5 + d*(c6 + d*c7)))))))
-   end function get_pull
+      acceleration = y*(c0 + d*(c1 + d*(c2 + d*(c3 + d*(c4 + d*(c5 + d*(c6 + d*c7)))))))
+   end function get_deceleration
 
    !> Acceleration z**2/(1 - y) by the flux, for s = 1; eight terms of the geometric series as a product.
-   elemental function get_push(z, d, inverse) result(push)
-      !> z, the distance from the place of the series, and 1/(1 - y) there.
+   elemental function get_flux_acceleration(z, d, inverse) result(acceleration)
+      !> z, the distance from the expansion point, and 1/(1 - y) there.
       real(wp), intent(in) :: z, d, inverse
       !> z**2/(1 - y).
-      real(wp) :: push
+      real(wp) :: acceleration
       real(wp) :: q, square
 
       q = inverse*d
       square = q*q
-      push = z*z*inverse
-      push = push + push*q
-      push = push + push*square
-      push = push + push*(square*square)
-   end function get_push
+      acceleration = z*z*inverse
+      acceleration = acceleration + acceleration*q
+      acceleration = acceleration + acceleration*square
+      acceleration = acceleration + acceleration*(square*square)
+   end function get_flux_acceleration
 
    !> Force on the floor and power lost, and their rates of change.
    pure subroutine get_flows(shell, series, state, force, force_rate, power, power_rate)
@@ -174,14 +175,14 @@ contains
       integer :: n
 
       associate (y => state%deflection, z => state%velocity, s => shell%weight)
-         d = y - series%place
+         d = y - series%expansion_point
          c = 0.0_wp
          c_rate = 0.0_wp
          do n = degree, 0, -1
             c_rate = c_rate*d + c
             c = c*d + series%term(:, n)
          end do
-         a = s*get_push(z, d, series%inverse) - y*c
+         a = s*get_flux_acceleration(z, d, series%inverse) - y*c
          force = y*(1 - y)*c + (1 - s)*z**2
          force_rate = z*((1 - 2*y)*c + y*(1 - y)*c_rate) + 2*(1 - s)*z*a
          power = (0.5_wp - s)*z**3
@@ -213,32 +214,33 @@ contains
          !$omp& reduction(+: outsides)
          do i = 1, batch_size
             associate (y => state%deflection(i), z => state%velocity(i), s => shell%weight, h => length(i), &
-               place => series%place(i), inverse => series%inverse(i), c0 => series%term(i, 0), c1 => series%term(i, 1), &
+               point => series%expansion_point(i), inverse => series%inverse(i), c0 => series%term(i, 0), c1 => &
+               series%term(i, 1), &
                c2 => series%term(i, 2), c3 => series%term(i, 3), c4 => series%term(i, 4), c5 => series%term(i, 5), &
                c6 => series%term(i, 6), c7 => series%term(i, 7))
                half = h/2
-               d1 = y - place
-               a1 = s*get_push(z, d1, inverse) - get_pull(y, d1, c0, c1, c2, c3, c4, c5, c6, c7)
+               d1 = y - point
+               a1 = s*get_flux_acceleration(z, d1, inverse) - get_deceleration(y, d1, c0, c1, c2, c3, c4, c5, c6, c7)
                y2 = y + half*z
                z2 = z + half*a1
-               d2 = y2 - place
-               a2 = s*get_push(z2, d2, inverse) - get_pull(y2, d2, c0, c1, c2, c3, c4, c5, c6, c7)
+               d2 = y2 - point
+               a2 = s*get_flux_acceleration(z2, d2, inverse) - get_deceleration(y2, d2, c0, c1, c2, c3, c4, c5, c6, c7)
                y3 = y + half*z2
                z3 = z + half*a2
-               d3 = y3 - place
-               a3 = s*get_push(z3, d3, inverse) - get_pull(y3, d3, c0, c1, c2, c3, c4, c5, c6, c7)
+               d3 = y3 - point
+               a3 = s*get_flux_acceleration(z3, d3, inverse) - get_deceleration(y3, d3, c0, c1, c2, c3, c4, c5, c6, c7)
                y4 = y + h*z3
                z4 = z + h*a3
-               d4 = y4 - place
-               a4 = s*get_push(z4, d4, inverse) - get_pull(y4, d4, c0, c1, c2, c3, c4, c5, c6, c7)
+               d4 = y4 - point
+               a4 = s*get_flux_acceleration(z4, d4, inverse) - get_deceleration(y4, d4, c0, c1, c2, c3, c4, c5, c6, c7)
 
-               ! Added, as a branch would not be vectorised.
+               ! Added, as a branch would not be vectorized.
                outside = merge(0.0_wp, not_a_number, max(max(abs(d1), abs(d2)), max(abs(d3), abs(d4))) <= series%reach(i))
                outsides = outsides + outside
                sixth = h*(1/6.0_wp)
                new%deflection(i) = y + sixth*(z + 2*(z2 + z3) + z4)
                new%velocity(i) = z + sixth*(a1 + 2*(a2 + a3) + a4) + outside
-               elastic = (1 - y)*get_pull(y, d1, c0, c1, c2, c3, c4, c5, c6, c7)
+               elastic = (1 - y)*get_deceleration(y, d1, c0, c1, c2, c3, c4, c5, c6, c7)
                whole = elastic + (1 - s)*(z*z)
                new%impulse(i) = state%impulse(i) + whole
                new%loss(i) = state%loss(i) + (0.5_wp - s)*(z*z*z)
@@ -252,31 +254,31 @@ contains
          !$omp& reduction(+: outsides)
          do i = 1, batch_size
             associate (y => state%deflection(i), z => state%velocity(i), h => length(i), &
-               place => series%place(i), c0 => series%term(i, 0), c1 => series%term(i, 1), &
+               point => series%expansion_point(i), c0 => series%term(i, 0), c1 => series%term(i, 1), &
                c2 => series%term(i, 2), c3 => series%term(i, 3), c4 => series%term(i, 4), c5 => series%term(i, 5), &
                c6 => series%term(i, 6), c7 => series%term(i, 7))
                half = h/2
-               d1 = y - place
-               a1 = -get_pull(y, d1, c0, c1, c2, c3, c4, c5, c6, c7)
+               d1 = y - point
+               a1 = -get_deceleration(y, d1, c0, c1, c2, c3, c4, c5, c6, c7)
                y2 = y + half*z
                z2 = z + half*a1
-               d2 = y2 - place
-               a2 = -get_pull(y2, d2, c0, c1, c2, c3, c4, c5, c6, c7)
+               d2 = y2 - point
+               a2 = -get_deceleration(y2, d2, c0, c1, c2, c3, c4, c5, c6, c7)
                y3 = y + half*z2
                z3 = z + half*a2
-               d3 = y3 - place
-               a3 = -get_pull(y3, d3, c0, c1, c2, c3, c4, c5, c6, c7)
+               d3 = y3 - point
+               a3 = -get_deceleration(y3, d3, c0, c1, c2, c3, c4, c5, c6, c7)
                y4 = y + h*z3
                z4 = z + h*a3
-               d4 = y4 - place
-               a4 = -get_pull(y4, d4, c0, c1, c2, c3, c4, c5, c6, c7)
+               d4 = y4 - point
+               a4 = -get_deceleration(y4, d4, c0, c1, c2, c3, c4, c5, c6, c7)
 
                outside = merge(0.0_wp, not_a_number, max(max(abs(d1), abs(d2)), max(abs(d3), abs(d4))) <= series%reach(i))
                outsides = outsides + outside
                sixth = h*(1/6.0_wp)
                new%deflection(i) = y + sixth*(z + 2*(z2 + z3) + z4)
                new%velocity(i) = z + sixth*(a1 + 2*(a2 + a3) + a4) + outside
-               elastic = (1 - y)*get_pull(y, d1, c0, c1, c2, c3, c4, c5, c6, c7)
+               elastic = (1 - y)*get_deceleration(y, d1, c0, c1, c2, c3, c4, c5, c6, c7)
                whole = elastic + z*z
                new%impulse(i) = state%impulse(i) + whole
                new%loss(i) = state%loss(i) + 0.5_wp*(z*z*z)

@@ -33,13 +33,13 @@ module thud_shell_sets
    type :: set_type
       type(ball_type) :: ball
       type(drop_type) :: drop
-      !> Number of the choice of the flux term, as in `flux_choices`.
+      !> Index of the flux term, as in `flux_choices`.
       integer :: flux = 1
    end type set_type
 
    !> Outcome of one drop; NaN where it could not be computed.
    type :: set_outcome_type
-      !> The batch has computed it; else the single solver has the result or the sentence.
+      !> The batch has computed it; else the single solver has the result or the error.
       logical :: computed = .false.
       !> Time from first touch to release, s.
       real(wp) :: contact_time = not_a_number
@@ -89,7 +89,7 @@ contains
       logical, intent(out) :: valid(:)
       !> Numbers of the sets whose input is right: [n_valid].
       integer, allocatable, intent(out) :: order(:)
-      !> Places in `order` where blocks begin, and the place after the last: [n_block + 1].
+      !> Indices in `order` where blocks begin, and the one after the last: [n_block + 1].
       integer, allocatable, intent(out) :: first(:)
       !> Classes of contact times per doubling.
       integer, parameter :: classes = 64
@@ -168,7 +168,7 @@ contains
       type(sampling_type), intent(in) :: sampling
       !> Elastic forces, then floor forces, N, up to the last contact: [2 block_size, n_sample].
       real(wp), intent(inout), contiguous :: force(:, :)
-      !> Number of the last sample that was written.
+      !> Index of the last sample that was written.
       integer, intent(out) :: last_sample
       !> The outcomes: [n_set].
       type(set_outcome_type), intent(out) :: outcomes(:)
@@ -207,7 +207,7 @@ contains
    !> Equation and beginning of one lane; see `thud_shell_batch` for the units.
    pure subroutine set_lane(impacts, i, set, step)
       type(impact_batch_type), intent(inout) :: impacts
-      !> Number of the lane.
+      !> Index of the ball.
       integer, intent(in) :: i
       type(set_type), intent(in) :: set
       !> The step, s.
@@ -229,7 +229,7 @@ contains
    !> Whether a lane has a result: the checks of `solve_lumped`.
    function is_computed(impacts, i, set, sampling) result(computed)
       type(impact_batch_type), intent(in) :: impacts
-      !> Number of the lane.
+      !> Index of the ball.
       integer, intent(in) :: i
       type(set_type), intent(in) :: set
       type(sampling_type), intent(in) :: sampling

@@ -1,7 +1,7 @@
 !> The improved analytical model that the paper asks for (section 5): the exact modes of the free
 !> hollow sphere, driven by unilateral contact with the floor. Geometry and material go in only.
 !>
-!> Modes up to a highest harmonic oscillate; all that is left out answers at once, by its static
+!> Modes up to a highest harmonic oscillate; all that is left out responds at once, by its static
 !> flexibility. Time steps are exact for each mode. In every step the impulses of the surface
 !> rings make the gaps complementary to the pressures: no ring penetrates, none pulls, and there
 !> is no penalty stiffness.
@@ -33,13 +33,13 @@ module thud_modal_ball
 
    public :: modal_ball_type
 
-   !> Maximum phase angle of a mode in a step; faster ones answer statically.
+   !> Maximum phase angle of a mode in a step; faster ones respond statically.
    real(wp), parameter :: max_phase = pi/2
 
-   !> Part of the energy at first touch that closing gaps within a step may take.
+   !> Fraction of the energy at first touch that closing gaps within a step may take.
    real(wp), parameter :: max_contact_loss = 0.02_wp
 
-   !> Families whose energies are separate channels, from n = 0 on.
+   !> Families whose energies are recorded separately, from n = 0 on.
    integer, parameter :: n_family = 6
 
    !> The model.
@@ -95,7 +95,7 @@ contains
       type(theory_limit_type), allocatable :: limits(:)
       real(wp) :: angle
 
-      angle = asin(min(1.0_wp, maxval(history%channel(:, 1))/ball%outer_radius))
+      angle = asin(min(1.0_wp, maxval(history%model_history(:, 1))/ball%outer_radius))
       limits = [get_wall_limits(ball, history), &
          theory_limit_type('sampling', 'sample_rate in Hz times substeps', &
          sampling%sample_rate*real(sampling%substeps, wp), lowest=16000.0_wp, &
@@ -112,7 +112,7 @@ contains
       if (.not. options%contact_gravity) limits = [limits, get_gravity_limit(drop, history)]
    end function get_theory_limits
 
-   !> Force on each of two plates that press the ball slowly.
+   !> Force on each of two plates in a quasi-static compression.
    subroutine compress(ball, options, deflection, force, error)
       type(ball_type), intent(in) :: ball
       class(modal_ball_type), intent(in) :: options
@@ -146,9 +146,9 @@ contains
       interval = 1/(sampling%sample_rate*real(sampling%substeps, wp))
       history = new_force_history(sampling%sample_rate, n_sample, ['contact_force'])
       history%impact_velocity = get_impact_velocity(drop)
-      history%channel_name = [character(len=24) :: 'contact_radius_m', ('energy_n'//to_text(i)//'_J', i=0, n_family - 1), &
-         'energy_rest_J']
-      allocate (history%channel(n_sample, n_family + 2), source=0.0_wp)
+      history%model_history_name = [character(len=24) :: 'contact_radius_m', ('energy_n'//to_text(i)//'_J', &
+         i=0, n_family - 1), 'energy_rest_J']
+      allocate (history%model_history(n_sample, n_family + 2), source=0.0_wp)
       call use_one_blas_thread()
       rings = new_surface_rings(options%rings, options%static_harmonics, options%floor_friction == 'stick')
       call prepare(ball, options, rings, floor, interval, step, contact, error)
@@ -177,21 +177,21 @@ contains
       type(ring_contact_type), intent(out) :: contact
       !> The modes cannot be computed, or the rings cannot be distinguished.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: response(rings%n_way*options%rings, rings%n_way*options%rings)
+      real(wp) :: response(rings%n_dof*options%rings, rings%n_dof*options%rings)
       real(wp), allocatable :: zeta(:)
       logical :: failed
 
       response = 0.0_wp
-      response(::rings%n_way, ::rings%n_way) = interval/ball%mass + get_impulse_response(floor, &
+      response(::rings%n_dof, ::rings%n_dof) = interval/ball%mass + get_impulse_response(floor, &
          new_receiver_step(floor, interval))
       call add_modes(ball, options, rings, interval, step, response, error)
       if (allocated(error)) return
       allocate (zeta, mold=step%omega)
       call set_damping(options, step, zeta)
       call set_factors(step, zeta, interval)
-      response = response + matmul(transpose(step%fall), spread(step%factor(:, place_q, place_v), 2, &
-         size(response, 1))*step%fall)
-      call new_ring_contact(response, rings%n_way, contact, failed)
+      response = response + matmul(transpose(step%shape_at_ring), spread(step%factor(:, place_q, place_v), 2, &
+         size(response, 1))*step%shape_at_ring)
+      call new_ring_contact(response, rings%n_dof, contact, failed)
       if (failed) error = numerical_error('&modal_ball: rings = '//to_text(options%rings) &
          //' cannot be distinguished; allowed: fewer rings, more static_harmonics, or more substeps')
    end subroutine prepare
@@ -204,21 +204,22 @@ contains
       type(surface_rings_type), intent(in) :: rings
       !> Length of a step, s.
       real(wp), intent(in) :: interval
-      !> Gets frequencies, harmonics and falls of the modes.
+      !> Gets frequencies, harmonics and shapes of the modes.
       type(mode_step_type), intent(inout) :: step
-      !> Gets the fall of each ring by unit impulse on each added, m/(N s): [n_gap, n_gap].
+      !> Gets the displacement of each ring by unit impulse on each added, m/(N s): [n_gap, n_gap].
       real(wp), intent(inout) :: response(:, :)
       !> The modes cannot be computed.
       type(error_type), allocatable, intent(out) :: error
       type(basis_type) :: basis
       type(family_type) :: family
-      real(wp), dimension(size(response, 1), 2, 0:options%static_harmonics) :: sunk
-      real(wp), allocatable :: fall(:, :)
+      real(wp), dimension(size(response, 1), 2, 0:options%static_harmonics) :: static_displacement
+      real(wp), allocatable :: shape_at_ring(:, :)
       logical :: failed
       integer :: n, kept, k, last
 
       basis = new_basis(ball, options%static_harmonics, options%cavity_gas)
-      allocate (step%omega(0), step%harmonic(0), fall(size(response, 1), (options%harmonics + 1)*options%radial_modes))
+      allocate (step%omega(0), step%harmonic(0), shape_at_ring(size(response, 1), (options%harmonics + &
+         1)*options%radial_modes))
       do n = 0, options%static_harmonics
          call check_interrupt(error)
          if (allocated(error)) return
@@ -236,19 +237,20 @@ contains
                //' cannot be computed; allowed: fewer harmonics, or a thinner wall')
             return
          end if
-         sunk(:, :, n) = matmul(rings%fall(:, :, n), family%flexibility)
+         static_displacement(:, :, n) = matmul(rings%shape_at_ring(:, :, n), family%flexibility)
          last = size(step%omega) + size(family%omega)
-         fall(:, size(step%omega) + 1:last) = matmul(rings%fall(:, :, n), family%surface)
+         shape_at_ring(:, size(step%omega) + 1:last) = matmul(rings%shape_at_ring(:, :, n), family%surface)
          step%omega = [step%omega, family%omega]
          step%harmonic = [step%harmonic, (n, k=1, size(family%omega))]
       end do
-      step%fall = transpose(fall(:, :last))
-      associate (rows => size(response, 1), columns => size(sunk)/size(response, 1))
-         call dgemm('N', 'T', rows, rows, columns, 1/interval, sunk, rows, rings%fall, rows, 1.0_wp, response, rows)
+      step%shape_at_ring = transpose(shape_at_ring(:, :last))
+      associate (rows => size(response, 1), columns => size(static_displacement)/size(response, 1))
+         call dgemm('N', 'T', rows, rows, columns, 1/interval, static_displacement, rows, rings%shape_at_ring, rows, &
+            1.0_wp, response, rows)
       end associate
    end subroutine add_modes
 
-   !> Marches from first touch until the ball has left for good, on a floor that moves to the end of the record.
+   !> Marches from first touch until the ball has left for good, on a mobile floor to the end of the record.
    subroutine march(ball, sampling, interval, rings, step, contact, state, history, error)
       type(ball_type), intent(in) :: ball
       type(sampling_type), intent(in) :: sampling
@@ -262,15 +264,15 @@ contains
       type(force_history_type), intent(inout) :: history
       !> The contact outlasts the record, or energy is lost in contact.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: impulse, quiet
+      real(wp) :: impulse, settling_time
       integer :: i, j, n_step, last
-      logical :: left
+      logical :: has_left
 
       ! The surface may touch again while the slowest mode swings back, half a period later.
-      quiet = 0.0_wp
-      if (size(step%omega) > 0) quiet = pi/(sqrt(step%spring)*minval(step%omega))
+      settling_time = 0.0_wp
+      if (size(step%omega) > 0) settling_time = pi/(sqrt(step%equilibrium_ratio)*minval(step%omega))
       last = 0
-      left = .false.
+      has_left = .false.
       samples: do i = 1, size(history%floor_force)
          call record_motion(ball, step, state, i, history)
          do j = 1, sampling%substeps
@@ -281,17 +283,17 @@ contains
             if (contact%last > 0) then
                last = n_step
                history%impulse = history%impulse + impulse
-               history%part(i, 1) = history%part(i, 1) + impulse*sampling%sample_rate
-               history%channel(i, 1) = max(history%channel(i, 1), ball%outer_radius*rings%radius(contact%last))
+               history%component(i, 1) = history%component(i, 1) + impulse*sampling%sample_rate
+               history%model_history(i, 1) = max(history%model_history(i, 1), ball%outer_radius*rings%radius(contact%last))
             end if
             if (contact%last == size(rings%radius)) then
                error = numerical_error('&drop: '//to_text(1.0e3_wp*n_step*interval)//' ms after first touch the ball lies ' &
-                  //'on its outermost ring, its centre sunk by '//to_text(1.0e3_wp*(ball%outer_radius - state%height)) &
+                  //'on its outermost ring, its center sunk by '//to_text(1.0e3_wp*(ball%outer_radius - state%height)) &
                   //' mm; allowed: a lower height, or a stiffer ball')
                return
             end if
-            left = state%speed > 0.0_wp .and. (n_step - last)*interval > quiet
-            if (left .and. .not. state%floor_moves) exit samples
+            has_left = state%speed > 0.0_wp .and. (n_step - last)*interval > settling_time
+            if (has_left .and. .not. state%floor_moves) exit samples
          end do
          if (state%floor_moves) then
             ! The mean of the interval, as the force is.
@@ -300,7 +302,7 @@ contains
             history%velocity(i) = history%velocity(i) - history%floor_velocity(i)
          end if
       end do samples
-      call check_end(sampling, quiet, left, contact, state, error)
+      call check_end(sampling, settling_time, has_left, contact, state, error)
       if (allocated(error)) return
       history%contact_time = last*interval
       call check_contact_samples(sampling, history%contact_time, error)
@@ -308,12 +310,12 @@ contains
    end subroutine march
 
    !> Refuses a record that ends too early.
-   subroutine check_end(sampling, quiet, left, contact, state, error)
+   subroutine check_end(sampling, settling_time, has_left, contact, state, error)
       type(sampling_type), intent(in) :: sampling
       !> Time without contact after which the surface touches no more, s.
-      real(wp), intent(in) :: quiet
+      real(wp), intent(in) :: settling_time
       !> It has passed, and the ball rises.
-      logical, intent(in) :: left
+      logical, intent(in) :: has_left
       type(ring_contact_type), intent(in) :: contact
       !> Motion of ball and floor.
       type(ball_motion_type), intent(in) :: state
@@ -321,13 +323,13 @@ contains
       type(error_type), allocatable, intent(out) :: error
       character(len=64) :: allowed
 
-      if (.not. left) then
+      if (.not. has_left) then
          allowed = 'longer than that'
          if (state%floor_moves) allowed = 'longer than that, and a floor from which the ball rebounds'
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
-            //to_text(quiet)//' s after the last contact; allowed: '//trim(allowed))
+            //to_text(settling_time)//' s after the last contact; allowed: '//trim(allowed))
       else if (state%floor_moves) then
-         if (can_strike(state%floor, state%floor_motion, minval(state%gap(::contact%n_way)), state%speed)) then
+         if (can_strike(state%floor, state%floor_motion, minval(state%gap(::contact%n_dof)), state%speed)) then
             error = input_error('&sampling: duration = '//to_text(sampling%duration) &
                //' s ends while the floor may strike the ball again; allowed: longer')
          end if
@@ -348,8 +350,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: energy, gain, initial
 
-      history%elastic_force = history%part(:, 1)
-      history%floor_force = history%part(:, 1)
+      history%elastic_force = history%component(:, 1)
+      history%floor_force = history%component(:, 1)
       history%peak_force = maxval(history%floor_force)
       history%peak_elastic_force = history%peak_force
       call continue_to_zero(history)
@@ -358,9 +360,9 @@ contains
       gain = ball%mass*(history%impact_velocity + state%speed + state%gravity*time)
       history%impulse_residual = abs(history%impulse - gain)/gain
       history%floor_work = state%floor_work
-      history%fact_name = [character(len=len(history%fact_name)) :: 'contact_loss']
-      history%fact_unit = [character(len=len(history%fact_unit)) :: 'J']
-      history%fact = [state%contact_loss]
+      history%model_quantity_name = [character(len=len(history%model_quantity_name)) :: 'contact_loss']
+      history%model_quantity_unit = [character(len=len(history%model_quantity_unit)) :: 'J']
+      history%model_quantity = [state%contact_loss]
       initial = ball%mass/2*history%impact_velocity**2
       energy = ball%mass*(state%speed**2/2 + state%gravity*(state%height - ball%outer_radius)) &
          + sum(get_energies(step, state%motion)) + state%loss + state%contact_loss + state%floor_work
@@ -381,11 +383,11 @@ contains
       type(mode_step_type), intent(in) :: step
       !> Motion of the ball.
       type(ball_motion_type), intent(in) :: state
-      !> Number of the sample.
+      !> Index of the sample.
       integer, intent(in) :: i
       type(force_history_type), intent(inout) :: history
       real(wp) :: energy(size(step%omega))
-      integer :: k, place
+      integer :: k, column
 
       energy = get_energies(step, state%motion)
       history%deflection(i) = ball%outer_radius - state%height - state%floor_motion%displacement
@@ -393,8 +395,8 @@ contains
       if (state%floor_moves) history%floor_displacement(i) = state%floor_motion%displacement
       history%max_deflection = max(history%max_deflection, history%deflection(i))
       do k = 1, size(energy)
-         place = 2 + min(step%harmonic(k), n_family)
-         history%channel(i, place) = history%channel(i, place) + energy(k)
+         column = 2 + min(step%harmonic(k), n_family)
+         history%model_history(i, column) = history%model_history(i, column) + energy(k)
       end do
    end subroutine record_motion
 

@@ -1,4 +1,4 @@
-!> Slow compression of the modal ball: the static flexibility of every harmonic, at the long-term modulus, under
+!> Quasi-static compression of the modal ball: the static flexibility of every harmonic, at the long-term modulus, under
 !> unilateral contact with two plates.
 module thud_modal_compression
    use thud_ball, only: ball_type
@@ -8,7 +8,7 @@ module thud_modal_compression
    use thud_modal_ball_options, only: modal_ball_options_type
    use thud_modal_damping, only: set_damping
    use thud_mode_step, only: mode_step_type
-   use thud_ring_contact, only: follow_sliding, new_ring_contact, ring_contact_type, solve_contact
+   use thud_ring_contact, only: new_ring_contact, ring_contact_type, solve_contact, update_sticking
    use thud_sphere_modes, only: basis_type, family_type, get_static_family, new_basis
    use thud_surface_rings, only: new_surface_rings, surface_rings_type
    use thud_text, only: to_text
@@ -44,21 +44,21 @@ contains
       call new_press(ball, options, rings, contact, error)
       if (allocated(error)) return
       allocate (start(size(contact%impulse)), gap(size(contact%impulse)), source=0.0_wp)
-      start(::rings%n_way) = ball%outer_radius*(1 - rings%height)
+      start(::rings%n_dof) = ball%outer_radius*(1 - rings%height)
       before = 0.0_wp
       do i = 1, size(deflection)
          ! Where rings stick, the way there counts.
          n_step = 1
-         if (rings%n_way == 2) n_step = 1 + int((deflection(i) - before)/(max_step*ball%outer_radius))
+         if (rings%n_dof == 2) n_step = 1 + int((deflection(i) - before)/(max_step*ball%outer_radius))
          do k = 1, n_step
             call check_interrupt(error)
             if (allocated(error)) return
             now = before + (deflection(i) - before)*k/n_step
             gap = start
-            gap(::rings%n_way) = gap(::rings%n_way) - now/2
+            gap(::rings%n_dof) = gap(::rings%n_dof) - now/2
             call solve_contact(contact, gap, error)
             if (allocated(error)) return
-            call follow_sliding(contact, start)
+            call update_sticking(contact, start)
          end do
          before = deflection(i)
          if (contact%last == options%rings) then
@@ -66,7 +66,7 @@ contains
                //' m the ball lies on its outermost ring; allowed: less')
             return
          end if
-         force(i) = sum(contact%impulse(::rings%n_way))
+         force(i) = sum(contact%impulse(::rings%n_dof))
       end do
    end subroutine compress_modal_ball
 
@@ -82,7 +82,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(basis_type) :: basis
       type(family_type) :: family
-      real(wp) :: response(rings%n_way*options%rings, rings%n_way*options%rings)
+      real(wp) :: response(rings%n_dof*options%rings, rings%n_dof*options%rings)
       type(ball_type) :: relaxed
       type(mode_step_type) :: no_modes
       real(wp) :: no_damping(0)
@@ -92,18 +92,18 @@ contains
       allocate (no_modes%omega(0))
       call set_damping(options, no_modes, no_damping)
       relaxed = ball
-      relaxed%youngs_modulus = no_modes%spring*ball%youngs_modulus
+      relaxed%youngs_modulus = no_modes%equilibrium_ratio*ball%youngs_modulus
       basis = new_basis(relaxed, options%static_harmonics, options%cavity_gas)
       response = 0.0_wp
       ! Both poles are pressed alike: even harmonics move by twice the force, odd ones stay.
       do n = 0, options%static_harmonics, 2
          call get_static_family(basis, n, family, failed)
          if (failed) exit
-         associate (fall => rings%fall(:, :, n))
-            response = response + 2*matmul(fall, matmul(family%flexibility, transpose(fall)))
+         associate (shape_at_ring => rings%shape_at_ring(:, :, n))
+            response = response + 2*matmul(shape_at_ring, matmul(family%flexibility, transpose(shape_at_ring)))
          end associate
       end do
-      if (.not. failed) call new_ring_contact(response, rings%n_way, contact, failed)
+      if (.not. failed) call new_ring_contact(response, rings%n_dof, contact, failed)
       if (failed) error = numerical_error('&modal_ball: rings = '//to_text(options%rings) &
          //' cannot be distinguished; allowed: fewer rings, or more static_harmonics')
    end subroutine new_press

@@ -22,16 +22,16 @@ contains
       real(wp), intent(out) :: damping_ratio(:)
       real(wp) :: viscosity
 
-      allocate (step%share(0), step%time(0))
+      allocate (step%relative_modulus(0), step%time(0))
       select case (options%damping_law)
       case ('rising')
          damping_ratio = options%loss_factor/2*step%omega/(2*pi*options%loss_frequency)
       case ('fractional')
          call fit_fractional_loss(new_fractional_loss(options%fractional_order, options%loss_factor, &
-            options%loss_frequency), step%share, step%time, viscosity)
-         step%spring = 1/get_storage_ratio(step%share, step%time, 2*pi*options%loss_frequency)
-         step%share = step%share*step%spring
-         damping_ratio = step%omega*viscosity*step%spring/2
+            options%loss_frequency), step%relative_modulus, step%time, viscosity)
+         step%equilibrium_ratio = 1/get_storage_ratio(step%relative_modulus, step%time, 2*pi*options%loss_frequency)
+         step%relative_modulus = step%relative_modulus*step%equilibrium_ratio
+         damping_ratio = step%omega*viscosity*step%equilibrium_ratio/2
       case default
          damping_ratio = options%loss_factor/2
       end select

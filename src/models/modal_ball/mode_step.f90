@@ -10,7 +10,7 @@ module thud_mode_step
 
    public :: advance, get_energies, mode_step_type, set_factors
 
-   !> Places of amplitude q and rate v in the motion of a mode; the strains x of the branches follow.
+   !> Indices of amplitude q and rate v in the motion of a mode; the strains x of the branches follow.
    integer, parameter, public :: place_q = 1, place_v = 2
 
    !> The modes and one step of each: their motion is multiplied by the factors; an impulse p at the beginning
@@ -21,13 +21,13 @@ module thud_mode_step
       !> Harmonic of each mode: [n_mode].
       integer, allocatable :: harmonic(:)
       !> Long-term modulus over the storage modulus.
-      real(wp) :: spring = 1.0_wp
+      real(wp) :: equilibrium_ratio = 1.0_wp
       !> Moduli of the branches over the storage modulus, and their relaxation times, s: [n_branch].
-      real(wp), allocatable :: share(:), time(:)
+      real(wp), allocatable :: relative_modulus(:), time(:)
       !> Factors of one step: [n_mode, 2 + n_branch, 2 + n_branch].
       real(wp), allocatable :: factor(:, :, :)
-      !> Fall of each ring's height by unit amplitude: [n_mode, n_ring].
-      real(wp), allocatable :: fall(:, :)
+      !> Mode shapes at the rings, downwards by unit amplitude: [n_mode, n_gap].
+      real(wp), allocatable :: shape_at_ring(:, :)
    end type mode_step_type
 
 contains
@@ -50,9 +50,9 @@ contains
          associate (omega => step%omega(i))
             rates = 0.0_wp
             rates(place_q, place_v) = omega
-            rates(place_v, place_q) = -omega*(step%spring + sum(step%share))
+            rates(place_v, place_q) = -omega*(step%equilibrium_ratio + sum(step%relative_modulus))
             rates(place_v, place_v) = -2*damping_ratio(i)*omega
-            rates(place_v, 3:) = omega*step%share
+            rates(place_v, 3:) = omega*step%relative_modulus
             do k = 3, n
                rates(k, [place_q, k]) = [1, -1]/step%time(k - 2)
             end do
@@ -89,9 +89,9 @@ contains
       real(wp) :: energy(size(step%omega))
       integer :: k
 
-      energy = step%spring*motion(:, place_q)**2
-      do k = 1, size(step%share)
-         energy = energy + step%share(k)*(motion(:, place_q) - motion(:, 2 + k))**2
+      energy = step%equilibrium_ratio*motion(:, place_q)**2
+      do k = 1, size(step%relative_modulus)
+         energy = energy + step%relative_modulus(k)*(motion(:, place_q) - motion(:, 2 + k))**2
       end do
       energy = (motion(:, place_v)**2 + step%omega**2*energy)/2
    end function get_energies

@@ -1,9 +1,9 @@
 !> Unilateral contact of surface rings with a plane: impulses p >= 0 and gaps g + A p >= 0 of
 !> which one is zero for every ring, a linear complementarity problem.
 !>
-!> Rings that stick have a second gap, that to the place where they touched first, and a second impulse of any sign.
-!> It closes the gap of the rings that touched in the step before: which these are does not hang on what is sought, so
-!> that there is always one solution, and what a step holds too long or too late goes with the length of the step.
+!> Rings that stick have a second gap, to the position of first touch, and a second impulse of any sign. It closes the
+!> gap of the rings that touched in the step before: these do not depend on the unknowns, so the solution is unique, and
+!> the error of holding a ring too long or too late is proportional to the step.
 module thud_ring_contact
    use thud_error, only: error_type, numerical_error
    use thud_kinds, only: wp
@@ -12,7 +12,7 @@ module thud_ring_contact
    implicit none (type, external)
    private
 
-   public :: follow_sliding, new_ring_contact, ring_contact_type, solve_contact
+   public :: new_ring_contact, ring_contact_type, solve_contact, update_sticking
 
    !> Gap that counts as closed, m: rounding of heights.
    real(wp), parameter :: closed = 1.0e-12_wp
@@ -22,8 +22,8 @@ module thud_ring_contact
 
    !> Rings, ordered from the lowest point outwards.
    type :: ring_contact_type
-      !> Gaps of a ring: 1, or 2 where it sticks; they follow each other.
-      integer :: n_way = 1
+      !> Degrees of freedom of a ring: 1, or 2 where it sticks; its gaps are adjacent.
+      integer :: n_dof = 1
       !> Gap by unit impulses, m/(N s): [n_gap, n_gap].
       real(wp), allocatable :: response(:, :)
       !> Its Cholesky factor. The touching rings are nearly always the first ones, and the factor of
@@ -31,20 +31,20 @@ module thud_ring_contact
       real(wp), allocatable :: factor(:, :)
       !> Impulses in the last step, N s, and gaps after it, m: [n_gap].
       real(wp), allocatable :: impulse(:), after(:)
-      !> Rings that touched in the last step, and rings that are held in their places: [n_ring].
-      logical, allocatable :: touches(:), holds(:)
-      !> Number of the outermost ring that touches, and of the last gap that an impulse closed; 0 for none.
+      !> Rings that touched in the last step, and rings that stick: [n_ring].
+      logical, allocatable :: touches(:), sticks(:)
+      !> Index of the outermost ring that touches, and of the last gap that an impulse closed; 0 for none.
       integer :: last = 0, last_gap = 0
    end type ring_contact_type
 
 contains
 
    !> Prepares the contact.
-   subroutine new_ring_contact(response, n_way, contact, failed)
+   subroutine new_ring_contact(response, n_dof, contact, failed)
       !> Gap by unit impulses, symmetric, m/(N s): [n_gap, n_gap].
       real(wp), intent(in) :: response(:, :)
-      !> Gaps of a ring.
-      integer, intent(in) :: n_way
+      !> Degrees of freedom of a ring.
+      integer, intent(in) :: n_dof
       !> The contact, nothing touching.
       type(ring_contact_type), intent(out) :: contact
       !> The response is not positive definite.
@@ -54,9 +54,9 @@ contains
       n = size(response, 1)
       allocate (contact%response, source=response)
       allocate (contact%factor, source=response)
-      contact%n_way = n_way
+      contact%n_dof = n_dof
       allocate (contact%impulse(n), contact%after(n), source=0.0_wp)
-      allocate (contact%touches(n/n_way), contact%holds(n/n_way), source=.false.)
+      allocate (contact%touches(n/n_dof), contact%sticks(n/n_dof), source=.false.)
       call dpotrf('L', n, contact%factor, n, info)
       failed = info /= 0
    end subroutine new_ring_contact
@@ -73,14 +73,14 @@ contains
       integer :: round, first_wrong
       logical :: failed
 
-      if (.not. any(contact%touches)) contact%touches = gap(::contact%n_way) < 0.0_wp
+      if (.not. any(contact%touches)) contact%touches = gap(::contact%n_dof) < 0.0_wp
       do round = 1, max_rounds
          call close_gaps(contact, gap, failed)
          if (failed) exit
-         associate (n => contact%last_gap, way => contact%n_way)
+         associate (n => contact%last_gap, n_dof => contact%n_dof)
             contact%after = gap
             if (n > 0) contact%after = gap + matmul(contact%response(:, :n), contact%impulse(:n))
-            wrong = merge(contact%impulse(::way) < 0.0_wp, contact%after(::way) < -closed, contact%touches)
+            wrong = merge(contact%impulse(::n_dof) < 0.0_wp, contact%after(::n_dof) < -closed, contact%touches)
          end associate
          if (.not. any(wrong)) return
          if (round < max_rounds/2) then
@@ -95,16 +95,16 @@ contains
          //' rounds; allowed: fewer rings, or more substeps')
    end subroutine solve_contact
 
-   !> Holds the rings that touch where they are at the end of a step.
-   pure subroutine follow_sliding(contact, start)
+   !> Lets the rings that touch at the end of a step stick there.
+   pure subroutine update_sticking(contact, start)
       type(ring_contact_type), intent(inout) :: contact
       !> Gaps without motion, m: [n_gap].
       real(wp), intent(inout) :: start(:)
 
-      if (contact%n_way == 1) return
-      where (.not. contact%holds) start(2::2) = start(2::2) - contact%after(2::2)
-      contact%holds = contact%touches
-   end subroutine follow_sliding
+      if (contact%n_dof == 1) return
+      where (.not. contact%sticks) start(2::2) = start(2::2) - contact%after(2::2)
+      contact%sticks = contact%touches
+   end subroutine update_sticking
 
    !> Impulses that close the gaps of the touching rings, and those of the rings that are held.
    subroutine close_gaps(contact, gap, failed)
@@ -114,12 +114,12 @@ contains
       !> The response of the touching rings is not positive definite.
       logical, intent(out) :: failed
       real(wp), allocatable :: matrix(:, :), solution(:, :)
-      integer, allocatable :: places(:)
+      integer, allocatable :: indices(:)
       logical :: closes(size(gap))
       integer :: i, n, info
 
-      closes(::contact%n_way) = contact%touches
-      if (contact%n_way == 2) closes(2::2) = contact%holds
+      closes(::contact%n_dof) = contact%touches
+      if (contact%n_dof == 2) closes(2::2) = contact%sticks
       n = count(closes)
       contact%last_gap = findloc(closes, .true., dim=1, back=.true.)
       contact%last = findloc(contact%touches, .true., dim=1, back=.true.)
@@ -131,13 +131,13 @@ contains
          call dtrsv('L', 'N', 'N', n, contact%factor, size(gap), contact%impulse, 1)
          call dtrsv('L', 'T', 'N', n, contact%factor, size(gap), contact%impulse, 1)
       else
-         allocate (places(n), matrix(n, n), solution(n, 1))
-         places = pack([(i, i=1, size(gap))], closes)
-         matrix = contact%response(places, places)
-         solution(:, 1) = -gap(places)
+         allocate (indices(n), matrix(n, n), solution(n, 1))
+         indices = pack([(i, i=1, size(gap))], closes)
+         matrix = contact%response(indices, indices)
+         solution(:, 1) = -gap(indices)
          call dposv('L', n, 1, matrix, n, solution, n, info)
          failed = info /= 0
-         if (.not. failed) contact%impulse(places) = solution(:, 1)
+         if (.not. failed) contact%impulse(indices) = solution(:, 1)
       end if
    end subroutine close_gaps
 

@@ -58,7 +58,7 @@ module thud_sphere_modes
       !> U and V at the outer surface of modes of unit modal mass, 1/sqrt(kg): [2, n_mode].
       real(wp), allocatable :: surface(:, :)
       !> Static displacements of the surface by what the modes leave out, U and V by unit
-      !> generalised forces on U and V, m/N: [2, 2].
+      !> generalized forces on U and V, m/N: [2, 2].
       real(wp) :: flexibility(2, 2) = 0.0_wp
    end type family_type
 

@@ -1,10 +1,11 @@
 !> Rings around the lowest point of the sphere that take the pressure of the floor.
 !>
-!> The pressure is linear between neighbouring rings: ring i stands for the hat that is 1 at its angle and 0 at its
-!> neighbours'. Its height is the mean over that hat, so that force times fall is work. Loads on lines instead would
+!> The pressure is linear between neighboring rings: ring i stands for the hat that is 1 at its angle and 0 at its
+!> neighbors'. Its height is the mean over that hat, so that force times displacement is work. Loads on lines instead would
 !> converge with the first power of the spacing, and take many more harmonics.
 !>
-!> Rings that stick have two ways to move, down and inwards; each has its row of the falls, first that of height.
+!> Rings that stick have two degrees of freedom, down and inwards; each has its row of the mode shapes, first that of
+!> height.
 module thud_surface_rings
    use thud_constants, only: pi
    use thud_kinds, only: wp
@@ -21,12 +22,12 @@ module thud_surface_rings
    type :: surface_rings_type
       !> Distance of each from the axis: [n_ring].
       real(wp), allocatable :: radius(:)
-      !> Mean height of each hat below the centre: [n_ring].
+      !> Mean height of each hat below the center: [n_ring].
       real(wp), allocatable :: height(:)
-      !> Mean fall of each hat by unit U and by unit V of each harmonic: [n_way*n_ring, 2, 0:highest].
-      real(wp), allocatable :: fall(:, :, :)
-      !> Ways to move: 1, or 2 of rings that stick.
-      integer :: n_way = 1
+      !> Mean displacement of each hat by unit U and by unit V of each harmonic: [n_dof*n_ring, 2, 0:highest].
+      real(wp), allocatable :: shape_at_ring(:, :, :)
+      !> Degrees of freedom of a ring: 1, or 2 where it sticks.
+      integer :: n_dof = 1
    end type surface_rings_type
 
 contains
@@ -43,13 +44,13 @@ contains
       real(wp), dimension(0:highest) :: value, first, second
       real(wp), allocatable :: node(:), weight(:)
       real(wp) :: area(n_ring)
-      real(wp) :: width, angle, share
+      real(wp) :: width, angle, area_fraction
       integer :: i, j, k, n_node, row
 
       width = outermost_angle/(n_ring - 1)
       rings%radius = sin([((i - 1)*width, i=1, n_ring)])
-      rings%n_way = merge(2, 1, sticks)
-      allocate (rings%height(n_ring), rings%fall(rings%n_way*n_ring, 2, 0:highest), source=0.0_wp)
+      rings%n_dof = merge(2, 1, sticks)
+      allocate (rings%height(n_ring), rings%shape_at_ring(rings%n_dof*n_ring, 2, 0:highest), source=0.0_wp)
       area = 0.0_wp
       ! Enough for all digits of a hat times the highest harmonic.
       n_node = 4 + ceiling(highest*width/2)
@@ -60,23 +61,24 @@ contains
             angle = (i - 1 + (1 + node(k))/2)*width
             call get_legendre(cos(angle), value, first, second)
             do j = 0, 1
-               share = weight(k)*merge(1 + node(k), 1 - node(k), j == 1)*sin(angle)
-               area(i + j) = area(i + j) + share
-               rings%height(i + j) = rings%height(i + j) + share*cos(angle)
+               area_fraction = weight(k)*merge(1 + node(k), 1 - node(k), j == 1)*sin(angle)
+               area(i + j) = area(i + j) + area_fraction
+               rings%height(i + j) = rings%height(i + j) + area_fraction*cos(angle)
                ! P_n cos t and -dP_n/dt sin t.
-               row = rings%n_way*(i + j - 1) + 1
-               rings%fall(row, 1, :) = rings%fall(row, 1, :) + share*cos(angle)*value
-               rings%fall(row, 2, :) = rings%fall(row, 2, :) + share*sin(angle)**2*first
+               row = rings%n_dof*(i + j - 1) + 1
+               rings%shape_at_ring(row, 1, :) = rings%shape_at_ring(row, 1, :) + area_fraction*cos(angle)*value
+               rings%shape_at_ring(row, 2, :) = rings%shape_at_ring(row, 2, :) + area_fraction*sin(angle)**2*first
                if (.not. sticks) cycle
                ! -P_n sin t and -dP_n/dt cos t.
-               rings%fall(row + 1, 1, :) = rings%fall(row + 1, 1, :) - share*sin(angle)*value
-               rings%fall(row + 1, 2, :) = rings%fall(row + 1, 2, :) + share*sin(angle)*cos(angle)*first
+               rings%shape_at_ring(row + 1, 1, :) = rings%shape_at_ring(row + 1, 1, :) - area_fraction*sin(angle)*value
+               rings%shape_at_ring(row + 1, 2, :) = rings%shape_at_ring(row + 1, 2, :) + &
+                  area_fraction*sin(angle)*cos(angle)*first
             end do
          end do
       end do
       rings%height = rings%height/area
-      do i = 1, size(rings%fall, 1)
-         rings%fall(i, :, :) = rings%fall(i, :, :)/area(1 + (i - 1)/rings%n_way)
+      do i = 1, size(rings%shape_at_ring, 1)
+         rings%shape_at_ring(i, :, :) = rings%shape_at_ring(i, :, :)/area(1 + (i - 1)/rings%n_dof)
       end do
    end function new_surface_rings
 

@@ -1,0 +1,89 @@
+"""One drop by its keywords."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING
+
+from thud.base._schema import Ball, Drop, Sampling
+from thud.base.checks import refuse
+from thud.base.errors import PlausibilityWarning
+from thud.case.case import Case, new_model
+from thud.impact.compute import compute
+
+if TYPE_CHECKING:
+    from thud.base._schema import FloorOptions, ModelName, ModelOptions
+    from thud.impact.impact import Impact
+
+
+def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
+    ball: Ball | Case | None = None,
+    drop: Drop | None = None,
+    model: ModelName | ModelOptions | None = None,
+    *,
+    sample_rate: float | None = None,
+    duration: float | None = None,
+    substeps: int | None = None,
+    floor: FloorOptions | None = None,
+    **options: object,
+) -> Impact:
+    """Drop a ball on a floor.
+
+    Parameters
+    ----------
+    ball, drop
+        By default the rubber ball of the paper, from 1 m. `ball` may instead be a `Case`; then no
+        other argument is allowed.
+    model
+        ``"hollow_sphere"`` (the analytical model of the paper, the default), ``"modal_ball"`` (the
+        improved one), ``"finite_element"``, ``"measured_modes"``, ``"hunt_crossley"`` or
+        ``"two_mass"``; or an object of the classes below, which holds the options.
+    sample_rate
+        Samples per second, Hz.
+    duration
+        Length of the record, s; longer than the contact.
+    substeps
+        Integration steps per sampling interval.
+    floor
+        Floor on which the ball is dropped too, an object of `Rigid`, `InfinitePlate`, `Oscillator`,
+        `Plate`, `FloatingFloor`, `JoistFloor` or `MeasuredMobility`; the standards assess the force
+        on a rigid one.
+    **options
+        Options of the model, see `HollowSphere`, `ModalBall`, `FiniteElement`, `MeasuredModes`,
+        `HuntCrossley` and `TwoMass`; such as ``momentum_flux="retarding"``.
+
+    Returns
+    -------
+    Impact
+        Force, motion and scalar results.
+
+    Raises
+    ------
+    InputError
+        Names group, key, value and allowed range.
+    NumericalError
+        Where the drop leaves the range of the model or the steps are too coarse.
+
+    Warns
+    -----
+    PlausibilityWarning
+        As `Impact.warnings`.
+    """
+    sampling = {"sample_rate": sample_rate, "duration": duration, "substeps": substeps}
+    given = {name: value for name, value in sampling.items() if value is not None}
+    if isinstance(ball, Case):
+        if given or options or any(part is not None for part in (drop, model, floor)):
+            refuse("solve() takes a case or the parts of one, not both", "solve(case)")
+        case = ball
+    else:
+        case = Case(
+            ball=Ball() if ball is None else ball,
+            drop=Drop() if drop is None else drop,
+            model=new_model("hollow_sphere" if model is None else model, options),
+            sampling=Sampling(**given),  # type: ignore[arg-type]
+            floor=floor,
+        )
+    impact = compute(case)
+    for warning in impact.warnings:
+        warnings.warn(warning, PlausibilityWarning, stacklevel=2)
+    return impact
