@@ -272,10 +272,6 @@ def test_positions_of_small_rooms_keep_a_quarter_of_the_side() -> None:
             module._positions("a", places, sides, draw)  # noqa: SLF001
 
 
-def test_seeds_are_those_of_32_bits() -> None:
-    assert module._seed(2**32 - 1) == 2**32 - 1  # noqa: SLF001
-
-
 def test_each_mode_of_the_room_decays_as_the_nearest_third(found: thud.ModalRoom) -> None:
     times = np.linspace(0.4, 1.5, 12)
     prediction = replace(found.prediction, reverberation_time=times)

@@ -157,7 +157,7 @@ def test_grids_and_lists_need_values_that_fit() -> None:
     assert sampling.read_design({}, ("grid",), fits) == {"design": "grid"}
 
 
-def test_sets_of_saltelli_exchange_one_column_each() -> None:
+def test_samples_of_saltelli_exchange_one_column_each() -> None:
     """A, A with one column of B for each parameter, B: the points of Saltelli's design."""
     points = sampling.unit_samples("saltelli", 3, 8, 5, 0, 40).reshape(8, 5, 3)
     first, second = points[:, 0], points[:, 4]
@@ -292,7 +292,7 @@ def test_verdict_is_in_doubt_where_errors_reach_a_limit() -> None:
     assert verdict(failed, 0.2 * half * np.eye(10)[0])[1:] == (False, False)
 
 
-def test_range_of_a_surrogate_counts_doubtful_sets_twice() -> None:
+def test_range_of_a_surrogate_counts_doubtful_samples_twice() -> None:
     dataset = xr.Dataset(
         {"conforms": ("sample", [True, True, True, False, False, False, False, False]),
          "doubtful": ("sample", [True, False, False, True, True, False, False, False])}

@@ -297,7 +297,7 @@ def test_temperature_shifts_the_frequency_of_the_loss() -> None:
     )
 
 
-def test_sets_below_the_range_of_the_shift_have_no_results() -> None:
+def test_samples_below_the_range_of_the_shift_have_no_results() -> None:
     study: dict[str, Any] = {
         "fixed": {"model": "modal_ball", "damping_law": "rising"},
         "temperature": WLF,
@@ -308,7 +308,7 @@ def test_sets_below_the_range_of_the_shift_have_no_results() -> None:
     assert "NaN" in str(found["reason"].values[1])
 
 
-def test_failing_sets_say_why_and_disturb_no_other() -> None:
+def test_failing_samples_say_why_and_disturb_no_other() -> None:
     found = thud.sweep({"parameters": {"height": {"values": [1.0, -1.0, 1000.0]}}}).dataset
     assert found["status"].values.tolist() == [0, 1, 2]
     assert found["reason"].values[0] == ""
@@ -319,7 +319,7 @@ def test_failing_sets_say_why_and_disturb_no_other() -> None:
 
 
 @pytest.mark.parametrize("fixed", [{}, {"force": "floor", "source": "tyre"}])
-def test_sets_give_what_single_drops_give(fixed: dict[str, str]) -> None:
+def test_samples_give_what_single_drops_give(fixed: dict[str, str]) -> None:
     study = thud.read_study(
         {
             "fixed": fixed,
@@ -383,7 +383,7 @@ def test_fixed_model_is_that_of_the_case_or_has_its_defaults() -> None:
         assert getattr(study.case.model, "harmonics", None) == harmonics
 
 
-def test_many_sets_need_a_word(tmp_path: Path) -> None:
+def test_many_samples_need_a_word(tmp_path: Path) -> None:
     many: dict[str, Any] = {"name": "a", "design": {"kind": "random", "size": 200_000}}
     many["parameters"] = {"height": {"low": 0.5, "high": 1}}
     with pytest.raises(thud.InputError, match=naming("a", 200000, "hollow_sphere", "MB", "yes")):
@@ -711,7 +711,7 @@ def test_design_that_exceeds_the_memory_is_told(
     assert re.search(naming("[design] size", size), line)
 
 
-def test_sets_that_exceed_the_memory_are_told_before_they_are_computed() -> None:
+def test_samples_that_exceed_the_memory_are_told_before_they_are_computed() -> None:
     height = thud.Parameter(low=0.5, high=1.0, count=2**30)
     mass = thud.Parameter(low=2.4, high=2.6, count=2**30)
     with pytest.raises(thud.InputError, match=f"{2**60} samples"):

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 # From floors that a ball hardly leaves to floors that change a level by 0.01 dB, N s/m.
 RESISTANCES = np.geomspace(10**2.75, 1e6, 14)
-# Lines in a band of one third octave at 25 Hz.
+# Spectral lines in each band.
 _LINES_PER_BAND = 64
 # Part of the impact velocity below which the motion counts as that at maximum deflection.
 _SLOW_FRACTION = 0.25
@@ -55,7 +55,7 @@ class BallImpedance(Displayed):
     resistance : ndarray, shape (n_floor,)
         Resistances of the floors, ascending, N s/m.
     change : ndarray, shape (n_floor, n_band)
-        Level of the contact force less that of the blocked force, dB.
+        Level of the contact force − level of the blocked force, dB.
     estimate : ndarray, shape (n_floor, n_band)
         Complex impedance by the force on each floor, N s/m.
     tangent_mass, tangent_stiffness, tangent_damping : float

@@ -79,9 +79,9 @@ class MobilityFit(Displayed):
     ----------
     name : str
         Name, such as that of the file.
-    frequency : ndarray, shape (n_line,)
+    frequency : ndarray, shape (n_point,)
         Frequencies of the measurement, Hz.
-    measured : ndarray, shape (n_line,)
+    measured : ndarray, shape (n_point,)
         The measured mobility, m/(N s), complex.
     floor : MeasuredMobility
         The floor, for `solve` and cases.
@@ -112,7 +112,7 @@ class MobilityFit(Displayed):
 
     @property
     def error(self) -> float:
-        """Relative error, root of the mean square over the lines."""
+        """Relative error, root of the mean square over the frequency points."""
         return float(np.sqrt(np.mean(self._errors() ** 2)))
 
     def band_errors(self) -> dict[float, tuple[float, float]]:
@@ -143,8 +143,8 @@ class MobilityFit(Displayed):
         negative = np.mean(self.measured.real < 0)
         if negative > 0:
             result.append(
-                f"the measured real part is negative at {100 * negative:.2g} % of the lines, which "
-                "no passive floor has: the fit has none"
+                f"the measured real part is negative at {100 * negative:.2g} % of the frequencies, "
+                "which no passive floor has: the fit has none"
             )
         if self.error > _POOR:
             result.append(f"the fit misses the measurement by {100 * self.error:.0f} %")
@@ -190,7 +190,7 @@ class MobilityFit(Displayed):
         return mobility_fit(self)
 
     def _errors(self) -> Array:
-        """Return the relative errors of the lines."""
+        """Return the relative errors of the frequency points."""
         errors: Array = np.abs(self.mobility(self.frequency) / self.measured - 1)
         return errors
 
@@ -234,25 +234,25 @@ def fit_mobility(
     if quantity is not None:
         require_choice("quantity", quantity, get_args(Quantity))
     if isinstance(table, tuple):
-        name = place = "measurement"
+        name = label = "measurement"
         frequency, values = _checked(table)
     elif not isinstance(table, str | os.PathLike):
         refuse_value("table", table, "a file, or a tuple of frequencies, Hz, and complex values")
     else:
-        name, place = Path(table).stem, f"{table}"
+        name, label = Path(table).stem, f"{table}"
         frequency, values, known = _read(Path(table))
         if quantity and known and quantity != known:
             refuse(f"{table}: quantity = {quantity!r}, but the file holds {known!r}", repr(known))
         quantity = quantity or known
-    # A line at 0 Hz has no phase.
+    # The value at 0 Hz has no phase.
     frequency, values = frequency[frequency != 0], values[frequency != 0]
     values = values * (2j * np.pi * frequency) ** _POWERS[quantity or "mobility"]
-    if (count_of_lines := len(frequency)) <= 1:
-        refuse(f"{place}: {count_of_lines} lines above 0 Hz", "two or more")
+    if len(frequency) <= 1:
+        refuse(f"{label}: {len(frequency)} frequencies above 0 Hz", "two or more")
     if not (good := np.isfinite(values) & (values != 0)).all():
-        line = good.argmin()
-        shown = "not finite" if values[line] else "0"
-        refuse(f"{place}: the value at {frequency[line]:g} Hz is {shown}", "finite, not 0")
+        worst = good.argmin()
+        shown = "not finite" if values[worst] else "0"
+        refuse(f"{label}: the value at {frequency[worst]:g} Hz is {shown}", "finite, not 0")
     if order is not None:
         require_whole("order", order, 1, _ORDERS[-1])
     try:
@@ -260,7 +260,7 @@ def fit_mobility(
             return _chosen(name, frequency, values)
         return _fit(name, frequency, values, order)
     except ThudError as error:
-        message = f"{place}: {error}"
+        message = f"{label}: {error}"
         raise type(error)(message) from error
 
 

@@ -18,6 +18,7 @@ from scipy.signal import lfilter, sosfilt
 from thud.base._schema import Plate, Room
 from thud.base.bridge import ask
 from thud.base.checks import (
+    LARGEST_SEED,
     refuse,
     refuse_value,
     require_array,
@@ -41,15 +42,15 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     ComplexArray = NDArray[np.complex128]
 
-# Thirds 25 to 160 Hz, the first of the set.
+# Number of one-third-octave bands from 25 to 160 Hz.
 N_BAND = 9
 # Samples per second of the sound pressure, Hz: the filters of class 1 need four times 178 Hz.
 SAMPLE_RATE = 1024.0
-# Modes up to this frequency, Hz. The filter of 160 Hz lets 42 dB less through there.
+# Modes up to this frequency, Hz. The filter of 160 Hz attenuates by 42 dB there.
 MAX_FREQUENCY = 400.0
-# Least distance of random positions from all boundaries, m (ISO 16283-2).
+# Minimum distance of random positions from all boundaries, m (ISO 16283-2).
 BORDER = 0.5
-# Decay that is waited for, dB, and time constant of the Fast detector, s.
+# Decay within the record, dB, and time constant of the Fast detector, s.
 DECAY_RANGE, TIME_CONSTANT = 60.0, 0.125
 REFERENCE_PRESSURE = 2e-5
 # Maximum number of positions of either kind, of modes, and of modes times spectral lines: memory.
@@ -71,7 +72,7 @@ class ModalRoom(Displayed):
     size : tuple of float
         Length, width and height of the room, m.
     frequency : ndarray, shape (9,)
-        Rounded mid frequencies of the thirds 25 to 160 Hz.
+        Rounded mid frequencies of the one-third-octave bands 25 to 160 Hz.
     balls : ndarray, shape (n_ball, 2)
         Positions of the ball on the floor, m.
     microphones : ndarray, shape (n_microphone, 3)
@@ -119,9 +120,9 @@ class ModalRoom(Displayed):
         return result
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text, a third each."""
+        """Return header and rows of text, a band each."""
         head = (
-            "third, Hz", "mean, dB", "spread, dB", "least, dB", "largest, dB",
+            "band, Hz", "mean, dB", "spread, dB", "minimum, dB", "maximum, dB",
             "statistical, dB", "its spread, dB",
         )  # fmt: skip
         columns = (
@@ -156,7 +157,7 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
     microphones: int | ArrayLike = 32,
     seed: int = 0,
 ) -> ModalRoom:
-    """Compute the levels below a floor in the thirds 25 to 160 Hz by modes, position by position.
+    """Compute levels below a floor by modes, for each pair of positions, in bands up to 160 Hz.
 
     The floor is simply supported and covers the room, whose height is its volume over the area of
     the floor. Walls and ceilings of `room` are not part of it. Modes of the floor lose their energy
@@ -202,7 +203,8 @@ def positions_below(
     require_kind("floor", floor, Plate)
     assert isinstance(floor, Plate)  # noqa: S101 - for the type checker
     size = (floor.length, floor.width, room.volume / (floor.length * floor.width))
-    generator = np.random.default_rng(_seed(seed))
+    require_whole("seed", seed, 0, LARGEST_SEED)
+    generator = np.random.default_rng(seed)
     positions = _positions("balls", balls, size[:2], generator)
     receivers = _positions("microphones", microphones, size, generator)
     numbers, plate_frequency = _plate_modes(floor)
@@ -225,7 +227,9 @@ def positions_below(
         raise ModeCountError(message)
     mass = result["surface_mass"] * floor.length * floor.width / 4
     plate = _receptance(omega, plate_frequency, losses) * (1j * omega) / mass
-    stiffness = room.air_density * room.sound_speed**2 / (room.volume * _norms(orders))
+    # Means of the squares of the room's modes.
+    norms = np.prod(np.where(orders > 0, 0.5, 1.0), axis=1)
+    stiffness = room.air_density * room.sound_speed**2 / (room.volume * norms)
     air = _receptance(omega, room_frequency, decay) * (1j * omega) * stiffness[:, None]
     coupling = _coupling(orders, numbers, size[:2])
     shapes = np.prod(np.cos(np.pi * orders * receivers[:, None] / size), axis=2)
@@ -236,7 +240,8 @@ def positions_below(
         velocity = drive[:, None] * plate * force
         flow = coupling @ velocity
         sound = air * flow
-        levels.append(_fast_maxima(shapes @ sound))
+        pressure = np.fft.irfft(shapes @ sound, axis=1) * SAMPLE_RATE
+        levels.append(fast_levels(pressure).max(axis=2).T)
         # Energies by Parseval's theorem.
         plates.append(
             [
@@ -319,12 +324,6 @@ def _require_modes(what: str, count: int) -> None:
         raise ModeCountError(message)
 
 
-def _norms(orders: Array) -> Array:
-    """Return the means of the squares of the room's modes."""
-    norms: Array = np.prod(np.where(orders > 0, 0.5, 1.0), axis=1)
-    return norms
-
-
 def _coupling(orders: Array, numbers: Array, sides: tuple[float, ...]) -> Array:
     """Return the integrals of products of modes over the ceiling, m2, shape (n_room, n_plate).
 
@@ -368,18 +367,11 @@ def _spectrum(source: ImpactResult, duration: float) -> tuple[Array, ComplexArra
     return omega, np.fft.rfft(force, count)[: len(omega)] / source.sample_rate
 
 
-def _fast_maxima(spectrum: ComplexArray) -> Array:
-    """Return maximum Fast levels of the thirds, dB, shape (n_microphone, 9)."""
-    pressure = np.fft.irfft(spectrum, axis=1) * SAMPLE_RATE
-    result: Array = fast_levels(pressure).max(axis=2).T
-    return result
-
-
 def fast_levels(pressure: Array) -> Array:
     """Return what the Fast detector shows of sound pressure, dB, shape (9, n_record, n_sample).
 
     The pressure, Pa, has 1024 samples a second and shape (n_record, n_sample); it is filtered into
-    the thirds 25 to 160 Hz by filters of class 1.
+    the one-third-octave bands 25 to 160 Hz by filters of class 1.
     """
     kept = math.exp(-1 / (SAMPLE_RATE * TIME_CONSTANT))
     levels = []
@@ -391,7 +383,7 @@ def fast_levels(pressure: Array) -> Array:
 
 
 def _times(prediction: RoomPrediction, frequency: Array) -> Array:
-    """Return reverberation times at frequencies, s: those of the nearest thirds."""
+    """Return reverberation times at frequencies, s: those of the nearest bands."""
     distance = abs(np.log(np.maximum(frequency, 1.0)[:, None] / prediction.frequency))
     result: Array = prediction.reverberation_time[distance.argmin(axis=1)]
     return result
@@ -418,8 +410,3 @@ def _positions(
         limits = ", ".join(f"0 to {side:g}" for side in size)
         refuse_value(name, outside[0].tolist(), f"{limits} m")
     return positions
-
-
-def _seed(seed: int) -> int:
-    require_whole("seed", seed, 0, 2**32 - 1)
-    return seed

@@ -33,14 +33,14 @@ MIN_CHANGE = 0.1
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RoomPrediction(Displayed):
-    """Level that an impact causes in the room below: energy means over positions, in thirds.
+    """Level that an impact causes in the room below: energy means over positions, in bands.
 
     Attributes
     ----------
     floor, room : Plate and Room
         What it was predicted for.
     frequency : ndarray, shape (12,)
-        Rounded mid frequencies of the thirds 50 to 630 Hz.
+        Rounded mid frequencies of the one-third-octave bands 50 to 630 Hz.
     level : ndarray, shape (12,)
         Maximum Fast levels L_i,Fmax, dB re 20 uPa.
     time_of_maximum : ndarray, shape (12,)
@@ -52,9 +52,9 @@ class RoomPrediction(Displayed):
     reverberation_time : ndarray, shape (12,)
         Reverberation time of the room, s.
     floor_modes, room_modes : ndarray, shape (12,)
-        Expected number of modes in each third.
+        Expected number of modes in each band.
     few_modes : float
-        Number of modes below which the statistical answer of a third is doubtful.
+        Number of modes below which the statistical answer of a band is uncertain.
     mass_per_area : float
         Mass of the radiating plate over its area, kg/m2.
     spread : ndarray, shape (12,)
@@ -62,11 +62,11 @@ class RoomPrediction(Displayed):
         microphone, dB: theory of the variance by modal overlap (Langley and Cotoni 2004).
     octave_level, octave_time : ndarray, shape (4,)
         Maximum Fast levels of the octaves 63 to 500 Hz, dB, and their times, s: maxima of the sums
-        of their thirds.
+        of their bands.
     history_time : ndarray, shape (n_time,)
         Instants after the impact, s.
     history : ndarray, shape (n_time, 12)
-        What the Fast detector shows in each third then, dB.
+        What the Fast detector shows in each band then, dB.
     conductance : ndarray, shape (12,)
         Power that a force of unit mean square gives to the floor, m/(N s).
     source : Impact or Recording
@@ -137,7 +137,7 @@ class RoomPrediction(Displayed):
 
     @property
     def has_few_modes(self) -> NDArray[np.bool_]:
-        """Whether a third has few modes of floor or room, shape (12,)."""
+        """Whether a band has few modes of floor or room, shape (12,)."""
         return np.minimum(self.floor_modes, self.room_modes) < self.few_modes
 
     @property
@@ -161,20 +161,22 @@ class RoomPrediction(Displayed):
         return tuple(result)
 
     def difference(self, measured: RoomLevels) -> Array:
-        """Return measured less predicted level, dB, shape (12,), in the room as it is.
+        """Return measured − predicted level, dB, shape (12,), in the room as it is.
 
-        Raise InputError where the measured levels are not thirds.
+        Raise InputError where the measured levels are not in one-third-octave bands.
         """
         require_kind("measured", measured, RoomLevels)
         if measured.bands != THIRDS:
-            refuse("measured: the levels are octaves", "thirds, which the prediction has")
+            refuse(
+                "measured: the levels are octaves", "one-third-octave bands, as of the prediction"
+            )
         rated = np.isin(measured.frequency, self.frequency)
         return np.asarray(measured.level[rated] - self.level)
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text, a third each."""
+        """Return header and rows of text, a band each."""
         head = (
-            "third, Hz", "L_i,Fmax, dB", "standardized, dB", "spread, dB", "energy, mJ",
+            "band, Hz", "L_i,Fmax, dB", "standardized, dB", "spread, dB", "energy, mJ",
             "floor modes",
         )  # fmt: skip
         columns = (self.level, self.standardized, self.spread, 1e3 * self.energy, self.floor_modes)
@@ -204,7 +206,7 @@ def predict_level(
 ) -> RoomPrediction:
     """Predict the level that an impact causes in the room below.
 
-    Transient statistical energy analysis in thirds: the floor takes the energy of an infinite
+    Transient statistical energy analysis: the floor takes the energy of an infinite
     plate, loses and radiates it after ISO 12354-1, the room decays with its reverberation time, and
     the Fast detector shows its maximum. The force is that on the floor, where the model knows it:
     on floors that the impact has not seen, the source is dropped once more.

@@ -242,7 +242,7 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     path
         Columns with a header row: ``frequency``, Hz; ``background``, dB, and
         ``reverberation_time``, s, where they are known; every other column holds the levels of a
-        position, dB. The bands are the octaves or thirds that a rating needs, and more if wanted.
+        position, dB. The bands are those that a rating needs, or more.
     volume
         Volume of the room, m3.
 
@@ -359,7 +359,7 @@ def _nominal(frequency: float, path: object) -> float:
             return float(f"{best:.3g}")
     return refuse(
         f"{path}: frequency = {frequency:g} Hz is not a mid frequency",
-        "those of octaves or thirds, such as 50, 63, 80",
+        "those of octave or one-third-octave bands, such as 50, 63, 80",
     )
 
 

@@ -124,20 +124,11 @@ class Flank:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Posterior of the first touch of a flank.
+    """Posterior of the first touch of a flank, or with `release` of the end of a pulse.
 
-    Attributes
-    ----------
-    time : ndarray, shape (n_time,)
-        Uniform times of first touch, s.
-    kinds : ndarray, shape (n_kind,)
-        Possible kinds of the flank, as indices of `KINDS`.
-    weight : ndarray, shape (n_kind, n_time)
-        Probabilities of the times by kind.
-    factors : ndarray, shape (n_kind, n_time, n_column, n_column)
-        Factors of the information on the shapes; their last row is the data.
-    release : bool
-        Whether this is the end of a pulse.
+    `kinds` are indices of `KINDS`, and times are uniform, s. By kind and time it has probabilities,
+    [n_kind, n_time], and factors of the information on the shapes, whose last row is the data,
+    [n_kind, n_time, n_column, n_column].
     """
 
     time: NDArray[np.float64]

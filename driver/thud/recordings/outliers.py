@@ -26,14 +26,8 @@ ROUNDING = 1e-9
 class Outlier:
     """A drop that differs from the others by more than chance: marked, never excluded.
 
-    Attributes
-    ----------
-    name, quantity : str
-        Name of the drop, and the quantity in which it differs.
-    value : float
-        Its value.
-    score, critical : float
-        Deviation from the mean in standard deviations, and the largest one that chance explains.
+    Name of the drop, quantity and value, deviation from the mean in standard deviations, and the
+    largest one that chance explains.
     """
 
     name: str

@@ -41,14 +41,7 @@ RINGING = 2.0
 class Plate:
     """A force plate as a mass on a spring, whose deformation is measured.
 
-    Attributes
-    ----------
-    frequency : float
-        First resonance, Hz.
-    quality : float
-        Quality factor of the resonance.
-    frequency_uncertainty : float
-        Relative standard uncertainty of the resonance.
+    First resonance, Hz, its quality factor, and the relative standard uncertainty of the resonance.
     """
 
     frequency: float
@@ -98,16 +91,9 @@ class Plate:
 
 @dataclass(frozen=True)
 class PlateCheck:
-    """One demand on the force plate.
+    """A demand on the force plate, whether it is met, None if unknown, and the reason.
 
-    Attributes
-    ----------
-    demand : str
-        ``"flat above"`` (0.2 Hz), ``"flat below"`` (1000 Hz), ``"range"`` or ``"linear"``.
-    met : bool or None
-        Whether it is met; None if unknown.
-    sentence : str
-        Reason, with numbers.
+    Demands are ``"flat above"`` (0.2 Hz), ``"flat below"`` (1000 Hz), ``"range"`` and ``"linear"``.
     """
 
     demand: str

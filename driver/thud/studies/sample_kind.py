@@ -10,8 +10,7 @@ from thud.base._schema import KEYS
 from thud.base.checks import refuse, require_choice
 from thud.case.keys import DENSITY, OF_FILES, key_owners, value_in
 from thud.studies.backends import checked_backend
-from thud.studies.blocks import read_identity, result_names
-from thud.studies.computing import compute_samples
+from thud.studies.blocks import compute_samples, read_identity, result_names
 from thud.studies.dataset import disk_space
 from thud.studies.directory import FORMATS
 from thud.studies.kind import Kind

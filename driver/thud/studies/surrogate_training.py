@@ -16,8 +16,7 @@ from thud.base.errors import InputError, NumericalError
 from thud.base.extras import require_extra
 from thud.case.keys import find_key
 from thud.impact.quantities import LEVELS, SCALAR_QUANTITIES
-from thud.studies.blocks import read_identity, result_names
-from thud.studies.computing import compute_samples
+from thud.studies.blocks import compute_samples, read_identity, result_names
 from thud.studies.directory import require_version
 from thud.studies.parameter import Parameter
 from thud.studies.samples import SampleStudy

@@ -13,7 +13,7 @@ module thud_result_bundle
    implicit none (type, external)
    private
 
-   public :: add_compression, add_history, add_warnings, add_results, add_room_level
+   public :: add_compression, add_history, add_results, add_room_level, add_warnings
 
 contains
 

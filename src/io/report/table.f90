@@ -15,7 +15,7 @@ module thud_table
    implicit none (type, external)
    private
 
-   public :: get_defaults_line, get_compression_table, get_force_title, get_modes_table, get_span_row, get_table
+   public :: get_compression_table, get_defaults_line, get_force_title, get_modes_table, get_span_row, get_table
    public :: is_peak_of_other
 
 contains

@@ -27,7 +27,7 @@ module thud_modal_ball
    use thud_sphere_modes, only: basis_type, family_type, get_family, get_static_family, new_basis
    use thud_surface_rings, only: new_surface_rings, outermost_angle, surface_rings_type
    use thud_text, only: to_text
-   use thud_theory_limit, only: get_gravity_limit, get_wall_limits, theory_limit_type
+   use thud_validity_limit, only: get_gravity_limit, get_wall_limits, validity_limit_type
    implicit none (type, external)
    private
 
@@ -49,7 +49,7 @@ module thud_modal_ball
       procedure, pass(options) :: compress
       procedure, pass(options) :: get_cost
       procedure, pass(options) :: get_paper_modulus
-      procedure, pass(options) :: get_theory_limits
+      procedure, pass(options) :: get_validity_limits
    end type modal_ball_type
 
 contains
@@ -86,31 +86,31 @@ contains
 
    !> Limits of linear modes, and of what rings and harmonics resolve: beyond them the octave of 500 Hz is off by more than
    !> about 0.5 dB (docs/modal_ball.md).
-   function get_theory_limits(ball, drop, options, sampling, history) result(limits)
+   function get_validity_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
       class(modal_ball_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(force_history_type), intent(in) :: history
-      type(theory_limit_type), allocatable :: limits(:)
+      type(validity_limit_type), allocatable :: limits(:)
       real(wp) :: angle
 
       angle = asin(min(1.0_wp, maxval(history%model_history(:, 1))/ball%outer_radius))
       limits = [get_wall_limits(ball, history), &
-         theory_limit_type('sampling', 'sample_rate in Hz times substeps', &
+         validity_limit_type('sampling', 'sample_rate in Hz times substeps', &
          sampling%sample_rate*real(sampling%substeps, wp), lowest=16000.0_wp, &
          reason='longer steps leave fast modes out'), &
-         theory_limit_type('modal_ball', 'radial_modes', real(options%radial_modes, wp), lowest=5.0_wp, &
+         validity_limit_type('modal_ball', 'radial_modes', real(options%radial_modes, wp), lowest=5.0_wp, &
          reason='with fewer the level at 500 Hz is off, by up to 13 dB'), &
-         theory_limit_type('modal_ball', 'rings in contact', angle/outermost_angle*options%rings, lowest=14.0_wp, &
+         validity_limit_type('modal_ball', 'rings in contact', angle/outermost_angle*options%rings, lowest=14.0_wp, &
          reason='fewer rings do not resolve the contact'), &
-         theory_limit_type('modal_ball', 'harmonics times the angle of the contact', options%harmonics*angle, &
+         validity_limit_type('modal_ball', 'harmonics times the angle of the contact', options%harmonics*angle, &
          lowest=11.0_wp, reason='fewer harmonics do not resolve the contact'), &
-         theory_limit_type('modal_ball', 'harmonics times wall_thickness over outer_radius', &
+         validity_limit_type('modal_ball', 'harmonics times wall_thickness over outer_radius', &
          options%harmonics*ball%wall_thickness/ball%outer_radius, lowest=2.0_wp, &
          reason='fewer harmonics do not resolve a wall so thin')]
       if (.not. options%contact_gravity) limits = [limits, get_gravity_limit(drop, history)]
-   end function get_theory_limits
+   end function get_validity_limits
 
    !> Force on each of two plates in a quasi-static compression.
    subroutine compress(ball, options, deflection, force, error)
@@ -202,7 +202,6 @@ contains
       !> Modes.
       class(modal_ball_options_type), intent(in) :: options
       type(surface_rings_type), intent(in) :: rings
-      !> Length of a step, s.
       real(wp), intent(in) :: interval
       !> Gets frequencies, harmonics and shapes of the modes.
       type(mode_step_type), intent(inout) :: step
@@ -254,7 +253,6 @@ contains
    subroutine march(ball, sampling, interval, rings, step, contact, state, history, error)
       type(ball_type), intent(in) :: ball
       type(sampling_type), intent(in) :: sampling
-      !> Length of a step, s.
       real(wp), intent(in) :: interval
       type(surface_rings_type), intent(in) :: rings
       type(mode_step_type), intent(in) :: step

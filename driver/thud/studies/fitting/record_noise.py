@@ -116,7 +116,7 @@ class BackgroundRecord:
 
     @property
     def freedom(self) -> int:
-        """Number of independent values in the band, less the offset."""
+        """Number of independent values in the band − 1 for the offset."""
         return int(2 * self.below * self.seconds) - 1
 
     @property

@@ -129,7 +129,7 @@ class Fit(Estimates):
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Residuals less parameters and nuisance parameters."""
+        """Number of residuals − number of parameters, nuisance parameters included."""
         absorbed = sum(target.misfit.absorbed for target in self.targets)
         return len(self.residuals) - len(self.names) - absorbed
 
