@@ -41,7 +41,7 @@ module thud_command_line
       character(len=:), allocatable :: output
       !> Replace also files that thud has not written.
       logical :: replace = .false.
-      !> Write also the channels of the model.
+      !> Write also further quantities of the model against time.
       logical :: all = .false.
       !> Path of a table of samples, empty where not given.
       character(len=:), allocatable :: samples
@@ -103,7 +103,7 @@ contains
       end if
    end subroutine execute
 
-   !> Writes to the screen; a full output is an error, and one that nobody reads is none.
+   !> Writes to the screen; a full disk is an error, a closed pipe is none.
    subroutine write_line(descriptor, text, exit_code)
       !> `standard_output` or `standard_error`.
       integer, intent(in) :: descriptor
@@ -197,7 +197,7 @@ contains
       !> Number of the argument, of the option before and of its value after.
       integer, intent(inout) :: i
       character(len=*), intent(in) :: option
-      !> What it takes.
+      !> Its allowed values.
       character(len=*), intent(in) :: allowed
       character(len=:), allocatable, intent(inout) :: value
       !> There is none.
@@ -253,8 +253,8 @@ contains
          //'  -o, --output DIR     directory for the results (default: outputs/<case>, with'//newline &
          //'                       --samples outputs/<case>_samples)'//newline &
          //'  --replace            replace also files that thud has not written'//newline &
-         //'  --all                write also channels.csv: energies and other quantities of'//newline &
-         //'                       the model against time'//newline &
+         //'  --all                write also model_histories.csv: energies and other'//newline &
+         //'                       quantities of the model against time'//newline &
          //'  --samples TABLE.csv  a header row of keys and one drop, a sample, in each'//newline &
          //'                       further row; all other keys are those of CASE.nml'//newline &
          //'  --threads N          threads for the samples (default: 1)'//newline &

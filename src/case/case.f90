@@ -1,4 +1,4 @@
-!> A case: everything that one run needs. Which keys there are, which of them a case uses, and what it refuses.
+!> A case, the input of one run: its keys, which of them it uses, and their checks.
 module thud_case
    use thud_ball, only: ball_type, get_ball_fields
    use thud_band, only: band_choices, band_type
@@ -24,7 +24,7 @@ module thud_case
 
    !> Input of one run.
    type :: case_type
-      !> Groups that were left out of the text of the case, whose defaults hold: ` &drop &model`.
+      !> Groups that the text of the case leaves out, whose defaults apply: ` &drop &model`.
       character(len=32) :: left_out = ''
       !> Name of the case, also of its output directory.
       character(len=name_length) :: name = ''
@@ -32,34 +32,34 @@ module thud_case
       logical :: has_impact = .true.
       !> Free modes are asked for, by the group `&modes`.
       logical :: has_modes = .false.
-      !> The drop on a floor that may move is asked for, by the group `&floor`.
+      !> The drop on a mobile floor is asked for, by the group `&floor`.
       logical :: has_floor = .false.
       !> The level in the room below it is asked for, by the group `&room`.
       logical :: has_room = .false.
       !> Number of free modes, and their mesh.
       type(modes_options_type) :: modes
-      !> A slow compression is asked for, by the group `&compression`.
+      !> A quasi-static compression is asked for, by the group `&compression`.
       logical :: has_compression = .false.
-      !> How far, in how many points, and what the gas does.
+      !> Its options.
       type(compression_options_type) :: compression
       type(ball_type) :: ball
       type(drop_type) :: drop
       !> Source model, one of `model_names`.
       character(len=name_length) :: model = model_names(1)
-      !> Every model with its options; those of the chosen one count: [n_model].
+      !> Every model with its options, of which those of the chosen model are used: [n_model].
       type(model_slot_type), allocatable :: models(:)
       type(sampling_type) :: sampling
       !> Method of the levels.
       character(len=name_length) :: level_method = 'exact'
       !> Bands of the levels: octave, third or both.
       character(len=name_length) :: bands = 'octave'
-      !> Force whose levels, peak and verdict count: that on the floor, or the elastic one, the paper's ball force.
+      !> Assessed force: `floor`, or `elastic`, the ball force of the paper.
       character(len=name_length) :: level_force = 'floor'
       !> Source whose limits apply.
       character(len=name_length) :: source = 'rubber_ball'
       !> Floor, one of `floor_names`.
       character(len=name_length) :: floor = floor_names(1)
-      !> Every floor with its options; those of the chosen one count: [n_floor].
+      !> Every floor with its options, of which those of the chosen floor are used: [n_floor].
       type(floor_slot_type), allocatable :: floors(:)
       !> Room below.
       type(room_type) :: room
@@ -75,19 +75,19 @@ contains
       call new_floors(case%floors)
    end subroutine new_case
 
-   !> Number of the chosen model.
+   !> Index of the chosen model.
    pure function get_model_number(case) result(number)
       type(case_type), intent(in) :: case
-      !> Its place among the models; 0 where there is no such model.
+      !> Its index among the models; 0 if there is no such model.
       integer :: number
 
       number = findloc(model_names == case%model, .true., dim=1)
    end function get_model_number
 
-   !> Number of the chosen floor.
+   !> Index of the chosen floor.
    pure function get_floor_number(case) result(number)
       type(case_type), intent(in) :: case
-      !> Its place among the floors; 0 where there is no such floor.
+      !> Its index among the floors; 0 if there is no such floor.
       integer :: number
 
       number = findloc(floor_names == case%floor, .true., dim=1)
@@ -116,7 +116,7 @@ contains
          in_group('levels', [ &
          choice_field('method', case%level_method, 'method of the levels', level_methods), &
          choice_field('bands', case%bands, 'bands of levels.csv', band_choices), &
-         choice_field('force', case%level_force, 'force whose levels, peak and verdict count', &
+         choice_field('force', case%level_force, 'assessed force: levels, peak force and verdict are of it', &
          [character(len=8) :: 'floor', 'elastic'])]), &
          in_group('limits', [choice_field('source', case%source, 'source whose limits apply', source_names)]), &
          owned_by('floor', in_group('floor', [choice_field('name', case%floor, 'floor under the source', floor_names)]))]
@@ -126,7 +126,7 @@ contains
       fields = [fields, owned_by('room', in_group('room', get_room_fields(case%room)))]
    end function get_fields
 
-   !> Whether a key does something: for the impact, its model, the free modes, the slow compression, floor or room.
+   !> Whether a case uses a key: for the impact, its model, the free modes, the compression, the floor or the room.
    pure elemental function is_used(case, field) result(used)
       type(case_type), intent(in) :: case
       type(field_type), intent(in) :: field
@@ -148,7 +148,7 @@ contains
       end if
    end function is_used
 
-   !> The keys that do something, without lists that have no entries.
+   !> The keys that a case uses, without empty lists.
    function get_active_fields(case) result(fields)
       !> The case that the fields read and set.
       type(case_type), intent(in), target :: case
@@ -160,7 +160,7 @@ contains
       fields = pack(fields, [(is_used(case, fields(i)) .and. .not. fields(i)%is_empty(), i=1, size(fields))])
    end function get_active_fields
 
-   !> Refuses a case whose values lie outside their ranges or do not fit each other.
+   !> Refuses a case whose values are out of range or contradict each other.
    subroutine check_case(case, error)
       type(case_type), intent(in), target :: case
       !> Names group, key, value and allowed range.
@@ -181,10 +181,10 @@ contains
       end associate
    end subroutine check_case
 
-   !> Refuses a floor whose options do not fit each other, or over a room into which it cannot radiate.
+   !> Refuses a floor whose options contradict each other, or which cannot radiate into the room below.
    subroutine check_floor(case, error)
       type(case_type), intent(in) :: case
-      !> Names group, key, value and what is allowed.
+      !> Names group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
       type(band_type), allocatable :: bands(:)
       type(plate_type) :: plate

@@ -24,7 +24,7 @@ module thud_compute
    public :: assessment_type, compress_case, compute, compute_floor, compute_impact, drop_on_floor, get_assessed_force
    public :: get_cost, impact_type, is_conforming, predict_room_level, results_type, scope_type
 
-   !> Memory that a sample of a record takes, its transforms and text included, bytes; measured.
+   !> Memory for one sample of a record, its transforms and text included, bytes; measured.
    real(wp), parameter :: sample_memory = 600.0_wp
 
    !> What is computed of that which a case asks for.

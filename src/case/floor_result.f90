@@ -36,7 +36,7 @@ contains
       type(case_type), intent(in) :: case
       !> The drop on the floor.
       type(force_history_type), intent(in) :: contact
-      !> Energies and velocities of points are wanted, too.
+      !> Compute also energies and velocities of points.
       logical, intent(in) :: energies
       type(floor_result_type), intent(out) :: found
       !> A level cannot be computed, or the floor has no such point.
@@ -74,7 +74,7 @@ contains
       real(wp), intent(in) :: force(:)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
-      !> Place of the point, m.
+      !> Position of the point, m.
       real(wp), intent(in) :: x, y
       !> Velocity downwards, m/s: [n_sample].
       real(wp), intent(out) :: velocity(:)

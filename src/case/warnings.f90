@@ -29,7 +29,7 @@ module thud_warnings
    !> Poisson's ratios of rubbers, also of filled ones: [2].
    real(wp), parameter :: rubber_ratio(2) = [0.45_wp, 0.5_wp]
 
-   !> Two moduli count as the same within this part.
+   !> Relative difference below which two moduli are taken as the same.
    real(wp), parameter :: same_modulus = 0.02_wp
 
    !> Levels over all frequencies of a ball and a tyre that conform, dB re 1 N and 1 s: 4.4 dB, as of the flagship and of
@@ -42,7 +42,7 @@ module thud_warnings
    !> Outer edges of the octaves 31.5 and 500 Hz, Hz: [2].
    real(wp), parameter :: standard_band(2) = [22.4_wp, 707.0_wp]
 
-   !> Level of an octave below that over all frequencies at which rounding counts, dB.
+   !> Octave level below the level over all frequencies at which rounding errors matter, dB.
    real(wp), parameter :: max_decline = 120.0_wp
 
    !> Error of a coefficient of restitution.
@@ -98,7 +98,7 @@ contains
       end associate
       do i = 1, size(limits)
          if (.not. is_outside(limits(i))) cycle
-         ! One sentence on a drop, on whichever floor.
+         ! One warning for both floors.
          if (any(index(warnings, trim(limits(i)%quantity)//' is ') > 0)) cycle
          call add(warnings, get_limit_message(limits(i)))
       end do
@@ -127,7 +127,7 @@ contains
          //' Hz on hold less than 1e-12 of the energy of the force: rounding counts in their levels')
    end subroutine add_level_warnings
 
-   !> Adds a warning on octaves of the standard in which the floor is not what it claims to be.
+   !> Adds a warning on octaves of the standard in which the model of the floor is not valid.
    subroutine add_floor_warning(case, warnings)
       !> A case with a floor.
       type(case_type), intent(in) :: case
@@ -181,13 +181,13 @@ contains
       end associate
    end subroutine add_ball_warnings
 
-   !> Adds a sentence.
-   pure subroutine add(warnings, sentence)
+   !> Adds a warning.
+   pure subroutine add(warnings, message)
       !> Messages: [n].
       character(len=warning_length), allocatable, intent(inout) :: warnings(:)
-      character(len=*), intent(in) :: sentence
+      character(len=*), intent(in) :: message
 
-      warnings = [character(len=warning_length) :: warnings, sentence]
+      warnings = [character(len=warning_length) :: warnings, message]
    end subroutine add
 
 end module thud_warnings

@@ -216,9 +216,10 @@ contains
       call clear_flight(history)
       history%floor_work = impact%motion%work
       history%peak_force = impact%peak_force
-      history%scalar_name = [character(len=len(history%scalar_name)) :: history%scalar_name, 'contacts']
-      history%scalar_unit = [character(len=len(history%scalar_unit)) :: history%scalar_unit, '']
-      history%scalar = [history%scalar, real(impact%n_contact, wp)]
+      history%model_quantity_name = [character(len=len(history%model_quantity_name)) :: &
+         history%model_quantity_name, 'contacts']
+      history%model_quantity_unit = [character(len=len(history%model_quantity_unit)) :: history%model_quantity_unit, '']
+      history%model_quantity = [history%model_quantity, real(impact%n_contact, wp)]
       if (.not. source%cap_mass_per_deflection > 0.0_wp) return
       ! The cap that rests on the floor resists its acceleration.
       n = size(history%component_name)

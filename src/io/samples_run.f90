@@ -48,7 +48,7 @@ contains
       character(len=*), intent(in) :: output
       !> Files that thud has not written are replaced, too.
       logical, intent(in) :: replace
-      !> Table, verdict and place of the results.
+      !> Table, verdict and directory of the results.
       type(outcome_type), intent(out) :: outcome
       !> The run failed; nothing was written.
       type(error_type), allocatable, intent(out) :: error
@@ -149,7 +149,7 @@ contains
    pure subroutine add(tally, sweep, force)
       type(tally_type), intent(inout) :: tally
       type(sweep_type), intent(in) :: sweep
-      !> Number of the force whose levels are summed up.
+      !> Index of the force whose levels are summarized.
       integer, intent(in) :: force
       real(wp) :: values(octave_count + 1)
       integer :: i

@@ -320,9 +320,9 @@ contains
       center = self%get_center(state)
       history%deflection(i) = center(1)
       history%velocity(i) = center(2)
-      history%channel(i, :) = state([at_belt, at_rim])
+      history%model_history(i, :) = state([at_belt, at_rim])
       if (allocated(history%floor_displacement)) then
-         history%channel(i, :) = history%channel(i, :) + history%floor_displacement(i)
+         history%model_history(i, :) = history%model_history(i, :) + history%floor_displacement(i)
       end if
       history%component(i, :) = get_components(self, state)
       history%elastic_force(i) = sum(history%component(i, :))

@@ -1,4 +1,4 @@
-!> Drops of a case as parameter sets of the shell model, which are computed in batches (`thud_ensemble`).
+!> Samples of a case as parameter sets of the shell model, which are computed in batches (`thud_ensemble`).
 module thud_batch_sets
    use thud_case, only: case_type, get_active_fields, get_model_number
    use thud_column, only: column_type
@@ -13,11 +13,11 @@ module thud_batch_sets
 
 contains
 
-   !> Whether drops can be computed in batches: by the shell model, with exact levels, if they differ in nothing
-   !> but ball, drop and the options of the model.
+   !> Whether samples can be computed in batches: by the shell model, with exact levels, on a rigid floor, if they
+   !> differ only in ball, drop and options of the model.
    function suits_batch(case, columns) result(suits)
       type(case_type), intent(in), target :: case
-      !> In what the drops differ: [n_column].
+      !> Keys in which the samples differ: [n_column].
       type(column_type), intent(in) :: columns(:)
       logical :: suits
       type(field_type), allocatable :: fields(:)
@@ -27,7 +27,7 @@ contains
       select type (model => case%models(get_model_number(case))%model)
       type is (hollow_sphere_type)
          allocate (fields, source=get_active_fields(case))
-         fields = fields(columns%place)
+         fields = fields(columns%field)
          suits = case%level_method == 'exact' .and. .not. case%has_floor .and. all([(fields(i)%group == 'ball' &
             .or. fields(i)%group == 'drop' .or. fields(i)%owner == case%model, i=1, size(fields))])
       end select
@@ -37,7 +37,7 @@ contains
    subroutine fill_sets(case, columns, values, sets)
       !> The case, which gives what is not in the columns.
       type(case_type), intent(in), target :: case
-      !> In what the drops differ: [n_column].
+      !> Keys in which the samples differ: [n_column].
       type(column_type), intent(in) :: columns(:)
       !> Their values: [n_column, n_drop].
       real(wp), intent(in) :: values(:, :)
@@ -45,7 +45,7 @@ contains
       type(set_type), intent(out) :: sets(:)
       type(set_type), target :: set
       type(field_type), allocatable :: fields(:), set_fields(:)
-      integer :: place(size(columns))
+      integer :: index_of(size(columns))
       integer :: i, j
 
       set%ball = case%ball
@@ -53,15 +53,15 @@ contains
       allocate (fields, source=get_active_fields(case))
       allocate (set_fields, source=get_set_fields(set))
       ! The only other key is the choice of the flux term.
-      place = [(findloc(set_fields%key == fields(columns(j)%place)%key, .true., dim=1), j=1, size(columns))]
+      index_of = [(findloc(set_fields%key == fields(columns(j)%field)%key, .true., dim=1), j=1, size(columns))]
       select type (model => case%models(get_model_number(case))%model)
       type is (hollow_sphere_type)
          set%flux = findloc(flux_choices == model%momentum_flux, .true., dim=1)
       end select
       do i = 1, size(sets)
          do j = 1, size(columns)
-            if (place(j) > 0) then
-               set_fields(place(j))%real_value = values(j, i)
+            if (index_of(j) > 0) then
+               set_fields(index_of(j))%real_value = values(j, i)
             else
                set%flux = nint(values(j, i))
                ! A number that is not whole chooses nothing.

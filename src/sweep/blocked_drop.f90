@@ -11,7 +11,7 @@ module thud_blocked_drop
 
    public :: blocked_type, solve_blocked
 
-   !> The drop on a rigid floor that serves again while only floor and room differ.
+   !> The latest drop on a rigid floor, reused while only floor and room differ.
    type :: blocked_type
       !> All numbers that it depends on; not allocated before the first: [n_number].
       real(wp), allocatable :: cache_key(:)

@@ -1,4 +1,4 @@
-!> Columns of a table of drops: the keys in whose values they differ.
+!> Columns of a table of samples: the keys in which they differ.
 module thud_column
    use thud_case, only: case_type, get_active_fields
    use thud_error, only: error_type, input_error
@@ -10,14 +10,14 @@ module thud_column
 
    public :: column_type, find_columns
 
-   !> Groups in whose keys drops may not differ: names, and what a run writes.
+   !> Groups in whose keys samples may not differ.
    character(len=key_length), parameter :: common_groups(*) = [character(len=key_length) :: &
       'case', 'model', 'modes', 'compression', 'output', 'floor']
 
-   !> A key in whose values drops differ.
+   !> A key in which samples differ.
    type :: column_type
-      !> Its place among the keys that the case uses.
-      integer :: place = 0
+      !> Its index among the keys that the case uses.
+      integer :: field = 0
       !> Which entry of a list; 0 for keys that are no lists.
       integer :: entry = 0
    end type column_type
@@ -41,19 +41,19 @@ contains
       integer :: i, j
 
       allocate (fields, source=get_active_fields(case))
-      ! Levels of all drops have the same bands.
+      ! All samples have levels in the same bands.
       possible = [(.not. any(common_groups == fields(i)%group) .and. fields(i)%owner /= 'modes' &
          .and. fields(i)%key /= 'bands', i=1, size(fields))]
       allocate (columns(size(names)))
       do i = 1, size(names)
          call split_name(names(i), group, key, columns(i)%entry, known)
          ! Of keys of one name the first is meant, that of the source, unless a group is named.
-         columns(i)%place = findloc(possible .and. fields%key == key .and. (group == '' .or. fields%group == group), &
+         columns(i)%field = findloc(possible .and. fields%key == key .and. (group == '' .or. fields%group == group), &
             .true., dim=1)
          nullify (list)
-         known = known .and. columns(i)%place > 0
-         if (columns(i)%place > 0) then
-            list => fields(columns(i)%place)%list_value
+         known = known .and. columns(i)%field > 0
+         if (columns(i)%field > 0) then
+            list => fields(columns(i)%field)%list_value
             if (associated(list)) then
                known = known .and. columns(i)%entry >= 1 .and. columns(i)%entry <= list%count
             else
@@ -62,11 +62,11 @@ contains
          end if
          if (.not. known) then
             call get_suggestion(trim(names(i)), pack(fields%key, possible), suggestion)
-            error = input_error(quoted(names(i))//' is not a key of drops'//suggestion//'; allowed: ' &
+            error = input_error(quoted(names(i))//' is not a key of samples'//suggestion//'; allowed: ' &
                //join_quoted(pack(fields%key, possible)))
-            if (columns(i)%place > 0 .and. associated(list)) error = input_error(quoted(names(i)) &
+            if (columns(i)%field > 0 .and. associated(list)) error = input_error(quoted(names(i)) &
                //' is not an entry of the list; allowed: '//trim(key)//'(1) to '//trim(key)//'('//to_text(list%count)//')')
-         else if (any([(columns(j)%place == columns(i)%place .and. columns(j)%entry == columns(i)%entry, j=1, i - 1)])) then
+         else if (any([(columns(j)%field == columns(i)%field .and. columns(j)%entry == columns(i)%entry, j=1, i - 1)])) then
             error = input_error(quoted(names(i))//' is given twice; allowed: once')
          end if
          if (allocated(error)) return

@@ -1,9 +1,8 @@
-!> An ensemble from sets to levels and verdicts: blocks of drops, each with its levels while its forces
-!> are in cache, blocks shared out among threads.
+!> Many drops of the shell model: blocks of them are shared among threads, and levels of a block are computed while its
+!> forces are in cache.
 !>
-!> Every number of a set comes from its own lane of matrices and vectors of fixed shape, or, of levels of a
-!> long contact, from its own record: it does not depend on the number of threads, on the other sets or on
-!> the place among them.
+!> Every number of a set comes from its own column of arrays of fixed shape, or, for levels of a long contact, from
+!> its own record: it does not depend on the number of threads, on the other sets or on its index.
 module thud_ensemble
    use thud_band, only: band_type, get_octaves, octave_count
    use thud_band_projection, only: band_projection_type, get_band_energies, get_class_window, get_window_class, &
@@ -44,11 +43,11 @@ module thud_ensemble
       real(wp), allocatable :: force(:)
       !> Folded forces: [2 block_size n_row].
       real(wp), allocatable :: folded(:)
-      !> Number of the last sample that is not zero.
+      !> Index of the last sample that is not zero.
       integer :: last_sample = 0
       !> Criteria of the standards, one set's values at a time.
       type(criterion_type) :: criteria(criterion_count)
-      !> What keeps the thread from going on.
+      !> Error that stops the thread.
       type(error_type), allocatable :: error
    end type workspace_type
 
@@ -87,16 +86,16 @@ contains
    end function are_alike
 
    !> Quantities, levels and verdicts of all sets.
-   subroutine solve_ensemble(sets, sampling, source, threads, judged, projections, computed, quantity, levels, met, forces, &
-      error)
+   subroutine solve_ensemble(sets, sampling, source, threads, with_levels, projections, computed, quantity, levels, met, &
+      forces, error)
       !> The sets: [n_set].
       type(set_type), intent(in) :: sets(:)
       type(sampling_type), intent(in) :: sampling
       !> Source whose limits apply.
       character(len=*), intent(in) :: source
       integer, intent(in) :: threads
-      !> Levels and verdicts are wanted; without them they are NaN and not conforming.
-      logical, intent(in) :: judged
+      !> Compute levels and verdicts; without them they are NaN and not conforming.
+      logical, intent(in) :: with_levels
       !> Matrices of the levels for this sampling rate.
       type(projections_type), intent(inout) :: projections
       !> Whether the batch has computed a set: [n_set].
@@ -150,14 +149,14 @@ contains
       !> One block, from its sets to its verdicts.
       subroutine run_block(workspace, members)
          type(workspace_type), intent(inout) :: workspace
-         !> Numbers of the sets: [n_member].
+         !> Indices of the sets: [n_member].
          integer, intent(in) :: members(:)
          type(set_outcome_type) :: found(size(members))
          real(wp) :: found_levels(size(levels, 1), force_count, size(members))
          logical :: found_met(force_count, size(members))
          integer :: i
 
-         call solve_workspace(workspace, sets(members), sampling, judged, projections, found, found_levels, found_met)
+         call solve_workspace(workspace, sets(members), sampling, with_levels, projections, found, found_levels, found_met)
          do i = 1, size(members)
             computed(members(i)) = found(i)%computed
             levels(:, :, members(i)) = found_levels(:, :, i)
@@ -201,13 +200,13 @@ contains
    end subroutine set_workspace
 
    !> Outcomes, levels and verdicts of one block.
-   subroutine solve_workspace(workspace, sets, sampling, judged, projections, outcomes, levels, met)
+   subroutine solve_workspace(workspace, sets, sampling, with_levels, projections, outcomes, levels, met)
       type(workspace_type), intent(inout), target :: workspace
       !> The sets: [n_set].
       type(set_type), intent(in) :: sets(:)
       type(sampling_type), intent(in) :: sampling
-      !> Levels and verdicts are wanted.
-      logical, intent(in) :: judged
+      !> Compute levels and verdicts.
+      logical, intent(in) :: with_levels
       !> Matrices of the levels.
       type(projections_type), intent(inout) :: projections
       !> The outcomes: [n_set].
@@ -225,7 +224,7 @@ contains
       levels = not_a_number
       met = .false.
       workspace%last_sample = last_sample
-      if (.not. judged) return
+      if (.not. with_levels) return
       class = 0
       do i = 1, size(sets)
          if (.not. outcomes(i)%computed) cycle
@@ -278,7 +277,7 @@ contains
       end do
    end subroutine project
 
-   !> The same record by record, as of single drops. Records of sets with outcomes have levels: what fails is an interrupt.
+   !> The same record by record, as of single drops; it fails only if it is interrupted.
    subroutine take_single_levels(workspace, force, window, chosen, projections, levels)
       type(workspace_type), intent(inout) :: workspace
       !> As in `project`.
@@ -357,7 +356,7 @@ contains
    !> Copies the forces of one set.
    subroutine copy_forces(workspace, i, forces)
       type(workspace_type), intent(in), target :: workspace
-      !> Number of the set in the block.
+      !> Index of the set in the block.
       integer, intent(in) :: i
       !> Its forces, N: [n_sample, force_count].
       real(wp), intent(out) :: forces(:, :)

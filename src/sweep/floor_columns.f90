@@ -60,7 +60,7 @@ contains
       integer, intent(in) :: n_band
       !> Levels were computed; without them all but the energy is NaN.
       logical, intent(in) :: levels
-      !> The drop on a rigid floor, which counts where none on the floor is allocated.
+      !> The drop on a rigid floor, used if there is none on the floor.
       type(impact_type), intent(in) :: impact
       type(force_history_type), intent(in), allocatable :: on_floor
       type(floor_result_type), intent(in) :: floor

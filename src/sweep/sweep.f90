@@ -213,9 +213,9 @@ contains
       allocate (fields, source=get_active_fields(case))
       ! Keys of the case that all samples share.
       call check_fields(pack(fields, fields%owner == '' .and. fields%group /= 'ball' .and. fields%group /= 'drop' &
-         .and. [(all(columns%place /= i), i=1, size(fields))]), error)
+         .and. [(all(columns%field /= i), i=1, size(fields))]), error)
       if (allocated(error) .or. .not. forces) return
-      if (any([(any(fields(columns(i)%place)%key == [character(len=11) :: 'duration', 'sample_rate']), &
+      if (any([(any(fields(columns(i)%field)%key == [character(len=11) :: 'duration', 'sample_rate']), &
          i=1, size(columns))])) then
          error = input_error('forces are wanted of samples with their own sampling; allowed: one sampling for all, ' &
             //'that of the case')
@@ -276,7 +276,7 @@ contains
 
       scope = scope_type(levels=sweep%levels, energies=.false., room=sweep%levels)
       do i = 1, size(columns)
-         if (.not. allocated(error)) call fields(columns(i)%place)%set_number(values(i), columns(i)%entry, error)
+         if (.not. allocated(error)) call fields(columns(i)%field)%set_number(values(i), columns(i)%entry, error)
       end do
       if (.not. allocated(error)) call check_case(case, error)
       if (.not. allocated(error)) call solve_blocked(case, fields, scope, blocked, error)

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
 from conftest import REPOSITORY, naming
 
 import thud
-from thud import cli
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 MODAL: dict[str, Any] = {
     "case": str(REPOSITORY / "inputs/rubber_ball_modal_rising.nml"),
@@ -182,18 +178,3 @@ def test_places_without_results_stay_empty() -> None:
 def test_what_is_no_map_is_reported(parameters: dict[str, Any]) -> None:
     with pytest.raises(thud.InputError, match=naming("[parameters]")):
         thud.design({"parameters": parameters})
-
-
-def test_command_writes_figure_and_table(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    study = tmp_path / "design.toml"
-    study.write_text("parameters = {mass={values=[2, 3]}, height={values=[1, 2]}}")
-    assert cli.main(["design", "-q", str(study), "-o", str(tmp_path)]) == 0
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        ".thud",
-        "design.nc",
-        "design.svg",
-        "design.toml",
-    ]
-    assert capsys.readouterr() == ("", "")

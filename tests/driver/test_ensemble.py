@@ -144,7 +144,7 @@ def test_threads_and_order_change_no_bit(threads: int) -> None:
     assert_same_bits(reference, found, order[:45])
 
 
-def test_invalid_sets_are_marked_and_leave_the_others() -> None:
+def test_invalid_samples_are_marked_and_leave_the_others() -> None:
     parameters = random_sets(40, 4)
     for i in (9, 11, 13):  # the standard ball, whose ways to fail are known
         for key, value in (vars(thud.Ball()) | vars(thud.Drop())).items():
@@ -190,7 +190,7 @@ def test_case_without_impact_is_refused() -> None:
         thud.solve_many({"height": [1.0]}, case)
 
 
-def test_forces_of_invalid_sets_are_nan() -> None:
+def test_forces_of_invalid_samples_are_nan() -> None:
     ensemble = thud.solve_many({"height": [1.0, 900.0]}, forces=True)
     assert ensemble.elastic_force is not None
     assert np.isnan(ensemble.elastic_force[1]).all()

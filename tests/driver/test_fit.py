@@ -12,9 +12,10 @@ from conftest import naming
 from scipy import stats
 
 import thud
+from thud.case.keys import with_values
 from thud.studies.fitting import misfit, search
 from thud.studies.fitting.inference import infer, pair_sentences, statement, worst_directions
-from thud.studies.fitting.ranges import Range, bound_parameters, get_ranges, with_values
+from thud.studies.fitting.ranges import Range, bound_parameters, get_ranges
 
 RATE = 44100.0
 TRUTH = thud.Ball(youngs_modulus=1.8e6)
@@ -186,10 +187,10 @@ def test_correlations_are_shown_to_the_digit_that_differs_from_1() -> None:
     found = pair_sentences("abcd", np.where(sizes, sizes, sizes.T), 0.9)
     # The strongest first; above 0.998 no model tells them apart.
     assert found == [
-        "b and c cannot be told apart: correlation −0.99996",
-        "a and b cannot be told apart: correlation 0.999",
-        "a and c are hard to tell apart: correlation 0.95",
-        "c and d are hard to tell apart: correlation 0.90",
+        "b and c cannot be separated: correlation −0.99996",
+        "a and b cannot be separated: correlation 0.999",
+        "a and c can hardly be separated: correlation 0.95",
+        "c and d can hardly be separated: correlation 0.90",
     ]
 
 

@@ -1,4 +1,4 @@
-"""Several records in one fit, and what it says of parameters that cannot be told apart."""
+"""Several records in one fit, and what it says of parameters that cannot be separated."""
 
 from __future__ import annotations
 
@@ -86,7 +86,9 @@ def test_three_heights_give_modulus_and_mass(
         offset, error = target.nuisances["offset"]
         assert abs(offset - 4.0 * number) < FAR * error
     # 40 ms of quiet hold some 60 values.
-    found = re.search(r"target 3: noise of (\S+) N in the compared band, by the quiet", str(fit))
+    found = re.search(
+        r"target 3: noise of (\S+) N in the compared band, from the background", str(fit)
+    )
     assert found
     band = np.sqrt(2 * 1250 / RATE)
     assert float(found[1]) == pytest.approx(8.0 * band, rel=FAR / np.sqrt(2 * 60))

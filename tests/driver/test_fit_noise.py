@@ -1,4 +1,4 @@
-"""Fits to records with coloured noise, offset, hum and unknown gain, and tests of residuals."""
+"""Fits to records with colored noise, offset, hum and unknown gain, and tests of residuals."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from thud.recordings.noise import Background, covariances, fit_background, noise
 from thud.studies.fitting import force_misfit, inference, record_noise, search
 from thud.studies.fitting.inference import UNLIKELY, residual_warnings
 from thud.studies.fitting.record_noise import (
-    Quiet,
+    BackgroundRecord,
     Weights,
     cell_waves,
     find_pulse,
@@ -131,7 +131,7 @@ def test_weights_of_a_record_are_those_of_its_samples(
     mains: bool,  # noqa: FBT001
 ) -> None:
     n, count, rate = 301, 41, 3000.0
-    quiet = Quiet(np.zeros(n), rate, (120, 170), 400.0)
+    quiet = BackgroundRecord(np.zeros(n), rate, (120, 170), 400.0)
     draws = np.array([[2e-3, 0.4, 30.0, 1.5, 2.5], [4e-3, 0.2, 10.0, 0.5, 1.5]])
     background = Background((np.zeros(1), np.ones(1)), np.zeros(1), draws, 900.0)
     found = new_weights(
@@ -154,7 +154,7 @@ def test_weights_of_a_record_are_those_of_its_samples(
     np.testing.assert_allclose(one, other, rtol=0, atol=1e-5 * np.abs(other).max())
 
 
-def quiet_of(seed: int, tone: float = 0.0, size: float = 0.0) -> Quiet:
+def background_of(seed: int, tone: float = 0.0, size: float = 0.0) -> BackgroundRecord:
     """Return 0.1 s of white noise on both sides of a pulse, with a tone, Hz and N."""
     n = int(0.24 * RATE)
     time = np.arange(n) / RATE
@@ -162,18 +162,18 @@ def quiet_of(seed: int, tone: float = 0.0, size: float = 0.0) -> Quiet:
     force += size * np.sin(2 * np.pi * tone * time + seed)
     first, stop = int(0.11 * RATE), int(0.13 * RATE)
     force[first:stop] += 1500 * np.sin(np.pi * np.arange(stop - first) / (stop - first))
-    return Quiet(force, RATE, (first, stop), 500.0)
+    return BackgroundRecord(force, RATE, (first, stop), 500.0)
 
 
 def test_quiet_counts_up_to_a_tenth_of_a_second() -> None:
-    quiet = quiet_of(1)
+    quiet = background_of(1)
     # 0.11 s on each side, of which 0.1 s count; two values for each hertz of the band and second.
     assert quiet.seconds == pytest.approx(0.2)
     assert quiet.freedom == 2 * 500 * 0.2 - 1
     assert quiet.known
     assert quiet.middle == pytest.approx(0.12, abs=1 / RATE)
     assert quiet.deviation() == pytest.approx(5, rel=4 / np.sqrt(2 * 0.22 * RATE))
-    short = Quiet(quiet.force, RATE, (int(0.0105 * RATE), len(quiet.force)), 500.0)
+    short = BackgroundRecord(quiet.force, RATE, (int(0.0105 * RATE), len(quiet.force)), 500.0)
     assert short.freedom == int(2 * 500 * int(0.0105 * RATE) / RATE) - 1
     assert not short.known
     # Cells of a millisecond, one for each independent value of the band, next to the pulse.
@@ -199,7 +199,7 @@ def test_pulse_is_found_in_means_of_a_millisecond() -> None:
 
 
 def test_likelihood_of_quiet_is_that_of_normal_cells() -> None:
-    background = quiet_of(2).background()
+    background = background_of(2).background()
     other = replace(background, draws=2 * background.draws)
     time = (background.cells[0] + background.cells[1]) / 2
     trend = background.peak**2 * (1 + 0.01 * np.outer(time, time))
@@ -215,7 +215,7 @@ def test_likelihood_of_quiet_is_that_of_normal_cells() -> None:
 
 def test_noise_that_waves_have_taken_is_given_back() -> None:
     """Waves of t tones take 2 t of n degrees of freedom."""
-    quiet = quiet_of(3)
+    quiet = background_of(3)
     plain, tones = quiet.background(), (150.0, 333.0, 470.0, 611.0)
     cells, mean = quiet._means  # noqa: SLF001
     waves = cell_waves(cells, tones)
@@ -233,7 +233,7 @@ def test_noise_that_waves_have_taken_is_given_back() -> None:
 def test_hum_of_the_mains_has_its_own_standard_error() -> None:
     pulls = []
     for seed in range(6):
-        quiet = quiet_of(seed, 60.0, 4.0)
+        quiet = background_of(seed, 60.0, 4.0)
         mains, size, error = quiet.mains(quiet.background())
         assert mains == 60
         pulls.append((size - 4) / error)
@@ -253,7 +253,7 @@ def test_tones_are_looked_for_at_quarters_of_the_resolution(
 
     monkeypatch.setattr(record_noise, "_strongest", watched)
     truth = [123.4, 217.3, 333.1, 411.9]
-    quiet = quiet_of(6)
+    quiet = background_of(6)
     time = np.arange(len(quiet.force)) / RATE
     waves = np.sin(2 * np.pi * np.outer(truth, time)).sum(axis=0)
     found = replace(quiet, force=quiet.force + 10 * waves).tones()
@@ -272,7 +272,7 @@ def test_tones_are_looked_for_at_quarters_of_the_resolution(
 
 
 def test_strongest_tone_has_the_gain_of_its_likelihood() -> None:
-    quiet = quiet_of(5, 333.0, 3.0)
+    quiet = background_of(5, 333.0, 3.0)
     cells, mean = quiet._means  # noqa: SLF001
     whiten = record_noise._trendless(cells)  # noqa: SLF001
     np.testing.assert_allclose(whiten @ whiten, whiten, atol=1e-12)
@@ -303,7 +303,7 @@ def test_white_residuals_fail_each_test_as_often_as_it_says(
     told = [" ".join(residual_warnings(rng.normal(size=101), time)) for _ in range(500)]
     # The bound of Bonferroni is not reached by 1 - 0.1/2, and runs are whole numbers.
     low, high = stats.binom.ppf([1e-4, 1 - 1e-4], 500, [0.085, 0.115])
-    for words in ("coloured", "largest", "change their sign"):
+    for words in ("colored", "largest", "change their sign"):
         assert low <= sum(words in one for one in told) <= high
 
 
@@ -338,14 +338,14 @@ def test_noise_is_doubted_as_often_as_the_tests_say(
             # Three parameters take three of the twelve during contact.
             basis, _ = np.linalg.qr(rng.normal(size=(12, 3)))
             values[inside] -= basis @ (basis.T @ values[inside])
-            found = force_misfit._contact_doubt(values, inside, 3, 2.0)  # noqa: SLF001
+            found = force_misfit._contact_warning(values, inside, 3, 2.0)  # noqa: SLF001
         elif place == "change":
-            found = force_misfit._change_doubt(values, ~inside, inside)  # noqa: SLF001
+            found = force_misfit._change_warning(values, ~inside, inside)  # noqa: SLF001
         else:
             freedom = 25 if place == "size of quiet" else None
             known = SimpleNamespace(known_noise=True, noise_freedom=freedom)
             scale = np.sqrt(rng.chisquare(25) / 25) if freedom else 1.0
-            found = search._size_doubt(known, values / scale, 40.0)  # type: ignore[arg-type] # noqa: SLF001
+            found = search._size_warning(known, values / scale, 40.0)  # type: ignore[arg-type] # noqa: SLF001
         told += bool(found)
     low, high = stats.binom.ppf([1e-4, 1 - 1e-4], tries, 0.1)
     assert low <= told <= high
@@ -384,7 +384,7 @@ def test_what_lies_under_the_pulse_is_found(disturbance: str, name: str, size: f
     assert set(nuisances) == {"offset", name}
     value, error = nuisances[name]
     assert abs(value - size) < FAR * error
-    # That of an offset holds the unknown constant of coloured noise.
+    # That of an offset holds the unknown constant of colored noise.
     assert error < 0.15 * size
     assert f"{name} {value:.3g} ± {error:.2g} N" in str(fit)
 
@@ -415,7 +415,7 @@ def test_noise_makes_no_tone() -> None:
             misfit = thud.ForceTarget(record(colour, seed)).misfit()
             assert misfit.tones == ()
             # Pink noise was told as hum with an error that held for white noise.
-            _, size, error = misfit.quiet.mains(misfit.background)
+            _, size, error = misfit.background_record.mains(misfit.background)
             assert size < 4.5 * error
 
 
@@ -447,7 +447,7 @@ def test_gain_is_found_or_known_to_an_extent() -> None:
 @pytest.mark.parametrize(
     ("disturbance", "words"),
     [
-        ("blue noise", "coloured"),
+        ("blue noise", "colored"),
         ("spike", r"residual.* 86\.6"),
         ("ringing of 300 Hz", "uncertainty|model"),
         ("louder behind first touch", "contact"),
@@ -483,7 +483,7 @@ def test_white_residuals_pass_and_others_do_not() -> None:
     assert any(re.search(naming("sign", 0), one) for one in residual_warnings(np.abs(white), time))
     assert not residual_warnings(slow[:10], time[:10])
     # A constant is no frequency: it is told by its runs alone.
-    assert not any("coloured" in one for one in residual_warnings(white + 3, time))
+    assert not any("colored" in one for one in residual_warnings(white + 3, time))
 
 
 @pytest.mark.parametrize(

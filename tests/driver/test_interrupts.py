@@ -250,7 +250,7 @@ os._exit(0)
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("copies", [1, 2], ids=["once", "twice"])
-def test_executable_ends_sets_and_leaves_nothing(
+def test_executable_ends_samples_and_leaves_nothing(
     executable: str, number: int, copies: int, tmp_path: Path
 ) -> None:
     (tmp_path / "long.nml").write_text(LONG)

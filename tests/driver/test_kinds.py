@@ -29,6 +29,31 @@ def test_unknown_kind_is_reported() -> None:
         thud.read_study({}, "cube")
 
 
+@pytest.mark.parametrize(
+    ("name", "design", "words"),
+    [
+        ("design", "", "largest margin, dB"),
+        ("sensitivity", "design.size = 16\n", "total index of"),
+        ("uncertainty", "design.size = 30\n", "all criteria  0.0 %"),
+    ],
+)
+def test_command_writes_files_and_prints_a_table(
+    name: str, design: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    more = ["study_indices.csv"] if name == "sensitivity" else []
+    values = "values=[2, 3]" if name == "design" else "low=2, high=3"
+    text = f"parameters = {{mass={{{values}}}, height={{{values}}}}}"
+    (tmp_path / "study.toml").write_text(design + text)
+    assert cli.main([name, str(tmp_path / "study.toml"), "-o", str(tmp_path / "out")]) == 0
+    written = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert written == sorted([".thud", "study.nc", "study.svg", *more])
+    assert words in capsys.readouterr().out
+    if more:
+        lines = (tmp_path / "out" / more[0]).read_text().splitlines()
+        assert lines[0] == "output,parameter,first_order,first_order_interval,total,total_interval"
+        assert len(lines) == 1 + 7 * 2
+
+
 @pytest.mark.slow
 def test_kind_is_added_by_one_file_and_one_line(tmp_path: Path) -> None:
     page = (REPOSITORY / "docs/how_to_add.md").read_text()

@@ -41,7 +41,7 @@ def test_bands_cannot_be_changed_for_others() -> None:
         thud.get_bands().lower[0] = 0.0
 
 
-def test_sets_and_sources_are_those_of_the_library() -> None:
+def test_samples_and_sources_are_those_of_the_library() -> None:
     assert BANDWIDTHS == ("octave", "third")
     assert SOURCES == ("rubber_ball", "tyre")
     for bands in BANDWIDTHS:

@@ -63,6 +63,9 @@ def test_modes_and_their_number_are_found(exact: thud.MobilityFit) -> None:
     assert exact.error < 1e-10
     assert not exact.warnings
     assert max(abs(level) for _, level in exact.band_errors().values()) < 1e-9
+    assert exact.values["damping_ratio(2)"] == exact.floor.damping_ratio[1]
+    table = exact.to_dataframe()
+    np.testing.assert_allclose(table["fitted"], table["measured"], rtol=1e-8)
 
 
 def test_noise_is_not_fitted() -> None:
@@ -131,12 +134,12 @@ def test_other_universal_files_are_refused(
     ("frequency", "values", "words"),
     [
         (FREQUENCY, -MOBILITY, naming("mobility", "real")),
-        (FREQUENCY[::-1], MOBILITY, naming("line 2", "Hz")),
+        (FREQUENCY[::-1], MOBILITY, naming("point 2", "Hz")),
         (FREQUENCY, np.where(S.imag > 900, np.nan, MOBILITY), naming("Hz", "finite")),
         (FREQUENCY, np.where(S.imag > 900, 0, MOBILITY), naming("Hz", 0)),
         (FREQUENCY[:1], MOBILITY[:1], naming(1, "0 Hz")),
         (FREQUENCY, MOBILITY[:5], naming(300, 5)),
-        (-FREQUENCY[::-1], MOBILITY, naming("line 1", "Hz")),
+        (-FREQUENCY[::-1], MOBILITY, naming("point 1", "Hz")),
         (1e5 * FREQUENCY, MOBILITY, naming("pole_frequency", "1.0e7 Hz")),
     ],
 )

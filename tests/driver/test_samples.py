@@ -14,7 +14,7 @@ import pytest
 from conftest import naming
 
 import thud
-from thud.case.keys import put
+from thud.case.keys import with_values
 from thud.level.levels import SOURCES
 
 if TYPE_CHECKING:
@@ -247,7 +247,7 @@ def test_every_model_has_sets(run: Run, case: Path, tmp_path: Path, model: str) 
     rows = rows_of(tmp_path / "1/samples.csv")
     base = thud.Case.from_text(text)
     for row, value in zip(rows, values, strict=True):
-        impact = thud.solve(put(base, {key: value}))
+        impact = thud.solve(with_values(base, {key: value}))
         assert float(row["contact_time_s"]) == impact.contact_time
         assert float(row["peak_force_N"]) == impact.peak_force
         level = float(row["floor_octave_125_Hz_dB"])

@@ -9,13 +9,10 @@ import pytest
 from conftest import REPOSITORY, naming
 
 import thud
-from thud import cli
 from thud.studies.sampling import unit_samples
 from thud.studies.sensitivity import sobol_indices
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from thud.studies.sensitivity import Sensitivity
 
 # With a given contact time the level is 20 lg M + 10 lg h + c, whatever the radius.
@@ -119,20 +116,6 @@ def test_figure_of_five_parameters_fits_on_half_a_page() -> None:
     }
     study = {**LUMPED, "design": {"size": 8}, "parameters": parameters}
     assert thud.plot.draw_sensitivity(thud.sensitivity(study)).get_figheight() < 4.4
-
-
-def test_command_writes_indices(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "lumped.toml"
-    path.write_text(
-        "fixed = {model='hunt_crossley', contact_time=0.02}\ndesign.size = 16\n"
-        "parameters = {mass={low=2, high=3}, height={low=1, high=2}}"
-    )
-    assert cli.main(["sensitivity", str(path), "-o", str(tmp_path)]) == 0
-    lines = (tmp_path / "lumped_indices.csv").read_text().splitlines()
-    assert lines[0] == "output,parameter,first_order,first_order_interval,total,total_interval"
-    assert len(lines) == 1 + 7 * 2
-    assert (tmp_path / "lumped.svg").exists()
-    assert "total index of" in capsys.readouterr().out
 
 
 def test_useless_designs_are_reported() -> None:

@@ -157,7 +157,7 @@ def test_grids_and_lists_need_values_that_fit() -> None:
     assert sampling.read_design({}, ("grid",), fits) == {"design": "grid"}
 
 
-def test_sets_of_saltelli_exchange_one_column_each() -> None:
+def test_samples_of_saltelli_exchange_one_column_each() -> None:
     """A, A with one column of B for each parameter, B: the points of Saltelli's design."""
     points = sampling.unit_samples("saltelli", 3, 8, 5, 0, 40).reshape(8, 5, 3)
     first, second = points[:, 0], points[:, 4]
@@ -292,7 +292,7 @@ def test_verdict_is_in_doubt_where_errors_reach_a_limit() -> None:
     assert verdict(failed, 0.2 * half * np.eye(10)[0])[1:] == (False, False)
 
 
-def test_range_of_a_surrogate_counts_doubtful_sets_twice() -> None:
+def test_range_of_a_surrogate_counts_doubtful_samples_twice() -> None:
     dataset = xr.Dataset(
         {"conforms": ("sample", [True, True, True, False, False, False, False, False]),
          "doubtful": ("sample", [True, False, False, True, True, False, False, False])}
@@ -395,7 +395,7 @@ class Found:
 
 # What `SurrogateLevels` takes of a comparison with levels.
 MISFIT: dict[str, Any] = {
-    "kind": "floor", "bands": "octave", "known_noise": True, "places": np.array([1, 3]),
+    "kind": "floor", "bands": "octave", "known_noise": True, "indices": np.array([1, 3]),
     "extra": ("contact_time", "restitution"), "target": np.array([40.0, 20.0, 0.02, 0.8]),
     "deviation": np.array([0.1, 0.2, 1e-5, 0.01]),
 }  # fmt: skip
@@ -550,8 +550,8 @@ def test_answers_are_the_verdict_of_what_is_predicted() -> None:
     ],
 )  # fmt: skip
 def test_surrogate_whose_parts_do_not_fit_is_not_whole(change: dict[str, Any]) -> None:
-    assert answering().is_whole
-    assert not replace(answering(), **change).is_whole
+    assert answering().is_complete
+    assert not replace(answering(), **change).is_complete
 
 
 def test_quantity_that_varies_by_rounding_only_is_its_mean() -> None:

@@ -384,7 +384,7 @@ def test_figure_shows_held_out_errors(trained: thud.Surrogate) -> None:
         *(f"Level {band} Hz" for band in ("31.5", "63", "125", "250", "500")),
     ]  # fmt: skip
     shown = [line.get_xdata() for line in axes.lines if len(line.get_xdata()) == 64]
-    np.testing.assert_array_equal(shown[-1], trained.residuals[:, trained.judged][:, -1])
+    np.testing.assert_array_equal(shown[-1], trained.residuals[:, trained.assessed][:, -1])
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ from thud import cli
 from thud.base import tables, units
 from thud.base._schema import MODELS
 from thud.base.units import MULTIPLES, scaled
-from thud.case.keys import known_keys, put
+from thud.case.keys import known_keys, with_values
 from thud.impact.ensemble import get_cost
 from thud.studies import directory, fit, samples, sampling, sweep
 
@@ -297,7 +297,7 @@ def test_temperature_shifts_the_frequency_of_the_loss() -> None:
     )
 
 
-def test_sets_below_the_range_of_the_shift_have_no_results() -> None:
+def test_samples_below_the_range_of_the_shift_have_no_results() -> None:
     study: dict[str, Any] = {
         "fixed": {"model": "modal_ball", "damping_law": "rising"},
         "temperature": WLF,
@@ -308,7 +308,7 @@ def test_sets_below_the_range_of_the_shift_have_no_results() -> None:
     assert "NaN" in str(found["reason"].values[1])
 
 
-def test_failing_sets_say_why_and_disturb_no_other() -> None:
+def test_failing_samples_say_why_and_disturb_no_other() -> None:
     found = thud.sweep({"parameters": {"height": {"values": [1.0, -1.0, 1000.0]}}}).dataset
     assert found["status"].values.tolist() == [0, 1, 2]
     assert found["reason"].values[0] == ""
@@ -319,7 +319,7 @@ def test_failing_sets_say_why_and_disturb_no_other() -> None:
 
 
 @pytest.mark.parametrize("fixed", [{}, {"force": "floor", "source": "tyre"}])
-def test_sets_give_what_single_drops_give(fixed: dict[str, str]) -> None:
+def test_samples_give_what_single_drops_give(fixed: dict[str, str]) -> None:
     study = thud.read_study(
         {
             "fixed": fixed,
@@ -334,7 +334,7 @@ def test_sets_give_what_single_drops_give(fixed: dict[str, str]) -> None:
     names = list(found.coords)[1:]
     for place in np.ndindex(*(found.sizes[name] for name in names)):
         one = found.isel(dict(zip(names, place, strict=True)))
-        impact = thud.solve(put(study.case, {name: one[name].item() for name in names}))
+        impact = thud.solve(with_values(study.case, {name: one[name].item() for name in names}))
         # What the ensemble promises: 1e-10 in forces, 1e-6 dB in levels.
         for name in ("contact_time", "peak_force", "peak_elastic_force", "impulse"):
             assert float(one[name]) == pytest.approx(getattr(impact, name), rel=1e-9)
@@ -383,7 +383,7 @@ def test_fixed_model_is_that_of_the_case_or_has_its_defaults() -> None:
         assert getattr(study.case.model, "harmonics", None) == harmonics
 
 
-def test_many_sets_need_a_word(tmp_path: Path) -> None:
+def test_many_samples_need_a_word(tmp_path: Path) -> None:
     many: dict[str, Any] = {"name": "a", "design": {"kind": "random", "size": 200_000}}
     many["parameters"] = {"height": {"low": 0.5, "high": 1}}
     with pytest.raises(thud.InputError, match=naming("a", 200000, "hollow_sphere", "MB", "yes")):
@@ -391,7 +391,7 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
     spread = {"low": 1, "high": 2, "count": 10**6}
     many = {"name": "a", "parameters": dict.fromkeys(("height", "mass", "gravity"), spread)}
     with pytest.raises(thud.InputError, match=naming("a.zarr", "3.99e+14 MB")):
-        thud.sweep(many, tmp_path, yes=True)
+        thud.sweep(many, tmp_path, allow_large=True)
     assert not (tmp_path / "a.partial").exists()
 
 
@@ -711,8 +711,8 @@ def test_design_that_exceeds_the_memory_is_told(
     assert re.search(naming("[design] size", size), line)
 
 
-def test_sets_that_exceed_the_memory_are_told_before_they_are_computed() -> None:
+def test_samples_that_exceed_the_memory_are_told_before_they_are_computed() -> None:
     height = thud.Parameter(low=0.5, high=1.0, count=2**30)
     mass = thud.Parameter(low=2.4, high=2.6, count=2**30)
     with pytest.raises(thud.InputError, match=f"{2**60} samples"):
-        thud.sweep({"parameters": {"height": height, "mass": mass}}, yes=True)
+        thud.sweep({"parameters": {"height": height, "mass": mass}}, allow_large=True)

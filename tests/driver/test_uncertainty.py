@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,11 +11,7 @@ from conftest import REPOSITORY, naming
 from scipy.stats import norm
 
 import thud
-from thud import cli
 from thud.studies.uncertainty import Uncertainty
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 SIZE = 600
 SMALL: dict[str, Any] = {
@@ -82,7 +78,7 @@ def test_interval_is_wilson_s(hits: int, trials: int) -> None:
     assert found == pytest.approx(sorted(np.roots(coefficients).real), abs=1e-12)
 
 
-def test_sets_without_results_are_counted_apart() -> None:
+def test_samples_without_results_are_counted_apart() -> None:
     study = {"design": {"size": 50}, "parameters": {"height": {"low": -1, "high": 1}}}
     result = thud.uncertainty(study)
     assert result.failed == np.sum(result.dataset["height"].values <= 0) > 0
@@ -111,17 +107,7 @@ def test_figure_shows_distribution_over_tolerance() -> None:
     assert words[result.dataset.attrs["assessed_force"]] in axes.get_ylabel()
 
 
-def test_command_writes_figure_and_table(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "small.toml"
-    path.write_text("design.size = 30\nparameters.mass = {std=0.05}")
-    assert cli.main(["uncertainty", str(path), "-o", str(tmp_path)]) == 0
-    assert (tmp_path / "small.svg").exists()
-    assert "all criteria  0.0 %" in capsys.readouterr().out
-
-
-def test_only_independent_sets_are_taken() -> None:
+def test_only_independent_samples_are_taken() -> None:
     with pytest.raises(thud.InputError, match=naming("kind", "'sobol'", "random")):
         thud.uncertainty({**SMALL, "design": {"kind": "sobol", "size": 8}})
 

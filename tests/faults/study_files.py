@@ -71,7 +71,7 @@ def attempt(chance: random.Random) -> tuple[str, str]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            table = get_kind(kind).run(study, yes=True, workers=1).table()
+            table = get_kind(kind).run(study, allow_large=True, workers=1).table()
     except thud.ThudError as error:
         inner = INNER.search(str(error))
         return ("raw", f"{error}: {text!r}") if inner or "\n" in str(error) else ("failed", "")

@@ -171,7 +171,7 @@ class Levels(Group):
     bands : str
         Bands of levels.csv; "octave", "third", "both".
     force : str
-        Force whose levels, peak and verdict count; "floor", "elastic".
+        Assessed force: levels, peak force and verdict are of it; "floor", "elastic".
     """
 
     method: LevelsMethod = "exact"
@@ -1020,7 +1020,7 @@ KEYS = (
     Key("", "sampling", "substeps", "whole", "", "integration steps per sampling interval", (), 1.0, 10000.0, True),
     Key("", "levels", "method", "choice", "", "method of the levels", ('exact', 'fft')),
     Key("", "levels", "bands", "choice", "", "bands of levels.csv", ('octave', 'third', 'both')),
-    Key("", "levels", "force", "choice", "", "force whose levels, peak and verdict count", ('floor', 'elastic')),
+    Key("", "levels", "force", "choice", "", "assessed force: levels, peak force and verdict are of it", ('floor', 'elastic')),
     Key("", "limits", "source", "choice", "", "source whose limits apply", ('rubber_ball', 'tyre')),
     Key("floor", "floor", "name", "choice", "", "floor under the source", ('rigid', 'infinite_plate', 'oscillator', 'plate', 'floating_floor', 'joist_floor', 'measured_mobility')),
     Key("infinite_plate", "infinite_plate", "resistance", "real", "N s/m", "force over velocity", (), 1.0, 1000000000000000.0),

@@ -40,16 +40,16 @@ DENSITY = Key("", "ball", "density", "real", "kg/m3", "density of the wall")
 TEMPERATURE = Key("", "ball", "temperature", "real", "degC", "temperature of the ball")
 
 
-def users(case: Case) -> tuple[str, ...]:
+def key_owners(case: Case) -> tuple[str, ...]:
     """Return what of a case has keys of its own: its model, its floor, its room."""
     floor = case.floor.name if case.floor else ""
-    found = (case.model.name if case.model else "", floor, "room" if case.room else "")
-    return tuple(filter(None, found))
+    result = (case.model.name if case.model else "", floor, "room" if case.room else "")
+    return tuple(filter(None, result))
 
 
 @lru_cache
 def known_keys(owners: tuple[str, ...]) -> Mapping[str, Key]:
-    """Return the keys in which samples may differ, by name; see `users`.
+    """Return the keys in which samples may differ, by name; see `key_owners`.
 
     Those of floor and room have names that begin with their group, such as ``"plate.thickness"``,
     and their own where no other key has it.
@@ -69,7 +69,7 @@ def known_keys(owners: tuple[str, ...]) -> Mapping[str, Key]:
 
 
 def find_key(name: str, owners: tuple[str, ...]) -> tuple[Key, int | None]:
-    """Return a key by its name, and the entry of a list: of ``"frequency(2)"`` 2; see `users`.
+    """Return a key by its name, and the entry of a list: of ``"frequency(2)"`` 2; see `key_owners`.
 
     Raises
     ------
@@ -89,28 +89,40 @@ def find_key(name: str, owners: tuple[str, ...]) -> tuple[Key, int | None]:
     return key, int(match[2]) if match[2] else None
 
 
-def put(case: Case, values: Mapping[str, object]) -> Case:
+def _group_of(key: Key, case: Case) -> str:
+    """Return the name of the group of a case that holds a key."""
+    if case.floor and key.owner == case.floor.name:
+        return "floor"
+    return key.group if key.group in {*GROUPS, "room"} else "model"
+
+
+def with_values(case: Case, values: Mapping[str, object]) -> Case:
     """Return a case with other values of some keys; entries of lists are named as in `find_key`."""
     assert case.model is not None  # noqa: S101 - studies have a model, see `read_study`
     groups: dict[str, dict[str, object]] = {}
     for name, value in values.items():
-        key, entry = find_key(name, users(case))
-        group = key.group if key.group in {*GROUPS, "room"} else "model"
-        if case.floor and key.owner == case.floor.name:
-            group = "floor"
-        place = groups.setdefault(group, {})
+        key, entry = find_key(name, key_owners(case))
+        group = _group_of(key, case)
+        changes = groups.setdefault(group, {})
         if entry is None:
-            place[key.name] = value
+            changes[key.name] = value
         else:
-            entries = list(place.get(key.name, getattr(getattr(case, group), key.name)))  # type: ignore[call-overload]
+            entries = list(changes.get(key.name, getattr(getattr(case, group), key.name)))  # type: ignore[call-overload]
             if entry > len(entries):
                 refuse(f"{name} does not exist", f"entries 1 to {len(entries)} of the case")
             entries[entry - 1] = value
-            place[key.name] = tuple(entries)
-    changed = {
-        group: dataclasses.replace(getattr(case, group), **found) for group, found in groups.items()
-    }
+            changes[key.name] = tuple(entries)
+    changed = {group: dataclasses.replace(getattr(case, group), **c) for group, c in groups.items()}
     return dataclasses.replace(case, **changed)
+
+
+def value_in(case: Case, name: str) -> Value | None:
+    """Return the value of a key in a case; None where it has none, or a list of them."""
+    key, entry = find_key(name, key_owners(case))
+    value = getattr(getattr(case, _group_of(key, case)), key.name, None)
+    if isinstance(value, tuple) and entry:
+        value = next(iter(value[entry - 1 :]), None)
+    return value if isinstance(value, Value) else None
 
 
 def humanize(name: str) -> str:
@@ -126,7 +138,7 @@ def humanize(name: str) -> str:
 
 def limits(key: Key, case: Case) -> tuple[float, float]:
     """Return the limits of a key, evaluated for the other keys of a case."""
-    group = getattr(case, key.group if key.group in GROUPS else "model")
+    group = getattr(case, _group_of(key, case))
     return _end(key.lower, group), _end(key.upper, group)
 
 

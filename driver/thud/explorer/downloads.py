@@ -10,7 +10,7 @@ import numpy as np
 
 from thud.base.checks import refuse, require_number, shown
 from thud.case.case import check_case
-from thud.case.keys import find_key, known_keys, users
+from thud.case.keys import find_key, key_owners, known_keys
 from thud.comparison.comparison import compare
 from thud.explorer.answer import new_case
 from thud.impact.compute import compute
@@ -65,7 +65,7 @@ def study(values: Values) -> bytes:
     moved = _moves(values.pop(MOVED, {}))
     case = new_case(values)
     check_case(case)
-    names = {f"{key.group}.{key.name}": name for name, key in known_keys(users(case)).items()}
+    names = {f"{key.group}.{key.name}": name for name, key in known_keys(key_owners(case)).items()}
     ranges = {names[key]: ends for key, ends in moved.items() if key in names and ends[0] < ends[1]}
     if not ranges:
         refuse("move a slider first", "a study of one or more")
@@ -79,7 +79,7 @@ def study(values: Values) -> bytes:
     lines += ['kind = "grid"'] if grid else ['kind = "sobol"', f"size = {SETS}", "seed = 1"]
     lines += ["", "[parameters]"]
     for name, (low, high) in ranges.items():
-        key = find_key(name, users(case))[0]
+        key = find_key(name, key_owners(case))[0]
         count = f", count = {_count(key, low, high)}" if grid else ""
         ends = [round(low), round(high)] if key.kind == "whole" else [low, high]
         lines.append(f'"{name}" = {{ low = {ends[0]!r}, high = {ends[1]!r}{count} }}')

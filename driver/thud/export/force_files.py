@@ -145,8 +145,8 @@ def _resampled(given: BlockedForce, rate: float) -> BlockedForce:
     room = math.ceil(REACH * max(1.0, down / up)) + 1
     force = resample_poly(np.pad(given.force, room), up, down)
     start = given.start - room / given.sample_rate
-    found = replace(given, force=force, sample_rate=rate, start=start)
-    (frequency, old), (grid, new) = given.spectrum(), found.spectrum()
+    result = replace(given, force=force, sample_rate=rate, start=start)
+    (frequency, old), (grid, new) = given.spectrum(), result.spectrum()
     band = np.arange(1, min(RECORDED_BAND, frequency[-1], grid[-1]))
     old, new = (np.interp(band, f, s) for f, s in ((frequency, old), (grid, new)))
     error = float(np.abs(new - old).max() / np.abs(old).max())
@@ -154,7 +154,7 @@ def _resampled(given: BlockedForce, rate: float) -> BlockedForce:
         f"Resampled from {given.sample_rate:g} Hz, band-limited; to {RECORDED_BAND:g} Hz the "
         f"spectrum has changed by up to {error:.1e} of its maximum"
     )
-    return replace(found, notes=(*given.notes, note))
+    return replace(result, notes=(*given.notes, note))
 
 
 def wav_files(force: BlockedForce, path: str) -> dict[str, bytes]:

@@ -40,30 +40,30 @@ class FloorComparison(Displayed):
 
     @property
     def warnings(self) -> list[str]:
-        """What a reader of the numbers has to know, with the names of the floors."""
-        found = self.predictions.items()
-        return [f"{name}: {warning}" for name, one in found for warning in one.warnings]
+        """Caveats of the numbers, with the names of the floors."""
+        result = self.predictions.items()
+        return [f"{name}: {warning}" for name, one in result for warning in one.warnings]
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text; columns are the floors."""
-        found = self.predictions.values()
+        result = self.predictions.values()
         octaves = [f"{f:g} Hz octave, dB" for f in get_bands("octave").nominal[1:]]
         return [
             ("", *self.predictions),
-            ("floor", *(one.floor.name.replace("_", " ") for one in found)),
-            ("force", *(one.force for one in found)),
-            ("L_iA,Fmax, dB", *(str(one.rating.rounded) for one in found)),
-            ("standardized, dB", *(str(one.standardized_rating.rounded) for one in found)),
+            ("floor", *(one.floor.name.replace("_", " ") for one in result)),
+            ("force", *(one.force for one in result)),
+            ("L_iA,Fmax, dB", *(str(one.rating.rounded) for one in result)),
+            ("standardized, dB", *(str(one.standardized_rating.rounded) for one in result)),
             *(
-                (title, *(f"{one.octave_level[i]:.1f}" for one in found))
+                (title, *(f"{one.octave_level[i]:.1f}" for one in result))
                 for i, title in enumerate(octaves)
             ),
             (
                 "class (KS F 2863-2)",
-                *(CLASSES[one.octave_rating.korean_class or 0] for one in found),
+                *(CLASSES[one.octave_rating.korean_class or 0] for one in result),
             ),
-            ("energy, 50 to 630 Hz, mJ", *(f"{1e3 * one.energy.sum():.3g}" for one in found)),
-            ("tapping machine, L_n,w (C_I), dB", *(_tapping(one) for one in found)),
+            ("energy, 50 to 630 Hz, mJ", *(f"{1e3 * one.energy.sum():.3g}" for one in result)),
+            ("tapping machine, L_n,w (C_I), dB", *(_tapping(one) for one in result)),
         ]
 
     def figure(self) -> Figure:
@@ -100,8 +100,8 @@ class FloorComparison(Displayed):
 
     def __repr__(self) -> str:
         """Return the names of the floors and their levels."""
-        found = (f"{name} {one.rating.rounded} dB" for name, one in self.predictions.items())
-        return f"<FloorComparison: {', '.join(found)}>"
+        result = (f"{name} {one.rating.rounded} dB" for name, one in self.predictions.items())
+        return f"<FloorComparison: {', '.join(result)}>"
 
 
 def compare_floors(
@@ -123,28 +123,28 @@ def compare_floors(
     """
     if not isinstance(cases, Mapping) or not cases:
         refuse("cases are not given", "a mapping of names to one or more cases or predictions")
-    found: dict[str, RoomPrediction] = {}
+    result: dict[str, RoomPrediction] = {}
     for name, given in tqdm(cases.items(), unit="floor", disable=not progress, leave=False):
         require_kind("name", name, str)
         require_kind(name, given, Case | RoomPrediction)
         if isinstance(given, RoomPrediction):
-            found[name] = given
+            result[name] = given
             continue
         if given.model is None or given.floor is None or given.room is None:
             refuse(
                 f"{name}: the case has no level in a room", "a case with &model, &floor and &room"
             )
         try:
-            found[name] = predict_level(compute(given))
+            result[name] = predict_level(compute(given))
         except ThudError as error:
             message = f"{name}: {error}"
             raise type(error)(message) from error
-    return FloorComparison(found)
+    return FloorComparison(result)
 
 
 def _tapping(one: RoomPrediction) -> str:
     """Return the reference level of the tapping machine, of the floors that have one."""
     if not has_tapping_level(one.floor):
         return ""
-    found = tapping_level(one.floor, one.room)
-    return f"{found.weighted} ({found.adaptation})"
+    result = tapping_level(one.floor, one.room)
+    return f"{result.weighted} ({result.adaptation})"

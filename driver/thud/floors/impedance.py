@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 
 # From floors that a ball hardly leaves to floors that change a level by 0.01 dB, N s/m.
 RESISTANCES = np.geomspace(10**2.75, 1e6, 14)
-# Lines in a band of one third octave at 25 Hz.
-_DENSITY = 64
+# Spectral lines in each band.
+_LINES_PER_BAND = 64
 # Part of the impact velocity below which the motion counts as that at maximum deflection.
-_SLOW = 0.25
+_SLOW_FRACTION = 0.25
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,7 +55,7 @@ class BallImpedance(Displayed):
     resistance : ndarray, shape (n_floor,)
         Resistances of the floors, ascending, N s/m.
     change : ndarray, shape (n_floor, n_band)
-        Level of the contact force less that of the blocked force, dB.
+        Level of the contact force − level of the blocked force, dB.
     estimate : ndarray, shape (n_floor, n_band)
         Complex impedance by the force on each floor, N s/m.
     tangent_mass, tangent_stiffness, tangent_damping : float
@@ -124,21 +124,23 @@ class BallImpedance(Displayed):
         if not 0 < decibels < math.inf:
             refuse_value("decibels", decibels, "above 0")
         size = np.log10(np.maximum(np.abs(self.change), 1e-12))
-        wanted = math.log10(decibels)
-        place = np.log10(self.resistance)
-        found = np.full(len(self.frequency), np.nan)
+        log_change = math.log10(decibels)
+        log_resistance = np.log10(self.resistance)
+        result = np.full(len(self.frequency), np.nan)
         for band, column in enumerate(size.T):
-            above = np.flatnonzero(column >= wanted)
+            above = np.flatnonzero(column >= log_change)
             if len(above) == 0:
                 continue
             i = above[-1]
-            if i == len(place) - 1:
+            if i == len(log_resistance) - 1:
                 refuse_value(
                     "decibels", decibels, f"above {10 ** column[i]:.2g}, the change by the heaviest"
                 )
-            part = (column[i] - wanted) / (column[i] - column[i + 1])
-            found[band] = 10 ** (place[i] + part * (place[i + 1] - place[i]))
-        return found
+            part = (column[i] - log_change) / (column[i] - column[i + 1])
+            result[band] = 10 ** (
+                log_resistance[i] + part * (log_resistance[i + 1] - log_resistance[i])
+            )
+        return result
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, a band each."""
@@ -245,12 +247,12 @@ def _band_spectra(force: Array, sample_rate: float, bands: BandSet) -> list[NDAr
     time = np.arange(len(force)) / sample_rate
     used = np.flatnonzero(force)
     end = used[-1] + 1 if len(used) else 1
-    found: list[NDArray[np.complex128]] = []
+    result: list[NDArray[np.complex128]] = []
     for low, high in zip(edges.lower, edges.upper, strict=True):
-        lines = low + (np.arange(_DENSITY) + 0.5) * (high - low) / _DENSITY
+        lines = low + (np.arange(_LINES_PER_BAND) + 0.5) * (high - low) / _LINES_PER_BAND
         waves: NDArray[np.complex128] = np.exp(-2j * np.pi * np.outer(lines, time[:end]))
-        found.append(waves @ force[:end])
-    return found
+        result.append(waves @ force[:end])
+    return result
 
 
 def _tangent(source: Impact) -> tuple[float, float, float]:
@@ -259,7 +261,7 @@ def _tangent(source: Impact) -> tuple[float, float, float]:
     F - F_max = k (d - d_max) + c d' and F = -m d'' where d' is below a quarter of its first value.
     """
     deepest = int(np.argmax(source.deflection))
-    slow = np.abs(source.velocity) < _SLOW * source.impact_velocity
+    slow = np.abs(source.velocity) < _SLOW_FRACTION * source.impact_velocity
     first = deepest - int(np.argmin(slow[deepest::-1])) + 1
     last = deepest + int(np.argmin(slow[deepest:]))
     part = slice(first, last)

@@ -25,12 +25,14 @@ from thud.base.checks import (
 from thud.base.columns import read_titled
 from thud.base.display import Displayed
 from thud.base.errors import NumericalError, ThudError
+from thud.base.extras import require_extra
 from thud.case.case import Case
 from thud.impact.mobility import mobility
 from thud.level.levels import get_bands
 from thud.recordings.channel import guarded, library, require_small
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
@@ -61,7 +63,7 @@ _OTHERS = {
 # Numbers of poles that are tried; the library takes no more.
 _ORDERS = (2, 4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64)
 # Numbers without a gain after which no more are tried.
-_PATIENCE = 5
+_STAGNATION_LIMIT = 5
 # Error below which no more poles are tried: that of a table with eight digits.
 _EXACT = 1e-8
 # Error of the fit that raises a warning, and of the change that makes it passive.
@@ -77,9 +79,9 @@ class MobilityFit(Displayed):
     ----------
     name : str
         Name, such as that of the file.
-    frequency : ndarray, shape (n_line,)
+    frequency : ndarray, shape (n_point,)
         Frequencies of the measurement, Hz.
-    measured : ndarray, shape (n_line,)
+    measured : ndarray, shape (n_point,)
         The measured mobility, m/(N s), complex.
     floor : MeasuredMobility
         The floor, for `solve` and cases.
@@ -98,8 +100,19 @@ class MobilityFit(Displayed):
         return mobility(self.floor, frequency)
 
     @property
+    def values(self) -> dict[str, float]:
+        """Parameters of the floor by name, entries of lists as ``"damping_ratio(1)"``."""
+        result: dict[str, float] = {}
+        for name, value in vars(self.floor).items():
+            if isinstance(value, tuple):
+                result |= {f"{name}({i})": entry for i, entry in enumerate(value, start=1)}
+            else:
+                result[name] = value
+        return result
+
+    @property
     def error(self) -> float:
-        """Relative error, root of the mean square over the lines."""
+        """Relative error, root of the mean square over the frequency points."""
         return float(np.sqrt(np.mean(self._errors() ** 2)))
 
     def band_errors(self) -> dict[float, tuple[float, float]]:
@@ -109,7 +122,7 @@ class MobilityFit(Displayed):
         part, hence of the energy that a flat force injects, against the measured one, dB; NaN where
         one of them is not positive.
         """
-        found = {}
+        result = {}
         errors = self._errors()
         fitted = self.mobility(self.frequency)
         octaves = get_bands("octave")
@@ -120,27 +133,27 @@ class MobilityFit(Displayed):
             real = [np.trapezoid(y.real[inside], self.frequency[inside])
                     for y in (fitted, self.measured)]  # fmt: skip
             level = 10 * np.log10(real[0] / real[1]) if min(real) > 0 else np.nan
-            found[float(name)] = float(np.sqrt(np.mean(errors[inside] ** 2))), float(level)
-        return found
+            result[float(name)] = float(np.sqrt(np.mean(errors[inside] ** 2))), float(level)
+        return result
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a reader of the fit has to know."""
-        found = []
+        """Why the fit may be wrong, a sentence each."""
+        result = []
         negative = np.mean(self.measured.real < 0)
         if negative > 0:
-            found.append(
-                f"the measured real part is negative at {100 * negative:.2g} % of the lines, which "
-                "no passive floor has: the fit has none"
+            result.append(
+                f"the measured real part is negative at {100 * negative:.2g} % of the frequencies, "
+                "which no passive floor has: the fit has none"
             )
         if self.error > _POOR:
-            found.append(f"the fit misses the measurement by {100 * self.error:.0f} %")
+            result.append(f"the fit misses the measurement by {100 * self.error:.0f} %")
         elif self.error > _CHANGED * self.free_error and self.error > _EXACT:
-            found.append(
+            result.append(
                 f"to be passive the fit gave up accuracy: {100 * self.error:.2g} % instead of "
                 f"{100 * self.free_error:.2g} %"
             )
-        return tuple(found)
+        return tuple(result)
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of a table of errors."""
@@ -149,6 +162,19 @@ class MobilityFit(Displayed):
             for band, (error, level) in self.band_errors().items()
         ]
         return [("octave, Hz", "error, %", "real part, dB"), *body]
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the measured mobility and the fit, m/(N s), complex.
+
+        Raise InputError where pandas is not installed.
+        """
+        with require_extra("studies"):
+            import pandas as pd
+
+        fitted = self.mobility(self.frequency)
+        return pd.DataFrame(
+            {"frequency_Hz": self.frequency, "measured": self.measured, "fitted": fitted}
+        )
 
     def namelist(self) -> str:
         """Return the groups ``&floor`` and ``&measured_mobility`` as text for a case."""
@@ -164,7 +190,7 @@ class MobilityFit(Displayed):
         return mobility_fit(self)
 
     def _errors(self) -> Array:
-        """Return the relative errors of the lines."""
+        """Return the relative errors of the frequency points."""
         errors: Array = np.abs(self.mobility(self.frequency) / self.measured - 1)
         return errors
 
@@ -208,25 +234,25 @@ def fit_mobility(
     if quantity is not None:
         require_choice("quantity", quantity, get_args(Quantity))
     if isinstance(table, tuple):
-        name = place = "measurement"
+        name = label = "measurement"
         frequency, values = _checked(table)
     elif not isinstance(table, str | os.PathLike):
         refuse_value("table", table, "a file, or a tuple of frequencies, Hz, and complex values")
     else:
-        name, place = Path(table).stem, f"{table}"
+        name, label = Path(table).stem, f"{table}"
         frequency, values, known = _read(Path(table))
         if quantity and known and quantity != known:
             refuse(f"{table}: quantity = {quantity!r}, but the file holds {known!r}", repr(known))
         quantity = quantity or known
-    # A line at 0 Hz has no phase.
+    # The value at 0 Hz has no phase.
     frequency, values = frequency[frequency != 0], values[frequency != 0]
     values = values * (2j * np.pi * frequency) ** _POWERS[quantity or "mobility"]
-    if (n_line := len(frequency)) <= 1:
-        refuse(f"{place}: {n_line} lines above 0 Hz", "two or more")
+    if len(frequency) <= 1:
+        refuse(f"{label}: {len(frequency)} frequencies above 0 Hz", "two or more")
     if not (good := np.isfinite(values) & (values != 0)).all():
-        line = good.argmin()
-        shown = "not finite" if values[line] else "0"
-        refuse(f"{place}: the value at {frequency[line]:g} Hz is {shown}", "finite, not 0")
+        worst = good.argmin()
+        shown = "not finite" if values[worst] else "0"
+        refuse(f"{label}: the value at {frequency[worst]:g} Hz is {shown}", "finite, not 0")
     if order is not None:
         require_whole("order", order, 1, _ORDERS[-1])
     try:
@@ -234,7 +260,7 @@ def fit_mobility(
             return _chosen(name, frequency, values)
         return _fit(name, frequency, values, order)
     except ThudError as error:
-        message = f"{place}: {error}"
+        message = f"{label}: {error}"
         raise type(error)(message) from error
 
 
@@ -261,19 +287,21 @@ def _chosen(name: str, frequency: Array, values: NDArray[np.complex128]) -> Mobi
     orders = [order for order in _ORDERS if order < len(frequency)]
     for order in orders or [1]:
         # Three values for each coefficient, or noise is fitted.
-        if best is not None and (worse == _PATIENCE or 3 * (2 * order + 1) > 2 * len(frequency)):
+        if best is not None and (
+            worse == _STAGNATION_LIMIT or 3 * (2 * order + 1) > 2 * len(frequency)
+        ):
             break
         worse += 1
         try:
-            found = _fit(name, frequency, values, order)
+            result = _fit(name, frequency, values, order)
         except ThudError as error:
             failure = failure or error
             continue
-        miss = max(found.error, _EXACT)
+        miss = max(result.error, _EXACT)
         count = 2 * len(frequency)
         criterion = count * np.log(miss**2) + (2 * order + 1) * np.log(count)
         if criterion < least:
-            best, least, worse = found, criterion, 0
+            best, least, worse = result, criterion, 0
         if miss <= _EXACT:
             break
     if best is None:
@@ -283,14 +311,14 @@ def _chosen(name: str, frequency: Array, values: NDArray[np.complex128]) -> Mobi
 
 def _fit(name: str, frequency: Array, values: NDArray[np.complex128], order: int) -> MobilityFit:
     """Return the fit with a number of poles."""
-    found: dict[str, Any] = ask(
+    result: dict[str, Any] = ask(
         "mobility_fit", frequency=frequency, real=values.real, imaginary=values.imag, order=order
     )
     lists: dict[str, Any] = {
         key: value if isinstance(value, float) else tuple(map(float, value))
-        for key, value in found["floor"].items()
+        for key, value in result["floor"].items()
     }
-    return MobilityFit(name, frequency, values, MeasuredMobility(**lists), found["free_error"])
+    return MobilityFit(name, frequency, values, MeasuredMobility(**lists), result["free_error"])
 
 
 def _read(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:

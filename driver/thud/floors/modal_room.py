@@ -18,6 +18,7 @@ from scipy.signal import lfilter, sosfilt
 from thud.base._schema import Plate, Room
 from thud.base.bridge import ask
 from thud.base.checks import (
+    LARGEST_SEED,
     refuse,
     refuse_value,
     require_array,
@@ -41,16 +42,16 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     ComplexArray = NDArray[np.complex128]
 
-# Thirds 25 to 160 Hz, the first of the set.
+# Number of one-third-octave bands from 25 to 160 Hz.
 N_BAND = 9
 # Samples per second of the sound pressure, Hz: the filters of class 1 need four times 178 Hz.
 SAMPLE_RATE = 1024.0
-# Modes up to this frequency, Hz. The filter of 160 Hz lets 42 dB less through there.
-HIGHEST = 400.0
-# Least distance of random positions from all boundaries, m (ISO 16283-2).
+# Modes up to this frequency, Hz. The filter of 160 Hz attenuates by 42 dB there.
+MAX_FREQUENCY = 400.0
+# Minimum distance of random positions from all boundaries, m (ISO 16283-2).
 BORDER = 0.5
-# Decay that is waited for, dB, and time constant of the Fast detector, s.
-WAITED, FAST = 60.0, 0.125
+# Decay within the record, dB, and time constant of the Fast detector, s.
+DECAY_RANGE, TIME_CONSTANT = 60.0, 0.125
 REFERENCE_PRESSURE = 2e-5
 # Maximum number of positions of either kind, of modes, and of modes times spectral lines: memory.
 MAX_POSITIONS, MAX_MODES, MAX_VALUES = 1000, 20000, 2 * 10**7
@@ -71,7 +72,7 @@ class ModalRoom(Displayed):
     size : tuple of float
         Length, width and height of the room, m.
     frequency : ndarray, shape (9,)
-        Rounded mid frequencies of the thirds 25 to 160 Hz.
+        Rounded mid frequencies of the one-third-octave bands 25 to 160 Hz.
     balls : ndarray, shape (n_ball, 2)
         Positions of the ball on the floor, m.
     microphones : ndarray, shape (n_microphone, 3)
@@ -112,16 +113,16 @@ class ModalRoom(Displayed):
     @property
     def statistical(self) -> Array:
         """Levels and spread of the statistical prediction, dB, shape (2, 9); NaN below 50 Hz."""
-        found = np.full((2, N_BAND), np.nan)
+        result = np.full((2, N_BAND), np.nan)
         there = np.isin(self.frequency, self.prediction.frequency)
         n = there.sum()
-        found[:, there] = self.prediction.level[:n], self.prediction.spread[:n]
-        return found
+        result[:, there] = self.prediction.level[:n], self.prediction.spread[:n]
+        return result
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text, a third each."""
+        """Return header and rows of text, a band each."""
         head = (
-            "third, Hz", "mean, dB", "spread, dB", "least, dB", "largest, dB",
+            "band, Hz", "mean, dB", "spread, dB", "minimum, dB", "maximum, dB",
             "statistical, dB", "its spread, dB",
         )  # fmt: skip
         columns = (
@@ -156,7 +157,7 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
     microphones: int | ArrayLike = 32,
     seed: int = 0,
 ) -> ModalRoom:
-    """Compute the levels below a floor in the thirds 25 to 160 Hz by modes, position by position.
+    """Compute levels below a floor by modes, for each pair of positions, in bands up to 160 Hz.
 
     The floor is simply supported and covers the room, whose height is its volume over the area of
     the floor. Walls and ceilings of `room` are not part of it. Modes of the floor lose their energy
@@ -202,41 +203,45 @@ def positions_below(
     require_kind("floor", floor, Plate)
     assert isinstance(floor, Plate)  # noqa: S101 - for the type checker
     size = (floor.length, floor.width, room.volume / (floor.length * floor.width))
-    draw = np.random.default_rng(_seed(seed))
-    places = _positions("balls", balls, size[:2], draw)
-    heard = _positions("microphones", microphones, size, draw)
+    require_whole("seed", seed, 0, LARGEST_SEED)
+    generator = np.random.default_rng(seed)
+    positions = _positions("balls", balls, size[:2], generator)
+    receivers = _positions("microphones", microphones, size, generator)
     numbers, plate_frequency = _plate_modes(floor)
     orders, room_frequency = _room_modes(size, room.sound_speed)
-    found = ask(
+    result = ask(
         "radiator",
         case=case_text(Case(floor=floor, room=room)),
         frequency=np.maximum(plate_frequency, 1.0),
     )
-    losses = 2 * np.pi * plate_frequency * found["loss_factor"]
+    losses = 2 * np.pi * plate_frequency * result["loss_factor"]
     decay = 6 * math.log(10) / _times(prediction, room_frequency)
     duration = _duration(min(losses.min(), decay.min()))
     omega, force = _spectrum(prediction.source, duration)
     if len(omega) * len(orders) > MAX_VALUES:
         message = (
-            f"room: {len(orders)} modes below {HIGHEST:g} Hz ring for {duration:.1f} s; allowed: "
-            "a smaller volume or reverberation time; in large rooms the statistical prediction "
-            "holds"
+            f"room: {len(orders)} modes below {MAX_FREQUENCY:g} Hz ring for {duration:.1f} s; "
+            "allowed: a smaller volume or reverberation time; in large rooms the statistical "
+            "prediction holds"
         )
         raise ModeCountError(message)
-    mass = found["surface_mass"] * floor.length * floor.width / 4
+    mass = result["surface_mass"] * floor.length * floor.width / 4
     plate = _receptance(omega, plate_frequency, losses) * (1j * omega) / mass
-    stiffness = room.air_density * room.sound_speed**2 / (room.volume * _norms(orders))
+    # Means of the squares of the room's modes.
+    norms = np.prod(np.where(orders > 0, 0.5, 1.0), axis=1)
+    stiffness = room.air_density * room.sound_speed**2 / (room.volume * norms)
     air = _receptance(omega, room_frequency, decay) * (1j * omega) * stiffness[:, None]
     coupling = _coupling(orders, numbers, size[:2])
-    shapes = np.prod(np.cos(np.pi * orders * heard[:, None] / size), axis=2)
+    shapes = np.prod(np.cos(np.pi * orders * receivers[:, None] / size), axis=2)
     levels, plates, rooms = [], [], []
     step = omega[1] / (2 * np.pi)
-    for place in places:
-        drive = np.prod(np.sin(np.pi * numbers * place / size[:2]), axis=1)
+    for position in positions:
+        drive = np.prod(np.sin(np.pi * numbers * position / size[:2]), axis=1)
         velocity = drive[:, None] * plate * force
         flow = coupling @ velocity
         sound = air * flow
-        levels.append(_fast_maxima(shapes @ sound))
+        pressure = np.fft.irfft(shapes @ sound, axis=1) * SAMPLE_RATE
+        levels.append(fast_levels(pressure).max(axis=2).T)
         # Energies by Parseval's theorem.
         plates.append(
             [
@@ -254,8 +259,8 @@ def positions_below(
         prediction=prediction,
         size=size,
         frequency=get_bands("third").nominal[:N_BAND],
-        balls=places,
-        microphones=heard,
+        balls=positions,
+        microphones=receivers,
         level=np.array(levels),
         floor_frequency=np.sort(plate_frequency),
         room_frequency=np.sort(room_frequency),
@@ -270,8 +275,8 @@ def plate_frequencies(floor: Plate, numbers: ArrayLike) -> Array:
     square = (np.pi * np.asarray(numbers) / (floor.length, floor.width)) ** 2
     x, y, ratio = square[..., 0], square[..., 1], math.sqrt(floor.stiffness_ratio)
     root = np.sqrt(x**2 / ratio + 2 * floor.torsion_ratio * x * y + ratio * y**2)
-    found: Array = floor.wave_speed * floor.thickness / math.sqrt(12) * root / (2 * np.pi)
-    return found
+    result: Array = floor.wave_speed * floor.thickness / math.sqrt(12) * root / (2 * np.pi)
+    return result
 
 
 def _plate_modes(floor: Plate) -> tuple[Array, Array]:
@@ -280,14 +285,14 @@ def _plate_modes(floor: Plate) -> tuple[Array, Array]:
     unit = floor.wave_speed * floor.thickness * math.pi / (2 * math.sqrt(12))
     stretch = floor.stiffness_ratio**0.125
     sides = floor.length * stretch, floor.width / stretch
-    numbers = _grid([1 + int(side * math.sqrt(HIGHEST / unit)) for side in sides])
+    numbers = _grid([1 + int(side * math.sqrt(MAX_FREQUENCY / unit)) for side in sides])
     numbers += 1
     frequency = plate_frequencies(floor, numbers)
-    keep = frequency <= HIGHEST
+    keep = frequency <= MAX_FREQUENCY
     if not keep.any():
         message = (
             f"floor: its first natural frequency is {frequency.min():.0f} Hz; allowed: a floor "
-            f"with modes below {HIGHEST:g} Hz"
+            f"with modes below {MAX_FREQUENCY:g} Hz"
         )
         raise ModeCountError(message)
     _require_modes("floor: the plate has", int(keep.sum()))
@@ -296,33 +301,27 @@ def _plate_modes(floor: Plate) -> tuple[Array, Array]:
 
 def _room_modes(size: tuple[float, float, float], speed: float) -> tuple[Array, Array]:
     """Return numbers of half-waves, shape (n, 3), and frequencies of the room's modes, Hz."""
-    most = [1 + int(2 * side * HIGHEST / speed) for side in size]
-    _require_modes("room: volume gives", math.prod(most) // 3)
-    orders = _grid(most)
+    counts = [1 + int(2 * side * MAX_FREQUENCY / speed) for side in size]
+    _require_modes("room: volume gives", math.prod(counts) // 3)
+    orders = _grid(counts)
     frequency = speed / 2 * np.sqrt(((orders / size) ** 2).sum(axis=1))
-    keep = frequency <= HIGHEST
+    keep = frequency <= MAX_FREQUENCY
     return orders[keep], frequency[keep]
 
 
-def _grid(most: list[int]) -> Array:
+def _grid(counts: list[int]) -> Array:
     """Return all combinations of whole numbers from 0 to below the given ones."""
-    grid = np.meshgrid(*(np.arange(float(one)) for one in most), indexing="ij")
-    return np.stack(grid, -1).reshape(-1, len(most))
+    grid = np.meshgrid(*(np.arange(float(one)) for one in counts), indexing="ij")
+    return np.stack(grid, -1).reshape(-1, len(counts))
 
 
 def _require_modes(what: str, count: int) -> None:
     if count > MAX_MODES:
         message = (
-            f"{what} about {count} modes below {HIGHEST:g} Hz; allowed: at most {MAX_MODES}; "
+            f"{what} about {count} modes below {MAX_FREQUENCY:g} Hz; allowed: at most {MAX_MODES}; "
             "there the statistical prediction holds"
         )
         raise ModeCountError(message)
-
-
-def _norms(orders: Array) -> Array:
-    """Return the means of the squares of the room's modes."""
-    norms: Array = np.prod(np.where(orders > 0, 0.5, 1.0), axis=1)
-    return norms
 
 
 def _coupling(orders: Array, numbers: Array, sides: tuple[float, ...]) -> Array:
@@ -346,7 +345,7 @@ def _duration(slowest: float) -> float:
     It is periodic: what rings on longer would come before the impact. `slowest` is the least rate
     of decay of an energy, 1/s; half a second is for the impact and the detector.
     """
-    return 0.5 + WAITED * math.log(10) / (10 * slowest)
+    return 0.5 + DECAY_RANGE * math.log(10) / (10 * slowest)
 
 
 def _receptance(omega: Array, frequency: Array, decay: Array) -> ComplexArray:
@@ -368,20 +367,13 @@ def _spectrum(source: ImpactResult, duration: float) -> tuple[Array, ComplexArra
     return omega, np.fft.rfft(force, count)[: len(omega)] / source.sample_rate
 
 
-def _fast_maxima(spectrum: ComplexArray) -> Array:
-    """Return maximum Fast levels of the thirds, dB, shape (n_microphone, 9)."""
-    pressure = np.fft.irfft(spectrum, axis=1) * SAMPLE_RATE
-    found: Array = fast_levels(pressure).max(axis=2).T
-    return found
-
-
 def fast_levels(pressure: Array) -> Array:
     """Return what the Fast detector shows of sound pressure, dB, shape (9, n_record, n_sample).
 
     The pressure, Pa, has 1024 samples a second and shape (n_record, n_sample); it is filtered into
-    the thirds 25 to 160 Hz by filters of class 1.
+    the one-third-octave bands 25 to 160 Hz by filters of class 1.
     """
-    kept = math.exp(-1 / (SAMPLE_RATE * FAST))
+    kept = math.exp(-1 / (SAMPLE_RATE * TIME_CONSTANT))
     levels = []
     for sections in band_filters("third", SAMPLE_RATE)[:N_BAND]:
         square = sosfilt(sections, pressure, axis=-1) ** 2
@@ -391,35 +383,30 @@ def fast_levels(pressure: Array) -> Array:
 
 
 def _times(prediction: RoomPrediction, frequency: Array) -> Array:
-    """Return reverberation times at frequencies, s: those of the nearest thirds."""
+    """Return reverberation times at frequencies, s: those of the nearest bands."""
     distance = abs(np.log(np.maximum(frequency, 1.0)[:, None] / prediction.frequency))
-    found: Array = prediction.reverberation_time[distance.argmin(axis=1)]
-    return found
+    result: Array = prediction.reverberation_time[distance.argmin(axis=1)]
+    return result
 
 
 def _positions(
-    name: str, given: int | ArrayLike, size: tuple[float, ...], draw: np.random.Generator
+    name: str, given: int | ArrayLike, size: tuple[float, ...], generator: np.random.Generator
 ) -> Array:
     """Return positions, m, shape (n, len(size)), drawn or checked."""
     sides = np.array(size)
     if isinstance(given, int | np.integer | float | str):
         require_whole(name, given, 1, MAX_POSITIONS)
         border = np.minimum(BORDER, sides / 4)
-        random: Array = border + draw.random((int(given), len(size))) * (sides - 2 * border)
+        random: Array = border + generator.random((int(given), len(size))) * (sides - 2 * border)
         return random
-    places = require_real(name, require_array(name, given, dimensions=(2,)))
-    if places.shape[1] != len(size) or not 1 <= len(places) <= MAX_POSITIONS:
+    positions = require_real(name, require_array(name, given, dimensions=(2,)))
+    if positions.shape[1] != len(size) or not 1 <= len(positions) <= MAX_POSITIONS:
         refuse(
-            f"{name} have the shape {places.shape}",
+            f"{name} have the shape {positions.shape}",
             f"(n, {len(size)}), n from 1 to {MAX_POSITIONS}",
         )
-    outside = places[~((places >= 0) & (places <= sides)).all(axis=1)]
+    outside = positions[~((positions >= 0) & (positions <= sides)).all(axis=1)]
     if len(outside):
         limits = ", ".join(f"0 to {side:g}" for side in size)
         refuse_value(name, outside[0].tolist(), f"{limits} m")
-    return places
-
-
-def _seed(seed: int) -> int:
-    require_whole("seed", seed, 0, 2**32 - 1)
-    return seed
+    return positions

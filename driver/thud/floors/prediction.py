@@ -27,20 +27,20 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 THIRDS = BANDWIDTHS[1]
-# Change of the force by a floor that gives way, dB, that raises a warning.
-NOTICED = 0.1
+# Change of the force by a yielding floor, dB, that raises a warning.
+MIN_CHANGE = 0.1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RoomPrediction(Displayed):
-    """Level that an impact causes in the room below: energy means over positions, in thirds.
+    """Level that an impact causes in the room below: energy means over positions, in bands.
 
     Attributes
     ----------
     floor, room : Plate and Room
         What it was predicted for.
     frequency : ndarray, shape (12,)
-        Rounded mid frequencies of the thirds 50 to 630 Hz.
+        Rounded mid frequencies of the one-third-octave bands 50 to 630 Hz.
     level : ndarray, shape (12,)
         Maximum Fast levels L_i,Fmax, dB re 20 uPa.
     time_of_maximum : ndarray, shape (12,)
@@ -52,9 +52,9 @@ class RoomPrediction(Displayed):
     reverberation_time : ndarray, shape (12,)
         Reverberation time of the room, s.
     floor_modes, room_modes : ndarray, shape (12,)
-        Expected number of modes in each third.
+        Expected number of modes in each band.
     few_modes : float
-        Number of modes below which the statistical answer of a third is doubtful.
+        Number of modes below which the statistical answer of a band is uncertain.
     mass_per_area : float
         Mass of the radiating plate over its area, kg/m2.
     spread : ndarray, shape (12,)
@@ -62,11 +62,11 @@ class RoomPrediction(Displayed):
         microphone, dB: theory of the variance by modal overlap (Langley and Cotoni 2004).
     octave_level, octave_time : ndarray, shape (4,)
         Maximum Fast levels of the octaves 63 to 500 Hz, dB, and their times, s: maxima of the sums
-        of their thirds.
+        of their bands.
     history_time : ndarray, shape (n_time,)
         Instants after the impact, s.
     history : ndarray, shape (n_time, 12)
-        What the Fast detector shows in each third then, dB.
+        What the Fast detector shows in each band then, dB.
     conductance : ndarray, shape (12,)
         Power that a force of unit mean square gives to the floor, m/(N s).
     source : Impact or Recording
@@ -137,44 +137,46 @@ class RoomPrediction(Displayed):
 
     @property
     def has_few_modes(self) -> NDArray[np.bool_]:
-        """Whether a third has few modes of floor or room, shape (12,)."""
+        """Whether a band has few modes of floor or room, shape (12,)."""
         return np.minimum(self.floor_modes, self.room_modes) < self.few_modes
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a reader of the numbers has to know."""
+        """Caveats of the numbers."""
         few = self.has_few_modes
-        found = [*self.floor_warnings]
+        result = [*self.floor_warnings]
         if few.any():
             bands = ", ".join(f"{f:g}" for f in self.frequency[few])
-            found.append(
+            result.append(
                 f"fewer than {self.few_modes:g} modes of floor or room at {bands} Hz: levels there "
                 "are means over many floors and rooms; single positions are expected to differ "
                 f"with a standard deviation of {self.spread[few].max():.1f} to "
                 f"{self.spread[few].min():.1f} dB"
             )
-        if self.force == "blocked" and abs(self.force_change) > NOTICED:
-            found.append(
-                f"the floor gives way: the peak of the force would change by about "
+        if self.force == "blocked" and abs(self.force_change) > MIN_CHANGE:
+            result.append(
+                f"the floor yields: the peak of the force would change by about "
                 f"{self.force_change:.1f} dB, and the force on a rigid floor is used"
             )
-        return tuple(found)
+        return tuple(result)
 
     def difference(self, measured: RoomLevels) -> Array:
-        """Return measured less predicted level, dB, shape (12,), in the room as it is.
+        """Return measured − predicted level, dB, shape (12,), in the room as it is.
 
-        Raise InputError where the measured levels are not thirds.
+        Raise InputError where the measured levels are not in one-third-octave bands.
         """
         require_kind("measured", measured, RoomLevels)
         if measured.bands != THIRDS:
-            refuse("measured: the levels are octaves", "thirds, which the prediction has")
+            refuse(
+                "measured: the levels are octaves", "one-third-octave bands, as of the prediction"
+            )
         rated = np.isin(measured.frequency, self.frequency)
         return np.asarray(measured.level[rated] - self.level)
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text, a third each."""
+        """Return header and rows of text, a band each."""
         head = (
-            "third, Hz", "L_i,Fmax, dB", "standardized, dB", "spread, dB", "energy, mJ",
+            "band, Hz", "L_i,Fmax, dB", "standardized, dB", "spread, dB", "energy, mJ",
             "floor modes",
         )  # fmt: skip
         columns = (self.level, self.standardized, self.spread, 1e3 * self.energy, self.floor_modes)
@@ -204,7 +206,7 @@ def predict_level(
 ) -> RoomPrediction:
     """Predict the level that an impact causes in the room below.
 
-    Transient statistical energy analysis in thirds: the floor takes the energy of an infinite
+    Transient statistical energy analysis: the floor takes the energy of an infinite
     plate, loses and radiates it after ISO 12354-1, the room decays with its reverberation time, and
     the Fast detector shows its maximum. The force is that on the floor, where the model knows it:
     on floors that the impact has not seen, the source is dropped once more.
@@ -232,8 +234,8 @@ def predict_level(
     moved = _on_floor(source, asked)
     levels = (moved or source).levels(THIRDS, force="floor")
     rated = np.isin(get_bands(THIRDS).nominal, rated_bands(THIRDS))
-    found = ask("room_level", case=case_text(asked), levels=levels[rated])
-    bands = found["room_bands"]
+    result = ask("room_level", case=case_text(asked), levels=levels[rated])
+    bands = result["room_bands"]
     if moved:
         blocked = (
             source.blocked_force.max() if isinstance(source, FloorImpact) else source.peak("floor")
@@ -247,14 +249,14 @@ def predict_level(
         source=moved or source,
         force="contact" if moved else "blocked",
         force_change=change,
-        floor_warnings=tuple(map(text, found.get("warnings", {}).values())),
+        floor_warnings=tuple(map(text, result.get("warnings", {}).values())),
         time_of_maximum=bands.pop("time"),
-        few_modes=found["room"]["few_modes"],
-        mass_per_area=found["room"]["surface_mass"],
-        octave_level=found["room_octaves"]["level"],
-        octave_time=found["room_octaves"]["time"],
-        history_time=found["room_history"]["time"],
-        history=found["room_history"]["level"],
+        few_modes=result["room"]["few_modes"],
+        mass_per_area=result["room"]["surface_mass"],
+        octave_level=result["room_octaves"]["level"],
+        octave_time=result["room_octaves"]["time"],
+        history_time=result["room_history"]["time"],
+        history=result["room_history"]["level"],
         **bands,
     )
 

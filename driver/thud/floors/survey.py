@@ -148,24 +148,24 @@ class RoomLevels(Displayed):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a reader of the numbers has to know."""
-        found = []
+        """Caveats of the numbers."""
+        result = []
         if len(self.positions) < MIN_POSITIONS:
-            found.append(
+            result.append(
                 f"levels of {self._count}; ISO 16283-2 asks for {MIN_POSITIONS} positions of the "
                 "source or more"
             )
         different = float(np.ptp(self.positions.mean(axis=1)))
         if different > DIFFERENT:
-            found.append(
+            result.append(
                 f"the levels of two positions differ by {different:.0f} dB in the mean: check that "
                 "every column without a known title holds the levels of a position"
             )
         if self.background is None:
-            found.append("the background is not known: levels are not corrected for it")
+            result.append("the background is not known: levels are not corrected for it")
         elif self.is_upper_bound.any():
             bands = ", ".join(f"{f:g}" for f in self.frequency[self.is_upper_bound])
-            found.append(
+            result.append(
                 f"less than 6 dB above the background at {bands} Hz: levels there are maxima, and "
                 "so is what is made of them"
             )
@@ -177,8 +177,8 @@ class RoomLevels(Displayed):
             if value is None
         ]  # fmt: skip
         if missing:
-            found.append(f"not standardized: {' and '.join(missing)} not given")
-        return tuple(found)
+            result.append(f"not standardized: {' and '.join(missing)} not given")
+        return tuple(result)
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, a band each."""
@@ -230,8 +230,8 @@ class RoomLevels(Displayed):
     def _corrected(self) -> tuple[Array, NDArray[np.bool_]]:
         if self.background is None:
             return self.measured, np.zeros(len(self.frequency), dtype=bool)
-        found = ask("background", levels=self.measured, background=self.background)
-        return found["levels"], found["is_upper_bound"].astype(bool)
+        result = ask("background", levels=self.measured, background=self.background)
+        return result["levels"], result["is_upper_bound"].astype(bool)
 
 
 def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) -> RoomLevels:
@@ -242,7 +242,7 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     path
         Columns with a header row: ``frequency``, Hz; ``background``, dB, and
         ``reverberation_time``, s, where they are known; every other column holds the levels of a
-        position, dB. The bands are the octaves or thirds that a rating needs, and more if wanted.
+        position, dB. The bands are those that a rating needs, or more.
     volume
         Volume of the room, m3.
 
@@ -295,13 +295,13 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     )  # fmt: skip
 
 
-def levels_csv(found: RoomLevels) -> bytes:
+def levels_csv(result: RoomLevels) -> bytes:
     """Return the levels as a table with titles."""
     columns = {
-        "nominal_Hz": found.frequency, "mean_dB": found.measured, "spread_dB": found.spread,
-        "background_dB": found.background, "level_dB": found.level,
-        "is_upper_bound": found.is_upper_bound.astype(int),
-        "reverberation_time_s": found.reverberation_time, "standardized_dB": found.standardized,
+        "nominal_Hz": result.frequency, "mean_dB": result.measured, "spread_dB": result.spread,
+        "background_dB": result.background, "level_dB": result.level,
+        "is_upper_bound": result.is_upper_bound.astype(int),
+        "reverberation_time_s": result.reverberation_time, "standardized_dB": result.standardized,
     }  # fmt: skip
     known = {title: values for title, values in columns.items() if values is not None}
     text = io.StringIO()
@@ -312,10 +312,10 @@ def levels_csv(found: RoomLevels) -> bytes:
     return text.getvalue().encode()
 
 
-def rating_table(found: RoomLevels) -> list[tuple[str, ...]]:
+def rating_table(result: RoomLevels) -> list[tuple[str, ...]]:
     """Return header and rows of the single numbers."""
-    after = found.standardized_rating
-    rows = [*found.rating.rows()]
+    after = result.standardized_rating
+    rows = [*result.rating.rows()]
     if after is not None:
         rows = [(*row, more[1]) for row, more in zip(rows, after.rows(), strict=True)]
         rows[0] = ("rating", "in the room", "standardized")
@@ -359,7 +359,7 @@ def _nominal(frequency: float, path: object) -> float:
             return float(f"{best:.3g}")
     return refuse(
         f"{path}: frequency = {frequency:g} Hz is not a mid frequency",
-        "those of octaves or thirds, such as 50, 63, 80",
+        "those of octave or one-third-octave bands, such as 50, 63, 80",
     )
 
 

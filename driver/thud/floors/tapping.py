@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from thud.base._schema import FloorOptions
 
 
-# Thirds 50 to 3150 Hz: rounded mid frequencies; those from 100 Hz on are rated.
+# One-third-octave bands 50 to 3150 Hz: rounded mid frequencies; those from 100 Hz on are rated.
 THIRDS = np.array(
     [50, 63, 80, 100, 125, 160, 200, 250, 315, 400, 500, 630, 800, 1000, 1250, 1600, 2000, 2500,
      3150], dtype=float,
 )  # fmt: skip
 RATED = slice(3, None)
-# Reference curve of the thirds 100 to 3150 Hz, dB (ISO 717-2), its value at 500 Hz, and the sum of
-# the excesses that is allowed.
+# Reference curve from 100 to 3150 Hz, dB (ISO 717-2), its value at 500 Hz, and the allowed sum of
+# the excesses.
 CURVE = np.array([62, 62, 62, 62, 62, 62, 61, 60, 59, 58, 57, 54, 51, 48, 45, 42], dtype=float)
 AT_500, MAX_EXCESS = 60, 32.0
 # Ratio of wave speed, m/s, and density, kg/m3, that the constant of the formula holds, that of
@@ -36,12 +36,12 @@ CONCRETE, WITHIN = 3500 / 2300, 1.26
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TappingLevel(Displayed):
-    """Normalised level of the tapping machine below a homogeneous floor, in thirds.
+    """Normalized level of the tapping machine below a homogeneous floor, in bands.
 
     Attributes
     ----------
     frequency : ndarray, shape (19,)
-        Rounded mid frequencies of the thirds 50 to 3150 Hz.
+        Rounded mid frequencies of the one-third-octave bands 50 to 3150 Hz.
     level : ndarray, shape (19,)
         L_n, dB re 20 uPa, for an absorption of 10 m2.
     """
@@ -61,7 +61,7 @@ class TappingLevel(Displayed):
 
     @property
     def adaptation(self) -> int:
-        """Spectrum adaptation term C_I, dB, of the thirds 100 to 2500 Hz (ISO 717-2 annex A)."""
+        """Spectrum adaptation term C_I, dB, from 100 to 2500 Hz (ISO 717-2 annex A)."""
         # Without that of 3150 Hz.
         total = 10 * np.log10((10 ** (self._tenths[:-1] / 100)).sum())
         return int(np.floor(total + 0.5)) - 15 - self.weighted
@@ -73,9 +73,9 @@ class TappingLevel(Displayed):
         return tenths
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text, a third each."""
-        found = zip(self.frequency, self.level, strict=True)
-        return [("third, Hz", "L_n, dB"), *((f"{f:g}", f"{level:.1f}") for f, level in found)]
+        """Return header and rows of text, a band each."""
+        result = zip(self.frequency, self.level, strict=True)
+        return [("band, Hz", "L_n, dB"), *((f"{f:g}", f"{level:.1f}") for f, level in result)]
 
     def __repr__(self) -> str:
         """Return the single numbers."""
@@ -121,11 +121,12 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
             f"{floor.torsion_ratio:g}, but the formula of ISO 12354-2 is for isotropic floors",
             "1 and 1",
         )
-    case = Case(floor=floor, room=require_room(room))
-    found = ask("radiator", case=case_text(case), frequency=THIRDS)
-    time = 2.2 / (THIRDS * found["loss_factor"])
-    radiated = time * found["radiation_factor"] * THIRDS / 1000
-    level = 155 - 30 * np.log10(found["surface_mass"]) + 10 * np.log10(radiated)
+    require_kind("room", room, Room | None)
+    case = Case(floor=floor, room=room or Room())
+    result = ask("radiator", case=case_text(case), frequency=THIRDS)
+    time = 2.2 / (THIRDS * result["loss_factor"])
+    radiated = time * result["radiation_factor"] * THIRDS / 1000
+    level = 155 - 30 * np.log10(result["surface_mass"]) + 10 * np.log10(radiated)
     return TappingLevel(THIRDS, level)
 
 
@@ -140,11 +141,3 @@ def _is_near_concrete(floor: Plate) -> bool:
 
 def _is_isotropic(floor: Plate) -> bool:
     return (floor.stiffness_ratio, floor.torsion_ratio) == (1, 1)
-
-
-def require_room(room: Room | None) -> Room:
-    """Return a room, the default one for None; raise InputError for anything else."""
-    if room is None:
-        return Room()
-    require_kind("room", room, Room)
-    return room

@@ -12,7 +12,7 @@ import xarray as xr
 
 from thud.base import _schema as schema
 from thud.base.bridge import compiler, version
-from thud.case.keys import find_key, users
+from thud.case.keys import find_key, key_owners
 from thud.impact.quantities import (
     ALL_QUANTITIES,
     FLOOR_QUANTITIES,
@@ -61,7 +61,9 @@ def impact_dataset(impact: Impact, histories: Mapping[str, NDArray[np.float64]])
     variables["conforms"] = ((), conforms, attributes(SAMPLE_RESULTS["conforms"]))
     coordinates = {"time": _time(impact.time), **band_coordinates(BANDWIDTHS)}
     warnings = {"warnings": "\n".join(impact.warnings)}
-    found = xr.Dataset(variables, coordinates, origin(impact.case) | impact.facts | warnings)
+    found = xr.Dataset(
+        variables, coordinates, origin(impact.case) | impact.model_quantities | warnings
+    )
     # The arrays of the impact are read-only.
     return found.copy(deep=True)
 
@@ -90,7 +92,7 @@ def ensemble_dataset(ensemble: Ensemble) -> xr.Dataset:
     assert ensemble.case.model is not None  # noqa: S101 - `solve_many` has set it
     coordinates: dict[str, Any] = band_coordinates(bands for _, bands in ensemble.levels)
     for name, values in ensemble.parameters.items():
-        key, _ = find_key(name, users(ensemble.case))
+        key, _ = find_key(name, key_owners(ensemble.case))
         words = attributes(key)
         coordinates[coordinate(name, key)] = ("sample", values, words)
     variables: dict[str, Any] = {}

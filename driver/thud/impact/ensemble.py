@@ -22,7 +22,7 @@ from thud.base.checks import (
 from thud.base.immutable import freeze
 from thud.base.key import check_keywords
 from thud.case.case import Case, case_text, new_model
-from thud.case.keys import find_key, users
+from thud.case.keys import find_key, key_owners
 from thud.impact.outcomes import Ensemble
 from thud.impact.quantities import RATING, ROOM_LEVEL
 from thud.level.levels import BANDWIDTHS, FORCES, get_bands
@@ -285,7 +285,7 @@ def _columns(
 ) -> tuple[dict[str, NDArray[Any]], NDArray[np.float64]]:
     """Return one array per key, all of one length, and their numbers for the library."""
     assert case.model is not None  # noqa: S101 - `solve_many` has set it
-    keys = [find_key(name, users(case))[0] for name in parameters]
+    keys = [find_key(name, key_owners(case))[0] for name in parameters]
     for key in keys:
         if key not in KEYS:
             refuse(f"{key.name!r} is a parameter of studies", "keys of the input")

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.special import stdtr
 
 from thud.base._schema import LIMITS
 from thud.base.checks import refuse, refuse_value, require_choice
@@ -92,6 +91,8 @@ class Criterion(Displayed):
             return math.nan
         if estimate.uncertainty == 0:
             return float(self.lower <= self.value <= self.upper)
+        from scipy.special import stdtr
+
         limits = np.array([self.lower, self.upper])
         low, high = stdtr(estimate.freedom, (limits - self.value) / estimate.uncertainty)
         return float(high - low)

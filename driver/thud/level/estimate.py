@@ -6,8 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import Self
 
-from scipy.special import stdtrit
-
 from thud.base.immutable import Immutable
 
 CONFIDENCE = 0.95
@@ -82,10 +80,11 @@ class Estimate(Immutable):
     @property
     def coverage_factor(self) -> float:
         """Quantile of Student's t for 95 %."""
-        freedom = self.freedom
-        return float(stdtrit(freedom, (1 + CONFIDENCE) / 2)) if freedom > 0 else math.nan
+        from scipy.special import stdtrit
+
+        return float(stdtrit(self.freedom, (1 + CONFIDENCE) / 2)) if self.freedom > 0 else math.nan
 
     @property
     def expanded(self) -> float:
         """Expanded uncertainty: value ± this holds the true value with 95 %."""
-        return self.coverage_factor * self.uncertainty
+        return self.coverage_factor * self.uncertainty if self.uncertainty else 0.0

@@ -88,7 +88,7 @@ def _draw_force(fitted: FittedTarget, deviation: float, above: Axes, below: Axes
     )
     fit = column["model_N"] + column["background_N"]
     above.plot(time, fit / 1e3, color=COLORS[1], linestyle="--", linewidth=1.1, label="Fit")
-    width = 2 * misfit.band_share * deviation
+    width = 2 * misfit.band_fraction * deviation
     below.axhspan(-width, width, color=GREY, linewidth=0)
     below.plot(time, column["residual_N"], color=COLORS[6], linewidth=0.7)
     contact, touch = fitted.impact.contact_time, fitted.own_value(SHIFT, 0.0)

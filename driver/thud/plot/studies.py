@@ -387,8 +387,8 @@ def draw_surrogate(result: Surrogate) -> Figure:
 
     Quantities that are not levels have errors in 20 lg of their ratio.
     """
-    labels = [name for name, judged in zip(result.labels, result.judged, strict=True) if judged]
-    residuals = result.residuals[:, result.judged]
+    labels = [name for name, judged in zip(result.labels, result.assessed, strict=True) if judged]
+    residuals = result.residuals[:, result.assessed]
     figure, axes = empty_axes(0.9 + 0.2 * len(labels))
     bound = result.bound
     axes.axvspan(-bound, bound, color="0.85", linewidth=0, label=f"Bound of 95 %, {bound:g} dB")
@@ -399,7 +399,7 @@ def draw_surrogate(result: Surrogate) -> Figure:
             markeredgewidth=0.5, label=None if i else f"Each of {len(values)} held-out drops",
         )  # fmt: skip
     axes.errorbar(
-        np.zeros(len(labels)), position, xerr=result.errors[result.judged], fmt="none",
+        np.zeros(len(labels)), position, xerr=result.errors[result.assessed], fmt="none",
         color="black", elinewidth=0.8, capsize=3, label="95 % of drops",
     )  # fmt: skip
     words = [label.replace("floor ", "").replace("elastic ", "") for label in labels]

@@ -7,7 +7,7 @@ import os
 import warnings
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 from thud.base.checks import refuse
 from thud.base.errors import InputError
@@ -19,15 +19,14 @@ if TYPE_CHECKING:
 
     import numpy as np
     from numpy.typing import NDArray
-    from typing_extensions import Buffer
 
 # Maximum size of files that are read as a whole, bytes.
 MAX_IN_MEMORY = 2**27
-# Maximum number of bytes that a library may ask for at once.
-MAX_PIECE = 2**26
 # Maximum number of characters of a library's message that are shown.
 MAX_SHOWN = 100
 MIB = 2**20
+# Minimum number of samples of a recording.
+MIN_SAMPLES = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,48 +118,6 @@ def require_small(path: Path, kind: str, limit: int = MAX_IN_MEMORY) -> None:
             f"{shown_path(path)}: {size / MIB:.0f} MiB of {kind}, which is read as a whole",
             f"up to {limit // MIB} MiB; longer recordings as WAV, RF64, FLAC, HDF5 or TDMS",
         )
-
-
-class BoundedFile:
-    """A file that refuses to read more at once than it holds or than memory should.
-
-    Libraries ask for as many bytes as a header says.
-    """
-
-    def __init__(self, file: BinaryIO, name: str) -> None:
-        self.file = file
-        self.name = name
-        self.size = os.fstat(file.fileno()).st_size
-
-    def read(self, count: int = -1) -> bytes:
-        """Return the next bytes."""
-        left = max(0, self.size - self.file.tell())
-        size = left if count is None or count < 0 else int(count)
-        if size > MAX_PIECE or (size > left and size > MIB):
-            refuse(
-                f"{self.name}: a piece of {size / MIB:.0f} MiB, {left / MIB:.0f} MiB are left",
-                f"pieces of up to {MAX_PIECE // MIB} MiB inside the file",
-            )
-        return self.file.read(size)
-
-    def readinto(self, buffer: Buffer) -> int:
-        """Fill a buffer with the next bytes."""
-        view = memoryview(buffer).cast("B")
-        data = self.read(len(view))
-        view[: len(data)] = data
-        return len(data)
-
-    def seek(self, offset: int, whence: int = 0) -> int:
-        """Move to another position."""
-        return self.file.seek(offset, whence)
-
-    def tell(self) -> int:
-        """Return the position of the next byte."""
-        return self.file.tell()
-
-    def close(self) -> None:
-        """Close the file."""
-        self.file.close()
 
 
 def channel_of(text: str | None) -> int | str | None:

@@ -143,18 +143,10 @@ def _spread(rate: float, plate: Plate | None) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """Posteriors of first touch and release, and the background before and after.
+    """Posteriors of first touch, and of release in reversed time, s from the first sample.
 
-    Attributes
-    ----------
-    touch, release : Posterior
-        First touch, and release in reversed time, s from the first sample of the window.
-    background : Background
-        The fitted noise.
-    offset : float
-        Median of the background, which was removed before, N.
-    limits : tuple of int
-        Stop index of the background before, and first index of that after the contact.
+    `limits` are the stop index of the background before, and the first index of that after the
+    contact; the offset, N, is the median of both, which was removed before.
     """
 
     touch: Posterior
@@ -247,7 +239,7 @@ def find_posteriors(
                 find_edge(force, edges, ahead, likely, rate, middle, searches, window.plate)
             )
         if last + 1 < passes:
-            touch, back = (_reach(one.edge(), 3 / rate + 1e-4) for one in posteriors)
+            touch, back = (_reach(posterior.edge(), 3 / rate + 1e-4) for posterior in posteriors)
             release = (-back[1], -back[0])
             # Samples that a filter affects are no background.
             beyond = _spread(rate, window.plate)

@@ -48,14 +48,9 @@ TOLERANCE = 0.02
 class Noise:
     """Noise of a recording: white, pink and brown.
 
-    Attributes
-    ----------
-    deviation : float
-        Standard deviation of one sample, N.
-    source : str
-        ``"before and after"``, ``"before"`` or ``"after"``: the background that shows it.
-    white, pink, brown : float
-        One-sided spectral densities at 1 Hz, N2/Hz: constant, proportional to 1/f and to 1/f2.
+    The deviation is that of one sample, N. Densities at 1 Hz are one-sided, N2/Hz: constant,
+    proportional to 1/f and to 1/f2. The source is the background that shows them: ``"before and
+    after"``, ``"before"`` or ``"after"``.
     """
 
     deviation: float
@@ -80,14 +75,14 @@ class Noise:
         return float(np.sqrt(sum(variances)))
 
 
-def noise_covariances(one: Cells, other: Cells) -> NDArray[np.float64]:
+def noise_covariances(cells: Cells, other: Cells) -> NDArray[np.float64]:
     """Return covariances of means over cells that are equal or apart: [4, n_one, n_other].
 
     Of pink and brown noise of density 1 at 1 Hz and of hum of 50 and 60 Hz of variance 1. The
     covariances at a lag are -ln|lag| and -pi2 |lag|, up to a constant that the unknown offset
     absorbs; the mean of the first over two cells is taken to second order in their lengths.
     """
-    (a, b), (c, d) = one, other
+    (a, b), (c, d) = cells, other
     lag = np.abs(((a + b) / 2)[:, None] - (c + d) / 2)
     width = (((b - a) ** 2)[:, None] + (d - c) ** 2) / 2
     near = np.nonzero(lag**2 < NEAR * width)
@@ -100,13 +95,13 @@ def noise_covariances(one: Cells, other: Cells) -> NDArray[np.float64]:
     sign = np.array([1, -1, -1, 1]) / ((b - a) * (d - c))[:, None]
     pink[near] = (sign * (size**2 * (0.75 - 0.5 * np.log(size))).T).sum(1)
     brown[near] = (sign * (-(np.pi**2) / 6 * size**3).T).sum(1)
-    waves = _waves(one)
-    hum = waves @ (waves if other is one else _waves(other)).swapaxes(1, 2)
+    waves = _waves(cells)
+    hum = waves @ (waves if other is cells else _waves(other)).swapaxes(1, 2)
     return np.array([pink, brown, *hum])
 
 
 def _waves(cells: Cells) -> NDArray[np.float64]:
-    """Return means of the waves of each hum over cells; two frequencies stand for an uncertain one.
+    """Return means of the waves of each hum over cells; two frequencies each.
 
     Shape (n_mains, n_cell, n_wave).
     """
@@ -123,17 +118,10 @@ def _waves(cells: Cells) -> NDArray[np.float64]:
 class Background(Immutable):
     """Background under the force, predicted linearly from cells next to the contact.
 
-    Attributes
-    ----------
-    cells : Cells
-        Begins and ends of the cells, s.
-    mean : ndarray, shape (n_cell,)
-        Their mean forces, N.
-    draws : ndarray, shape (n_draw, 5)
-        Draws of the variances: densities of white, pink and brown noise, N2/Hz, and variances of
-        hum of 50 and of 60 Hz, N2; one draw if they are known.
-    peak : float
-        Scale of the priors of offset and drift, N.
+    Begins and ends of the cells are in s, their mean forces in N, [n_cell]. The draws of the
+    variances, [n_draw, 5], are densities of white, pink and brown noise, N2/Hz, and variances of
+    hum of 50 and of 60 Hz, N2; a single draw if they are known. The peak force, N, scales the
+    priors of offset and drift.
     """
 
     cells: Cells
@@ -219,9 +207,9 @@ def _solve_lower(factor: NDArray[np.float64], right: NDArray[np.float64]) -> NDA
     return np.asarray(lapack.dtrtrs(factor, right, lower=True)[0])
 
 
-def _trend(one: Cells, other: Cells, peak: float) -> NDArray[np.float64]:
+def _trend(cells: Cells, other: Cells, peak: float) -> NDArray[np.float64]:
     """Return the prior covariance of offset and drift."""
-    time = np.multiply.outer((one[0] + one[1]) / 2, (other[0] + other[1]) / 2)
+    time = np.multiply.outer((cells[0] + cells[1]) / 2, (other[0] + other[1]) / 2)
     return np.asarray(peak**2 * (OFFSET**2 + DRIFT**2 * time), dtype=np.float64)
 
 
@@ -239,14 +227,8 @@ def covariances(cells: Cells) -> NDArray[np.float64]:
 def fit_background(cells: Cells, mean: NDArray[np.float64], peak: float) -> Background:
     """Return the background with variances drawn from their posterior.
 
-    Parameters
-    ----------
-    cells
-        Begins and ends of the cells, s from about the middle of the contact.
-    mean : ndarray, shape (n_cell,)
-        Mean force of each, N.
-    peak
-        Peak force, N.
+    Cells are given by begins and ends, s from about the middle of the contact, and their mean
+    forces, N, shape (n_cell,); the peak force is in N.
     """
     unit = covariances(cells)
     scale = np.array([np.mean(np.diagonal(unit[0])), 1.0, np.pi**2 * 0.02, 1.0, 1.0])

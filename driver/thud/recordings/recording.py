@@ -88,7 +88,7 @@ class Recording(Displayed):
         return self.assess().rows()
 
     @classmethod
-    def from_array(  # noqa: PLR0913 - what a laboratory knows
+    def from_array(  # noqa: PLR0913 - keys of the configuration
         cls,
         force: ArrayLike,
         sample_rate: float,
@@ -135,7 +135,7 @@ class Recording(Displayed):
         *,
         progress: bool = False,
         workers: int = 1,
-        keep: str | os.PathLike[str] | Checkpoint | None = None,
+        checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     ) -> Recording:
         """Measure the drops of signals; other arguments as for `read_recording`.
 
@@ -145,7 +145,11 @@ class Recording(Displayed):
             Where a drop cannot be measured.
         """
         drops, origins, uncertainty = measure_signals(
-            signals, checked_config(config), progress=progress, workers=workers, keep=keep
+            signals,
+            checked_config(config),
+            progress=progress,
+            workers=workers,
+            checkpoint=checkpoint,
         )
         name = Path(origins[0].path or origins[0].name).stem
         return cls(name, drops, origins, config, uncertainty)
@@ -165,7 +169,7 @@ class Recording(Displayed):
         """Time of first touch, s: 0."""
         return 0.0
 
-    def assessed_force(self, force: LevelsForce | None = None) -> LevelsForce:  # noqa: ARG002 - there is one
+    def assessed_force(self, force: LevelsForce | None = None) -> LevelsForce:  # noqa: ARG002 - of the protocol
         """Return the force that a force plate measures: ``"floor"``."""
         return "floor"
 
@@ -234,16 +238,18 @@ class Recording(Displayed):
     @cached_property
     def own_warnings(self) -> tuple[str, ...]:
         """What may be wrong with the recording as a whole, a sentence each."""
-        config, found = self.config, list[str]()
+        config, warnings = self.config, list[str]()
         if math.isnan(self.estimates["peaks"].value):
-            found.append("the number of peaks is unknown: some may be noise")
+            warnings.append("the number of peaks is unknown: some may be noise")
         known = sum(math.isfinite(drop.restitution.value) for drop in self.drops)
         if 0 < known < len(self.drops):
-            found.append(f"the restitution of {known} of {len(self.drops)} drops is known")
-        found += check_restitution(self.drops, config.conditions(self.calibration_uncertainty))
+            warnings.append(f"the restitution of {known} of {len(self.drops)} drops is known")
+        warnings += check_restitution(self.drops, config.conditions(self.calibration_uncertainty))
         if config.mass is None and math.isfinite(self.estimates["mass"].value):
-            found.append("the mass is not stated: the effective mass is assessed")
-        found += [f"force plate: {one.sentence}" for one in config.plate_checks if one.met is False]
+            warnings.append("the mass is not stated: the effective mass is assessed")
+        warnings += [
+            f"force plate: {one.sentence}" for one in config.plate_checks if one.met is False
+        ]
         plate = config.resonance
         missing = {
             "calibration": self.calibration_uncertainty is None,
@@ -252,9 +258,9 @@ class Recording(Displayed):
             "drop height": config.height is not None and config.height_uncertainty is None,
         }
         if any(missing.values()):
-            words = ", ".join(what for what in missing if missing[what])
-            found.append(f"uncertainty not stated, and not included: {words}")
-        return tuple(found)
+            names = ", ".join(name for name in missing if missing[name])
+            warnings.append(f"uncertainty not stated, and not included: {names}")
+        return tuple(warnings)
 
     @property
     def steps(self) -> tuple[str, ...]:
@@ -276,29 +282,20 @@ class Recording(Displayed):
         """Return a quantity of the table by its name, SI units; NaN if unknown."""
         return float(getattr(self, name, math.nan))
 
-    def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - there is one
+    def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - of the protocol
         """Return the force of the first drop, corrected, N, shape (n_sample,), for any `kind`."""
         return self.drops[0].force
 
-    def peak(self, force: LevelsForce | None = None) -> float:  # noqa: ARG002 - there is one
+    def peak(self, force: LevelsForce | None = None) -> float:  # noqa: ARG002 - of the protocol
         """Return the mean maximum force, N."""
         return self.peak_force
 
     def average(self, bands: BandSet = "octave", method: str = "exact") -> AverageLevels:
-        """Return the energy average of the levels of the drops, with its uncertainty.
-
-        Parameters
-        ----------
-        bands
-            ``"octave"`` or ``"third"``.
-        method
-            ``"exact"``, ``"fft"`` or ``"filter"``.
-        """
-        known = self._averages
-        if (bands, method) not in known:
-            found = measure_levels(self.drops, bands, method, low_pass=self.config.low_pass)
-            known[bands, method] = average_levels(found)
-        return known[bands, method]
+        """Return the energy average of the levels by ``"exact"``, ``"fft"`` or ``"filter"``."""
+        if (bands, method) not in self._averages:
+            levels = measure_levels(self.drops, bands, method, low_pass=self.config.low_pass)
+            self._averages[bands, method] = average_levels(levels)
+        return self._averages[bands, method]
 
     @cached_property
     def _averages(self) -> dict[tuple[str, str], AverageLevels]:
@@ -308,18 +305,18 @@ class Recording(Displayed):
         self,
         bands: BandSet = "octave",
         method: str | None = None,
-        force: LevelsForce | None = None,  # noqa: ARG002 - there is one
+        force: LevelsForce | None = None,  # noqa: ARG002 - of the protocol
     ) -> NDArray[np.float64]:
         """Return the force exposure levels, energy average of the drops, dB, shape (n_band,)."""
         return self.average(bands, method or self.level_method).level.copy()
 
     def agreement(self, bands: BandSet = "octave") -> dict[str, NDArray[np.float64]]:
         """Return the largest deviation of each method from ``"exact"`` in any drop, dB."""
-        low = self.config.low_pass
-        found = [compare_methods(drop, bands, low_pass=low) for drop in self.drops]
+        low_pass = self.config.low_pass
+        levels = [compare_methods(drop, bands, low_pass=low_pass) for drop in self.drops]
         return {
-            method: np.max([np.abs(one[method] - one["exact"]) for one in found], axis=0)
-            for method in found[0]
+            method: np.max([np.abs(one[method] - one["exact"]) for one in levels], axis=0)
+            for method in levels[0]
         }
 
     @cached_property
@@ -347,17 +344,9 @@ class Recording(Displayed):
     def assess(
         self,
         source: LimitsSource | None = None,
-        force: LevelsForce | None = None,  # noqa: ARG002 - there is one
+        force: LevelsForce | None = None,  # noqa: ARG002 - of the protocol
     ) -> Verdict:
-        """Assess the source at 95 % by the limits of the configuration.
-
-        Parameters
-        ----------
-        source
-            ``"rubber_ball"`` or ``"tyre"``; by default that of the configuration.
-        force
-            Ignored: a force plate measures the force on the floor.
-        """
+        """Assess a source, by default that of the configuration, at 95 % by its limits."""
         return assess(
             self.level_estimates(),
             source=source or self.config.source,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -73,7 +73,7 @@ class Signal(Immutable):
             refuse(f"{name}: sample_rate = {sample_rate:g}", "positive numbers, Hz")
         if not np.isfinite(values).all():
             refuse(f"{name}: a value is not finite", "real numbers")
-        return cls(name, "", float(sample_rate), len(values), ArraySamples(values))
+        return cls(name, "", float(sample_rate), len(values), partial(read_array, values.copy()))
 
     @cached_property
     def checksum(self) -> str:
@@ -93,19 +93,7 @@ class Signal(Immutable):
     def read(self, start: int, stop: int) -> NDArray[np.float64]:
         """Return the force of the samples from start to before stop, N, positive in compression.
 
-        Parameters
-        ----------
-        start, stop
-            Numbers of samples, 0 to `n_sample`.
-
-        Returns
-        -------
-        ndarray, shape (stop - start,)
-
-        Raises
-        ------
-        InputError
-            Where the file has changed, is damaged, or holds values that are not finite.
+        Raise InputError where the file has changed, is damaged, or holds non-finite values.
         """
         if not 0 <= start <= stop <= self.n_sample:
             refuse(f"{self.name}: samples {start} to {stop}", f"samples 0 to {self.n_sample}")
@@ -121,12 +109,6 @@ class Signal(Immutable):
         return force
 
 
-@dataclass(frozen=True, eq=False)
-class ArraySamples(Immutable):
-    """Samples that are in memory, shape (n_sample,)."""
-
-    values: NDArray[np.float64]
-
-    def __call__(self, start: int, stop: int) -> NDArray[np.float64]:
-        """Return a copy of the samples from start to before stop."""
-        return self.values[start:stop].copy()
+def read_array(values: NDArray[np.float64], start: int, stop: int) -> NDArray[np.float64]:
+    """Return a copy of the samples of an array from start to before stop."""
+    return values[start:stop].copy()

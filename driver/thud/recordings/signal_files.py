@@ -6,11 +6,12 @@ import errno
 import os
 import stat
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse, require_choice, require_kind, require_number, shown
-from thud.recordings.channel import MIB, Channel, shown_path, shown_text
+from thud.recordings.channel import MIB, MIN_SAMPLES, Channel, shown_path, shown_text
 from thud.recordings.force_units import (
     ALLOWED,
     ASSUMED,
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 
 # Minimum and maximum sample rate, Hz: the octave of 500 Hz needs 1.42 kHz and a filter.
 RATES = (2500.0, 1e8)
-MIN_SAMPLES = 8
 # Minimum stored fraction of a file, which else is sparse, and maximum number of inspected pieces.
 MIN_STORED = 0.01
 MAX_PIECES = 1000
@@ -85,8 +85,8 @@ def open_signals(  # noqa: PLR0913 - the keys of the configuration
     file = regular_file(path)
     channels = read_channels(file)
     return [
-        _signal(file, one, stated, several=len(channels) > 1)
-        for one in choose_channels(channels, channel, shown_path(file))
+        _signal(file, each, stated, several=len(channels) > 1)
+        for each in choose_channels(channels, channel, shown_path(file))
     ]
 
 
@@ -138,25 +138,25 @@ def _stored(descriptor: int, size: int) -> int:
 def choose_channels(channels: list[Channel], channel: int | str | None, name: str) -> list[Channel]:
     """Return the selected channels; raise InputError where the selection is ambiguous."""
     listed = ", ".join(
-        f"{one.number}" + (f" {shown_text(one.name)!r}" if one.name else "")
-        for one in channels[:20]
+        f"{each.number}" + (f" {shown_text(each.name)!r}" if each.name else "")
+        for each in channels[:20]
     )
     if channel is None:
-        forces = [one for one in channels if UNITS.get(find_unit(one.unit), ("",))[0] == "N"]
+        forces = [each for each in channels if UNITS.get(find_unit(each.unit), ("",))[0] == "N"]
         if not forces and len(channels) > 1:
             refuse(
                 f"{name}: has {len(channels)} channels, none of them in a unit of force",
                 f"channel = one of {listed}",
             )
         return forces or channels
-    found = [one for one in channels if channel in {one.number, one.name}]
+    found = [each for each in channels if channel in {each.number, each.name}]
     if not found and isinstance(channel, str):
         word = channel.strip().casefold()
         found = [
-            one
-            for one in channels
+            each
+            for each in channels
             if word
-            in {str(one.number), one.name.casefold(), one.name.rpartition("/")[2].casefold()}
+            in {str(each.number), each.name.casefold(), each.name.rpartition("/")[2].casefold()}
         ]
     if len(found) != 1:
         refuse(f"{name}: channel = {shown(channel)} fits {len(found)} channels", f"one of {listed}")
@@ -173,51 +173,51 @@ class _Stated:
     sample_rate: float | None
 
 
-def _signal(path: Path, one: Channel, stated: _Stated, *, several: bool) -> Signal:
+def _signal(path: Path, channel: Channel, stated: _Stated, *, several: bool) -> Signal:
     """Return the signal of a channel; raise InputError where its rate or unit is unknown."""
     name = shown_path(Path(path.name))
     if several:
-        name += f", {shown_text(one.name) or f'channel {one.number}'}"
-    if one.n_sample < MIN_SAMPLES:
-        refuse(f"{name}: {one.n_sample} samples", f"{MIN_SAMPLES} samples or more")
-    rate, steps = _rate(one, stated, name)
-    unit, replaced = _unit(one, stated, name)
-    factor, words, uncertainty = newtons_per_unit(unit, stated.calibration, one.counts, name)
+        name += f", {shown_text(channel.name) or f'channel {channel.number}'}"
+    if channel.n_sample < MIN_SAMPLES:
+        refuse(f"{name}: {channel.n_sample} samples", f"{MIN_SAMPLES} samples or more")
+    rate, steps = _rate(channel, stated, name)
+    unit, replaced = _unit(channel, stated, name)
+    factor, words, uncertainty = newtons_per_unit(unit, stated.calibration, channel.counts, name)
     # Integers are read as fractions of full scale.
-    scale = factor * one.counts if one.counts and unit == "counts" else factor
-    extremes = scan(one.samples, one.n_sample, name)
+    scale = factor * channel.counts if channel.counts and unit == "counts" else factor
+    extremes = scan(channel.samples, channel.n_sample, name)
     sign, changed = find_sign(extremes, scale, stated.polarity, name)
     return Signal(
         name=name,
         path=str(path),
         sample_rate=rate,
-        n_sample=one.n_sample,
-        samples=Scaled(one.samples, sign * scale),
-        full_scale=abs(scale) if one.counts else None,
-        date=shown_text(one.date),
+        n_sample=channel.n_sample,
+        samples=partial(_read_scaled, channel.samples, sign * scale),
+        full_scale=abs(scale) if channel.counts else None,
+        date=shown_text(channel.date),
         calibration=words,
         calibration_uncertainty=uncertainty,
-        steps=(*one.steps, *steps, *replaced, *changed),
+        steps=(*channel.steps, *steps, *replaced, *changed),
         warnings=check_peak(extremes, sign * scale, name, assumed=unit == ASSUMED),
     )
 
 
-def _rate(one: Channel, stated: _Stated, name: str) -> tuple[float, tuple[str, ...]]:
+def _rate(channel: Channel, stated: _Stated, name: str) -> tuple[float, tuple[str, ...]]:
     """Return the sample rate of a channel, Hz, and notes."""
-    rate = one.sample_rate if stated.sample_rate is None else float(stated.sample_rate)
+    rate = channel.sample_rate if stated.sample_rate is None else float(stated.sample_rate)
     if rate is None:
         refuse(f"{name}: the sample rate is not known", "sample_rate in Hz, or a column of times")
     if not RATES[0] <= rate <= RATES[1]:
         refuse(f"{name}: the sample rate is {rate:.6g} Hz", f"{RATES[0]:g} to {RATES[1]:g} Hz")
-    if one.sample_rate in {None, rate}:
+    if channel.sample_rate in {None, rate}:
         return rate, ()
-    was = f"{one.sample_rate:.7g} Hz"
+    was = f"{channel.sample_rate:.7g} Hz"
     return rate, (f"The rate of the file, {was}, was replaced by {rate:.7g} Hz as stated.",)
 
 
-def _unit(one: Channel, stated: _Stated, name: str) -> tuple[str, tuple[str, ...]]:
+def _unit(channel: Channel, stated: _Stated, name: str) -> tuple[str, tuple[str, ...]]:
     """Return the unit of the values of a channel, and notes."""
-    known = find_unit(one.unit)
+    known = find_unit(channel.unit)
     if stated.unit is not None:
         if known == "FS" and stated.unit not in {"FS", "counts"}:
             refuse(
@@ -231,22 +231,17 @@ def _unit(one: Channel, stated: _Stated, name: str) -> tuple[str, tuple[str, ...
         )
     if known:
         return known, ()
-    if not one.unit and stated.calibration is None:
+    if not channel.unit and stated.calibration is None:
         return ASSUMED, ("The file states no unit; the values are assumed to be in N.",)
-    if one.unit or isinstance(stated.calibration, str | Calibration):
-        own = f"in {shown_text(one.unit)!r}" if one.unit else "without a unit"
+    if channel.unit or isinstance(stated.calibration, str | Calibration):
+        own = f"in {shown_text(channel.unit)!r}" if channel.unit else "without a unit"
         refuse(f"{name}: the values are {own}", f"unit = one of {ALLOWED}")
     return "", ()
 
 
-@dataclass(frozen=True, eq=False)
-class Scaled:
-    """Samples times a number."""
-
-    samples: Callable[[int, int], NDArray[np.float64]]
-    factor: float
-
-    def __call__(self, start: int, stop: int) -> NDArray[np.float64]:
-        """Return the samples from start to before stop."""
-        values = self.samples(start, stop)
-        return values if self.factor == 1.0 else values * self.factor
+def _read_scaled(
+    samples: Callable[[int, int], NDArray[np.float64]], factor: float, start: int, stop: int
+) -> NDArray[np.float64]:
+    """Return samples times a factor, from start to before stop."""
+    values = samples(start, stop)
+    return values if factor == 1.0 else values * factor

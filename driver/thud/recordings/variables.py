@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from thud.base.checks import refuse
-from thud.recordings.channel import Channel
+from thud.recordings.channel import MIN_SAMPLES, Channel
 from thud.recordings.header_aliases import (
     DATE,
     TIME_UNITS,
@@ -18,15 +19,14 @@ from thud.recordings.header_aliases import (
     split_title,
     text_of,
 )
-from thud.recordings.signal import ArraySamples
+from thud.recordings.signal import read_array
 from thud.recordings.uniform_grid import uniform_grid
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Maximum number of columns of a matrix of channels, and minimum number of samples.
+# Maximum number of columns of a matrix of channels.
 MAX_COLUMNS = 256
-MIN_SAMPLES = 8
 
 
 def channels_of_variables(values: dict[str, NDArray[np.generic]], name: str) -> list[Channel]:
@@ -49,7 +49,7 @@ def channels_of_variables(values: dict[str, NDArray[np.generic]], name: str) -> 
         group, word = _split(key)
         header = [
             (_split(other)[1], text_of(value))
-            for other, value in sorted(values.items(), key=lambda one: -one[0].count("/"))
+            for other, value in sorted(values.items(), key=lambda item: -item[0].count("/"))
             if np.size(value) == 1 and group.startswith(_split(other)[0])
         ]
         same = next(
@@ -67,7 +67,7 @@ def channels_of_variables(values: dict[str, NDArray[np.generic]], name: str) -> 
                 name=key + index,
                 number=number,
                 n_sample=len(column),
-                samples=ArraySamples(column),
+                samples=partial(read_array, column),
                 unit=split_title(word)[1] or find_word(header, UNIT),
                 sample_rate=own,
                 date=find_word(header, DATE),

@@ -1,16 +1,20 @@
-"""Files of samples: finished blocks while a study runs, then one file or Zarr group."""
+"""Blocks of samples: computed, kept in files while a study runs, then joined."""
 
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 from contextlib import contextmanager
 from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import xarray as xr
+from tqdm import tqdm
 
+from thud.base.bridge import version
 from thud.base.checks import refuse
 from thud.base.files import (
     is_failure,
@@ -22,13 +26,16 @@ from thud.base.files import (
     replace_file,
     uninterrupted,
 )
+from thud.studies.backends import run_blocks
 from thud.studies.dataset import disk_space, grid_of, in_order, new_dataset
+from thud.studies.samples import Block
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from thud.studies.samples import Block, Columns, SampleStudy
+    from thud.studies.kind import RunOptions
+    from thud.studies.samples import Columns, SampleStudy
 
 # Results that need more bytes than this are written as Zarr.
 LARGE = 256 * 2**20
@@ -85,11 +92,11 @@ class Blocks:
         """Return whether the block that begins with a sample is finished."""
         return self._block(start).exists()
 
-    def keep(self, block: Block, found: Columns) -> None:
+    def keep(self, block: Block, result: Columns) -> None:
         """Write the results of a block atomically."""
-        stop = block.start + len(found["status"])
+        stop = block.start + len(result["status"])
         columns = self._study.parameter_columns(block.start, stop)
-        _write(new_dataset(self._study, columns, found), self._block(block.start))
+        _write(new_dataset(self._study, columns, result), self._block(block.start))
 
     def finish(self) -> None:
         """Join all blocks, then remove them."""
@@ -114,8 +121,8 @@ class Blocks:
         try:
             with _named(self.path):
                 for i in range(0, len(names), together):
-                    found = _join(paths, names[i : i + together], known_whole=i > 0)
-                    grid = grid_of(self._study, found)
+                    result = _join(paths, names[i : i + together], known_whole=i > 0)
+                    grid = grid_of(self._study, result)
                     grid.to_zarr(part, mode="a" if i else "w", consolidated=False)
                 part.rename(self.path)
         finally:
@@ -257,3 +264,50 @@ def _named(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(error.filename or path)) from error
+
+
+def compute_samples(study: SampleStudy, folder: Path | None, how: RunOptions) -> xr.Dataset:
+    """Compute or continue a study; without a folder its results are not written.
+
+    Raises InputError where they cannot fit in memory, and NumericalError where the backend loses
+    samples; samples that fail have a status and a reason.
+    """
+    if not folder and disk_space(study) > os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"):
+        refuse(
+            f"{study.count} samples do not fit in memory", "fewer samples, or a directory for them"
+        )
+    size = study.block_size
+    blocks = Blocks(folder, study, size) if folder else None
+    memory: dict[int, Columns] = {}
+
+    def keep(block: Block, result: Columns) -> None:
+        if blocks:
+            blocks.keep(block, result)
+        else:
+            memory[block.start] = result
+        bar.update(len(result["status"]))
+
+    if not (blocks and blocks.complete):
+        if blocks:
+            blocks.open()
+        starts = range(0, study.count, size)
+        open_starts = [start for start in starts if not (blocks and blocks.has(start))]
+        done = study.count - sum(min(size, study.count - start) for start in open_starts)
+        hidden = not how.get("progress", False)
+        with tqdm(total=study.count, initial=done, unit="sample", disable=hidden) as bar:
+            backend = how.get("backend"), how.get("workers"), how.get("scheduler")
+            run_blocks(_blocks(study, open_starts, size), keep, *backend)
+    if blocks:
+        blocks.finish()
+        return read_dataset(blocks.path)
+    parts = [memory[start] for start in sorted(memory)]
+    whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return grid_of(study, new_dataset(study, study.parameter_columns(0, study.count), whole))
+
+
+def _blocks(study: SampleStudy, starts: list[int], size: int) -> Iterator[Block]:
+    for start in starts:
+        columns = study.key_columns(study.parameter_columns(start, min(start + size, study.count)))
+        yield Block(
+            start, study.case, columns, version(), study.surrogate, counts_peaks=study.counts_peaks
+        )

@@ -128,7 +128,7 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
         modulus.
     """
     start = Ball() if ball is None else ball
-    measured, wanted = _data(deflection, force)
+    measured, measured_force = _data(deflection, force)
     require_confidence(confidence)
     span = float(measured[-1] - measured[0])
     curves: dict[float, CompressionCurve] = {}
@@ -143,14 +143,14 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
         return curves[modulus]
 
     def residuals(x: Array) -> Array:
-        found = curve(float(np.exp(x[0])) * start.youngs_modulus)
+        result = curve(float(np.exp(x[0])) * start.youngs_modulus)
         depth = measured - measured[0] - x[1] * span
-        model_force = PchipInterpolator(found.deflection, found.force)(np.maximum(depth, 0))
-        return np.asarray(model_force - wanted)
+        model_force = PchipInterpolator(result.deflection, result.force)(np.maximum(depth, 0))
+        return np.asarray(model_force - measured_force)
 
     # The plates may touch a little before the first point.
     bounds = ([-np.inf, -0.04], [np.inf, 0.9])
-    first = np.array([np.log(_ratio(curve(start.youngs_modulus), measured, wanted)), 0.0])
+    first = np.array([np.log(_ratio(curve(start.youngs_modulus), measured, measured_force)), 0.0])
     best = least_squares(residuals, first, bounds=bounds, x_scale=(1.0, 0.1), xtol=1e-10)
     if np.linalg.matrix_rank(best.jac) < _PARAMETERS:
         message = (
@@ -159,11 +159,11 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
         raise NumericalError(message)
     modulus = float(np.exp(best.x[0])) * start.youngs_modulus
     touch = float(measured[0] + best.x[1] * span)
-    deviation = float(np.sqrt(best.fun @ best.fun / (len(wanted) - _PARAMETERS)))
+    deviation = float(np.sqrt(best.fun @ best.fun / (len(measured_force) - _PARAMETERS)))
     scale = np.array([modulus, span])
     covariance = deviation**2 * np.linalg.inv(best.jac.T @ best.jac) * np.outer(scale, scale)
-    found = tuple(_warnings(best.fun, best.x[1], bounds))
-    for text in found:
+    result = tuple(_warnings(best.fun, best.x[1], bounds))
+    for text in result:
         warnings.warn(text, FitWarning, stacklevel=3)
     return CompressionFit(
         names=("youngs_modulus", "touch"),
@@ -174,40 +174,40 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
         confidence=confidence,
         noise=deviation,
         residuals=best.fun,
-        warnings=found,
+        warnings=result,
         deflection=measured,
-        force=wanted,
+        force=measured_force,
         curve=curve(modulus),
     )
 
 
 def _data(deflection: ArrayLike, force: ArrayLike) -> tuple[Array, Array]:
     """Return both columns; raise InputError where they are no curve."""
-    measured, wanted = (
+    measured, measured_force = (
         require_real(name, require_array(name, values, {1}))
         for name, values in (("deflection", deflection), ("force", force))
     )
-    if measured.shape != wanted.shape or len(measured) < _MIN_DATA:
+    if measured.shape != measured_force.shape or len(measured) < _MIN_DATA:
         refuse(
-            f"deflection has {len(measured)} entries and force {len(wanted)}",
+            f"deflection has {len(measured)} entries and force {len(measured_force)}",
             f"the same number, at least {_MIN_DATA}",
         )
-    if not (np.isfinite(measured).all() and np.isfinite(wanted).all()):
+    if not (np.isfinite(measured).all() and np.isfinite(measured_force).all()):
         refuse("deflection or force is not finite", "finite numbers")
     falling = np.flatnonzero(np.diff(measured) <= 0)
     if falling.size:
         refuse(f"deflection does not rise at point {falling[0] + 2}", "the branch of loading")
-    if not wanted[-1] > max(0.0, wanted[0]):
+    if not measured_force[-1] > max(0.0, measured_force[0]):
         refuse("force does not rise with the deflection", "pressure is positive")
-    return measured, wanted
+    return measured, measured_force
 
 
-def _ratio(curve: CompressionCurve, measured: Array, wanted: Array) -> float:
+def _ratio(curve: CompressionCurve, measured: Array, measured_force: Array) -> float:
     """Return the factor that brings the work of a curve to the measured one.
 
     Raise InputError where the model has no force at such deflections.
     """
-    work = float(np.trapezoid(wanted, measured))
+    work = float(np.trapezoid(measured_force, measured))
     shown = np.interp(measured - measured[0], curve.deflection, curve.force)
     model_work = float(np.trapezoid(shown, measured))
     if not model_work > 0:
@@ -215,16 +215,18 @@ def _ratio(curve: CompressionCurve, measured: Array, wanted: Array) -> float:
             f"deflection spans {np.ptp(measured):g} m, where the model has no force",
             "a ball that is pressed by millimeters",
         )
-    return max(work, 0.01 * float(wanted[-1] * np.ptp(measured))) / model_work
+    return max(work, 0.01 * float(measured_force[-1] * np.ptp(measured))) / model_work
 
 
-def _warnings(residuals: Array, place: float, bounds: tuple[list[float], list[float]]) -> list[str]:
+def _warnings(
+    residuals: Array, relative_touch: float, bounds: tuple[list[float], list[float]]
+) -> list[str]:
     """Return why the intervals may be wrong."""
-    found = []
-    if min(place - bounds[0][1], bounds[1][1] - place) < 1e-6:  # noqa: PLR2004 - of the span
-        found.append(
+    result = []
+    if min(relative_touch - bounds[0][1], bounds[1][1] - relative_touch) < 1e-6:  # noqa: PLR2004 - of the span
+        result.append(
             "the first touch lies at the limit of the search: give data from first touch on"
         )
     if runs := runs_warning(residuals):
-        found.append(f"{runs}: the model does not explain the curve")
-    return found
+        result.append(f"{runs}: the model does not explain the curve")
+    return result

@@ -8,8 +8,15 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from thud.impact.datasets import attributes, band_coordinates, origin, room_coordinates
-from thud.impact.quantities import ALL_QUANTITIES, BANDS, CONTACT_LEVELS, ROOM_BAND, ROOM_LEVEL
-from thud.level.levels import get_bands
+from thud.impact.quantities import (
+    ALL_QUANTITIES,
+    BANDS,
+    CONTACT_LEVELS,
+    LEVELS,
+    ROOM_BAND,
+    ROOM_LEVEL,
+)
+from thud.level.levels import BANDWIDTHS, get_bands
 from thud.studies.samples import level_names
 from thud.studies.sampling import sampler_versions
 
@@ -19,6 +26,10 @@ if TYPE_CHECKING:
     from thud.studies.parameter import Parameter
     from thud.studies.samples import Columns, SampleStudy
 
+# Dimension of each result that has one beside the sample.
+_DIMENSIONS = {
+    **{name: bands for name, (_, bands) in LEVELS.items()}, **CONTACT_LEVELS, ROOM_LEVEL: ROOM_BAND
+}  # fmt: skip
 # Bytes of a sample on disk without its levels and parameters, and of an empty file.
 _SAMPLE_BYTES = 95
 _FILE_BYTES = 27_000
@@ -32,26 +43,20 @@ def disk_space(study: SampleStudy) -> int:
     return files * _FILE_BYTES + 2 * total * (_SAMPLE_BYTES + 8 * (levels + len(study.parameters)))
 
 
-def new_dataset(study: SampleStudy, columns: Columns, found: Columns) -> xr.Dataset:
+def new_dataset(study: SampleStudy, columns: Columns, results: Columns) -> xr.Dataset:
     """Return the results of some samples, along the dimension ``sample``, levels also along bands.
 
-    `columns` holds their parameters by name, `found` what `evaluate` returns.
+    `columns` holds their parameters by name, `results` what `evaluate` returns.
     """
-    levels = level_names(study.case)
-    dimension: dict[str, str] = {
-        **{name: bands for name, (_, bands) in levels.items()},
-        **CONTACT_LEVELS,
-    }
-    coordinates: dict[str, Any] = band_coordinates(bands for _, bands in levels.values())
-    if ROOM_LEVEL in found:
-        dimension[ROOM_LEVEL] = ROOM_BAND
-        coordinates |= room_coordinates()
+    used = {_DIMENSIONS[name] for name in results if name in _DIMENSIONS}
+    coordinates: dict[str, Any] = band_coordinates(bands for bands in BANDWIDTHS if bands in used)
+    coordinates |= room_coordinates() if ROOM_BAND in used else {}
     for parameter in study.parameters:
         values = _objects(columns[parameter.name])
         coordinates[parameter.coordinate] = ("sample", values, _attributes(study, parameter))
     variables = {}
-    for name, values in found.items():
-        dimensions = ("sample", dimension[name]) if name in dimension else ("sample",)
+    for name, values in results.items():
+        dimensions = ("sample", _DIMENSIONS[name]) if name in _DIMENSIONS else ("sample",)
         words: dict[str, Any] = {**attributes(ALL_QUANTITIES[name])}
         if study.surrogate and name in study.surrogate.outputs:
             words["surrogate_error"] = study.surrogate.error_of(name)
@@ -66,7 +71,7 @@ def _attributes(study: SampleStudy, parameter: Parameter) -> dict[str, Any]:
     if law and parameter.name in law.keys:
         meaning += f" at {law.reference:g} degC; changed by its temperature"
     return {
-        "units": key.unit or "1",
+        **attributes(key),
         "long_name": meaning,
         "group": key.group,
         "key": parameter.name,

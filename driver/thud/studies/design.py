@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 from thud.base.checks import refuse
 from thud.case.case import Case
-from thud.case.keys import DENSITY
+from thud.case.keys import DENSITY, value_in
 from thud.impact.quantities import RATING
 from thud.studies.result import SampleResult
 from thud.studies.sample_kind import SampleKind
-from thud.studies.study import value_in, wall_volume
+from thud.studies.study import wall_volume
 
 if TYPE_CHECKING:
     import os
@@ -43,7 +43,7 @@ class Design(SampleResult):
     axes : tuple of str
         The two parameters.
     mark : tuple of float or None
-        Where the ball of the paper, or else the case, lies; None where it has no such place.
+        Where the ball of the paper, or else the case, lies; None where that is outside the map.
     mark_name : str
         ``"paper's ball"`` or ``"case"``.
     """
@@ -94,10 +94,10 @@ class DesignKind(SampleKind[Design]):
 
     def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SampleStudy:
         """Return a study of two numeric parameters."""
-        found = super().complete(study, given, folder)
-        if len(found.parameters) != _AXES or not all(map(_is_axis, found.parameters)):
+        result = super().complete(study, given, folder)
+        if len(result.parameters) != _AXES or not all(map(_is_axis, result.parameters)):
             refuse("[parameters] do not make a map", "two numeric ones of two values or more")
-        return found
+        return result
 
     def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> Design:
         """Return the map of all samples."""
@@ -113,22 +113,8 @@ def design(
 ) -> Design:
     """Compute which geometry and material conform to the standards.
 
-    Parameters
-    ----------
-    study
-        Path of a TOML file, or what would stand in it; it has two numeric parameters.
-    output, **how
-        As of `sweep`.
-
-    Returns
-    -------
-    Design
-        Margin and verdict of the force that the case assesses.
-
-    Raises
-    ------
-    InputError
-        As `sweep`; also where there are not two numeric parameters with two values or more.
+    The study has two numeric parameters with two values or more; arguments and errors are those of
+    `sweep`.
     """
     return KIND.run(study, output, **how)
 
@@ -138,20 +124,20 @@ def _is_axis(parameter: Parameter) -> bool:
 
 
 def _mark(study: SampleStudy) -> tuple[tuple[float, float] | None, str]:
-    """Return the place of the paper's ball if all else is as in the paper, else of the case."""
+    """Return the position of the paper's ball if all else is as in the paper, else of the case."""
     names = [parameter.name for parameter in study.parameters]
     paper, ours = _ball_and_drop(Case(), None), _ball_and_drop(study.case, study.density)
     by_density = study.density is not None or DENSITY.name in names
     rest = set(paper) - set(names) - {"mass" if by_density else DENSITY.name}
     of_paper = set(names) <= set(paper) and all(math.isclose(ours[n], paper[n]) for n in rest)
     values = paper if of_paper else ours
-    places: list[Any] = [values.get(name, value_in(study.case, name)) for name in names]
+    positions: list[Any] = [values.get(name, value_in(study.case, name)) for name in names]
     ends = [(min(grid), max(grid)) for grid in (p.grid() for p in study.parameters)]
     inside = all(
-        place is not None and low <= float(place) <= high
-        for place, (low, high) in zip(places, ends, strict=True)
+        position is not None and low <= float(position) <= high
+        for position, (low, high) in zip(positions, ends, strict=True)
     )
-    x, y = places
+    x, y = positions
     return (float(x), float(y)) if inside else None, "paper's ball" if of_paper else "case"
 
 

@@ -37,21 +37,21 @@ def take(
     Raises InputError where another run uses it, it holds results of another version of the study or
     a file is in the way (both only without `replace`), OSError where nothing can be written.
     """
-    place = Path(folder)
+    directory = Path(folder)
     names = kind.identity_files(study)
-    place.mkdir(parents=True, exist_ok=True)
+    directory.mkdir(parents=True, exist_ok=True)
     with ExitStack() as stack:
         try:
-            stack.enter_context(locked(place, LOCK_EX | LOCK_NB))
+            stack.enter_context(locked(directory, LOCK_EX | LOCK_NB))
         except BlockingIOError as error:
-            refuse(f"{place / names[0]} is being computed", "wait, or another directory", error)
-        results = Results(place, kind.name, study.inputs, replace=replace, is_locked=True)
+            refuse(f"{directory / names[0]} is being computed", "wait, or another directory", error)
+        results = Results(directory, kind.name, study.inputs, replace=replace, is_locked=True)
         listed = kind.listed_files(study)
         results.require(n for n in listed if figures or not n.endswith(FORMATS))
-        readers = dict.fromkeys((place / name for name in names), kind.identity_in)
+        readers = dict.fromkeys((directory / name for name in names), kind.identity_in)
         require_version(readers, study, results, listed)
-        if not (place / names[0]).exists():
-            with TemporaryFile(dir=place):
+        if not (directory / names[0]).exists():
+            with TemporaryFile(dir=directory):
                 pass
         yield results
 

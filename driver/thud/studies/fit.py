@@ -24,7 +24,7 @@ from thud.studies.fitting.search import search
 from thud.studies.kind import Kind
 from thud.studies.study import Study, fix_keys, table_of, with_density
 from thud.studies.surrogate_levels import answered, confirmed, within_region
-from thud.studies.trained_surrogate import Surrogate, read_plan, read_surrogate
+from thud.studies.trained_surrogate import Surrogate, get_surrogate, read_plan
 
 if TYPE_CHECKING:
     import os
@@ -115,9 +115,8 @@ def fit(  # noqa: PLR0913 - options of a search
     _require_options(options)
     known = bound_parameters(case, parameters)
     pairs = _pairs(case, _targets(target), {parameter.name for parameter in known})
-    if surrogate is not None and not isinstance(surrogate, Surrogate):
-        surrogate = read_surrogate(surrogate)
-    found = _search(pairs, get_ranges(case, known), options, surrogate, progress=progress)
+    trained = None if surrogate is None else get_surrogate(surrogate)
+    found = _search(pairs, get_ranges(case, known), options, trained, progress=progress)
     for sentence in found.warnings:
         warnings.warn(sentence, FitWarning, stacklevel=3)
     return found
@@ -136,28 +135,28 @@ def _pairs(
     case: Case, targets: Sequence[Target], names: AbstractSet[str]
 ) -> list[tuple[Case, Misfit]]:
     """Return the case of each target and what the fit needs of it."""
-    found: list[tuple[Case, Misfit]] = []
+    result: list[tuple[Case, Misfit]] = []
     for number, target in enumerate(targets, start=1):
-        place = "target" if len(targets) == 1 else f"target {number}"
-        require_kind(f"{place}: fixed", target.fixed, Mapping)
+        label = "target" if len(targets) == 1 else f"target {number}"
+        require_kind(f"{label}: fixed", target.fixed, Mapping)
         for name in target.fixed:
             if name in names or name == "model":
                 refuse(
-                    f"{place}: fixed {name} is not allowed",
+                    f"{label}: fixed {name} is not allowed",
                     "keys of ball, drop and model that are not among [parameters]",
                 )
-        own, density = fix_keys(case, target.fixed, f"{place}: fixed")
+        own, density = fix_keys(case, target.fixed, f"{label}: fixed")
         own = own if density is None else with_density(own, density)
         try:
             if target.fixed:
                 check_case(replace(own, modes=None))
-            found.append((own, target.misfit()))
+            result.append((own, target.misfit()))
         except InputError as error:
             if len(targets) == 1:
                 raise
-            message = f"{place}: {str(error).removeprefix('target: ')}"
+            message = f"{label}: {str(error).removeprefix('target: ')}"
             raise InputError(message) from error
-    return found
+    return result
 
 
 def _search(
@@ -216,16 +215,16 @@ class FitStudy(Study):
         """Return target and search."""
         tables = self.tables["target"]
         tables = tables if isinstance(tables, list) else [tables]
-        found: dict[str, str] = {}
+        result: dict[str, str] = {}
         for end, table, (_, misfit) in zip(
             file_ends(len(tables)), tables, self.pairs(), strict=True
         ):
-            found |= {f"[target{end}] {key}": f"{value!r}" for key, value in table.items()}
+            result |= {f"[target{end}] {key}": f"{value!r}" for key, value in table.items()}
             digest = hashlib.sha256(misfit.data().tobytes()).hexdigest()[:16]
-            found[f"numbers of [target{end}]"] = digest
+            result[f"numbers of [target{end}]"] = digest
         if self.surrogate:
-            found["surrogate"] = self.surrogate.digest
-        return found | {name: f"{value!r}" for name, value in self.options.items()}
+            result["surrogate"] = self.surrogate.digest
+        return result | {name: f"{value!r}" for name, value in self.options.items()}
 
     def pairs(self) -> list[tuple[Case, Misfit]]:
         """Return the case of each target and what the fit needs of it."""
@@ -238,7 +237,7 @@ class FitKind(Kind[FitStudy, Fit]):
     name = "fit"
     words = ("target", "surrogate", *OPTIONS)
 
-    def new_parameter(self, name: str, given: object, case: Case, centre: object) -> Parameter:  # noqa: ARG002
+    def new_parameter(self, name: str, given: object, case: Case, density: object) -> Parameter:  # noqa: ARG002
         """Return a parameter that is fitted."""
         return fitted_parameter(name, given, case)
 
@@ -262,20 +261,17 @@ class FitKind(Kind[FitStudy, Fit]):
         # JSON knows neither dates nor infinity.
         shown = json.loads(json.dumps(given, default=str), parse_constant=str)
         head = {**vars(study), "case": case}
-        found = FitStudy(**head, targets=targets, tables=shown, options=options)
-        found.pairs()
+        result = FitStudy(**head, targets=targets, tables=shown, options=options)
+        result.pairs()
         if "surrogate" not in given:
-            return found
+            return result
         trained = read_plan(table_of(given, "surrogate"), folder)
         if not isinstance(trained, Surrogate):
             refuse("[surrogate] of a fit has no file", "file, of a surrogate that is trained")
-        return self.with_surrogate(found, trained)
+        return self.with_surrogate(result, trained)
 
-    def with_surrogate(
-        self, study: FitStudy, given: Surrogate | str | os.PathLike[str]
-    ) -> FitStudy:
+    def with_surrogate(self, study: FitStudy, trained: Surrogate) -> FitStudy:
         """Return a study whose drops a surrogate answers. Raises InputError where it cannot."""
-        trained = given if isinstance(given, Surrogate) else read_surrogate(given)
         _answered(study.pairs(), trained, study.parameters)
         return replace(study, surrogate=trained)
 

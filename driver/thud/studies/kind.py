@@ -12,13 +12,13 @@ from thud.base.checks import refuse, require_words
 from thud.studies.directory import take
 from thud.studies.result import StudyResult
 from thud.studies.study import Study, named_files, read_common, read_tables
+from thud.studies.trained_surrogate import get_surrogate
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from thud.base.files import Results
     from thud.case.case import Case
-    from thud.case.keys import Value
     from thud.studies.parameter import Parameter
     from thud.studies.study import Source
     from thud.studies.trained_surrogate import Surrogate
@@ -38,7 +38,7 @@ class RunOptions(TypedDict, total=False):
         Number of threads or processes; by default one per processor.
     scheduler : str or None
         Address of a Dask scheduler.
-    yes : bool
+    allow_large : bool
         Start also with more samples than have to be confirmed.
     progress : bool
         Show a progress bar.
@@ -52,7 +52,7 @@ class RunOptions(TypedDict, total=False):
     backend: Literal["threads", "processes", "dask"] | None
     workers: int | None
     scheduler: str | None
-    yes: bool
+    allow_large: bool
     progress: bool
     replace: bool
     surrogate: Surrogate | str | os.PathLike[str] | None
@@ -88,7 +88,7 @@ class Kind(ABC, Generic[S, R]):
         require_words("keywords", how, RunOptions.__annotations__)
         study = self.read_study(source)
         if (surrogate := how.get("surrogate")) is not None:
-            study = self.with_surrogate(study, surrogate)
+            study = self.with_surrogate(study, get_surrogate(surrogate))
             if isinstance(surrogate, str | os.PathLike):
                 study = dataclasses.replace(study, inputs=(*study.inputs, surrogate))
         self.require(study, **how)
@@ -102,15 +102,15 @@ class Kind(ABC, Generic[S, R]):
 
     @abstractmethod
     def new_parameter(
-        self, name: str, given: object, case: Case, centre: Value | None
+        self, name: str, given: object, case: Case, density: float | None
     ) -> Parameter:
-        """Return a parameter of its name, table, case and value there."""
+        """Return a parameter of its name and table; the density of the wall where it is fixed."""
 
     @abstractmethod
     def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> S:
         """Return a study with what only this kind has."""
 
-    def with_surrogate(self, study: S, given: Surrogate | str | os.PathLike[str]) -> S:  # noqa: ARG002
+    def with_surrogate(self, study: S, trained: Surrogate) -> S:  # noqa: ARG002
         """Return a study whose drops a surrogate answers."""
         refuse(f"surrogate is not allowed for a {self.name} study", "studies of samples of drops")
 

@@ -14,15 +14,7 @@ if TYPE_CHECKING:
 
 
 class KindInfo(NamedTuple):
-    """One kind of study.
-
-    Attributes
-    ----------
-    help : str
-        What the command line says of it.
-    has_samples : bool
-        It computes samples of drops, on any backend.
-    """
+    """Help of the command of a kind of study, and whether it computes samples on any backend."""
 
     help: str
     has_samples: bool = True

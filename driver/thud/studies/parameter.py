@@ -124,32 +124,32 @@ class Parameter(Plain):
         values: NDArray[Any] = spaced(self.low, self.high, self.count)
         return np.unique(np.rint(values).astype(int)) if self.key.kind == "whole" else values
 
-    def quantile(self, share: NDArray[np.float64]) -> NDArray[np.generic]:
+    def quantile(self, fraction: NDArray[np.float64]) -> NDArray[np.generic]:
         """Return the values below which a share of all values lies."""
         if self.values is not None:
-            return np.take(self.grid(), (share * len(self.values)).astype(int))
+            return np.take(self.grid(), (fraction * len(self.values)).astype(int))
         if self.std is not None and self.mean is not None:
             # The quantile of a share of 0 is infinite.
-            return np.asarray(self.mean + self.std * ndtri(np.maximum(share, 2.0**-54)))
+            return np.asarray(self.mean + self.std * ndtri(np.maximum(fraction, 2.0**-54)))
         assert self.low is not None  # noqa: S101 - see `varied`
         assert self.high is not None  # noqa: S101
         whole = self.key.kind == "whole"
         # Every whole number has the share between itself and the next.
         high = self.high + 1 if whole else self.high
         if self.scale == "log":
-            found = self.low * (high / self.low) ** share
+            result = self.low * (high / self.low) ** fraction
         else:
-            found = self.low + share * (high - self.low)
-        return np.minimum(np.floor(found), self.high).astype(int) if whole else found
+            result = self.low + fraction * (high - self.low)
+        return np.minimum(np.floor(result), self.high).astype(int) if whole else result
 
-    def trial(self, share: float) -> Value | None:
+    def trial(self, fraction: float) -> Value | None:
         """Return a value to try a case with: the start, or a quantile, or None."""
         if self.start is not None:
             return self.start
         if self.values is None and self.std is None and None in {self.low, self.high}:
             return None
-        found: Value = self.quantile(np.array([share])).tolist()[0]
-        return found
+        result: Value = self.quantile(np.array([fraction])).tolist()[0]
+        return result
 
     def __str__(self) -> str:
         """Return the parameter as it would stand in a file."""
@@ -168,35 +168,37 @@ def _in_unit(value: Value, power: int) -> Value:
     return scaled(value, -power) if number and power else value  # type: ignore[arg-type]
 
 
-def varied(name: str, given: object, owners: tuple[str, ...], centre: Value | None) -> Parameter:
-    """Return a parameter that varies; `centre`, its value in the case, is the default mean."""
+def varied(
+    name: str, given: object, owners: tuple[str, ...], default_mean: Value | None
+) -> Parameter:
+    """Return a parameter that varies; `default_mean` is its value in the case."""
     words = [word for form in FORMS.values() for word in form]
-    place, key, given, power = _begin(name, given, owners, words)
+    label, key, given, power = _begin(name, given, owners, words)
     form = next((form for form in FORMS if form in given), None)
     if form is None:
         refuse(
-            f"{place} = {shown(given)} has no values",
+            f"{label} = {shown(given)} has no values",
             "a table with values = [...], or low and high, or std, and unit",
         )
-    require_words(f"{place} with {form}", given, (*FORMS[form], "unit"))
+    require_words(f"{label} with {form}", given, (*FORMS[form], "unit"))
     if form != "values" and key.kind not in NUMBERS:
         allowed = ", ".join(map(repr, key.choices)) or "true, false"
-        refuse(f"{place} is not a number", f"values = [...] of {allowed}")
+        refuse(f"{label} is not a number", f"values = [...] of {allowed}")
 
     def read(word: str) -> float:
-        return float(checked(f"{place}: {word}", key, given[word], power))
+        return float(checked(f"{label}: {word}", key, given[word], power))
 
-    found: dict[str, Any]
+    result: dict[str, Any]
     if form == "values":
         values = given["values"]
         if not isinstance(values, list | tuple) or not values:
-            refuse(f"{place}: values = {shown(values)} is empty or no list", "[one, or, more]")
-        found = {"values": tuple(checked(f"{place}: values", key, v, power) for v in values)}
+            refuse(f"{label}: values = {shown(values)} is empty or no list", "[one, or, more]")
+        result = {"values": tuple(checked(f"{label}: values", key, v, power) for v in values)}
     elif form == "low":
-        found = _between(place, key, given, read)
+        result = _between(label, key, given, read)
     else:
-        found = _normal(place, key, given, read, centre)
-    return Parameter(**found, unit=given.get("unit"), name=name, key=key)
+        result = _normal(label, key, given, read, default_mean)
+    return Parameter(**result, unit=given.get("unit"), name=name, key=key)
 
 
 def fitted(name: str, given: object, owners: tuple[str, ...]) -> Parameter:
@@ -207,11 +209,11 @@ def fitted(name: str, given: object, owners: tuple[str, ...]) -> Parameter:
         given = {}
     elif not isinstance(given, Mapping):
         given = {"start": given}
-    place, key, given, power = _begin(name, given, owners, FITTED)
+    label, key, given, power = _begin(name, given, owners, FITTED)
     numbers: dict[str, Any] = {}
     for word, value in given.items():
         if word != "unit" and value is not None:
-            require_number(f"{place}: {word}", value)
+            require_number(f"{label}: {word}", value)
             numbers[word] = scaled(value, power)
     return Parameter(**numbers, unit=given.get("unit"), name=name, key=key)
 
@@ -219,38 +221,38 @@ def fitted(name: str, given: object, owners: tuple[str, ...]) -> Parameter:
 def _begin(
     name: str, given: object, owners: tuple[str, ...], words: Sequence[str]
 ) -> tuple[str, Key, Mapping[str, Any], int]:
-    """Return place, key, table and power of ten of the unit of a parameter."""
-    place = f"[parameters] {name}"
+    """Return label, key, table and power of ten of the unit of a parameter."""
+    label = f"[parameters] {name}"
     key, entry = find_key(name, owners)
     if key.kind == "list" and entry is None:
-        refuse(f"{place} is a list", f"one entry of it, such as {name + '(1)'!r}")
+        refuse(f"{label} is a list", f"one entry of it, such as {name + '(1)'!r}")
     if not isinstance(given, Mapping):
-        refuse(f"{place} = {shown(given)} is not a table", f"{', '.join(words)}, unit")
-    require_words(place, given, (*words, "unit"))
+        refuse(f"{label} = {shown(given)} is not a table", f"{', '.join(words)}, unit")
+    require_words(label, given, (*words, "unit"))
     unit = key.unit or "1" if given.get("unit") is None else given["unit"]
-    return place, key, given, power_of(unit, key.unit, place)
+    return label, key, given, power_of(unit, key.unit, label)
 
 
-def checked(place: str, key: Key, value: object, power: int) -> Value:
+def checked(label: str, key: Key, value: object, power: int) -> Value:
     """Return a value in the unit of its key. Raises InputError where it is not of its kind."""
     number = math.nan
     if isinstance(value, int | float) and not isinstance(value, bool):
         number = scaled(value, power) if -LARGEST < value < LARGEST else math.inf
-    valid, allowed, found = {
+    valid, allowed, result = {
         "choice": (value in key.choices, ", ".join(map(repr, key.choices)), value),
         "flag": (isinstance(value, bool), "true, false", value),
         "whole": (number.is_integer(), "whole numbers", number),
     }.get(key.kind, (math.isfinite(number), "finite numbers", number))
     if not valid:
-        refuse_value(place, value, allowed)
-    return int(number) if key.kind == "whole" else found  # type: ignore[return-value]
+        refuse_value(label, value, allowed)
+    return int(number) if key.kind == "whole" else result  # type: ignore[return-value]
 
 
 def _between(
-    place: str, key: Key, given: Mapping[str, Any], read: Callable[[str], float]
+    label: str, key: Key, given: Mapping[str, Any], read: Callable[[str], float]
 ) -> dict[str, Any]:
     if "high" not in given:
-        refuse(f"{place} has no high end", "high beside low")
+        refuse(f"{label} has no high end", "high beside low")
     low, high = read("low"), read("high")
     whole = key.kind == "whole"
     # Ends that are other keys depend on the sample.
@@ -258,49 +260,49 @@ def _between(
     upper = math.inf if isinstance(key.upper, str) else key.upper
     if whole and not lower <= low <= high <= upper:
         refuse(
-            f"{place}: low = {low:g} and high = {high:g} are not allowed",
+            f"{label}: low = {low:g} and high = {high:g} are not allowed",
             f"{lower:g} <= low < high <= {upper:g}",
         )
     count, scale = given.get("count", 0), given.get("scale", _SCALES[0])
-    require_choice(f"{place}: scale", scale, _SCALES)
+    require_choice(f"{label}: scale", scale, _SCALES)
     positive = ", 0 < low" if scale == "log" else ""
     if not low < high or (positive and low <= 0):
-        refuse_value(f"{place}: low", given["low"], f"low < high{positive}")
+        refuse_value(f"{label}: low", given["low"], f"low < high{positive}")
     if "count" in given:
-        require_whole(f"{place}: count", count, 2, int(high - low) + 1 if whole else MAX_VALUES)
+        require_whole(f"{label}: count", count, 2, int(high - low) + 1 if whole else MAX_VALUES)
     return {"low": low, "high": high, "count": count, "scale": scale}
 
 
 def _normal(
-    place: str,
+    label: str,
     key: Key,
     given: Mapping[str, Any],
     read: Callable[[str], float],
-    centre: Value | None,
+    default_mean: Value | None,
 ) -> dict[str, Any]:
     if key.kind == "whole":
-        refuse(f"{place} is a whole number", "values = [...], or low and high")
+        refuse(f"{label} is a whole number", "values = [...], or low and high")
     std = read("std")
     if not std > 0:
-        refuse_value(f"{place}: std", given["std"], "0 < std")
-    mean = read("mean") if "mean" in given else centre
+        refuse_value(f"{label}: std", given["std"], "0 < std")
+    mean = read("mean") if "mean" in given else default_mean
     if mean is None or not math.isfinite(float(mean)):
-        refuse(f"{place} has no mean", "mean beside std")
+        refuse(f"{label} has no mean", "mean beside std")
     return {"mean": float(mean), "std": std}
 
 
-def quantity(place: str, given: object, unit: str) -> Any:  # noqa: ANN401 - a value of any kind
+def quantity(label: str, given: object, unit: str) -> Any:  # noqa: ANN401 - a value of any kind
     """Return a value, a list, or a table of ``value`` and ``unit``, in the unit of a key."""
     if not isinstance(given, Mapping):
         return given
-    require_words(place, given, ("value", "unit"))
-    power = power_of(given.get("unit", unit or "1"), unit, place)
+    require_words(label, given, ("value", "unit"))
+    power = power_of(given.get("unit", unit or "1"), unit, label)
     if "value" not in given:
-        refuse(f"{place} has no value", "value, and its unit")
+        refuse(f"{label} has no value", "value, and its unit")
     value: Any = given["value"]
     entries = value if isinstance(value, list) else [value]
     if "unit" in given:
         for entry in entries:
-            require_number(place, entry)
+            require_number(label, entry)
         entries = [scaled(entry, power) for entry in entries]
     return entries if isinstance(value, list) else entries[0]

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, Unpack
 
 from thud.base._schema import KEYS
 from thud.base.checks import refuse, require_choice
-from thud.case.keys import OF_FILES, users
+from thud.case.keys import DENSITY, OF_FILES, key_owners, value_in
 from thud.studies.backends import checked_backend
-from thud.studies.blocks import read_identity, result_names
-from thud.studies.computing import compute_samples
+from thud.studies.blocks import compute_samples, read_identity, result_names
 from thud.studies.dataset import disk_space
 from thud.studies.directory import FORMATS
 from thud.studies.kind import Kind
@@ -22,10 +21,9 @@ from thud.studies.sampling import read_design
 from thud.studies.study import table_of
 from thud.studies.surrogate_training import surrogate_name, train
 from thud.studies.temperature import read_temperature
-from thud.studies.trained_surrogate import Surrogate, read_plan, read_surrogate
+from thud.studies.trained_surrogate import Surrogate, read_plan
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Mapping
     from pathlib import Path
 
@@ -33,7 +31,6 @@ if TYPE_CHECKING:
 
     from thud.base.files import Results
     from thud.case.case import Case
-    from thud.case.keys import Value
     from thud.studies.kind import RunOptions
     from thud.studies.parameter import Parameter
     from thud.studies.study import Study
@@ -59,14 +56,15 @@ class DropsKind(Kind[SampleStudy, R]):
     designs: ClassVar[tuple[str, ...]]
 
     def new_parameter(
-        self, name: str, given: object, case: Case, centre: Value | None
+        self, name: str, given: object, case: Case, density: float | None
     ) -> Parameter:
         """Return a parameter that varies."""
         if name == "bands":
             refuse(
                 "[parameters] bands is not allowed", "bands in [fixed], the same for all samples"
             )
-        return varied(name, given, users(case), centre)
+        mean = density if name == DENSITY.name else value_in(case, name)
+        return varied(name, given, key_owners(case), mean)
 
     def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SampleStudy:
         """Return a study with its design."""
@@ -82,28 +80,28 @@ class DropsKind(Kind[SampleStudy, R]):
         if case.model and files:
             case = replace(case, model=replace(case.model, **files))  # type: ignore[arg-type]
         head = {**vars(study), "case": case}
-        found = SampleStudy(**head, **design, temperature=temperature, format=written)
+        result = SampleStudy(**head, **design, temperature=temperature, format=written)
         if "surrogate" not in given:
-            return found
+            return result
         _require_no_floor(case)
         plan = read_plan(table_of(given, "surrogate"), folder)
         if isinstance(plan, Surrogate):
-            return self.with_surrogate(found, plan)
-        return replace(found, plan=plan)
+            return self.with_surrogate(result, plan)
+        return replace(result, plan=plan)
 
-    def with_surrogate(
-        self, study: SampleStudy, given: Surrogate | str | os.PathLike[str]
-    ) -> SampleStudy:
+    def with_surrogate(self, study: SampleStudy, trained: Surrogate) -> SampleStudy:
         """Return a study whose samples a surrogate answers. Raises InputError where it cannot."""
         _require_no_floor(study.case)
-        surrogate = given if isinstance(given, Surrogate) else read_surrogate(given)
-        surrogate.require(study.case, study.key_columns(study.parameter_columns(0, 1)))
-        return replace(study, plan=None, surrogate=surrogate)
+        trained.require(study.case, study.key_columns(study.parameter_columns(0, 1)))
+        return replace(study, plan=None, surrogate=trained)
 
     def require(self, study: SampleStudy, **how: Unpack[RunOptions]) -> None:
         """Raise InputError where there are too many samples, or no such backend."""
-        if study.count > MAX_SAMPLES and not how.get("yes"):
-            refuse(self.describe(study), f"up to {MAX_SAMPLES} samples, more with yes=True (--yes)")
+        if study.count > MAX_SAMPLES and not how.get("allow_large"):
+            refuse(
+                self.describe(study),
+                f"up to {MAX_SAMPLES} samples, or allow_large=True (--yes)",
+            )
         checked_backend(how.get("backend"), how.get("workers"), how.get("scheduler"))
 
     def listed_files(self, study: SampleStudy) -> list[str]:

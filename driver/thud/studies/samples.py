@@ -62,21 +62,21 @@ class SampleStudy(Study):
     plan: Plan | None = None
     surrogate: Surrogate | None = None
 
-    # Whether the peaks of the judged force are counted in each sample.
+    # Whether the peaks of the assessed force are counted in each sample.
     counts_peaks: ClassVar[bool] = False
 
     def own_identity(self) -> dict[str, str]:
         """Return design and temperature law."""
-        found = sampler_versions(self.design) | {"[design] kind": self.design}
+        result = sampler_versions(self.design) | {"[design] kind": self.design}
         if self.size:
-            found |= {"[design] size": f"{self.size}", "[design] seed": f"{self.seed}"}
+            result |= {"[design] size": f"{self.size}", "[design] seed": f"{self.seed}"}
         if self.temperature:
-            found |= {f"[temperature] {k}": f"{v!r}" for k, v in self.temperature.given.items()}
+            result |= {f"[temperature] {k}": f"{v!r}" for k, v in self.temperature.given.items()}
         if self.plan:
-            found |= self.plan.identity
+            result |= self.plan.identity
         elif self.surrogate:
-            found["surrogate"] = self.surrogate.digest
-        return found
+            result["surrogate"] = self.surrogate.digest
+        return result
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -110,25 +110,27 @@ class SampleStudy(Study):
     def parameter_columns(self, start: int, stop: int) -> Columns:
         """Return values of samples `start` to `stop` - 1 by parameter, shape (n_sample,)."""
         if self.design == "grid":
-            places = np.unravel_index(np.arange(start, stop), self.shape)
-            return {p.name: p.grid()[i] for p, i in zip(self.parameters, places, strict=True)}
+            indices = np.unravel_index(np.arange(start, stop), self.shape)
+            return {p.name: p.grid()[i] for p, i in zip(self.parameters, indices, strict=True)}
         if self.design == "list":
             return {p.name: p.grid()[start:stop] for p in self.parameters}
-        shares = unit_samples(self.design, len(self.parameters), self.size, self.seed, start, stop)
-        return {p.name: p.quantile(shares[:, i]) for i, p in enumerate(self.parameters)}
+        fractions = unit_samples(
+            self.design, len(self.parameters), self.size, self.seed, start, stop
+        )
+        return {p.name: p.quantile(fractions[:, i]) for i, p in enumerate(self.parameters)}
 
     def key_columns(self, columns: Columns) -> Columns:
         """Return samples of `parameter_columns` as values of keys, shape (n_sample,).
 
         The density determines the mass, the temperature modulus and loss factor.
         """
-        found = dict(columns)
-        density = found.pop(DENSITY.name, self.density)
+        result = dict(columns)
+        density = result.pop(DENSITY.name, self.density)
         if density is not None:
-            ball = vars(self.case.ball) | found
+            ball = vars(self.case.ball) | result
             volume = wall_volume(ball["outer_radius"], ball["wall_thickness"])
-            found["mass"] = density * volume * np.ones(len(next(iter(columns.values()))))
-        return self.temperature.act(self.case, found) if self.temperature else found
+            result["mass"] = density * volume * np.ones(len(next(iter(columns.values()))))
+        return self.temperature.act(self.case, result) if self.temperature else result
 
 
 @dataclass(frozen=True)
@@ -148,12 +150,8 @@ class Block:
 
 
 def evaluate(block: Block) -> Columns:
-    """Compute the samples of a block.
+    """Return the results of a block by their names in `ALL_QUANTITIES`; NaN where a sample fails.
 
-    Returns the `SCALAR_QUANTITIES`; the levels of `level_names`, dB, shape (n_sample, n_band);
-    ``margin``, dB; ``conforms``; ``status`` and ``reason``; on floors ``contact_octave_level`` and
-    the like, and `FLOOR_QUANTITIES`; of a surrogate ``doubtful``; where they are counted, the
-    ``peaks`` of the judged force. Samples with an error have no numbers: NaN.
     Raises InputError where this is another version of thud.
     """
     if block.version != version():
@@ -163,22 +161,22 @@ def evaluate(block: Block) -> Columns:
         )
     if block.surrogate:
         return block.surrogate.predict(block.case, block.columns)
-    found = solve_many(block.columns, block.case, threads=1, forces=block.counts_peaks)
-    columns: Columns = {name: getattr(found, name) for name in SCALAR_QUANTITIES}
+    result = solve_many(block.columns, block.case, threads=1, forces=block.counts_peaks)
+    columns: Columns = {name: getattr(result, name) for name in SCALAR_QUANTITIES}
     for name, (force, bands) in level_names(block.case).items():
-        columns[name] = found.levels[force, bands]
-    columns |= {f"contact_{bands}_level": level for bands, level in found.contact_levels.items()}
-    columns |= {n: v for n in FLOOR_QUANTITIES if (v := getattr(found, n)) is not None}
+        columns[name] = result.levels[force, bands]
+    columns |= {f"contact_{bands}_level": level for bands, level in result.contact_levels.items()}
+    columns |= {n: v for n in FLOOR_QUANTITIES if (v := getattr(result, n)) is not None}
     if block.counts_peaks:
-        forces = getattr(found, f"{block.case.levels.force}_force")
+        forces = getattr(result, f"{block.case.levels.force}_force")
         columns["peaks"] = np.array(
-            [peak_count(f, found.sample_rate) if np.isfinite(f).all() else np.nan for f in forces]
+            [peak_count(f, result.sample_rate) if np.isfinite(f).all() else np.nan for f in forces]
         )
     return columns | {
-        "margin": found.margin,
-        "conforms": found.conforms,
-        "status": found.status.astype("int8"),
-        "reason": found.reason,
+        "margin": result.margin,
+        "conforms": result.conforms,
+        "status": result.status.astype("int8"),
+        "reason": result.reason,
     }
 
 

@@ -118,23 +118,9 @@ def sensitivity(
 ) -> Sensitivity:
     """Compute Sobol indices of the octave levels, the contact time and the peak of the force.
 
-    Parameters
-    ----------
-    study
-        Path of a TOML file, or what would stand in it. ``[design] size`` is the number of base
-        samples N, a power of 2 from 4; N (d + 2) samples are computed for d parameters.
-    output, **how
-        As of `sweep`.
-
-    Returns
-    -------
-    Sensitivity
-        Indices of the force that the case assesses, with confidence intervals.
-
-    Raises
-    ------
-    InputError
-        As `sweep`; also where too few samples have results.
+    ``[design] size`` of the study is the number of base samples N, a power of 2 from 4; N (d + 2)
+    samples are computed for d parameters. Arguments and errors are those of `sweep`; InputError is
+    also raised where too few samples have results.
     """
     return KIND.run(study, output, **how)
 
@@ -157,10 +143,10 @@ def _indices(study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
             "ranges in which samples have results",
         )
     rows = np.repeat(usable, dimension + 2)
-    found = [sobol_indices(values[rows], dimension, study.seed) for values in outputs.values()]
+    result = [sobol_indices(values[rows], dimension, study.seed) for values in outputs.values()]
     variables: dict[str, Any] = {
         name: (("output", "parameter"), np.stack(values), {"units": "1", "long_name": meaning})
-        for (name, meaning), values in zip(INDICES.items(), zip(*found, strict=True), strict=True)
+        for (name, meaning), values in zip(INDICES.items(), zip(*result, strict=True), strict=True)
     }
     if study.surrogate:
         meaning = {"units": "1", "long_name": "variance of the surrogate's errors over that of all"}
@@ -199,7 +185,7 @@ def sobol_indices(
     if not np.ptp(values) > 1e-12 * np.abs(values).max():
         return tuple(np.full((4, dimension), np.nan))
     cube = {"num_vars": dimension, "names": list(map(str, range(dimension)))}
-    found = sobol.analyze(
+    result = sobol.analyze(
         cube,
         values,
         calc_second_order=False,
@@ -207,4 +193,4 @@ def sobol_indices(
         conf_level=CONFIDENCE,
         seed=seed + 1,  # SALib takes 0 for none
     )
-    return tuple(np.asarray(found[name]) for name in ("S1", "S1_conf", "ST", "ST_conf"))
+    return tuple(np.asarray(result[name]) for name in ("S1", "S1_conf", "ST", "ST_conf"))

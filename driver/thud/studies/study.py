@@ -21,7 +21,7 @@ from thud.base.checks import refuse, refuse_value, require_kind, require_words, 
 from thud.base.errors import InputError
 from thud.base.files import read_input
 from thud.case.case import Case, check_case, new_model, read_case, tables_case
-from thud.case.keys import DENSITY, TEMPERATURE, Value, find_key, put, users
+from thud.case.keys import DENSITY, TEMPERATURE, find_key, key_owners, with_values
 from thud.studies.parameter import Parameter, checked, quantity
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ WORDS = ("name", "case", "fixed", "parameters")
 # Longer texts are shortened to their beginning and a checksum.
 _LONG = 300
 # Quantiles of the parameters at which a case is tried.
-SHARES = (0.01, 0.5, 0.99)
+TRIAL_QUANTILES = (0.01, 0.5, 0.99)
 _NAMED_KEY = re.compile(r"&\w+: (\w+)")
 
 
@@ -76,21 +76,21 @@ class Study:
 
     @property
     def identity(self) -> dict[str, str]:
-        """What its results depend on, as texts by place and key."""
-        found = {"thud": version(), "kind": self.kind, **self.own_identity()}
-        found["[parameters]"] = ", ".join(p.name for p in self.parameters)
-        found |= {f"[parameters] {p.name}": str(p) for p in self.parameters}
+        """What its results depend on, as texts by group and key."""
+        result = {"thud": version(), "kind": self.kind, **self.own_identity()}
+        result["[parameters]"] = ", ".join(p.name for p in self.parameters)
+        result |= {f"[parameters] {p.name}": str(p) for p in self.parameters}
         if self.density is not None:
-            found["[fixed] density"] = f"{self.density!r} kg/m3"
+            result["[fixed] density"] = f"{self.density!r} kg/m3"
         for group, keys in self.case.to_namelist().items():
-            found |= {f"&{group}: {key}": f"{value!r}" for key, value in keys.items()}
-        return {key: _shortened(value) for key, value in found.items()}
+            result |= {f"&{group}: {key}": f"{value!r}" for key, value in keys.items()}
+        return {key: _shortened(value) for key, value in result.items()}
 
-    def trial_case(self, share: float) -> Case:
+    def trial_case(self, quantile: float) -> Case:
         """Return the case with its parameters at a quantile; InputError where there is none."""
         acting = (p for p in self.parameters if p.key not in {DENSITY, TEMPERATURE})
-        found = {p.name: p.trial(share) for p in acting}
-        case = put(self.case, {name: v for name, v in found.items() if v is not None})
+        result = {p.name: p.trial(quantile) for p in acting}
+        case = with_values(self.case, {name: v for name, v in result.items() if v is not None})
         return case if self.density is None else with_density(case, self.density)
 
     def own_identity(self) -> dict[str, str]:
@@ -172,7 +172,7 @@ def read_common(
     folder: Path,
     kind: str,
     words: Iterable[str],
-    new_parameter: Callable[[str, object, Case, Value | None], Parameter],
+    new_parameter: Callable[[str, object, Case, float | None], Parameter],
 ) -> Study:
     """Read what all kinds share; `words` are those that this kind has in addition to `WORDS`."""
     require_words("the study", given, (*WORDS, *words))
@@ -184,12 +184,9 @@ def read_common(
     case, density = fix_keys(_case(given.get("case"), folder, fixed), fixed)
     if not parameters:
         refuse("[parameters] is empty", "one parameter or more")
-    found = tuple(
-        new_parameter(name, entry, case, density if name == DENSITY.name else value_in(case, name))
-        for name, entry in parameters.items()
-    )
+    result = tuple(new_parameter(name, entry, case, density) for name, entry in parameters.items())
     _require_use(fixed, parameters)
-    study = Study(name, kind, case, found, density)
+    study = Study(name, kind, case, result, density)
     _require_valid(study, fixed)
     return study
 
@@ -227,18 +224,18 @@ def fix_keys(
     for name, entry in fixed.items():
         if name == "model":
             continue
-        place = f"{table} {name}"
-        key, place_in_list = find_key(name, users(case))
+        label = f"{table} {name}"
+        key, index = find_key(name, key_owners(case))
         if key == TEMPERATURE:
-            refuse(f"{place} is not allowed", "temperature in [parameters]")
-        value = quantity(place, entry, key.unit)
-        if key.kind == "list" and place_in_list is None:
+            refuse(f"{label} is not allowed", "temperature in [parameters]")
+        value = quantity(label, entry, key.unit)
+        if key.kind == "list" and index is None:
             entries = value if isinstance(value, list) else [value]
-            values[name] = tuple(checked(place, key, item, 0) for item in entries)
+            values[name] = tuple(checked(label, key, item, 0) for item in entries)
         else:
-            values[name] = checked(place, key, value, 0)
+            values[name] = checked(label, key, value, 0)
     density = values.pop(DENSITY.name, None)
-    return put(case, values), density  # type: ignore[return-value]
+    return with_values(case, values), density  # type: ignore[return-value]
 
 
 def _require_use(fixed: Mapping[str, Any], parameters: Mapping[str, Any]) -> None:
@@ -258,13 +255,13 @@ def _require_valid(study: Study, fixed: Mapping[str, Any]) -> None:
     """Raise InputError where the library refuses a fixed value for all values of the parameters."""
     keys = {name.partition("(")[0] for name in fixed} | ({"mass"} if study.density else set())
     refusals = []
-    for share in SHARES:
+    for quantile in TRIAL_QUANTILES:
         try:
-            check_case(replace(study.trial_case(share), modes=None, compression=None))
+            check_case(replace(study.trial_case(quantile), modes=None, compression=None))
         except InputError as error:
             refusals.append(str(error))
     named = [_NAMED_KEY.match(refusal) for refusal in refusals]
-    if len(named) == len(SHARES) and all(found and found[1] in keys for found in named):
+    if len(named) == len(TRIAL_QUANTILES) and all(result and result[1] in keys for result in named):
         message = f"[fixed]: {refusals[0]}"
         raise InputError(message)
 
@@ -281,20 +278,3 @@ def wall_volume(outer_radius: Any, wall_thickness: Any) -> Any:  # noqa: ANN401 
     # Powers of absurd radii raise OverflowError, their products are infinite.
     outer_cube, inner_cube = (radius * radius * radius for radius in (outer_radius, inner))
     return 4 / 3 * np.pi * (outer_cube - inner_cube)
-
-
-def value_in(case: Case, name: str) -> Value | None:
-    """Return the value of a key in a case; None where it has none, or a list of them."""
-    groups: tuple[object, ...] = (
-        case.ball, case.drop, case.sampling, case.levels, case.limits, case.model, case.floor,
-        case.room,
-    )  # fmt: skip
-    group, dot, rest = name.rpartition(".")
-    if dot:
-        groups = (case.room if group == "room" else case.floor,)
-    key, _, entry = rest.partition("(")
-    values = (getattr(group, key, None) for group in groups)
-    found = next((value for value in values if value is not None), None)
-    if isinstance(found, tuple) and entry:
-        found = next(iter(found[int(entry.rstrip(")")) - 1 :]), None)
-    return found if isinstance(found, Value) else None

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from thud.base.files import Results
     from thud.case.case import Case
-    from thud.case.keys import Value
     from thud.studies.kind import RunOptions
     from thud.studies.samples import SampleStudy
     from thud.studies.study import Source, Study
@@ -32,21 +31,21 @@ class SurrogateKind(DropsKind[Surrogate]):
     designs = ("grid",)
 
     def new_parameter(
-        self, name: str, given: object, case: Case, centre: Value | None
+        self, name: str, given: object, case: Case, density: float | None
     ) -> Parameter:
         """Return a parameter that varies from a minimum to a maximum."""
-        found = super().new_parameter(name, given, case, centre)
-        if found.low is None or found.count or found.scale != Parameter.scale:
+        result = super().new_parameter(name, given, case, density)
+        if result.low is None or result.count or result.scale != Parameter.scale:
             refuse(f"[parameters] {name} is not a range of a surrogate", "low, high and unit")
         # The samples of the study are the corners of the region.
-        return replace(found, count=2)
+        return replace(result, count=2)
 
     def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SampleStudy:
         """Return a study with the plan of its training."""
-        found = super().complete(study, {"surrogate": {}, **given}, folder)
-        if found.plan is None:
+        result = super().complete(study, {"surrogate": {}, **given}, folder)
+        if result.plan is None:
             refuse("[surrogate] file is not allowed in its own training", "error, size and seed")
-        return found
+        return result
 
     def compute(
         self, study: SampleStudy, results: Results | None, **how: Unpack[RunOptions]
@@ -77,23 +76,9 @@ def surrogate(
 ) -> Surrogate:
     """Train a surrogate: what studies may ask instead of the model.
 
-    Parameters
-    ----------
-    study
-        Path of a TOML file, or what would stand in it; each parameter has low and high.
-    output, **how
-        See `sweep`. The drops are kept; an interrupted training is continued.
-
-    Returns
-    -------
-    Surrogate
-        To be given to `sweep` and the others as `surrogate`, and saved by its `save`.
-
-    Raises
-    ------
-    InputError
-        As `sweep`; also where a drop has no result or the number of peaks differs among drops.
-    NumericalError
-        Where the error exceeds its bound with all the drops that are allowed.
+    Each parameter of the study has low and high. Arguments and errors are those of `sweep`, which
+    takes the result as `surrogate`, and so do the others. The drops are kept; an interrupted
+    training is continued. InputError is also raised where a drop has no result or the number of
+    peaks differs among drops, NumericalError where the error exceeds its bound with all drops.
     """
     return KIND.run(study, output, **how)

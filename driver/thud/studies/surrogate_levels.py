@@ -10,10 +10,10 @@ import numpy as np
 from thud.base.checks import refuse
 from thud.base.errors import NumericalError
 from thud.base.immutable import freeze
+from thud.case.keys import value_in
 from thud.impact.compute import compute
 from thud.level.levels import BANDWIDTHS
 from thud.studies.fitting.level_target import LevelMisfit
-from thud.studies.study import value_in
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -48,7 +48,7 @@ class SurrogateLevels(LevelMisfit):
             self.name = self.name.replace("_", f"_{self.bands}_")
         if self.name not in surrogate.outputs:
             refuse(f"the surrogate has no {self.name}", f"{', '.join(surrogate.outputs)}")
-        missed = np.sqrt(surrogate.mean_square(self.name))[self.places]
+        missed = np.sqrt(surrogate.mean_square(self.name))[self.indices]
         ratios = [np.sqrt(surrogate.mean_square(n)[0]) * np.log(10) / 20 for n in self.extra]
         sizes = self.target[len(missed) :]
         own = [np.array([r * s]) for r, s in zip(ratios, sizes, strict=True)]
@@ -65,11 +65,11 @@ class SurrogateLevels(LevelMisfit):
         columns: dict[str, Any] = {
             name: np.array([value_in(case, name)]) for name in self.surrogate.keys
         }
-        found = self.surrogate.predict(case, columns)
-        if found["status"][0]:
-            raise NumericalError(found["reason"][0])
-        levels = found[self.name][0][self.places]
-        values = np.concatenate([levels, *(found[name] for name in self.extra)])
+        result = self.surrogate.predict(case, columns)
+        if result["status"][0]:
+            raise NumericalError(result["reason"][0])
+        levels = result[self.name][0][self.indices]
+        values = np.concatenate([levels, *(result[name] for name in self.extra)])
         if not np.isfinite(values).all():
             refuse("the surrogate does not answer all quantities of the target", "others")
         return cast("Impact", Answer(values))

@@ -1,4 +1,4 @@
-"""Training of surrogates: drops until the errors of what is judged are small enough."""
+"""Training of surrogates: drops until the errors of what is assessed are small enough."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ from thud.base.errors import InputError, NumericalError
 from thud.base.extras import require_extra
 from thud.case.keys import find_key
 from thud.impact.quantities import LEVELS, SCALAR_QUANTITIES
-from thud.studies.blocks import read_identity, result_names
-from thud.studies.computing import compute_samples
+from thud.studies.blocks import compute_samples, read_identity, result_names
 from thud.studies.directory import require_version
 from thud.studies.parameter import Parameter
 from thud.studies.samples import SampleStudy
@@ -168,10 +167,12 @@ def _learn(
         length=np.ones(len(region)), weights=blank, mean=blank[0], scale=blank[0], residuals=blank,
     )  # fmt: skip
     unknown = [n for n, v in zip(found.labels, values.T, strict=True) if not np.isfinite(v).all()]
-    judged = [n for n, j in zip(found.labels, found.judged, strict=True) if j and n in unknown]
-    if judged:
-        refuse(f"{judged[0]} is 0 or not known in some drops", "a model and ranges in which it is")
-    return replace(found, **regress(points, values, found.judged))
+    assessed = [n for n, j in zip(found.labels, found.assessed, strict=True) if j and n in unknown]
+    if assessed:
+        refuse(
+            f"{assessed[0]} is 0 or not known in some drops", "a model and ranges in which it is"
+        )
+    return replace(found, **regress(points, values, found.assessed))
 
 
 def _decibels(name: str, values: Values) -> Values:
@@ -180,15 +181,15 @@ def _decibels(name: str, values: Values) -> Values:
         return values
     if (values <= 0).any():
         values = np.full_like(values, np.nan)
-    found: Values = 20 * np.log10(values)[:, np.newaxis]
-    return found
+    result: Values = 20 * np.log10(values)[:, np.newaxis]
+    return result
 
 
-def regress(points: Values, values: Values, judged: NDArray[np.bool_]) -> dict[str, Any]:
+def regress(points: Values, values: Values, assessed: NDArray[np.bool_]) -> dict[str, Any]:
     """Return a Gaussian process through values at points in the unit cube.
 
     The lengths of correlation and the noise (steps of the time integration, contacts node by
-    node) maximise the likelihood of what is judged; all other quantities share them. Parts of a
+    node) maximize the likelihood of what is assessed; all other quantities share them. Parts of a
     `Surrogate`: length, weights, mean, scale, residuals.
     """
     with require_extra("surrogate"):
@@ -200,7 +201,7 @@ def regress(points: Values, values: Values, judged: NDArray[np.bool_]) -> dict[s
     scale[scale <= _ROUNDING * np.maximum(np.abs(mean), 1.0)] = 0.0
     varies = scale > 0  # false where there is no value
     normal = np.where(varies, (values - mean) / np.where(varies, scale, 1.0), 0.0)
-    chosen = judged & varies if (judged & varies).any() else judged
+    chosen = assessed & varies if (assessed & varies).any() else assessed
     shape = Matern(np.full(points.shape[1], 2.0), (0.05, 50.0), nu=SMOOTHNESS)
     kernel = ConstantKernel(10.0, (1e-2, 1e6)) * shape + WhiteKernel(1e-2, (1e-10, 10.0))
     process = GaussianProcessRegressor(kernel)

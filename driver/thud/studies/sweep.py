@@ -94,7 +94,7 @@ def sweep(
     output
         Directory of the results; an interrupted study is continued. None: they are not written.
     **how
-        Keywords `backend`, `workers`, `scheduler`, `yes`, `progress`, `replace`; see
+        Keywords `backend`, `workers`, `scheduler`, `allow_large`, `progress`, `replace`; see
         `thud.studies.kind.RunOptions`.
 
     Returns
@@ -113,8 +113,8 @@ def sweep(
 
     Examples
     --------
-    >>> found = sweep({"parameters": {"height": {"values": [50, 100], "unit": "cm"}}})
-    >>> found.dataset["contact_time"].round(4).values.tolist()
+    >>> result = sweep({"parameters": {"height": {"values": [50, 100], "unit": "cm"}}})
+    >>> result.dataset["contact_time"].round(4).values.tolist()
     [0.0211, 0.0204]
     """
     return KIND.run(study, output, **how)

@@ -72,9 +72,9 @@ class Temperature:
         Modulus and loss factor stay those at the `loss_frequency` of the case: of the fractional
         law 1 + p (cos + i sin) (a**order - 1) with the angle pi order/2 and p = loss factor/sin.
         """
-        found = dict(samples)
-        temperature = found.pop(TEMPERATURE.name)
-        values = {**vars(case.ball), **vars(case.model), **found}
+        result = dict(samples)
+        temperature = result.pop(TEMPERATURE.name)
+        values = {**vars(case.ball), **vars(case.model), **result}
         above = temperature - self.reference
         modulus = values["youngs_modulus"] * (1 + (self.coefficient or 0.0) * above)
         if self.c1 is not None:
@@ -83,8 +83,8 @@ class Temperature:
             springpot = values["loss_factor"] / np.sin(angle) * self.shift(temperature) ** order
             storage = 1 - values["loss_factor"] / np.tan(angle) + springpot * np.cos(angle)
             modulus = modulus * storage
-            found["loss_factor"] = springpot * np.sin(angle) / storage
-        return {**found, "youngs_modulus": modulus}
+            result["loss_factor"] = springpot * np.sin(angle) / storage
+        return {**result, "youngs_modulus": modulus}
 
 
 def _loss_law(case: Case) -> str:

@@ -25,11 +25,10 @@ from thud.base.checks import (
 from thud.base.extras import require_extra
 from thud.base.files import is_failure, read_input, replace_file
 from thud.case.case import Case, case_text
-from thud.case.keys import OF_FILES, put
+from thud.case.keys import OF_FILES, value_in, with_values
 from thud.level.assessment import get_criteria
 from thud.level.levels import get_bands
 from thud.studies.result import StudyResult
-from thud.studies.study import value_in
 
 if TYPE_CHECKING:
     import os
@@ -44,9 +43,9 @@ if TYPE_CHECKING:
     Values = NDArray[np.float64]
 
 # Share of the held-out drops within the error that is stated, and the confidence of that.
-SHARE = 0.95
+COVERAGE = 0.95
 # Samples that are computed together: their kernel stays in the cache.
-_TOGETHER = 250
+_CHUNK = 250
 # Values beyond the region by this part of its width are rounding.
 _ROUNDING = 1e-9
 # Smoothness of the kernel of Matern: responses that can be differentiated twice.
@@ -79,7 +78,7 @@ class Surrogate(StudyResult):
     bound : float
         Maximum error of what is answered, dB; other quantities are NaN.
     peaks : int
-        Number of peaks of the judged force, the same in all drops.
+        Number of peaks of the assessed force, the same in all drops.
     identity : dict of str to str
         What the drops and their choice depend on.
     points : ndarray, shape (n_drop, n_key)
@@ -109,8 +108,8 @@ class Surrogate(StudyResult):
     residuals: Values
 
     def __repr__(self) -> str:
-        """Return the keys and the largest error of what is judged."""
-        error = float(self.errors[self.judged].max())
+        """Return the keys and the largest error of what is assessed."""
+        error = float(self.errors[self.assessed].max())
         return (
             f"<Surrogate of {len(self.points)} drops by {', '.join(self.keys)}: "
             f"95 % within {error:.3f} dB>"
@@ -142,15 +141,15 @@ class Surrogate(StudyResult):
     @property
     def labels(self) -> list[str]:
         """Names of all numbers."""
-        found = []
+        result = []
         for name, count in self.outputs.items():
             words = name.replace("_", " ")
             bands = get_bands("third" if "third" in name else "octave").nominal
-            found += [f"{words} {band:g} Hz" for band in bands] if count > 1 else [words]
-        return found
+            result += [f"{words} {band:g} Hz" for band in bands] if count > 1 else [words]
+        return result
 
     @property
-    def judged(self) -> NDArray[np.bool_]:
+    def assessed(self) -> NDArray[np.bool_]:
         """Which numbers the verdict depends on, shape (n_number,)."""
         names = {f"{self.case.levels.force}_level", "contact_time", "restitution"}
         return np.repeat([name in names for name in self.outputs], list(self.outputs.values()))
@@ -160,28 +159,28 @@ class Surrogate(StudyResult):
         """Error of each number, dB, shape (n_number,); NaN where the model has no such result."""
         count = len(self.points)
         # With 58 drops or fewer there is no such order statistic.
-        place = int(binom.ppf(SHARE, count, SHARE))
-        found: Values = np.sort(np.abs(self.residuals), axis=0)[place]
+        rank = int(binom.ppf(COVERAGE, count, COVERAGE))
+        found: Values = np.sort(np.abs(self.residuals), axis=0)[rank]
         return found
 
     @property
     def worst(self) -> tuple[str, float]:
-        """Name and error, dB, of the judged number with the largest error."""
-        errors = np.where(self.judged, self.errors, -np.inf)
+        """Name and error, dB, of the assessed number with the largest error."""
+        errors = np.where(self.assessed, self.errors, -np.inf)
         return self.labels[int(np.nanargmax(errors))], float(np.nanmax(errors))
 
     @property
     def sentence(self) -> str:
-        """How it was trained, its largest error of what is judged, and what it does not answer."""
+        """How it was trained, its largest assessed error, and what it does not answer."""
         label, error = self.worst
-        found = (
+        result = (
             f"surrogate of {len(self.points)} drops: 95 % of held-out drops within {error:.2g} dB "
             f"({label}; the rest of the verdict closer)"
         )
         if self.withheld:
-            found += f"; not answered, with errors above {self.bound:g} dB: "
-            found += ", ".join(self.withheld)
-        return found
+            result += f"; not answered, with errors above {self.bound:g} dB: "
+            result += ", ".join(self.withheld)
+        return result
 
     @property
     def withheld(self) -> list[str]:
@@ -191,13 +190,13 @@ class Surrogate(StudyResult):
 
     def error_of(self, name: str) -> Values:
         """Return the errors of a quantity, dB, shape (count,)."""
-        found: Values = self._split(self.errors[np.newaxis])[name][0]
-        return found
+        result: Values = self._split(self.errors[np.newaxis])[name][0]
+        return result
 
     def mean_square(self, name: str) -> Values:
         """Return the mean squares of the held-out errors of a quantity, dB2, shape (count,)."""
-        found: Values = self._split(np.mean(self.residuals**2, axis=0)[np.newaxis])[name][0]
-        return found
+        result: Values = self._split(np.mean(self.residuals**2, axis=0)[np.newaxis])[name][0]
+        return result
 
     def _split(self, numbers: Values) -> dict[str, Values]:
         """Return columns of numbers by quantity, shape (n, count)."""
@@ -218,7 +217,7 @@ class Surrogate(StudyResult):
         model = self.case.model.name  # type: ignore[union-attr]
         if case.model is None or case.model.name != model:
             refuse("the surrogate was trained on another model", f"model = {model!r}")
-        before, now = (keys_of(put(one, middle)) for one in (self.case, case))
+        before, now = (keys_of(with_values(one, middle)) for one in (self.case, case))
         if changed := [key for key in before if before[key] != now.get(key)]:
             key = changed[0]
             refuse(f"{key} = {now.get(key)}: the surrogate was trained with {before[key]}", "that")
@@ -241,12 +240,12 @@ class Surrogate(StudyResult):
         width = high - low
         edge = _ROUNDING * np.maximum(width, np.abs(high))
         outside = ~((values >= low - edge) & (values <= high + edge))
-        places = (values - low) / np.where(width > 0, width, 1.0)
+        points = (values - low) / np.where(width > 0, width, 1.0)
         kernel = Matern(self.length, nu=SMOOTHNESS)
         numbers = np.empty((count, len(self.mean)))
-        for start in range(0, count, _TOGETHER):
-            some = slice(start, start + _TOGETHER)
-            numbers[some] = kernel(places[some], self.points) @ self.weights
+        for start in range(0, count, _CHUNK):
+            some = slice(start, start + _CHUNK)
+            numbers[some] = kernel(points[some], self.points) @ self.weights
         numbers = numbers * self.scale + self.mean
         numbers[:, ~(self.errors <= self.bound)] = np.nan
         failed = outside.any(axis=1)
@@ -269,27 +268,27 @@ class Surrogate(StudyResult):
     ) -> Columns:
         parts = self._split(numbers)
         levels = {name: part for name, part in parts.items() if self.outputs[name] > 1}
-        found: Columns = {n: 10 ** (part[:, 0] / 20) for n, part in parts.items()} | levels
+        result: Columns = {n: 10 ** (part[:, 0] / 20) for n, part in parts.items()} | levels
         names = ("contact_time", "restitution")
         level = f"{case.levels.force}_level"
         rest = [given.get(n, np.asarray(value_in(case, n))) for n in ("mass", "height")]
         exact = [np.zeros(1)] * 3
         verdicts = assess_many(
-            (found[level], *(found[n] for n in names), np.array([self.peaks]), *rest),
+            (result[level], *(result[n] for n in names), np.array([self.peaks]), *rest),
             (
                 self.error_of(level)[np.newaxis],
-                *(found[n] * (10 ** (self.error_of(n) / 20) - 1) for n in names),
+                *(result[n] * (10 ** (self.error_of(n) / 20) - 1) for n in names),
                 *exact,
             ),
             case.limits.source,
         )
         verdicts["doubtful"] &= reasons == ""
         status = np.where(reasons == "", 0, 1).astype("int8")
-        return found | verdicts | {"status": status, "reason": reasons}
+        return result | verdicts | {"status": status, "reason": reasons}
 
     @property
-    def is_whole(self) -> bool:
-        """Whether its parts fit together, and what is judged has numbers."""
+    def is_complete(self) -> bool:
+        """Whether its parts fit together, and what is assessed has numbers."""
         drops, keys, numbers = len(self.points), len(self.keys), sum(self.outputs.values())
         shapes = {
             "region": (keys, 2), "points": (drops, keys), "length": (keys,),
@@ -300,11 +299,11 @@ class Surrogate(StudyResult):
             return False
         low, high = self.region.T
         known = (self.points, self.length, *(
-            getattr(self, name)[..., self.judged] for name in ("weights", "mean", "residuals")
+            getattr(self, name)[..., self.assessed] for name in ("weights", "mean", "residuals")
         ))  # fmt: skip
         return bool(
             drops > 0
-            and self.judged.any()
+            and self.assessed.any()
             and (low <= high).all()
             and (self.length > 0).all()
             and all(np.isfinite(part).all() for part in known)
@@ -363,11 +362,11 @@ def assess_many(
         Source whose limits apply.
     """
     count, bands = values[0].shape
-    judged, by = (_columns(part, count) for part in (values, errors))
+    assessed, by = (_columns(part, count) for part in (values, errors))
     criteria = get_criteria(source)
     lower = np.array([one.lower for one in criteria])
     upper = np.array([one.upper for one in criteria])
-    inside = np.minimum(judged - lower, upper - judged)
+    inside = np.minimum(assessed - lower, upper - assessed)
     surely, perhaps = ((inside >= sign * by).all(axis=1) for sign in (1, -1))
     return {
         "margin": inside[:, :bands].min(axis=1),
@@ -383,7 +382,7 @@ def _columns(parts: tuple[Values, ...], count: int) -> Values:
 
 
 def keys_of(case: Case) -> dict[str, str]:
-    """Return what the results of a surrogate depend on in a case, as texts by place and key."""
+    """Return what the results of a surrogate depend on in a case, as texts by group and key."""
     groups = case.to_namelist()
     return {
         f"&{group}: {key}": f"{value!r}"
@@ -391,6 +390,11 @@ def keys_of(case: Case) -> dict[str, str]:
         if group not in {"case", "limits", OF_FILES}
         for key, value in keys.items()
     }
+
+
+def get_surrogate(given: Surrogate | str | os.PathLike[str]) -> Surrogate:
+    """Return a surrogate, read where the path of its file is given."""
+    return given if isinstance(given, Surrogate) else read_surrogate(given)
 
 
 def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
@@ -413,8 +417,8 @@ def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
             digest = str(file["digest"])
         header["case"] = Case.from_text(header["case"])
         header["keys"] = tuple(header["keys"])
-        found = Surrogate(**header, **arrays)
-        intact = found.digest == digest and found.is_whole
+        result = Surrogate(**header, **arrays)
+        intact = result.digest == digest and result.is_complete
     except Exception as error:
         if is_failure(error):
             raise
@@ -426,7 +430,7 @@ def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
             f"{path} is damaged: wrong checksum, shapes or numbers",
             "a file that Surrogate.save wrote",
         )
-    return found
+    return result
 
 
 @dataclass(frozen=True)
@@ -436,7 +440,7 @@ class Plan:
     Attributes
     ----------
     error : float
-        Bound of the error of what is judged, dB.
+        Bound of the error of what is assessed, dB.
     size : int
         Maximum number of drops.
     seed : int
@@ -449,7 +453,7 @@ class Plan:
 
     @property
     def identity(self) -> dict[str, str]:
-        """What a surrogate depends on besides its drops, as texts by place and key."""
+        """What a surrogate depends on besides its drops, as texts by group and key."""
         with require_extra("surrogate"):
             import sklearn
         return {
@@ -471,18 +475,18 @@ class Plan:
 
 def read_plan(given: Mapping[str, object], folder: Path) -> Plan | Surrogate:
     """Return the plan of a table ``[surrogate]``, or the surrogate of the file that it names."""
-    place = "[surrogate]"
+    label = "[surrogate]"
     if "file" in given:
-        require_words(f"{place} with file", given, ("file",))
+        require_words(f"{label} with file", given, ("file",))
         path = given["file"]
         if not isinstance(path, str) or not path.strip():
-            refuse_value(f"{place} file", path, "the path of a saved surrogate")
+            refuse_value(f"{label} file", path, "the path of a saved surrogate")
         return read_surrogate(folder / path)
-    require_words(place, given, ("error", "size", "seed", "file"))
+    require_words(label, given, ("error", "size", "seed", "file"))
     error, size, seed = (given.get(w, getattr(Plan, w)) for w in ("error", "size", "seed"))
-    require_number(f"{place} error", error)
+    require_number(f"{label} error", error)
     if not error > 0:  # type: ignore[operator]
-        refuse_value(f"{place} error", error, "numbers above 0, dB")
-    require_whole(f"{place} size", size, MIN_DROPS, MAX_DROPS)
-    require_whole(f"{place} seed", seed, 0, LARGEST_SEED)
+        refuse_value(f"{label} error", error, "numbers above 0, dB")
+    require_whole(f"{label} size", size, MIN_DROPS, MAX_DROPS)
+    require_whole(f"{label} seed", seed, 0, LARGEST_SEED)
     return Plan(float(error), size, seed)  # type: ignore[arg-type]

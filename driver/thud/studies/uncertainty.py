@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from thud.base._schema import LimitsSource
     from thud.case.case import Case
-    from thud.case.keys import Value
     from thud.studies.kind import RunOptions
     from thud.studies.parameter import Parameter
     from thud.studies.samples import SampleStudy
@@ -43,7 +42,7 @@ class Uncertainty(SampleResult):
     dataset : Dataset
         Every sample.
     levels : ndarray, shape (n_sample, 5)
-        Octave levels of the force that is judged, dB; samples without results are left out.
+        Octave levels of the assessed force, dB; samples without results are left out.
     source : str
         Source whose limits apply.
     conforming, computed, failed : int
@@ -74,8 +73,8 @@ class Uncertainty(SampleResult):
     @property
     def interval(self) -> tuple[float, float]:
         """Wilson's score interval of the probability, of 95 %; valid for none and for all too."""
-        found = binomtest(self.conforming, self.computed).proportion_ci(CONFIDENCE, "wilson")
-        return found.low, found.high
+        result = binomtest(self.conforming, self.computed).proportion_ci(CONFIDENCE, "wilson")
+        return result.low, result.high
 
     @property
     def surrogate_range(self) -> tuple[float, float] | None:
@@ -131,7 +130,7 @@ class UncertaintyKind(SampleKind[Uncertainty]):
     designs = ("random",)
 
     def new_parameter(
-        self, name: str, given: object, case: Case, centre: Value | None
+        self, name: str, given: object, case: Case, density: float | None
     ) -> Parameter:
         """Return a parameter that varies; the limits are the same for all samples."""
         if name in {"source", "force"}:
@@ -139,7 +138,7 @@ class UncertaintyKind(SampleKind[Uncertainty]):
                 f"[parameters] {name} is not allowed, because all samples have the same limits",
                 f"{name} in [fixed]",
             )
-        return super().new_parameter(name, given, case, centre)
+        return super().new_parameter(name, given, case, density)
 
     def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> Uncertainty:
         """Return the distribution over all samples."""
@@ -166,21 +165,7 @@ def uncertainty(
 ) -> Uncertainty:
     """Compute how tolerances spread the levels, and the probability of conformity.
 
-    Parameters
-    ----------
-    study
-        Path of a TOML file, or what would stand in it; its parameters are independent.
-    output, **how
-        As of `sweep`.
-
-    Returns
-    -------
-    Uncertainty
-        Levels of the force that the case assesses, and the probability of conformity.
-
-    Raises
-    ------
-    InputError
-        As `sweep`; also where fewer than two samples have results.
+    The parameters of the study are independent. Arguments and errors are those of `sweep`;
+    InputError is also raised where fewer than two samples have results.
     """
     return KIND.run(study, output, **how)

@@ -53,7 +53,7 @@ contains
          call assign_group(groups(i), fields, error)
       end do
       if (allocated(error)) return
-      ! What is done with an unchecked case hangs on these.
+      ! The use of an unchecked case depends on these.
       call check_fields(pack(fields, fields%group == 'model' .or. fields%group == 'floor' .and. fields%key == 'name'), error)
       if (.not. allocated(error)) call check_name(case%name, error)
       if (.not. allocated(error)) call check_use(groups, case, error)

@@ -22,7 +22,7 @@ module thud_line_reader
       integer :: descriptor = -1
       !> The bytes read last.
       character(len=buffer_length) :: buffer = ''
-      !> Bytes in it, and those that were given out.
+      !> Number of bytes in it, and of those that were returned.
       integer :: filled = 0, taken = 0
       !> Number of the latest line.
       integer, public :: line = 0

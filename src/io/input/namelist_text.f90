@@ -71,7 +71,7 @@ contains
    subroutine separate(text, clean, structure, error)
       !> Text of the input file.
       character(len=*), intent(in) :: text
-      !> The text without comments, every character in its old place.
+      !> The text without comments, every character at its position in the file.
       character(len=:), allocatable, intent(out) :: clean
       !> In lower case, with all quoted text made of `x`.
       character(len=:), allocatable, intent(out) :: structure
@@ -113,15 +113,15 @@ contains
          //'; allowed: quotes that begin and end in one line')
    end subroutine separate
 
-   !> Name and end of the group that starts at a place.
+   !> Name and end of the group that starts at a position.
    subroutine find_group(structure, start, group, finish, error)
       !> Text without comments and quoted text.
       character(len=*), intent(in) :: structure
-      !> Place of the first character.
+      !> Position of the first character.
       integer, intent(in) :: start
       !> The group, without its assignments yet.
       type(group_type), intent(out) :: group
-      !> Place of the `/` or of the `&` in `&end`.
+      !> Position of the `/` or of the `&` in `&end`.
       integer, intent(out) :: finish
       !> No group starts here, or it has no end.
       type(error_type), allocatable, intent(out) :: error
@@ -150,18 +150,18 @@ contains
    subroutine split_group(clean, structure, start, finish, group, error)
       !> Text without comments; the same without quoted text.
       character(len=*), intent(in) :: clean, structure
-      !> First place after the name of the group; last place before its end.
+      !> First position after the name of the group; last position before its end.
       integer, intent(in) :: start, finish
       !> The group, to which the assignments are added.
       type(group_type), intent(inout) :: group
       !> Something is not `key = value`.
       type(error_type), allocatable, intent(out) :: error
       type(assignment_type) :: given
-      integer :: equals, key_start, key_end, next_key, place
+      integer :: equals, key_start, key_end, next_key, position
 
       allocate (group%assignments(0))
-      place = start
-      call find_key(structure(:finish), place, key_start, key_end, equals)
+      position = start
+      call find_key(structure(:finish), position, key_start, key_end, equals)
       if (key_start > finish .and. verify(structure(start:finish), blanks//',') == 0) return
       if (key_start > finish .or. verify(structure(start:min(key_start, finish + 1) - 1), blanks//',') > 0) then
          call get_value(clean(start:finish), given%value)
@@ -177,9 +177,9 @@ contains
             return
          end if
          given%key = structure(key_start:key_end)
-         place = equals + 1
-         call find_key(structure(:finish), place, next_key, key_end, equals)
-         call get_value(clean(place:min(next_key, finish + 1) - 1), given%value)
+         position = equals + 1
+         call find_key(structure(:finish), position, next_key, key_end, equals)
+         call get_value(clean(position:min(next_key, finish + 1) - 1), given%value)
          group%assignments = [group%assignments, given]
          key_start = next_key
       end do
@@ -189,9 +189,9 @@ contains
    pure subroutine find_key(structure, from, first, last, equals)
       !> Text without comments and quoted text, up to the group's end.
       character(len=*), intent(in) :: structure
-      !> Place to search from.
+      !> Position to search from.
       integer, intent(in) :: from
-      !> First character of the key; last character of the key; place of the equals sign.
+      !> First character of the key; last character of the key; position of the equals sign.
       integer, intent(out) :: first, last, equals
 
       first = len(structure) + 1
@@ -216,17 +216,17 @@ contains
       if (first > 0 .and. last >= first) value = replaced(text(first:last), blanks, ' ')
    end subroutine get_value
 
-   !> Number of the line that a place is in.
-   pure function line_of(text, place) result(line)
+   !> Number of the line of a position.
+   pure function line_of(text, position) result(line)
       character(len=*), intent(in) :: text
-      !> Place of a character.
-      integer, intent(in) :: place
+      !> Position of a character.
+      integer, intent(in) :: position
       !> Line, the first one is 1.
       integer :: line
       integer :: i
 
       line = 1
-      do i = 1, min(place, len(text)) - 1
+      do i = 1, min(position, len(text)) - 1
          if (text(i:i) == newline) line = line + 1
       end do
    end function line_of

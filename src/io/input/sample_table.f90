@@ -77,7 +77,7 @@ contains
       end if
       if (.not. allocated(error)) then
          allocate (fields, source=get_active_fields(case))
-         table%fields = fields(table%columns%place)
+         table%fields = fields(table%columns%field)
       else
          call close_lines(table%reader)
       end if

@@ -13,7 +13,7 @@ module thud_report
    implicit none (type, external)
    private
 
-   public :: get_channels_csv, get_fact_group, get_force_csv, get_levels_csv, get_quantity_lines
+   public :: get_model_histories_csv, get_model_quantities, get_force_csv, get_levels_csv, get_quantity_lines
    public :: get_summary, get_word, line
 
 contains
@@ -55,21 +55,21 @@ contains
       text = get_history_csv(header, get_times(history), values)
    end function get_force_csv
 
-   !> Channels of the model against time.
-   function get_channels_csv(history) result(text)
-      !> The history, with channels.
+   !> Further quantities of the model against time.
+   function get_model_histories_csv(history) result(text)
+      !> The history, with such quantities.
       type(force_history_type), intent(in) :: history
-      !> Text of `channels.csv`.
+      !> Text of `model_histories.csv`.
       character(len=:), allocatable :: text
       character(len=:), allocatable :: header
       integer :: i
 
       header = 'time_s'
-      do i = 1, size(history%channel_name)
-         header = header//','//trim(history%channel_name(i))
+      do i = 1, size(history%model_history_name)
+         header = header//','//trim(history%model_history_name(i))
       end do
-      text = get_history_csv(header, get_times(history), history%channel)
-   end function get_channels_csv
+      text = get_history_csv(header, get_times(history), history%model_history)
+   end function get_model_histories_csv
 
    !> Times of the samples, s: [n_time].
    pure function get_times(history) result(times)
@@ -120,8 +120,10 @@ contains
 
       text = '! thud '//version//': results of case '//trim(case%name)//', SI units, levels in dB re 1 N'//newline &
          //newline//'&summary'//newline//line('case', quoted(case%name), '')//line('model', quoted(case%model), '') &
-         //get_quantity_lines(history)//'/'//newline//newline//get_fact_group('facts', history)//warning_group(warning) &
-         //'&verdict'//newline //line('source', quoted(case%source), '') &
+         //get_quantity_lines(history)//'/'//newline//newline//get_model_quantities('model_quantities', history) &
+         //warning_group(warning) &
+         //'&verdict'//newline &
+         //line('source', quoted(case%source), '') &
          //line('level_method', quoted(case%level_method), '') &
          //line('level_force', quoted(case%level_force), '') &
          //line('conforms', to_text(is_conforming(case, assessment)), '')
@@ -150,7 +152,7 @@ contains
    end function get_quantity_lines
 
    !> Numbers that the model chose or found as a namelist group.
-   function get_fact_group(name, history) result(text)
+   function get_model_quantities(name, history) result(text)
       !> Name of the group.
       character(len=*), intent(in) :: name
       type(force_history_type), intent(in) :: history
@@ -159,13 +161,14 @@ contains
       integer :: i
 
       text = ''
-      if (size(history%scalar) == 0) return
+      if (size(history%model_quantity) == 0) return
       text = '&'//name//newline
-      do i = 1, size(history%scalar_name)
-         text = text//line(trim(history%scalar_name(i)), to_text(history%scalar(i)), trim(history%scalar_unit(i)))
+      do i = 1, size(history%model_quantity_name)
+         text = text//line(trim(history%model_quantity_name(i)), to_text(history%model_quantity(i)), &
+            trim(history%model_quantity_unit(i)))
       end do
       text = text//'/'//newline//newline
-   end function get_fact_group
+   end function get_model_quantities
 
    !> Warnings as a namelist group.
    function warning_group(warning) result(text)

@@ -58,8 +58,8 @@ contains
       do i = 1, history_quantity_count
          call bundle%add_number(prefix//'quantities.'//quantities(i)%name, values(i))
       end do
-      do i = 1, size(history%scalar)
-         call bundle%add_number(prefix//'facts.'//history%scalar_name(i), history%scalar(i))
+      do i = 1, size(history%model_quantity)
+         call bundle%add_number(prefix//'model_quantities.'//history%model_quantity_name(i), history%model_quantity(i))
       end do
       call bundle%add_array(prefix//'samples.deflection', n, history%deflection)
       call bundle%add_array(prefix//'samples.velocity', n, history%velocity)
@@ -71,11 +71,11 @@ contains
          call bundle%add_number(prefix//'floor.floor_work', history%floor_work)
       end if
       do i = 1, size(history%component_name)
-         call bundle%add_array(prefix//'parts.'//history%component_name(i), n, history%component(:, i))
+         call bundle%add_array(prefix//'components.'//history%component_name(i), n, history%component(:, i))
       end do
-      if (allocated(history%channel)) then
-         do i = 1, size(history%channel_name)
-            call bundle%add_array(prefix//'channels.'//history%channel_name(i), n, history%channel(:, i))
+      if (allocated(history%model_history)) then
+         do i = 1, size(history%model_history_name)
+            call bundle%add_array(prefix//'model_histories.'//history%model_history_name(i), n, history%model_history(:, i))
          end do
       end if
       associate (motion => history%motion, n_frame => history%motion%n_frame)

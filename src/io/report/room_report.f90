@@ -49,7 +49,7 @@ contains
          [size(prediction%history_time), size(prediction%bands) + 1]))
    end subroutine get_room_files
 
-   !> The levels for the screen; thirds of few modes are marked.
+   !> The levels for the screen; bands with few modes are marked.
    subroutine get_room_table(case, prediction, contact_time, coupled, text)
       type(case_type), intent(in) :: case
       type(room_level_type), intent(in) :: prediction
@@ -89,7 +89,7 @@ contains
          //'  The floor gives way under the source, and the force on a rigid floor is used: see docs/rooms.md.'//newline
    end subroutine get_room_table
 
-   !> Adds the single numbers of octaves and thirds.
+   !> Adds the ratings of octaves and of one-third octaves.
    subroutine add_ratings(prediction, coupled, text)
       type(room_level_type), intent(in) :: prediction
       !> The force is that on the floor.
@@ -108,7 +108,7 @@ contains
          text = text//'no class'
       end if
       text = text//' (KS F 2863-2)'//newline//'  L_iA,Fmax '//to_text(get_rounded(prediction%a_weighted))//' dB (' &
-         //fixed(prediction%a_weighted, 2)//') of thirds, ISO 717-2 annex D: ' &
+         //fixed(prediction%a_weighted, 2)//') of one-third octaves, ISO 717-2 annex D: ' &
          //trim(merge('contact force', 'blocked force', coupled))//', statistical mean over positions.'//newline
    end subroutine add_ratings
 

@@ -113,20 +113,20 @@ contains
       end do
    end function get_rest_width
 
-   !> A sentence as a cell.
-   pure function in_quotes(sentence) result(cell)
-      character(len=*), intent(in) :: sentence
+   !> A message as a cell.
+   pure function in_quotes(message) result(cell)
+      character(len=*), intent(in) :: message
       !> It in quotes, as far as there is space; quotes inside are doubled.
-      character(len=2*len(sentence) + 2) :: cell
+      character(len=2*len(message) + 2) :: cell
       integer :: i, at
 
       cell = '"'
       at = 1
-      do i = 1, len(sentence)
+      do i = 1, len(message)
          at = at + 1
-         cell(at:at) = sentence(i:i)
-         if (sentence(i:i) == '"') at = at + 1
-         if (sentence(i:i) == '"') cell(at:at) = '"'
+         cell(at:at) = message(i:i)
+         if (message(i:i) == '"') at = at + 1
+         if (message(i:i) == '"') cell(at:at) = '"'
       end do
       cell(at + 1:) = '"'
    end function in_quotes

@@ -130,7 +130,8 @@ contains
          sqrt(ball%outer_radius*ball%wall_thickness)/length, lowest=6.0_wp, &
          reason='fewer polar_elements do not resolve how a wall so thin bends'), &
          validity_limit_type('mesh', 'radius of the contact over the length of an element', &
-         maxval(history%channel(:, 1))/length, lowest=4.0_wp, reason='fewer polar_elements do not resolve the contact')]
+         maxval(history%model_history(:, 1))/length, lowest=4.0_wp, &
+         reason='fewer polar_elements do not resolve the contact')]
    end function get_validity_limits
 
    !> Loss factor of the material in shear against frequency.

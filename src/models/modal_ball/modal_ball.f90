@@ -39,7 +39,7 @@ module thud_modal_ball
    !> Fraction of the energy at first touch that closing gaps within a step may take.
    real(wp), parameter :: max_contact_loss = 0.02_wp
 
-   !> Families whose energies are separate channels, from n = 0 on.
+   !> Families whose energies are recorded separately, from n = 0 on.
    integer, parameter :: n_family = 6
 
    !> The model.
@@ -95,7 +95,7 @@ contains
       type(validity_limit_type), allocatable :: limits(:)
       real(wp) :: angle
 
-      angle = asin(min(1.0_wp, maxval(history%channel(:, 1))/ball%outer_radius))
+      angle = asin(min(1.0_wp, maxval(history%model_history(:, 1))/ball%outer_radius))
       limits = [get_wall_limits(ball, history), &
          validity_limit_type('sampling', 'sample_rate in Hz times substeps', &
          sampling%sample_rate*real(sampling%substeps, wp), lowest=16000.0_wp, &
@@ -146,9 +146,9 @@ contains
       interval = 1/(sampling%sample_rate*real(sampling%substeps, wp))
       history = new_force_history(sampling%sample_rate, n_sample, ['contact_force'])
       history%impact_velocity = get_impact_velocity(drop)
-      history%channel_name = [character(len=24) :: 'contact_radius_m', ('energy_n'//to_text(i)//'_J', i=0, n_family - 1), &
-         'energy_rest_J']
-      allocate (history%channel(n_sample, n_family + 2), source=0.0_wp)
+      history%model_history_name = [character(len=24) :: 'contact_radius_m', ('energy_n'//to_text(i)//'_J', &
+         i=0, n_family - 1), 'energy_rest_J']
+      allocate (history%model_history(n_sample, n_family + 2), source=0.0_wp)
       call use_one_blas_thread()
       rings = new_surface_rings(options%rings, options%static_harmonics, options%floor_friction == 'stick')
       call prepare(ball, options, rings, floor, interval, step, contact, error)
@@ -282,7 +282,7 @@ contains
                last = n_step
                history%impulse = history%impulse + impulse
                history%component(i, 1) = history%component(i, 1) + impulse*sampling%sample_rate
-               history%channel(i, 1) = max(history%channel(i, 1), ball%outer_radius*rings%radius(contact%last))
+               history%model_history(i, 1) = max(history%model_history(i, 1), ball%outer_radius*rings%radius(contact%last))
             end if
             if (contact%last == size(rings%radius)) then
                error = numerical_error('&drop: '//to_text(1.0e3_wp*n_step*interval)//' ms after first touch the ball lies ' &
@@ -358,9 +358,9 @@ contains
       gain = ball%mass*(history%impact_velocity + state%speed + state%gravity*time)
       history%impulse_residual = abs(history%impulse - gain)/gain
       history%floor_work = state%floor_work
-      history%scalar_name = [character(len=len(history%scalar_name)) :: 'contact_loss']
-      history%scalar_unit = [character(len=len(history%scalar_unit)) :: 'J']
-      history%scalar = [state%contact_loss]
+      history%model_quantity_name = [character(len=len(history%model_quantity_name)) :: 'contact_loss']
+      history%model_quantity_unit = [character(len=len(history%model_quantity_unit)) :: 'J']
+      history%model_quantity = [state%contact_loss]
       initial = ball%mass/2*history%impact_velocity**2
       energy = ball%mass*(state%speed**2/2 + state%gravity*(state%height - ball%outer_radius)) &
          + sum(get_energies(step, state%motion)) + state%loss + state%contact_loss + state%floor_work
@@ -394,7 +394,7 @@ contains
       history%max_deflection = max(history%max_deflection, history%deflection(i))
       do k = 1, size(energy)
          column = 2 + min(step%harmonic(k), n_family)
-         history%channel(i, column) = history%channel(i, column) + energy(k)
+         history%model_history(i, column) = history%model_history(i, column) + energy(k)
       end do
    end subroutine record_motion
 

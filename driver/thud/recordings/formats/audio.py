@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import struct
-from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
@@ -35,20 +35,13 @@ DATE = slice(320, 330)
 CLOCK = slice(330, 338)
 
 
-@dataclass(frozen=True)
-class AudioSamples:
-    """One channel of an audio file, which is opened for each read."""
-
-    path: Path
-    column: int
-
-    def __call__(self, start: int, stop: int) -> NDArray[np.float64]:
-        """Return the samples from start to before stop."""
-        soundfile = library("soundfile", "WAV and FLAC")
-        with guarded(self.path, "an audio file"), soundfile.SoundFile(os.fsencode(self.path)) as f:
-            f.seek(start)
-            block: NDArray[np.float64] = f.read(stop - start, dtype="float64", always_2d=True)
-        return np.ascontiguousarray(block[:, self.column])
+def _read(path: Path, column: int, start: int, stop: int) -> NDArray[np.float64]:
+    """Return the samples of a channel from start to before stop."""
+    soundfile = library("soundfile", "WAV and FLAC")
+    with guarded(path, "an audio file"), soundfile.SoundFile(os.fsencode(path)) as file:
+        file.seek(start)
+        block: NDArray[np.float64] = file.read(stop - start, dtype="float64", always_2d=True)
+    return np.ascontiguousarray(block[:, column])
 
 
 def read_channels(path: Path) -> list[Channel]:
@@ -72,7 +65,7 @@ def read_channels(path: Path) -> list[Channel]:
             "FLAC files with their length: encode it again, as by `ffmpeg -i OLD.flac NEW.flac`",
         )
     # A FLAC file that is cut off lacks its last sample.
-    if count < 1 or (is_flac and not _is_complete(path, count)):
+    if count < 1 or (is_flac and _read(path, 0, count - 1, count).size != 1):
         refuse(f"{name}: is cut off or has no samples", "a complete file")
     counts = SUBTYPES[kind]
     return [
@@ -80,7 +73,7 @@ def read_channels(path: Path) -> list[Channel]:
             name="",
             number=column + 1,
             n_sample=count,
-            samples=AudioSamples(path, column),
+            samples=partial(_read, path, column),
             unit="FS" if counts else "",
             sample_rate=rate,
             counts=counts,
@@ -88,11 +81,6 @@ def read_channels(path: Path) -> list[Channel]:
         )
         for column in range(columns)
     ]
-
-
-def _is_complete(path: Path, count: int) -> bool:
-    """Whether the last sample of a file is there."""
-    return AudioSamples(path, 0)(count - 1, count).size == 1
 
 
 def _read_chunks(file: BinaryIO, name: str) -> str:

@@ -5,13 +5,22 @@ from __future__ import annotations
 import errno
 import math
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from thud.base.checks import refuse
-from thud.recordings.channel import MIB, Channel, guarded, library, shown_path, shown_text
+from thud.recordings.channel import (
+    MIB,
+    MIN_SAMPLES,
+    Channel,
+    guarded,
+    library,
+    shown_path,
+    shown_text,
+)
 from thud.recordings.header_aliases import (
     DATE,
     TIME_UNITS,
@@ -25,7 +34,7 @@ from thud.recordings.header_aliases import (
     text_of,
 )
 from thud.recordings.uniform_grid import uniform_grid
-from thud.recordings.variables import MAX_COLUMNS, MIN_SAMPLES
+from thud.recordings.variables import MAX_COLUMNS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -51,26 +60,23 @@ MATLAB_OTHERS = {"char", "cell", "struct", "function_handle", "canonical empty"}
 SCALING = {"scalefactor": 1.0, "addoffset": 0.0}
 
 
-@dataclass(frozen=True)
-class Hdf5Samples:
-    """One scaled row or column of a dataset; the file is opened for each read."""
-
-    path: Path
-    dataset: str
-    column: tuple[int, int] | None
-    scale: float = 1.0
-    offset: float = 0.0
-
-    def __call__(self, start: int, stop: int) -> NDArray[np.float64]:
-        """Return the samples from start to before stop."""
-        h5py = library("h5py", "HDF5")
-        with guarded(self.path, "HDF5"), _open(h5py, self.path) as file:
-            piece: Any = slice(start, stop)
-            if self.column is not None:
-                axis, index = self.column
-                piece = (index, piece) if axis == 0 else (piece, index)
-            values = np.asarray(file[self.dataset][piece], dtype=np.float64)
-            return values * self.scale + self.offset
+def _read(  # noqa: PLR0913, PLR0917 - identify a channel and a section of it
+    path: Path,
+    dataset: str,
+    scale: float,
+    offset: float,
+    column: tuple[int, int] | None,
+    start: int,
+    stop: int,
+) -> NDArray[np.float64]:
+    """Return the samples of a scaled row or column of a dataset from start to before stop."""
+    h5py = library("h5py", "HDF5")
+    with guarded(path, "HDF5"), _open(h5py, path) as file:
+        piece: Any = slice(start, stop)
+        if column is not None:
+            axis, index = column
+            piece = (index, piece) if axis == 0 else (piece, index)
+        return np.asarray(file[dataset][piece], dtype=np.float64) * scale + offset
 
 
 @dataclass(frozen=True)
@@ -103,11 +109,11 @@ def read_channels(path: Path) -> list[Channel]:
     name = shown_path(path)
     with _open(h5py, path) as file:
         found = _walk(h5py, file, path)
-        times = [one for one in found if is_time(one.key.rpartition("/")[2])]
+        times = [entry for entry in found if is_time(entry.key.rpartition("/")[2])]
         channels: list[Channel] = []
-        for one in found:
-            if one not in times or len(found) == 1:
-                channels += _channels(path, one, times, len(channels))
+        for entry in found:
+            if entry not in times or len(found) == 1:
+                channels += _channels(path, entry, times, len(channels))
     if not channels:
         refuse(
             f"{name}: has no dataset of {MIN_SAMPLES} or more real numbers", "a recorded channel"
@@ -216,29 +222,29 @@ def _is_channel(data: Any, name: str, path: Path) -> bool:  # noqa: ANN401 - of 
     return True
 
 
-def _channels(path: Path, one: _Vectors, times: list[_Vectors], before: int) -> list[Channel]:
+def _channels(path: Path, entry: _Vectors, times: list[_Vectors], before: int) -> list[Channel]:
     """Return the channels of a dataset."""
-    count = math.prod(one.data.shape) // one.n_sample
-    rate, date = find_rate(one.header), find_word(one.header, DATE)
+    count = math.prod(entry.data.shape) // entry.n_sample
+    rate, date = find_rate(entry.header), find_word(entry.header, DATE)
     steps: tuple[str, ...] = ()
     same = next(
-        (t for t in times if t.n_sample == one.n_sample and one.parent.startswith(t.parent)), None
+        (t for t in times if t.n_sample == entry.n_sample and entry.parent.startswith(t.parent)),
+        None,
     )
     if rate is None and same is not None:
         rate, steps, since = _rate_of_times(path, same)
         date = date or since
-    scale, offset = (_scaling(path, one, word) for word in SCALING)
-    title = one.key.strip("/")
-    samples = Hdf5Samples(path, one.key, None, scale, offset)
+    scale, offset = (_scaling(path, entry, word) for word in SCALING)
+    title = entry.key.strip("/")
+    is_vector = len(entry.data.shape) == 1
+    read = partial(_read, path, entry.key, scale, offset)
     return [
         Channel(
             name=title + (f"[{i + 1}]" if count > 1 else ""),
             number=before + i + 1,
-            n_sample=one.n_sample,
-            samples=samples
-            if len(one.data.shape) == 1
-            else replace(samples, column=(1 - one.axis, i)),
-            unit=find_word(one.header, UNIT) or split_title(title.rpartition("/")[2])[1],
+            n_sample=entry.n_sample,
+            samples=partial(read, None if is_vector else (1 - entry.axis, i)),
+            unit=find_word(entry.header, UNIT) or split_title(title.rpartition("/")[2])[1],
             sample_rate=rate,
             date=date,
             steps=steps,
@@ -247,15 +253,15 @@ def _channels(path: Path, one: _Vectors, times: list[_Vectors], before: int) -> 
     ]
 
 
-def _scaling(path: Path, one: _Vectors, word: str) -> float:
+def _scaling(path: Path, entry: _Vectors, word: str) -> float:
     """Return the factor or offset of a dataset; raise InputError where it is no finite number."""
-    title = next((title for title, _ in one.header if plain(title) == word), "")
+    title = next((title for title, _ in entry.header if plain(title) == word), "")
     if not title:
         return SCALING[word]
-    value = find_word(one.header, frozenset({word}))
+    value = find_word(entry.header, frozenset({word}))
     number, unit = read_number(value) or (math.nan, "")
     if unit or not math.isfinite(number) or (number == 0 and word == "scalefactor"):
-        name = f"{shown_path(path)}: {shown_text(one.key.strip('/'))}: {shown_text(title)}"
+        name = f"{shown_path(path)}: {shown_text(entry.key.strip('/'))}: {shown_text(title)}"
         refuse(
             f"{name} = {shown_text(value)!r} is not allowed", "a finite number, as a factor not 0"
         )

@@ -6,14 +6,13 @@ import logging
 import os
 import struct
 import weakref
-from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
 from thud.base.checks import refuse
-from thud.recordings.channel import BoundedFile, Channel, guarded, library, shown_path
+from thud.recordings.channel import Channel, guarded, library, shown_path
 from thud.recordings.header_aliases import DATE, UNIT, find_rate, find_word, text_of
 
 if TYPE_CHECKING:
@@ -27,23 +26,8 @@ MAX_SEGMENTS = 200_000
 LEAD = struct.Struct("<4sIIQQ")
 
 
-@dataclass(frozen=True)
-class TdmsSamples:
-    """One channel of a TDMS file, which stays open: reading its description may take long."""
-
-    file: _OpenFile
-    group: str
-    name: str
-
-    def __call__(self, start: int, stop: int) -> NDArray[np.float64]:
-        """Return the samples from start to before stop."""
-        with guarded(self.file.path, "TDMS"):
-            channel = self.file.tdms[self.group][self.name]
-            return np.asarray(channel[start:stop], dtype=np.float64)
-
-
 class _OpenFile:
-    """A TDMS file that is opened at first use, also in another process."""
+    """A TDMS file that stays open, as its description may be long; another process reopens it."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -56,7 +40,12 @@ class _OpenFile:
         """The file of the library; closed with this object."""
         file = self.path.open("rb")
         weakref.finalize(self, file.close)
-        return _library().TdmsFile.open(BoundedFile(file, shown_path(self.path)))
+        return _library().TdmsFile.open(file)
+
+    def read(self, group: str, name: str, start: int, stop: int) -> NDArray[np.float64]:
+        """Return the samples of a channel from start to before stop."""
+        with guarded(self.path, "TDMS"):
+            return np.asarray(self.tdms[group][name][start:stop], dtype=np.float64)
 
 
 def _library() -> Any:  # noqa: ANN401 - a module
@@ -73,30 +62,31 @@ def read_channels(path: Path) -> list[Channel]:
     with path.open("rb") as raw:
         _require_complete(raw, shown_path(path))
     file = _OpenFile(path)
-    found = [(group, one) for group in file.tdms.groups() for one in group.channels()]
+    found = [(group, channel) for group in file.tdms.groups() for channel in group.channels()]
     if len(found) > MAX_CHANNELS:
         refuse(f"{shown_path(path)}: {len(found)} channels", f"up to {MAX_CHANNELS}")
     return [
-        _channel(file, number, group, one)
-        for number, (group, one) in enumerate(found, start=1)
-        if one.dtype.kind in "iuf" and len(one)
+        _channel(file, number, group, channel)
+        for number, (group, channel) in enumerate(found, start=1)
+        if channel.dtype.kind in "iuf" and len(channel)
     ]
 
 
-def _channel(file: _OpenFile, number: int, group: Any, one: Any) -> Channel:  # noqa: ANN401
+def _channel(file: _OpenFile, number: int, group: Any, channel: Any) -> Channel:  # noqa: ANN401
     """Return a channel of a TDMS file."""
     size = file.path.stat().st_size
-    if len(one) > size:  # a sample has at least a byte
+    if len(channel) > size:  # a sample has at least a byte
         refuse(
-            f"{shown_path(file.path)}: {len(one)} samples in {size} bytes", "an undamaged TDMS file"
+            f"{shown_path(file.path)}: {len(channel)} samples in {size} bytes",
+            "an undamaged TDMS file",
         )
-    owners = [owner.properties for owner in (one, group, file.tdms)]
+    owners = [owner.properties for owner in (channel, group, file.tdms)]
     items = [(str(key), text_of(value)) for owner in owners for key, value in owner.items()]
     return Channel(
-        name=one.name,
+        name=channel.name,
         number=number,
-        n_sample=len(one),
-        samples=TdmsSamples(file, group.name, one.name),
+        n_sample=len(channel),
+        samples=partial(file.read, group.name, channel.name),
         unit=find_word(items, UNIT),
         sample_rate=find_rate(items),
         date=find_word(items, DATE),

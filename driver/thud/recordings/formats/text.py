@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
@@ -21,7 +22,14 @@ from thud.base.columns import (
     strip_comment,
     to_number,
 )
-from thud.recordings.channel import MAX_IN_MEMORY, Channel, require_small, shown_path, shown_text
+from thud.recordings.channel import (
+    MAX_IN_MEMORY,
+    MIN_SAMPLES,
+    Channel,
+    require_small,
+    shown_path,
+    shown_text,
+)
 from thud.recordings.force_units import find_unit
 from thud.recordings.header_aliases import (
     DATE,
@@ -35,9 +43,9 @@ from thud.recordings.header_aliases import (
     plain,
     split_title,
 )
-from thud.recordings.signal import ArraySamples
+from thud.recordings.signal import read_array
 from thud.recordings.uniform_grid import uniform_grid
-from thud.recordings.variables import MAX_COLUMNS, MIN_SAMPLES
+from thud.recordings.variables import MAX_COLUMNS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -318,7 +326,7 @@ def _channels(table: _Table, values: dict[int, NDArray[np.float64]]) -> list[Cha
             name=titles[i],
             number=i + 1,
             n_sample=rows,
-            samples=ArraySamples(values[i]),
+            samples=partial(read_array, values[i]),
             unit=units[i],
             sample_rate=rate,
             date=find_word(table.header, DATE),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from thud.base.checks import refuse
 from thud.recordings.channel import Channel, library, require_small, shown_path
 from thud.recordings.header_aliases import TIME_UNITS
-from thud.recordings.signal import ArraySamples
+from thud.recordings.signal import read_array
 from thud.recordings.uniform_grid import uniform_grid
 
 if TYPE_CHECKING:
@@ -33,43 +34,45 @@ def read_channels(path: Path) -> list[Channel]:
     if len(kinds) > MAX_SETS:
         refuse(f"{shown_path(path)}: {len(kinds)} data sets", f"up to {MAX_SETS}")
     sets = [file.read_sets(number) for number, kind in enumerate(kinds) if kind == 58]  # noqa: PLR2004
-    histories = [one for one in sets if _is_history(one)]
+    histories = [data_set for data_set in sets if _is_history(data_set)]
     if not histories:
         refuse(f"{shown_path(path)}: has no time history", "data sets 58 of function type 1, real")
-    return [_channel(path, number, one) for number, one in enumerate(histories, start=1)]
+    return [_channel(path, number, data_set) for number, data_set in enumerate(histories, start=1)]
 
 
-def _is_history(one: dict[str, Any]) -> bool:
+def _is_history(data_set: dict[str, Any]) -> bool:
     """Whether a data set is a real time history."""
-    return one.get("func_type") == TIME_RESPONSE and one.get("ord_data_type") in REAL
+    return data_set.get("func_type") == TIME_RESPONSE and data_set.get("ord_data_type") in REAL
 
 
-def _channel(path: Path, number: int, one: dict[str, Any]) -> Channel:
+def _channel(path: Path, number: int, data_set: dict[str, Any]) -> Channel:
     """Return the channel of a data set."""
     name = f"{shown_path(path)}: data set {number}"
-    data = np.asarray(one["data"], dtype=np.float64)
-    due = int(one["num_pts"])
+    data = np.asarray(data_set["data"], dtype=np.float64)
+    due = int(data_set["num_pts"])
     # Binary sets may end with a line feed.
     if data.size < due or due < 1:
         refuse(f"{name}: {data.size} samples, {due} are due", "a complete file")
-    scale = TIME_UNITS.get(one["abscissa_axis_units_lab"].casefold(), 1.0)
+    scale = TIME_UNITS.get(data_set["abscissa_axis_units_lab"].casefold(), 1.0)
     steps: tuple[str, ...] = ()
-    if one["abscissa_spacing"] == 1:
-        step = one["abscissa_inc"] * scale
+    if data_set["abscissa_spacing"] == 1:
+        step = data_set["abscissa_inc"] * scale
     else:
-        _, step, steps = uniform_grid(np.asarray(one["x"], dtype=np.float64)[:due] * scale, name)
-    unit = one["ordinate_axis_units_lab"].strip()
-    if unit.upper() in NONE and one["ordinate_spec_data_type"] in FORCES:
+        _, step, steps = uniform_grid(
+            np.asarray(data_set["x"], dtype=np.float64)[:due] * scale, name
+        )
+    unit = data_set["ordinate_axis_units_lab"].strip()
+    if unit.upper() in NONE and data_set["ordinate_spec_data_type"] in FORCES:
         unit = "N"
         steps += ("The data set states no unit; as a force it is read in N.",)
-    label = one["ordinate_axis_lab"].strip()
+    label = data_set["ordinate_axis_lab"].strip()
     return Channel(
-        name=one["id1"].strip() if label.upper() in NONE else label,
+        name=data_set["id1"].strip() if label.upper() in NONE else label,
         number=number,
         n_sample=due,
-        samples=ArraySamples(data[:due]),
+        samples=partial(read_array, data[:due]),
         unit="" if unit.upper() in NONE else unit,
         sample_rate=1 / step if step > 0 else None,
-        date=one["id3"].strip() if one["id3"].strip().upper() not in NONE else "",
+        date=data_set["id3"].strip() if data_set["id3"].strip().upper() not in NONE else "",
         steps=steps,
     )

@@ -73,7 +73,7 @@ class Estimates(StudyResult):
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Residuals less parameters."""
+        """Number of residuals − number of parameters."""
         return len(self.residuals) - len(self.names)
 
     @property

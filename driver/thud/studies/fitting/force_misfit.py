@@ -15,8 +15,8 @@ from thud.impact.impact import Impact
 from thud.studies.fitting.inference import UNLIKELY, residual_warnings
 from thud.studies.fitting.misfit import GAIN, SHIFT, Misfit
 from thud.studies.fitting.record_noise import (
-    MIN_QUIET,
-    Quiet,
+    MIN_BACKGROUND,
+    BackgroundRecord,
     Weights,
     hum_harmonics,
     new_weights,
@@ -32,13 +32,13 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-# Rounded times leave this part of the highest frequency open.
+# Rounded times leave this fraction of the highest frequency open.
 SAME = 1e-5
-# A comparison of contact and quiet needs this many independent values of each, and any test a
-# residual above this part of the peak force, which exceeds sampling errors.
+# Minimum number of independent values of contact and of background that are compared, and of the
+# residual over the peak force that is tested, which exceeds sampling errors.
 MIN_FREEDOM = 5
 NUMERICAL = 1e-4
-# Standard errors of hum that make it worth telling: noise alone has as much with UNLIKELY.
+# Standard errors of hum from which it is stated; noise alone reaches them with UNLIKELY.
 NOTABLE = float(np.sqrt(-2 * np.log(UNLIKELY)))
 # Scale of a shift in time, s.
 SHIFT_SCALE = 1e-3
@@ -48,7 +48,7 @@ class ForceMisfit(Misfit):
     """How far the force of an impact is from a record, by frequency."""
 
     deviation_unit = "N"
-    deviation_source = "noise, or 50 independent values of quiet,"
+    deviation_source = "noise, or 50 independent values of background,"
 
     def __init__(self, target: ForceTarget, record: Record, pulse: tuple[int, int]) -> None:
         self.time, self.force, self.sample_rate = record
@@ -63,12 +63,17 @@ class ForceMisfit(Misfit):
         self.frequency = freeze(np.arange(count) / self.period)
         self.count = 2 * len(self.frequency) - 1
         self.spectrum = freeze(np.fft.rfft(self.force, norm="ortho")[:count])
-        self.quiet = Quiet(self.force, self.sample_rate, pulse, self.below)
-        shown = self.quiet.known and self.quiet.deviation() > NUMERICAL * self.force.max()
-        self.offset = self.quiet.known if target.offset is None else target.offset
+        self.background_record = BackgroundRecord(self.force, self.sample_rate, pulse, self.below)
+        shown = (
+            self.background_record.known
+            and self.background_record.deviation() > NUMERICAL * self.force.max()
+        )
+        self.offset = self.background_record.known if target.offset is None else target.offset
         self.known_noise = shown or target.noise is not None
-        self.noise_freedom = self.quiet.freedom if shown and target.noise is None else None
-        self._shown = shown
+        self.noise_freedom = (
+            self.background_record.freedom if shown and target.noise is None else None
+        )
+        self._known = shown
         self.own = {}
         if not self.exact if target.time_shift is None else target.time_shift:
             self.own[SHIFT] = "s", SHIFT_SCALE
@@ -79,7 +84,7 @@ class ForceMisfit(Misfit):
         if self.prior is not None and not self.known_noise:
             refuse(
                 f"target: gain = {self.prior:g} is not allowed without a known noise",
-                f"noise, {MIN_QUIET / 2 / self.below:.3g} s of quiet, or inf",
+                f"noise, {MIN_BACKGROUND / 2 / self.below:.3g} s of background, or inf",
             )
         self.size = self.count + (self.prior is not None)
         self._transforms: dict[tuple[int, float], ZoomFFT] = {}
@@ -89,18 +94,18 @@ class ForceMisfit(Misfit):
         """Frequencies of hum that are nuisance parameters, Hz."""
         if self.target.hum is not None:
             return hum_harmonics(self.target.hum, self.below)
-        return self.quiet.tones() if self._shown else ()
+        return self.background_record.tones() if self._known else ()
 
     @cached_property
     def background(self) -> Background | None:
-        """The noise of the quiet parts; None where they do not tell."""
-        return self.quiet.background(self.tones) if self._shown else None
+        """The noise of the background; None where it is too short."""
+        return self.background_record.background(self.tones) if self._known else None
 
     @cached_property
     def weights(self) -> Weights:
         """The weights of the residuals."""
         return new_weights(
-            self.quiet,
+            self.background_record,
             self.count,
             background=self.background,
             noise=self.target.noise,
@@ -110,8 +115,8 @@ class ForceMisfit(Misfit):
         )
 
     @property
-    def band_share(self) -> float:
-        """Part of the deviation of white noise that lies in the compared band."""
+    def band_fraction(self) -> float:
+        """Fraction of the deviation of white noise that lies in the compared band."""
         return float(np.sqrt(self.count / len(self.time)))
 
     @property
@@ -140,8 +145,9 @@ class ForceMisfit(Misfit):
 
     def value(self, name: str, own: Array) -> float:
         """Return one of its own parameters, or what it is where it is not fitted."""
-        place = list(self.own).index(name) if name in self.own else None
-        return {SHIFT: 0.0, GAIN: 1.0}[name] if place is None else float(own[place])
+        if name not in self.own:
+            return {SHIFT: 0.0, GAIN: 1.0}[name]
+        return float(own[list(self.own).index(name)])
 
     def residual(self, impact: Impact, own: Array) -> Array:
         """Return model minus target over standard deviation, shape (size,)."""
@@ -205,19 +211,19 @@ class ForceMisfit(Misfit):
         value, covariance = self.weights.estimates(
             self._grid(self.spectrum - self.model_spectrum(impact, own))
         )
-        found = {}
+        result = {}
         if self.offset:
-            found["offset"] = float(value[0]), float(np.sqrt(covariance[0, 0]))
-        for place, tone in enumerate(self.tones, start=int(self.offset)):
-            pair = np.array([place, place + len(self.tones)])
-            found[f"hum of {tone:.4g} Hz"] = wave_size(value[pair], covariance[np.ix_(pair, pair)])
+            result["offset"] = float(value[0]), float(np.sqrt(covariance[0, 0]))
+        for i, tone in enumerate(self.tones, start=int(self.offset)):
+            pair = np.array([i, i + len(self.tones)])
+            result[f"hum of {tone:.4g} Hz"] = wave_size(value[pair], covariance[np.ix_(pair, pair)])
         if self.background is not None and self.target.hum is None:
-            mains, size, error = self.quiet.mains(self.background, self.tones)
+            mains, size, error = self.background_record.mains(self.background, self.tones)
             if size > NOTABLE * error:
-                found[f"hum of {mains:g} Hz"] = size, error
-        return found
+                result[f"hum of {mains:g} Hz"] = size, error
+        return result
 
-    def doubts(self, impact: Impact, own: Array, deviation: float, count: int) -> list[str]:
+    def warnings(self, impact: Impact, own: Array, deviation: float, count: int) -> list[str]:
         """Return what residuals of a deviation show that `count` parameters cannot explain.
 
         Noise is the same throughout and independent once it is weighted; what the model cannot
@@ -232,16 +238,16 @@ class ForceMisfit(Misfit):
         begin = self.value(SHIFT, own)
         inside = (time >= begin) & (time <= begin + impact.contact_time)
         unit = deviation * self.unit_deviation
-        found = _contact_doubt(weighted, inside, count, unit)
-        if not found:
-            found = residual_warnings(weighted, time)
-            found += _change_doubt(weighted, time < begin, time > begin + impact.contact_time)
-        if not (self.quiet.known or self.target.offset is not None or self.exact):
-            found.append(
-                f"the record has {1e3 * self.quiet.seconds:.3g} ms of quiet: offset, hum and "
-                "colour of the noise are not known, and the intervals hold for white noise alone"
+        result = _contact_warning(weighted, inside, count, unit)
+        if not result:
+            result = residual_warnings(weighted, time)
+            result += _change_warning(weighted, time < begin, time > begin + impact.contact_time)
+        if not (self.background_record.known or self.target.offset is not None or self.exact):
+            result.append(
+                f"the background lasts {1e3 * self.background_record.seconds:.3g} ms: offset, hum "
+                "and color of the noise are not known, and the intervals hold for white noise alone"
             )
-        return found
+        return result
 
     def history(self, spectrum: NDArray[np.complex128]) -> Array:
         """Return the history of a transform, N, shape (n_sample,)."""
@@ -254,7 +260,7 @@ class ForceMisfit(Misfit):
         return grid
 
 
-def _contact_doubt(
+def _contact_warning(
     weighted: Array, inside: NDArray[np.bool_], count: int, unit: float
 ) -> list[str]:
     """Return how residuals differ during contact from before and after, where they do."""
@@ -262,21 +268,21 @@ def _contact_doubt(
     if min(during, other) < MIN_FREEDOM:
         return []
     square = float((weighted[inside] ** 2).sum()) / during
-    quiet = float((weighted[~inside] ** 2).sum()) / other
-    if square < stats.f.isf(UNLIKELY, during, other) * quiet:
+    outside = float((weighted[~inside] ** 2).sum()) / other
+    if square < stats.f.isf(UNLIKELY, during, other) * outside:
         return []
-    told = (
+    text = (
         f"the residual is {unit * np.sqrt(square):.3g} N during the contact and "
-        f"{unit * np.sqrt(quiet):.3g} N otherwise: the model does not follow the force to within "
+        f"{unit * np.sqrt(outside):.3g} N otherwise: the model does not follow the force to within "
         "the noise, and the intervals are too narrow"
     )
-    return [told]
+    return [text]
 
 
-def _change_doubt(
+def _change_warning(
     weighted: Array, before: NDArray[np.bool_], after: NDArray[np.bool_]
 ) -> list[str]:
-    """Return how residuals before contact differ from those behind it, where they do."""
+    """Return how residuals before contact differ from those after it, where they do."""
     counts = int(before.sum()), int(after.sum())
     if min(counts) < MIN_FREEDOM:
         return []
@@ -284,8 +290,8 @@ def _change_doubt(
     tail = min(stats.f.sf(ratio, *counts[::-1]), stats.f.cdf(ratio, *counts[::-1]))
     if 2 * tail > UNLIKELY:
         return []
-    told = (
-        f"the residuals are {np.sqrt(ratio):.3g} times as large behind the contact as before it: "
+    text = (
+        f"the residuals are {np.sqrt(ratio):.3g} times as large after the contact as before it: "
         "the noise is not the same throughout, and the intervals do not hold"
     )
-    return [told]
+    return [text]

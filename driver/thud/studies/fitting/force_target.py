@@ -11,8 +11,9 @@ from thud.base.checks import refuse, refuse_value, require_choice, require_numbe
 from thud.base.immutable import Immutable
 from thud.impact.impact import Impact
 from thud.level.levels import FORCES, RECORDED_BAND
+from thud.recordings.channel import MIN_SAMPLES
 from thud.recordings.recording import Recording
-from thud.recordings.uniform_grid import MIN_ROWS, Record, read_record
+from thud.recordings.uniform_grid import Record, read_record
 from thud.studies.fitting.force_misfit import ForceMisfit
 from thud.studies.fitting.misfit import require_positive
 from thud.studies.fitting.record_noise import MIN_HUM, find_pulse, trimmed
@@ -38,8 +39,9 @@ class ForceTarget(Immutable):
     Model and record are compared in the frequencies up to `below`: their discrete Fourier
     transforms over the time of the record, in which a shift in time is a phase. What lies above is
     noise, or numerical ripple. The residuals are weighted by the covariance of the noise, white,
-    pink and brown, which the quiet before and after the pulse shows (generalised least squares);
-    offset and hum are nuisance parameters. More quiet than 0.1 s on each side does not count.
+    pink and brown, which the background before and after the pulse shows (generalized least
+    squares);
+    offset and hum are nuisance parameters. Background beyond 0.1 s on each side does not count.
 
     Attributes
     ----------
@@ -47,7 +49,8 @@ class ForceTarget(Immutable):
         The force; of arrays: time, s, and force, N, both of shape (n_sample,).
     noise : float or None
         Standard deviation of the noise of one sample, white, N; None: the noise is that of the
-        quiet, or with less than 50 independent values of it estimated from the residual, as white.
+        background, or with less than 50 independent values of it estimated from the residual, as
+        white.
     force : str or None
         ``"floor"`` (what a force plate measures) or ``"elastic"``: the force of the model, and
         of an impact as target.
@@ -61,10 +64,11 @@ class ForceTarget(Immutable):
     drop : int
         Number of the drop of a recording that has several, from 1.
     offset : bool or None
-        An offset is a nuisance parameter; None: where there is enough quiet.
+        An offset is a nuisance parameter; None: where there is enough background.
     hum : float or None
         Frequency, Hz, of hum whose first five harmonics are nuisance parameters; 0: there is none;
-        None: hum of 50 or 60 Hz, and tones of other frequencies, as far as the quiet shows them.
+        None: hum of 50 or 60 Hz, and tones of other frequencies, as far as the background shows
+        them.
     gain : float or None
         Relative standard uncertainty of the calibration: a factor of the record is fitted, known to
         be 1 to this extent; infinite: not known; None: it is 1.
@@ -134,7 +138,7 @@ class ForceTarget(Immutable):
     def _pulse(
         self, time: NDArray[np.float64], force: NDArray[np.float64], rate: float
     ) -> tuple[int, int]:
-        """Return the first sample that is no quiet, and the one behind the last."""
+        """Return the first sample of the pulse, and the stop (exclusive)."""
         if isinstance(self.record, Impact):
             return 0, len(force)
         if not isinstance(self.record, Recording):
@@ -171,7 +175,7 @@ def _cut(
     except (TypeError, ValueError, OverflowError):
         begin = end = np.nan
     inside = (time >= begin) & (time <= end)
-    if np.count_nonzero(inside) < MIN_ROWS or not force[inside].max() > 0:
+    if np.count_nonzero(inside) < MIN_SAMPLES or not force[inside].max() > 0:
         refuse_value(
             "target: window",
             window,

@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 # are zero.
 NO_EFFECT = 1e-9
 UNRESOLVED = 0.5
-# Singular values of the Jacobian below this part of the maximum, or below this many of its own
+# Singular values of the Jacobian below this fraction of the maximum, or below this many of its own
 # errors, are zero.
 MIN_RATIO = 1e-6
 ERRORS = 3.0
 # Entries of a unit vector below this are zero.
 NEGLIGIBLE = 1e-3
-# Correlations that are told, and above which two parameters cannot be told apart in practice: the
-# error of any model is larger than what separates them.
+# Correlations that are stated, and above which two parameters cannot be separated in practice: the
+# error of any model exceeds their difference.
 STRONG = 0.9
 INSEPARABLE = 0.998
 # Probability of a false warning by one test.
@@ -97,13 +97,13 @@ def worst_directions(covariance: Array, maximum: float) -> list[tuple[float, Arr
     """Return directions whose standard deviation exceeds a maximum, with that deviation."""
     finite = np.flatnonzero(np.isfinite(np.diag(covariance)))
     variances, vectors = np.linalg.eigh(covariance[np.ix_(finite, finite)])
-    found = []
+    result = []
     for variance, vector in zip(variances[::-1], vectors.T[::-1], strict=True):
         if variance > maximum**2:
             direction = np.zeros(len(covariance))
             direction[finite] = vector
-            found.append((float(np.sqrt(variance)), direction))
-    return found
+            result.append((float(np.sqrt(variance)), direction))
+    return result
 
 
 def null_sentence(names: Sequence[str], direction: Array) -> str:
@@ -134,46 +134,46 @@ def pair_sentences(names: Sequence[str], correlation: Array, least: float) -> li
     """Return the pairs of parameters whose correlation reaches a size, the strongest first."""
     strong = np.triu(np.nan_to_num(np.abs(correlation)), 1)
     pairs = sorted(np.argwhere(strong >= least).tolist(), key=lambda pair: -strong[*pair])
-    found = []
+    result = []
     for i, j in pairs:
         size = strong[i, j]
         # 1.00 would hide a difference.
         digits = int(np.clip(np.ceil(-np.log10(max(1 - size, 1e-9))), 2, 9))
-        words = "cannot be told" if size >= INSEPARABLE else "are hard to tell"
+        words = "cannot be" if size >= INSEPARABLE else "can hardly be"
         value = f"{correlation[i, j]:.{digits}f}".replace("-", "−")
-        found.append(f"{names[i]} and {names[j]} {words} apart: correlation {value}")
-    return found
+        result.append(f"{names[i]} and {names[j]} {words} separated: correlation {value}")
+    return result
 
 
 def statement(names: Sequence[str], covariance: Array, correlation: Array, count: int) -> list[str]:
-    """Return how well parameters can be told apart, from the covariance of their relative values.
+    """Return how well parameters can be separated, from the covariance of their relative values.
 
     The first `count` parameters are those of the model.
     """
-    found = []
+    result = []
     directions = worst_directions(covariance[:count, :count], 0.0)
     if len(directions) > 1:
         (worst, direction), (best, _) = directions[0], directions[-1]
         part = _parts(names[:count], direction)
         size = 100 * worst * max(abs(float(value)) for value in direction)
         change = _change(part) if len(part) > 1 else part[0][0]
-        found.append(
+        result.append(
             f"least determined: {change}, standard error {size:.2g} %; a direction that is "
             f"{worst / best:.3g} times as uncertain as the best determined one"
         )
-    return found + pair_sentences(names, correlation, STRONG)
+    return result + pair_sentences(names, correlation, STRONG)
 
 
 def _parts(names: Sequence[str], direction: Array) -> list[tuple[str, float]]:
     """Return names and entries of a direction without negligible ones; the maximum is 1."""
     largest = np.abs(direction).max()
-    found = [
+    result = [
         (name, float(value / largest))
         for name, value in zip(names, direction, strict=True)
         if abs(value) > SMALL * largest
     ]
-    sign = np.sign(found[0][1])
-    return [(name, sign * value) for name, value in found]
+    sign = np.sign(result[0][1])
+    return [(name, sign * value) for name, value in result]
 
 
 def _join(words: Sequence[str]) -> str:
@@ -199,8 +199,8 @@ def coverage_factor(confidence: float, freedom: int | None) -> float:
     It is Student's t, or normal where the noise is known (`freedom` is None).
     """
     require_confidence(confidence)
-    place = (1 + confidence) / 2
-    return float(stats.norm.ppf(place) if freedom is None else stats.t.ppf(place, freedom))
+    quantile = (1 + confidence) / 2
+    return float(stats.norm.ppf(quantile) if freedom is None else stats.t.ppf(quantile, freedom))
 
 
 def require_confidence(confidence: object) -> None:
@@ -213,35 +213,35 @@ def residual_warnings(residual: Array, time: Array) -> list[str]:
     """Return what the residuals of equally spaced times, s, show beside independent noise."""
     if len(residual) < MIN_TESTED:
         return []
-    found = (_color_warning(residual), _outlier_warning(residual, time), runs_warning(residual))
-    return [text for text in found if text]
+    result = (_color_warning(residual), _outlier_warning(residual, time), runs_warning(residual))
+    return [text for text in result if text]
 
 
 def _color_warning(residual: Array) -> str:
     """Test the cumulative periodogram (Bartlett): of white noise it is that of uniform numbers."""
     power = np.abs(np.fft.rfft(residual)[1:]) ** 2
     share = np.cumsum(power) / power.sum()
-    found = stats.kstest(share[:-1], "uniform")
-    if found.pvalue > UNLIKELY:
+    result = stats.kstest(share[:-1], "uniform")
+    if result.pvalue > UNLIKELY:
         return ""
-    place = np.searchsorted(share, 0.5) / len(power)
-    side = "low" if place < 0.5 else "high"  # noqa: PLR2004 - halves
+    fraction = np.searchsorted(share, 0.5) / len(power)
+    side = "low" if fraction < 0.5 else "high"  # noqa: PLR2004 - halves
     return (
-        f"the residuals are coloured: half of their power lies in the {side}est "
-        f"{min(place, 1 - place):.0%} of the compared frequencies: the noise or the model is not "
-        "what is assumed, and the intervals do not hold"
+        f"the residuals are colored: half of their power lies in the {side}est "
+        f"{min(fraction, 1 - fraction):.0%} of the compared frequencies: noise or model differ "
+        "from what is assumed, and the intervals do not hold"
     )
 
 
 def _outlier_warning(residual: Array, time: Array) -> str:
     """Test the largest of n normal residuals: n times its probability (Bonferroni)."""
-    place = int(np.argmax(np.abs(residual)))
-    size = abs(float(residual[place]))
+    index = int(np.argmax(np.abs(residual)))
+    size = abs(float(residual[index]))
     if 2 * len(residual) * stats.norm.sf(size) > UNLIKELY:
         return ""
     return (
-        f"the largest residual, at {1e3 * time[place]:.4g} ms, is {size:.3g} standard deviations: "
-        "it is no noise, and the intervals do not hold"
+        f"the largest residual, at {1e3 * time[index]:.4g} ms, is {size:.3g} standard deviations: "
+        "it is not noise, and the intervals do not hold"
     )
 
 

@@ -64,17 +64,17 @@ class LevelTarget(Plain):
         if self.force is not None:
             require_choice("target: force", self.force, FORCES)
         nominal = get_bands(self.bands).nominal.tolist()
-        asked = nominal
+        wanted = nominal
         if self.frequencies is not None:
             count = len(self.frequencies) if isinstance(self.frequencies, Sized) else 1
-            asked = numbers("frequencies", self.frequencies, count).tolist()
-        if not set(asked) <= set(nominal) or len(set(asked)) < len(asked):
+            wanted = numbers("frequencies", self.frequencies, count).tolist()
+        if not set(wanted) <= set(nominal) or len(set(wanted)) < len(wanted):
             listed = ", ".join(f"{frequency:g}" for frequency in nominal)
             refuse(
                 f"target: frequencies = {shown(self.frequencies)} are not allowed",
                 f"nominal mid frequencies of {self.bands} bands, {listed}",
             )
-        levels = numbers("levels", self.levels, len(asked))
+        levels = numbers("levels", self.levels, len(wanted))
         deviation = np.ones_like(levels)
         if self.uncertainty is not None:
             entries: object = self.uncertainty
@@ -89,7 +89,7 @@ class LevelTarget(Plain):
         deviation = np.concatenate([deviation, [pair[1] for pair in known.values()]])
         for value in deviation.tolist():
             require_positive("uncertainty", value, "dB, s or 1")
-        return LevelMisfit(self, [nominal.index(f) for f in asked], target, deviation, list(known))
+        return LevelMisfit(self, [nominal.index(f) for f in wanted], target, deviation, list(known))
 
 
 class LevelMisfit(Misfit):
@@ -101,13 +101,13 @@ class LevelMisfit(Misfit):
     def __init__(
         self,
         target: LevelTarget,
-        places: list[int],
+        indices: list[int],
         values: Array,
         deviation: Array,
         extra: list[str],
     ) -> None:
         self.bands, self.kind = target.bands, target.force
-        self.places, self.extra = places, extra
+        self.indices, self.extra = indices, extra
         self.target, self.deviation = freeze(values), freeze(deviation)
         self.known_noise = target.uncertainty is not None
         self.size = len(values)
@@ -117,7 +117,7 @@ class LevelMisfit(Misfit):
 
     def values(self, impact: Impact) -> Array:
         """Return levels, dB, and what else is compared, s and 1, of an impact, shape (size,)."""
-        levels = impact.levels(self.bands, force=self.kind)[self.places]
+        levels = impact.levels(self.bands, force=self.kind)[self.indices]
         known = {"contact_time": impact.exact_contact_time, "restitution": impact.restitution}
         return np.concatenate([levels, [known[name] for name in self.extra]])
 
@@ -136,7 +136,7 @@ class LevelMisfit(Misfit):
     def columns(self, impact: Impact, own: Array) -> dict[str, list[object]]:  # noqa: ARG002
         """Return target and model side by side, dB, s and 1: columns by their names."""
         nominal = get_bands(self.bands).nominal
-        names = [f"{nominal[place]:g} Hz" for place in self.places]
+        names = [f"{nominal[i]:g} Hz" for i in self.indices]
         model = self.values(impact)
         return {
             "quantity": [*names, *(name.replace("_", " ") for name in self.extra)],

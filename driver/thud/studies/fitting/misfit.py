@@ -65,7 +65,7 @@ class Misfit(ABC):
         return 1.0
 
     @property
-    def band_share(self) -> float:
+    def band_fraction(self) -> float:
         """Part of the deviation of white noise that lies in the compared band."""
         return 1.0
 
@@ -106,7 +106,7 @@ class Misfit(ABC):
         """Return the impact of a case."""
         return compute(case)
 
-    def doubts(
+    def warnings(
         self,
         impact: Impact,  # noqa: ARG002
         own: Array,  # noqa: ARG002

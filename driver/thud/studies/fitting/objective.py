@@ -1,14 +1,13 @@
-"""The objective of a fit: weighted residuals of all targets and their derivatives at a place."""
+"""The objective of a fit: weighted residuals of all targets and their derivatives at a point x."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from thud.base.errors import NumericalError, ThudError
-from thud.studies.fitting.ranges import with_values
+from thud.case.keys import with_values
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,42 +21,31 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Part:
-    """One target of a fit.
-
-    Attributes
-    ----------
-    case : Case
-        The case with what is fixed for this target.
-    misfit : Misfit
-        Its comparison with an impact.
-    place : slice
-        Its own parameters in a place.
-    """
+class Term(NamedTuple):
+    """One target of a fit: its case, its comparison with an impact, its own parameters in x."""
 
     case: Case
     misfit: Misfit
-    place: slice
+    own: slice
 
 
-def new_parts(targets: list[tuple[Case, Misfit]], count: int) -> list[Part]:
-    """Return the parts of a fit of `count` common parameters."""
-    found = []
+def new_terms(targets: list[tuple[Case, Misfit]], count: int) -> list[Term]:
+    """Return the terms of a fit of `count` common parameters."""
+    terms = []
     for case, misfit in targets:
-        behind = count + len(misfit.own)
-        found.append(Part(case, misfit, slice(count, behind)))
-        count = behind
-    return found
+        stop = count + len(misfit.own)
+        terms.append(Term(case, misfit, slice(count, stop)))
+        count = stop
+    return terms
 
 
 class Objective:
     """Residuals and derivatives of cases; parameters are divided by their scales."""
 
-    def __init__(self, parts: list[Part], ranges: list[Range], bar: tqdm[Any]) -> None:
-        self.parts, self.ranges, self.bar = parts, ranges, bar
+    def __init__(self, terms: list[Term], ranges: list[Range], bar: tqdm[Any]) -> None:
+        self.terms, self.ranges, self.bar = terms, ranges, bar
         self.count = len(ranges)
-        own = [scale for part in parts for _, scale in part.misfit.own.values()]
+        own = [scale for term in terms for _, scale in term.misfit.own.values()]
         unlimited = np.full(len(own), np.inf)
         self.scale = np.array([entry.scale for entry in ranges] + own)
         self.low = np.append([entry.low for entry in ranges], -unlimited) / self.scale
@@ -66,73 +54,73 @@ class Objective:
         self.error: ThudError | None = None
         self._last: tuple[bytes, list[Impact]] | None = None
 
-    def case_at(self, part: Part, place: Array) -> Case:
-        """Return the case of a part at a place."""
-        values = place[: self.count] * self.scale[: self.count]
+    def case_at(self, term: Term, x: Array) -> Case:
+        """Return the case of a term at a point x."""
+        values = x[: self.count] * self.scale[: self.count]
         names = (entry.name for entry in self.ranges)
-        return with_values(part.case, dict(zip(names, values, strict=True)))
+        return with_values(term.case, dict(zip(names, values.tolist(), strict=True)))
 
-    def impacts(self, place: Array) -> list[Impact]:
-        """Return the impacts of a place, one for each part; none where one is impossible."""
-        key = place[: self.count].tobytes()
+    def impacts(self, x: Array) -> list[Impact]:
+        """Return the impacts of a point, one for each term; none where one is impossible."""
+        key = x[: self.count].tobytes()
         if self._last and self._last[0] == key:
             return self._last[1]
-        found: list[Impact] = []
-        for part in self.parts:
+        impacts: list[Impact] = []
+        for term in self.terms:
             self.evaluations += 1
             self.bar.update()
             try:
-                found.append(part.misfit.solve(self.case_at(part, place)))
+                impacts.append(term.misfit.solve(self.case_at(term, x)))
             except ThudError as error:
                 self.failures += 1
                 self.error = error
                 return []
-        self._last = key, found
-        return found
+        self._last = key, impacts
+        return impacts
 
-    def own(self, part: Part, place: Array) -> Array:
-        """Return the own parameters of a part at a place."""
-        values: Array = place[part.place] * self.scale[part.place]
+    def own_values(self, term: Term, x: Array) -> Array:
+        """Return the own parameters of a term at a point x."""
+        values: Array = x[term.own] * self.scale[term.own]
         return values
 
-    def residual(self, place: Array) -> Array:
-        """Return the residuals of a place; infinite where there is no impact."""
-        impacts = self.impacts(place)
+    def residual(self, x: Array) -> Array:
+        """Return the residuals of a point; infinite where there is no impact."""
+        impacts = self.impacts(x)
         if not impacts:
-            return np.full(sum(part.misfit.size for part in self.parts), np.inf)
-        pairs = zip(self.parts, impacts, strict=True)
-        return np.concatenate([p.misfit.residual(i, self.own(p, place)) for p, i in pairs])
+            return np.full(sum(term.misfit.size for term in self.terms), np.inf)
+        pairs = zip(self.terms, impacts, strict=True)
+        return np.concatenate([p.misfit.residual(i, self.own_values(p, x)) for p, i in pairs])
 
-    def jacobian(self, place: Array, share: float = 1.0) -> Array:
-        """Return the derivatives of the residuals by a share of the step, (n_residual, n)."""
-        step = share * max(part.misfit.step for part in self.parts)
-        here = self.residual(place)
-        jacobian = np.zeros((len(here), len(place)))
+    def jacobian(self, x: Array, fraction: float = 1.0) -> Array:
+        """Return the derivatives of the residuals with a fraction of the step, (n_residual, n)."""
+        step = fraction * max(term.misfit.step for term in self.terms)
+        here = self.residual(x)
+        jacobian = np.zeros((len(here), len(x)))
         first = 0
         # Before the columns, which compute other impacts.
-        for part, impact in zip(self.parts, self.impacts(place), strict=False):
-            rows = slice(first, first + part.misfit.size)
-            slopes = part.misfit.own_derivatives(impact, self.own(part, place))
-            jacobian[rows, part.place] = slopes * self.scale[part.place]
+        for term, impact in zip(self.terms, self.impacts(x), strict=False):
+            rows = slice(first, first + term.misfit.size)
+            slopes = term.misfit.own_derivatives(impact, self.own_values(term, x))
+            jacobian[rows, term.own] = slopes * self.scale[term.own]
             first = rows.stop
         for i in range(self.count):
-            jacobian[:, i] = self._column(place, i, step, here)
+            jacobian[:, i] = self._column(x, i, step, here)
         return jacobian
 
-    def _column(self, place: Array, i: int, step: float, here: Array) -> Array:
+    def _column(self, x: Array, i: int, step: float, here: Array) -> Array:
         """Return the derivative by one parameter; one-sided where the other side is impossible."""
         ends = []
-        for beside in (min(place[i] + step, self.high[i]), max(place[i] - step, self.low[i])):
-            other = place.copy()
+        for beside in (min(x[i] + step, self.high[i]), max(x[i] - step, self.low[i])):
+            other = x.copy()
             other[i] = beside
             value = self.residual(other)
             possible = np.isfinite(value).all()
-            ends.append((beside, value) if possible else (place[i], here))
+            ends.append((beside, value) if possible else (x[i], here))
         (above, high), (below, low) = ends
         if above == below:
             message = (
                 f"{self.ranges[i].name}: the model cannot be computed around "
-                f"{place[i] * self.scale[i]:g} ({self.error})"
+                f"{x[i] * self.scale[i]:g} ({self.error})"
             )
             raise NumericalError(message)
         column: Array = (high - low) / (above - below)

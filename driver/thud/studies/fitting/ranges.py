@@ -11,7 +11,7 @@ import numpy as np
 from thud.base._schema import KEYS
 from thud.base.checks import refuse, require_kind, suggestion
 from thud.base.units import scaled
-from thud.case.keys import limits, put, users
+from thud.case.keys import key_owners, limits, with_values
 from thud.studies.parameter import fitted
 
 if TYPE_CHECKING:
@@ -53,21 +53,16 @@ def known_parameters(case: Case) -> dict[str, tuple[Key, float]]:
     model = case.model
     if model is None:
         refuse("&model is missing", "a case with a source model")
-    found: dict[str, tuple[Key, float]] = {}
+    result: dict[str, tuple[Key, float]] = {}
     for key in KEYS:
         if key.group not in {"ball", "drop"} and key.owner != model.name:
             continue
         value = getattr(model if key.owner else getattr(case, key.group), key.name)
         if key.kind == "real":
-            found[key.name] = key, value
+            result[key.name] = key, value
         elif key.kind == "list" and not key.whole:
-            found |= {f"{key.name}({i})": (key, v) for i, v in enumerate(value, start=1)}
-    return found
-
-
-def with_values(case: Case, values: Mapping[str, float]) -> Case:
-    """Return a case with other values of some parameters."""
-    return put(case, {name: float(value) for name, value in values.items()})
+            result |= {f"{key.name}({i})": (key, v) for i, v in enumerate(value, start=1)}
+    return result
 
 
 def fitted_parameter(name: str, given: object, case: Case) -> Parameter:
@@ -80,7 +75,7 @@ def fitted_parameter(name: str, given: object, case: Case) -> Parameter:
             f"{suggestion(name, known)}",
             ", ".join(known),
         )
-    return fitted(name, given, users(case))
+    return fitted(name, given, key_owners(case))
 
 
 def bound_parameters(
@@ -99,10 +94,10 @@ def bound_parameters(
 
 def get_ranges(case: Case, parameters: Iterable[Parameter]) -> list[Range]:
     """Return ranges of parameters. Raises InputError where start and limits do not fit together."""
-    found = list(parameters)
+    result = list(parameters)
     # Ends of ranges that are other keys are those at the start.
-    begin = with_values(case, {p.name: p.start for p in found if p.start is not None})
-    return [_get_range(begin, parameter) for parameter in found]
+    begin = with_values(case, {p.name: p.start for p in result if p.start is not None})
+    return [_get_range(begin, parameter) for parameter in result]
 
 
 def _get_range(case: Case, given: Parameter) -> Range:

@@ -76,13 +76,13 @@ def _read_record(
     return samples[:, 0], samples[:, 1]
 
 
-def _measured(place: str, given: object, unit: str) -> tuple[float, float]:
+def _measured(label: str, given: object, unit: str) -> tuple[float, float]:
     """Return value and standard deviation of a table in the unit of a key."""
     words = ("value", "uncertainty")
     if not isinstance(given, dict) or not set(words) <= set(given):
-        refuse_value(place, given, "a table of value, uncertainty, unit")
-    require_words(place, given, (*words, "unit"))
-    power = power_of(given.get("unit", unit or "1"), unit, place)
+        refuse_value(label, given, "a table of value, uncertainty, unit")
+    require_words(label, given, (*words, "unit"))
+    power = power_of(given.get("unit", unit or "1"), unit, label)
     for word in words:
-        require_number(f"{place}: {word}", given[word])
+        require_number(f"{label}: {word}", given[word])
     return scaled(given["value"], power), scaled(given["uncertainty"], power)

@@ -1,4 +1,4 @@
-"""Noise of a record below a frequency, from its quiet parts, and how it weights residuals.
+"""Noise of a record below a frequency, from its background, and how it weights residuals.
 
 Records are compared on a grid of an odd number of points that holds their Fourier coefficients up
 to a frequency: `to_grid` is orthonormal, white noise stays white and keeps its deviation.
@@ -36,13 +36,12 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-# Quiet with fewer independent values in the band does not tell the noise.
-MIN_QUIET = 50
-# Least frequency of hum, Hz: slower ones are drift within a pulse. Maximum number of its tones that
-# are looked for in the quiet.
+# Background with fewer independent values in the band does not determine the noise.
+MIN_BACKGROUND = 50
+# Minimum frequency of hum, Hz: slower ones are drift within a pulse. Maximum number of its tones.
 MIN_HUM = 10.0
 MAX_TONES = 3
-# Harmonics of hum count up to this part of the highest frequency.
+# Harmonics of hum count up to this fraction of the highest frequency.
 HARMONIC_EDGE = 0.95
 # Time from the foot of a pulse to its edge, s: flanks of the models rise to it in 4 ms.
 FLANK = 2 * MARGIN * CELL
@@ -75,7 +74,7 @@ def grid_covariance(lags: Array, count: int) -> Array:
 
 
 def find_pulse(force: Array, rate: float) -> tuple[int, int]:
-    """Return the first sample of the pulse of a record and the one behind it, with room."""
+    """Return the first sample of the pulse of a record and the stop (exclusive), with room."""
     width = max(1, round(CELL * rate))
     smooth = np.convolve(force, np.full(width, 1 / width), mode="same")
     smooth -= np.quantile(smooth, 0.1)
@@ -89,8 +88,8 @@ def find_pulse(force: Array, rate: float) -> tuple[int, int]:
 
 
 @dataclass(frozen=True, eq=False)
-class Quiet:
-    """Quiet parts of a record.
+class BackgroundRecord:
+    """Background of a record, before and after its pulse.
 
     Attributes
     ----------
@@ -99,7 +98,7 @@ class Quiet:
     rate : float
         Samples per second, Hz.
     pulse : tuple of int
-        First sample that is no quiet, and the one behind the last.
+        First sample of the pulse, and the stop (exclusive).
     below : float
         Highest frequency that counts, Hz.
     """
@@ -111,19 +110,19 @@ class Quiet:
 
     @property
     def seconds(self) -> float:
-        """Length of the quiet that counts, s."""
+        """Length of the background that counts, s."""
         sides = (self.pulse[0] / self.rate, (len(self.force) - self.pulse[1]) / self.rate)
         return sum(min(side, MAX_BACKGROUND) for side in sides)
 
     @property
     def freedom(self) -> int:
-        """Number of independent values in the band, less the offset."""
+        """Number of independent values in the band − 1 for the offset."""
         return int(2 * self.below * self.seconds) - 1
 
     @property
     def known(self) -> bool:
-        """Whether there is enough of it to tell the noise."""
-        return self.freedom >= MIN_QUIET
+        """Whether there is enough of it to determine the noise."""
+        return self.freedom >= MIN_BACKGROUND
 
     @property
     def middle(self) -> float:
@@ -131,15 +130,15 @@ class Quiet:
         return (self.pulse[0] + self.pulse[1]) / 2 / self.rate
 
     def deviation(self) -> float:
-        """Return the standard deviation of the quiet samples, N."""
+        """Return the standard deviation of the background, N."""
         first, stop = self.pulse
         return float(np.std(np.concatenate([self.force[:first], self.force[stop:]])))
 
     @cached_property
     def _means(self) -> tuple[Cells, Array]:
-        """Cells of the quiet, s from the middle of the pulse, and their means less the median, N.
+        """Cells of the background, s from the middle of the pulse, and their means − median, N.
 
-        They are those of the band: wider ones would not tell the noise of its upper end. Quiet
+        They are those of the band: wider ones would not show the noise of its upper end. Background
         farther than 0.1 s away is left out, whatever the window.
         """
         width = max(1, int(self.rate / (2 * self.below)))
@@ -170,10 +169,10 @@ class Quiet:
         waves = cell_waves(cells, tones)
         left = mean - waves @ np.linalg.lstsq(waves, mean)[0]
         peak = float(self.force.max() - np.median(self.force))
-        found = fit_background(cells, left, peak)
+        result = fit_background(cells, left, peak)
         # What the waves have taken of the noise.
         scale = np.where(np.arange(5) < 3, len(mean) / (len(mean) - waves.shape[1] + 1), 1.0)  # noqa: PLR2004
-        return replace(found, draws=scale * found.draws)
+        return replace(result, draws=scale * result.draws)
 
     def tones(self) -> tuple[float, ...]:
         """Return the frequencies of tones, Hz, which noise and hum of 50 and 60 Hz do not explain.
@@ -186,30 +185,30 @@ class Quiet:
         grid = np.arange(MIN_HUM, HARMONIC_EDGE * self.below, step)
         # The noise has those of the mains.
         grid = grid[np.abs(grid[:, np.newaxis] - MAINS).min(axis=1) > 2 * step]
-        least = float(np.log(len(grid) / UNLIKELY))
-        found: tuple[float, ...] = ()
+        min_gain = float(np.log(len(grid) / UNLIKELY))
+        result: tuple[float, ...] = ()
         best = _log_likelihood(self.background())
-        while len(found) < MAX_TONES:
-            waves = cell_waves(cells, found)
+        while len(result) < MAX_TONES:
+            waves = cell_waves(cells, result)
             left = mean - waves @ np.linalg.lstsq(waves, mean)[0]
             tried = [
-                (_log_likelihood(self.background((*found, tone))), tone)
-                for whiten in (_trendless(cells), _whitening(self.background(found)))
+                (_log_likelihood(self.background((*result, tone))), tone)
+                for whiten in (_trendless(cells), _whitening(self.background(result)))
                 for tone, gain in [_strongest(cells, whiten @ left, whiten, grid)]
-                if gain > least
+                if gain > min_gain
             ]
             likelihood, tone = max(tried, default=(best, 0.0))
-            if likelihood < best + least:
+            if likelihood < best + min_gain:
                 break
-            best, found = likelihood, (*found, tone)
-        return found
+            best, result = likelihood, (*result, tone)
+        return result
 
     def mains(
         self, background: Background, tones: Sequence[float] = ()
     ) -> tuple[float, float, float]:
         """Return the mains frequency, Hz, and the amplitude and standard error of its hum, N.
 
-        By generalised least squares with the other noise of the quiet, tones, Hz, beside it.
+        By generalized least squares with the other noise of the background and tones, Hz.
         """
         cells, mean = self._means
         tone = MAINS[int(np.argmax(background.variances[3:]))]
@@ -248,11 +247,11 @@ def _strongest(cells: Cells, mean: Array, whiten: Array, grid: Array) -> tuple[f
         waves = np.moveaxis(cell_waves(cells, grid.tolist())[:, 1:].reshape(-1, 2, len(grid)), 2, 0)
         basis, _ = np.linalg.qr(whiten @ waves)
         power = np.sum(np.einsum("kni,n->ki", basis, mean) ** 2, axis=1)
-        place = int(np.argmax(power))
-        tone, step = float(grid[place]), float(np.diff(grid).min())
-        # Once more between the neighbours.
+        index = int(np.argmax(power))
+        tone, step = float(grid[index]), float(np.diff(grid).min())
+        # Once more between the neighbors.
         grid = np.linspace(tone - step, tone + step, 41)
-    share = min(float(power[place] / (mean @ mean)), 1 - 1e-12)
+    share = min(float(power[index] / (mean @ mean)), 1 - 1e-12)
     return tone, -0.5 * len(mean) * float(np.log1p(-share))
 
 
@@ -264,7 +263,7 @@ def _trendless(cells: Cells) -> Array:
 
 
 def _covariance(background: Background) -> Array:
-    """Return the covariance of quiet cells, offset and drift with it, N2."""
+    """Return the covariance of background cells, offset and drift included, N2."""
     middle = (background.cells[0] + background.cells[1]) / 2
     trend = OFFSET**2 + DRIFT**2 * np.multiply.outer(middle, middle)
     parts = np.tensordot(background.variances, covariances(background.cells), 1)
@@ -272,28 +271,28 @@ def _covariance(background: Background) -> Array:
 
 
 def _whitening(background: Background) -> Array:
-    """Return what makes quiet cells independent and of unit variance."""
+    """Return the matrix that makes background cells independent and of unit variance."""
     factor = np.linalg.cholesky(_covariance(background))
     whiten = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
     return np.asarray(whiten, dtype=np.float64)
 
 
 def _log_likelihood(background: Background) -> float:
-    """Return the logarithm of the likelihood of quiet cells."""
+    """Return the logarithm of the likelihood of background cells."""
     whiten = _whitening(background)
     white = whiten @ background.mean
     return float(np.log(np.diag(whiten)).sum() - 0.5 * white @ white)
 
 
 def trimmed(force: Array, rate: float) -> slice:
-    """Return the part of a record that holds the pulse and the quiet which counts."""
+    """Return the samples of the pulse and of the background that counts."""
     first, stop = find_pulse(force, rate)
     room = int(MAX_BACKGROUND * rate)
     return slice(max(first - room, 0), min(stop + room, len(force)))
 
 
 class Weights:
-    """Weights of residuals on a grid: generalised least squares, nuisance parameters projected out.
+    """Weights of residuals on a grid: generalized least squares, nuisance parameters projected out.
 
     Attributes
     ----------
@@ -302,13 +301,13 @@ class Weights:
     nuisance : ndarray, shape (n, n_nuisance)
         What each nuisance parameter adds to the record, for 1 N.
     predicted : ndarray, shape (n, n)
-        The part of the covariance that is predicted from the residual: drift and hum, N2.
+        The component of the covariance that is predicted from the residual: drift and hum, N2.
     """
 
     def __init__(self, covariance: Array, nuisance: Array, predicted: Array) -> None:
         self.covariance, self.nuisance = freeze(covariance), freeze(nuisance)
         self.predicted = freeze(predicted)
-        # In the order of time, the factor makes of each point what those before do not tell.
+        # In the order of time, the factor leaves of each point what those before do not determine.
         factor = np.linalg.cholesky(covariance)
         self._whiten = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
         self._basis, self._triangle = np.linalg.qr(self._whiten @ nuisance)
@@ -322,12 +321,12 @@ class Weights:
         return float(np.sqrt(spread / (count - 1)))
 
     def estimates(self, rest: Array) -> tuple[Array, Array]:
-        """Return the nuisance parameters of record less model, N, and their covariance, N2."""
+        """Return the nuisance parameters of record − model, N, and their covariance, N2."""
         inverse = np.linalg.inv(self._triangle)
         return inverse @ (self._basis.T @ (self._whiten @ rest)), inverse @ inverse.T
 
     def background(self, rest: Array) -> Array:
-        """Return what offset, drift and hum add to the record, N: [n], from record less model."""
+        """Return what offset, drift and hum add to the record, N: [n], from record − model."""
         value, _ = self.estimates(rest)
         left = self._whiten.T @ (self.matrix @ rest)
         result: Array = self.nuisance @ value + self.predicted @ left
@@ -341,7 +340,7 @@ def hum_harmonics(hum: float, below: float) -> tuple[float, ...]:
 
 
 def new_weights(  # noqa: PLR0913 - what the noise of a record is made of
-    quiet: Quiet,
+    quiet: BackgroundRecord,
     count: int,
     *,
     background: Background | None,
@@ -359,7 +358,7 @@ def new_weights(  # noqa: PLR0913 - what the noise of a record is made of
     count
         Number of points of the grid.
     background
-        The noise of the quiet; None: not known.
+        The noise of the background; None: not known.
     noise
         Standard deviation of white noise instead, N; without either it is 1 N.
     offset
@@ -371,22 +370,22 @@ def new_weights(  # noqa: PLR0913 - what the noise of a record is made of
     """
     n, rate = len(quiet.force), quiet.rate
     time = np.arange(n) / rate - quiet.middle
-    white, coloured, humming = (noise or 1.0) ** 2, np.zeros(n), np.zeros(n)
+    white, colored, humming = (noise or 1.0) ** 2, np.zeros(n), np.zeros(n)
     drift = 0.0
     if background is not None:
         rows = noise_covariances((time[:1], time[:1] + 1 / rate), (time, time + 1 / rate))[:, 0]
         variances = background.variances
         if noise is None:
             white = variances[0] * rate / 2
-            coloured = variances[1:3] @ rows[:2]
+            colored = variances[1:3] @ rows[:2]
         if mains:
             humming = variances[3:] @ rows[2:]
         drift = DRIFT * background.peak if offset else 0.0
     slope = to_grid(drift * time[:, np.newaxis], count)
     predicted = grid_covariance(humming, count) + slope @ slope.T
-    covariance = white * np.eye(count) + grid_covariance(coloured, count) + predicted
+    covariance = white * np.eye(count) + grid_covariance(colored, count) + predicted
     # Covariances of pink and brown noise hold up to a constant, that of an unknown offset; one of
     # the samples is root(n/count) times as large on the grid.
-    covariance += 10 * np.abs(coloured).max() * n / count
+    covariance += 10 * np.abs(colored).max() * n / count
     columns = cell_waves((time, time + 1 / rate), tones)[:, 0 if offset else 1 :]
     return Weights(covariance, to_grid(columns, count), predicted)

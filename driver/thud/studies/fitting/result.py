@@ -49,7 +49,7 @@ class FittedTarget(Immutable):
 
     case: Case
     impact: Impact
-    # Impact and residuals tell targets apart.
+    # Impact and residuals identify targets.
     misfit: Misfit = field(compare=False)
     own: NDArray[np.float64]
 
@@ -91,7 +91,7 @@ class Fit(Estimates):
     converged : bool
         The search has converged.
     identifiability : tuple of str
-        How well the parameters can be told apart, as sentences.
+        How well the parameters can be separated, as sentences.
     targets : tuple of FittedTarget
         Case, impact and comparison of each target.
     given_units : dict of str to tuple
@@ -129,7 +129,7 @@ class Fit(Estimates):
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Residuals less parameters and nuisance parameters."""
+        """Number of residuals − number of parameters, nuisance parameters included."""
         absorbed = sum(target.misfit.absorbed for target in self.targets)
         return len(self.residuals) - len(self.names) - absorbed
 
@@ -137,7 +137,7 @@ class Fit(Estimates):
     def interval_freedom(self) -> int | None:
         """Degrees of freedom of Student's t in the intervals; None: they are normal.
 
-        Those of the residuals where they tell the noise, or of the quiet of the records.
+        Those of the residuals where the noise is estimated from them, or of the background.
         """
         if not self.known_noise:
             return self.degrees_of_freedom
@@ -190,13 +190,13 @@ class Fit(Estimates):
         deviations = [self._deviation(target) for target in self.targets]
         lines = [f"{data}; {deviations[0]}"] if len(deviations) == 1 else [data]
         for number, target in enumerate(self.targets, start=1):
-            told = [deviations[number - 1]] if len(deviations) > 1 else []
-            told += [
+            parts = [deviations[number - 1]] if len(deviations) > 1 else []
+            parts += [
                 f"{name} {value:.3g} ± {error:.2g} N"
                 for name, (value, error) in target.nuisances.items()
             ]
-            place = f"target {number}: " if len(deviations) > 1 else ""
-            lines += [f"{place}{', '.join(told)}"] if told else []
+            label = f"target {number}: " if len(deviations) > 1 else ""
+            lines += [f"{label}{', '.join(parts)}"] if parts else []
         lines += self.identifiability
         return [*lines, f"{self.evaluations} impacts computed{failures}"]
 
@@ -211,9 +211,8 @@ class Fit(Estimates):
             return "standard deviations given"
         size = self.deviation_of(target)
         if self.known_noise and misfit.noise_freedom is not None:
-            return (
-                f"noise of {size * misfit.band_share:.3g} {unit} in the compared band, by the quiet"
-            )
+            in_band = f"{size * misfit.band_fraction:.3g} {unit}"
+            return f"noise of {in_band} in the compared band, from the background"
         source = "given" if self.known_noise else "estimated from the residuals"
         return f"standard deviation {size:.3g} {unit}, {source}"
 

@@ -25,7 +25,7 @@ from thud.studies.fitting.inference import (
     weak_sentence,
     worst_directions,
 )
-from thud.studies.fitting.objective import Objective, new_parts
+from thud.studies.fitting.objective import Objective, new_terms
 from thud.studies.fitting.result import Fit, FittedTarget
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from thud.case.case import Case
     from thud.studies.fitting.misfit import Misfit
-    from thud.studies.fitting.objective import Part
+    from thud.studies.fitting.objective import Term
     from thud.studies.fitting.ranges import Range
 
     Array = NDArray[np.float64]
@@ -59,20 +59,20 @@ def search(
 
     `options` are confidence, starts, seed and max_steps of `thud.fit`.
     """
-    parts = new_parts(targets, len(ranges))
-    _require_data(parts, len(ranges))
+    terms = new_terms(targets, len(ranges))
+    _require_data(terms, len(ranges))
     with tqdm(unit="impact", disable=not progress, leave=False) as bar:
-        objective = Objective(parts, ranges, bar)
+        objective = Objective(terms, ranges, bar)
         starts = _spread(ranges, int(options["starts"]), options["seed"])
-        place, converged = _search(objective, starts, int(options["max_steps"]))
-        return _conclude(objective, place, options["confidence"], converged=converged)
+        x, converged = _search(objective, starts, int(options["max_steps"]))
+        return _conclude(objective, x, options["confidence"], converged=converged)
 
 
-def _require_data(parts: list[Part], count: int) -> None:
-    misfits = [part.misfit for part in parts]
+def _require_data(terms: list[Term], count: int) -> None:
+    misfits = [term.misfit for term in terms]
     known = all(misfit.known_noise for misfit in misfits)
     for number, misfit in enumerate(misfits, start=1):
-        if len(parts) > 1 and not misfit.known_noise:
+        if len(terms) > 1 and not misfit.known_noise:
             refuse(
                 f"target {number}: the weight of its residuals is not known",
                 f"{misfit.deviation_source} where there are several targets",
@@ -92,22 +92,22 @@ def _spread(ranges: list[Range], count: int, seed: int) -> Iterator[Array]:
     first = np.array([entry.start / entry.scale for entry in ranges])
     yield first
     low, high = np.array([np.array(entry.spread) / entry.scale for entry in ranges]).T
-    for place in stats.qmc.LatinHypercube(len(ranges), rng=seed).random(count - 1):
-        yield low + place * (high - low)
+    for x in stats.qmc.LatinHypercube(len(ranges), rng=seed).random(count - 1):
+        yield low + x * (high - low)
 
 
 def _search(objective: Objective, starts: Iterator[Array], max_steps: int) -> tuple[Array, bool]:
-    """Return the best place from all starts, and whether the search converged there."""
+    """Return the best point from all starts, and whether the search converged there."""
     best: OptimizeResult | None = None
     failures: list[ThudError] = []
     for start in starts:
         try:
-            found = _descend(objective, start, max_steps)
+            result = _descend(objective, start, max_steps)
         except ThudError as error:
             failures.append(error)
             continue
-        if best is None or found.cost < best.cost:
-            best = found
+        if best is None or result.cost < best.cost:
+            best = result
     if best is None:
         raise failures[0]
     return best.x, bool(best.status > 0)
@@ -119,8 +119,8 @@ def _descend(objective: Objective, start: Array, max_steps: int) -> OptimizeResu
         message = f"the start cannot be computed: {objective.error}"
         raise type(objective.error or NumericalError())(message)
     own = [
-        part.misfit.own_start(impact) / objective.scale[part.place]
-        for part, impact in zip(objective.parts, first, strict=True)
+        term.misfit.own_start(impact) / objective.scale[term.own]
+        for term, impact in zip(objective.terms, first, strict=True)
     ]
     start = np.concatenate([start, *own])
     return least_squares(
@@ -131,45 +131,45 @@ def _descend(objective: Objective, start: Array, max_steps: int) -> OptimizeResu
         ftol=TOLERANCE,
         xtol=TOLERANCE,
         gtol=np.finfo(float).eps,  # ends a search that starts at a perfect fit
-        # LSMR is regularised: parameters without effect do not hold up the others. It searches
+        # LSMR is regularized: parameters without effect do not hold up the others. It searches
         # a plane, which a single parameter does not span.
         tr_solver="lsmr" if len(start) > 1 else "exact",
         max_nfev=max_steps,
     )
 
 
-def _conclude(objective: Objective, place: Array, confidence: float, *, converged: bool) -> Fit:
-    residual = objective.residual(place)
-    impacts = objective.impacts(place)
+def _conclude(objective: Objective, x: Array, confidence: float, *, converged: bool) -> Fit:
+    residual = objective.residual(x)
+    impacts = objective.impacts(x)
     if not impacts:
         raise NumericalError(str(objective.error))
-    jacobian = objective.jacobian(place)
-    finer = objective.jacobian(place, 0.5)
-    parts, count = objective.parts, objective.count
-    misfits = [part.misfit for part in parts]
+    jacobian = objective.jacobian(x)
+    finer = objective.jacobian(x, 0.5)
+    terms, count = objective.terms, objective.count
+    misfits = [term.misfit for term in terms]
     target_size = float(np.linalg.norm(np.concatenate([m.target_vector() for m in misfits])))
-    # Relative to the values found, a change along a direction reads as one in per cent.
-    relative = np.where(np.abs(place) > AT_LIMIT, np.abs(place), 1.0)
+    # Relative to the result, a change along a direction reads as one in per cent.
+    relative = np.where(np.abs(x) > AT_LIMIT, np.abs(x), 1.0)
     relative[count:] = 1.0
-    known = infer(jacobian * relative, finer * relative, target_size)
-    freedom = len(residual) - len(place) - sum(misfit.absorbed for misfit in misfits)
+    inferred = infer(jacobian * relative, finer * relative, target_size)
+    freedom = len(residual) - len(x) - sum(misfit.absorbed for misfit in misfits)
     deviation = 1.0
     if not all(misfit.known_noise for misfit in misfits):
         minimum = np.finfo(float).eps * target_size / np.sqrt(len(residual))
         deviation = max(float(np.sqrt(residual @ residual / freedom)), minimum)
     size = deviation * relative * objective.scale
     own = {
-        name if len(parts) == 1 else f"{name}({number})": unit
+        name if len(terms) == 1 else f"{name}({number})": unit
         for number, misfit in enumerate(misfits, start=1)
         for name, (unit, _) in misfit.own.items()
     }
     answer = Fit(
         names=(*(entry.name for entry in objective.ranges), *own),
         units=(*(entry.unit for entry in objective.ranges), *own.values()),
-        estimate=place * objective.scale,
-        covariance=known.covariance * np.outer(size, size),
+        estimate=x * objective.scale,
+        covariance=inferred.covariance * np.outer(size, size),
         limits=np.column_stack([objective.low, objective.high]) * objective.scale[:, np.newaxis],
-        singular_values=known.singular_values,
+        singular_values=inferred.singular_values,
         confidence=float(confidence),
         noise=deviation * misfits[0].unit_deviation,
         known_noise=all(misfit.known_noise for misfit in misfits),
@@ -182,42 +182,42 @@ def _conclude(objective: Objective, place: Array, confidence: float, *, converge
         identifiability=(),
         targets=tuple(
             FittedTarget(
-                objective.case_at(part, place), impact, part.misfit, objective.own(part, place)
+                objective.case_at(term, x), impact, term.misfit, objective.own_values(term, x)
             )
-            for part, impact in zip(parts, impacts, strict=True)
+            for term, impact in zip(terms, impacts, strict=True)
         ),
     )
-    spread = known.covariance * deviation**2
-    doubts = _doubts(objective, answer, place, known, spread)
-    told = statement(answer.names, spread, answer.correlation, count)
-    return replace(answer, warnings=tuple(doubts), identifiability=tuple(told))
+    spread = inferred.covariance * deviation**2
+    texts = _warnings(objective, answer, x, inferred, spread)
+    text = statement(answer.names, spread, answer.correlation, count)
+    return replace(answer, warnings=tuple(texts), identifiability=tuple(text))
 
 
-def _doubts(
-    objective: Objective, answer: Fit, place: Array, known: Inference, covariance: Array
+def _warnings(
+    objective: Objective, answer: Fit, x: Array, inferred: Inference, covariance: Array
 ) -> list[str]:
     """Return warnings of a fit; `covariance` is that of relative values."""
-    found = []
+    result = []
     if not answer.converged:
-        found.append("the search has not converged; allow more steps, or start elsewhere")
-    found += [null_sentence(answer.names, direction) for direction in known.null]
+        result.append("the search has not converged; allow more steps, or start elsewhere")
+    result += [null_sentence(answer.names, direction) for direction in inferred.null]
     factor = coverage_factor(answer.confidence, answer.interval_freedom)
     count = objective.count
     # Of a confidence below rounding the factor is 0, and no interval is wide.
     wide = worst_directions(covariance[:count, :count], WIDE / factor) if factor else []
     for deviation, direction in wide:
-        found.append(
+        result.append(
             weak_sentence(answer.names[:count], direction, factor * deviation, answer.confidence)
         )
-    if not known.null.size and not wide:
-        found += pair_sentences(answer.names, answer.correlation, INSEPARABLE)
+    if not inferred.null.size and not wide:
+        result += pair_sentences(answer.names, answer.correlation, INSEPARABLE)
     for entry, value, low, high in zip(
-        objective.ranges, place, objective.low, objective.high, strict=False
+        objective.ranges, x, objective.low, objective.high, strict=False
     ):
         if min(value - low, high - value) < AT_LIMIT:
             limit = (low if value - low < high - value else high) * entry.scale
             unit, factor = display_unit(entry.unit, limit)
-            found.append(
+            result.append(
                 f"{entry.name} ended at its limit, {limit / factor:g} {unit}".rstrip()
                 + ": its interval is cut there, and all intervals hold inside the limits only"
             )
@@ -228,14 +228,14 @@ def _doubts(
         residuals = answer.residuals[first : first + misfit.size]
         first += misfit.size
         shared = len(answer.names) / len(answer.targets)
-        own = _size_doubt(misfit, residuals, misfit.size - misfit.absorbed - shared)
-        own += misfit.doubts(target.impact, target.own, deviation, len(answer.names))
-        place_of = "" if len(answer.targets) == 1 else f"target {number}: "
-        found += [f"{place_of}{told}" for told in own]
-    return found
+        own = _size_warning(misfit, residuals, misfit.size - misfit.absorbed - shared)
+        own += misfit.warnings(target.impact, target.own, deviation, len(answer.names))
+        prefix = "" if len(answer.targets) == 1 else f"target {number}: "
+        result += [f"{prefix}{text}" for text in own]
+    return result
 
 
-def _size_doubt(misfit: Misfit, residuals: Array, freedom: float) -> list[str]:
+def _size_warning(misfit: Misfit, residuals: Array, freedom: float) -> list[str]:
     """Return that residuals are too large for the noise, where they are."""
     if not misfit.known_noise or freedom <= 0:
         return []
@@ -247,8 +247,8 @@ def _size_doubt(misfit: Misfit, residuals: Array, freedom: float) -> list[str]:
     )
     if tail > UNLIKELY:
         return []
-    told = (
+    text = (
         f"the residuals are {np.sqrt(square / freedom):.3g} times what the given uncertainty lets "
         "expect: the model does not explain the data"
     )
-    return [told]
+    return [text]

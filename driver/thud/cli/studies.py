@@ -65,7 +65,7 @@ def run_study(options: argparse.Namespace) -> int:
             "backend": options.backend,
             "workers": options.workers,
             "scheduler": options.scheduler,
-            "yes": options.yes,
+            "allow_large": options.yes,
         }
     kind.require(study, **how)
     folder = Path(options.output or Path("outputs", study.name))
