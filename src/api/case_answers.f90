@@ -50,7 +50,7 @@ contains
    end subroutine answer_effective_case
 
    !> The run of the namelist file `path`, as by the executable, to the directory `output`; with the numbers `replace`,
-   !> `channels` and `progress` not 0 it replaces files of others, writes the channels of the histories, and shows progress
+   !> `all` and `progress` not 0 it replaces files of others, writes the further quantities of the model, and shows progress
    !> on a terminal.
    subroutine answer_run(request, bundle, error)
       type(request_type), intent(in) :: request
@@ -66,7 +66,7 @@ contains
       call request%get_text('path', path)
       call request%get_text('output', output)
       if (request%get_number('progress') > 0.0_wp) call begin_progress()
-      call run_case(path, output, request%get_number('replace') > 0.0_wp, request%get_number('channels') > 0.0_wp, case, &
+      call run_case(path, output, request%get_number('replace') > 0.0_wp, request%get_number('all') > 0.0_wp, case, &
          results, outcome, error)
       call end_progress()
       if (allocated(error)) return

@@ -41,7 +41,7 @@ module thud_command_line
       character(len=:), allocatable :: output
       !> Replace also files that thud has not written.
       logical :: replace = .false.
-      !> Write also the channels of the model.
+      !> Write also further quantities of the model against time.
       logical :: all = .false.
       !> Path of a table of samples, empty where not given.
       character(len=:), allocatable :: samples
@@ -253,8 +253,8 @@ contains
          //'  -o, --output DIR     directory for the results (default: outputs/<case>, with'//newline &
          //'                       --samples outputs/<case>_samples)'//newline &
          //'  --replace            replace also files that thud has not written'//newline &
-         //'  --all                write also channels.csv: energies and other quantities of'//newline &
-         //'                       the model against time'//newline &
+         //'  --all                write also model_histories.csv: energies and other'//newline &
+         //'                       quantities of the model against time'//newline &
          //'  --samples TABLE.csv  a header row of keys and one drop, a sample, in each'//newline &
          //'                       further row; all other keys are those of CASE.nml'//newline &
          //'  --threads N          threads for the samples (default: 1)'//newline &

@@ -11,7 +11,7 @@ module thud_warnings
    use thud_registry, only: floor_names, model_names
    use thud_sampling, only: get_rate_limit
    use thud_text, only: fixed, quoted, to_text
-   use thud_theory_limit, only: get_limit_sentence, is_outside, theory_limit_type
+   use thud_validity_limit, only: get_limit_message, is_outside, validity_limit_type
    implicit none (type, external)
    private
 
@@ -86,21 +86,21 @@ contains
       type(force_history_type), intent(in) :: history
       !> Messages: [n].
       character(len=warning_length), allocatable, intent(inout) :: warnings(:)
-      type(theory_limit_type), allocatable :: limits(:)
+      type(validity_limit_type), allocatable :: limits(:)
       integer :: i
 
       associate (model => case%models(get_model_number(case))%model)
-         limits = [get_rate_limit(case%sampling), model%get_theory_limits(case%ball, case%drop, case%sampling, history), &
-            theory_limit_type('model', 'restitution less 1', history%restitution - 1, highest=restitution_error, &
+         limits = [get_rate_limit(case%sampling), model%get_validity_limits(case%ball, case%drop, case%sampling, history), &
+            validity_limit_type('model', 'restitution less 1', history%restitution - 1, highest=restitution_error, &
             reason='it gives energy to the source'), &
-            theory_limit_type('floor', 'restitution', history%restitution, lowest=-restitution_error, &
+            validity_limit_type('floor', 'restitution', history%restitution, lowest=-restitution_error, &
             reason='the source goes on downwards with a floor too light for it')]
       end associate
       do i = 1, size(limits)
          if (.not. is_outside(limits(i))) cycle
          ! One warning for both floors.
          if (any(index(warnings, trim(limits(i)%quantity)//' is ') > 0)) cycle
-         call add(warnings, get_limit_sentence(limits(i)))
+         call add(warnings, get_limit_message(limits(i)))
       end do
    end subroutine add_limit_warnings
 

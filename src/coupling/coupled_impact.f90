@@ -19,7 +19,7 @@ module thud_coupled_impact
 
    public :: solve_coupled
 
-   !> Touches, releases and turning points in one step; more than a few are a fault of the steps.
+   !> Touches, releases and turning points in one step; more than a few mean that steps are too long.
    integer, parameter :: max_events = 100
 
 contains
@@ -120,7 +120,6 @@ contains
       !> Length of the rest, s: before and after.
       real(wp), intent(inout) :: remaining
       type(impact_type), intent(inout) :: impact
-      !> The equations fail.
       type(error_type), allocatable, intent(out) :: error
       type(zero_search_type) :: search
 
@@ -146,7 +145,6 @@ contains
       real(wp), intent(in) :: length
       type(impact_type), intent(in) :: impact
       type(coupled_state_type), intent(out) :: end
-      !> The equations fail.
       type(error_type), allocatable, intent(out) :: error
       logical :: valid, converged
 
@@ -218,14 +216,15 @@ contains
       call clear_flight(history)
       history%floor_work = impact%motion%work
       history%peak_force = impact%peak_force
-      history%fact_name = [character(len=len(history%fact_name)) :: history%fact_name, 'contacts']
-      history%fact_unit = [character(len=len(history%fact_unit)) :: history%fact_unit, '']
-      history%fact = [history%fact, real(impact%n_contact, wp)]
+      history%model_quantity_name = [character(len=len(history%model_quantity_name)) :: &
+         history%model_quantity_name, 'contacts']
+      history%model_quantity_unit = [character(len=len(history%model_quantity_unit)) :: history%model_quantity_unit, '']
+      history%model_quantity = [history%model_quantity, real(impact%n_contact, wp)]
       if (.not. source%cap_mass_per_deflection > 0.0_wp) return
       ! The cap that rests on the floor resists its acceleration.
-      n = size(history%part_name)
-      history%part_name = [character(len=len(history%part_name)) :: history%part_name, 'cap_force']
-      history%part = reshape([history%part, history%floor_force - sum(history%part, dim=2)], &
+      n = size(history%component_name)
+      history%component_name = [character(len=len(history%component_name)) :: history%component_name, 'cap_force']
+      history%component = reshape([history%component, history%floor_force - sum(history%component, dim=2)], &
          [size(history%floor_force), n + 1])
    end subroutine finish_record
 

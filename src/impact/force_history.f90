@@ -25,7 +25,7 @@ module thud_force_history
    character(len=8), parameter :: force_names(force_count) = [character(len=8) :: 'elastic', 'floor']
 
    !> Length of the name of a force component.
-   integer, parameter :: part_name_length = 24
+   integer, parameter :: name_length = 24
 
    !> Force of one impact and the numbers that describe it.
    type :: force_history_type
@@ -36,9 +36,9 @@ module thud_force_history
       !> Rate of the deflection, m/s: [n_sample].
       real(wp), allocatable :: velocity(:)
       !> Names of the components of the force: [n_component].
-      character(len=part_name_length), allocatable :: part_name(:)
+      character(len=name_length), allocatable :: component_name(:)
       !> Components of the force, N: [n_sample, n_component].
-      real(wp), allocatable :: part(:, :)
+      real(wp), allocatable :: component(:, :)
       !> Force without flux of momentum, the paper's ball force, N: [n_sample].
       real(wp), allocatable :: elastic_force(:)
       !> Whole force on the floor, N: [n_sample].
@@ -47,16 +47,16 @@ module thud_force_history
       real(wp), allocatable :: floor_displacement(:), floor_velocity(:)
       !> Energy that the source gives to the floor, J.
       real(wp) :: floor_work = 0.0_wp
-      !> Names, with units, of further quantities against time: [n_channel].
-      character(len=part_name_length), allocatable :: channel_name(:)
-      !> Its values: [n_sample, n_channel].
-      real(wp), allocatable :: channel(:, :)
-      !> Names of scalar quantities that the model chose or computed: [n_fact].
-      character(len=part_name_length), allocatable :: fact_name(:)
-      !> Their SI units: [n_fact].
-      character(len=8), allocatable :: fact_unit(:)
-      !> These numbers: [n_fact].
-      real(wp), allocatable :: fact(:)
+      !> Names, with units, of further quantities against time: [n_model_history].
+      character(len=name_length), allocatable :: model_history_name(:)
+      !> Its values: [n_sample, n_model_history].
+      real(wp), allocatable :: model_history(:, :)
+      !> Names of scalar quantities that the model chose or computed: [n_model_quantity].
+      character(len=name_length), allocatable :: model_quantity_name(:)
+      !> Their SI units: [n_model_quantity].
+      character(len=8), allocatable :: model_quantity_unit(:)
+      !> These numbers: [n_model_quantity].
+      real(wp), allocatable :: model_quantity(:)
       !> Velocity towards the floor at first touch, m/s.
       real(wp) :: impact_velocity = 0.0_wp
       !> Snapshots of the deformed source, of models that take some.
@@ -117,7 +117,7 @@ contains
       last = floor(history%contact_time*history%sample_rate) + 1
       history%deflection(last + 1:) = 0.0_wp
       history%velocity(last + 1:) = 0.0_wp
-      if (allocated(history%channel)) history%channel(last + 1:, :) = 0.0_wp
+      if (allocated(history%model_history)) history%model_history(last + 1:, :) = 0.0_wp
    end subroutine clear_flight
 
    !> Finds the contact time between samples: the force is continued to zero in a straight line from the last two
@@ -139,28 +139,28 @@ contains
    end subroutine continue_to_zero
 
    !> A history of zero force.
-   pure function new_force_history(sample_rate, n_sample, part_name, channel_name) result(history)
+   pure function new_force_history(sample_rate, n_sample, component_name, model_history_name) result(history)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
       integer, intent(in) :: n_sample
       !> Names of the components of the force: [n_component].
-      character(len=*), intent(in) :: part_name(:)
-      !> Names of the channels (default: there are none): [n_channel].
-      character(len=*), intent(in), optional :: channel_name(:)
+      character(len=*), intent(in) :: component_name(:)
+      !> Names, with units, of further quantities against time (default: none): [n_model_history].
+      character(len=*), intent(in), optional :: model_history_name(:)
       !> The history, all arrays allocated and zero.
       type(force_history_type) :: history
 
       history%sample_rate = sample_rate
-      allocate (history%part_name(size(part_name)))
-      history%part_name = part_name
+      allocate (history%component_name(size(component_name)))
+      history%component_name = component_name
       allocate (history%deflection(n_sample), history%velocity(n_sample), history%elastic_force(n_sample), &
          history%floor_force(n_sample), source=0.0_wp)
-      allocate (history%part(n_sample, size(part_name)), source=0.0_wp)
-      allocate (history%fact_name(0), history%fact_unit(0), history%fact(0))
-      if (.not. present(channel_name)) return
-      allocate (history%channel_name(size(channel_name)))
-      history%channel_name = channel_name
-      allocate (history%channel(n_sample, size(channel_name)), source=0.0_wp)
+      allocate (history%component(n_sample, size(component_name)), source=0.0_wp)
+      allocate (history%model_quantity_name(0), history%model_quantity_unit(0), history%model_quantity(0))
+      if (.not. present(model_history_name)) return
+      allocate (history%model_history_name(size(model_history_name)))
+      history%model_history_name = model_history_name
+      allocate (history%model_history(n_sample, size(model_history_name)), source=0.0_wp)
    end function new_force_history
 
 end module thud_force_history

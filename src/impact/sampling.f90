@@ -5,7 +5,7 @@ module thud_sampling
    use thud_kinds, only: wp
    use thud_new_field, only: integer_field, real_field
    use thud_text, only: to_text
-   use thud_theory_limit, only: theory_limit_type
+   use thud_validity_limit, only: validity_limit_type
    implicit none (type, external)
    private
 
@@ -52,7 +52,7 @@ contains
 
    !> Refuses a record with too many samples or steps.
    subroutine check_sampling(sampling, error)
-      !> The sampling, each value of it inside its own range.
+      !> The sampling, each value inside its own range.
       type(sampling_type), intent(in) :: sampling
       !> Names the keys, their product and the allowed range.
       type(error_type), allocatable, intent(out) :: error
@@ -87,9 +87,9 @@ contains
    !> octave of 500 Hz changes its level by up to 0.2 dB at the limit, 2 dB at 2000 Hz.
    pure function get_rate_limit(sampling) result(limit)
       type(sampling_type), intent(in) :: sampling
-      type(theory_limit_type) :: limit
+      type(validity_limit_type) :: limit
 
-      limit = theory_limit_type('sampling', 'sample_rate in Hz', sampling%sample_rate, lowest=8000.0_wp, &
+      limit = validity_limit_type('sampling', 'sample_rate in Hz', sampling%sample_rate, lowest=8000.0_wp, &
          reason='below, samples falsify the level at 500 Hz, by up to 2 dB at 2000 Hz')
    end function get_rate_limit
 

@@ -12,7 +12,7 @@ module thud_source_model
    use thud_kinds, only: wp
    use thud_receiver, only: get_pole_count, receiver_type
    use thud_sampling, only: get_step_count, sampling_type
-   use thud_theory_limit, only: get_gravity_limit, theory_limit_type
+   use thud_validity_limit, only: get_gravity_limit, validity_limit_type
    implicit none (type, external)
    private
 
@@ -30,7 +30,7 @@ module thud_source_model
       procedure, pass(options) :: get_snapshot_shape
       procedure, pass(options) :: get_cost
       procedure, pass(options) :: get_paper_modulus
-      procedure, pass(options) :: get_theory_limits
+      procedure, pass(options) :: get_validity_limits
       procedure, pass(options) :: get_loss_factors
       procedure, pass(options) :: compress
       procedure, pass(options) :: couples
@@ -117,7 +117,7 @@ contains
    end function get_paper_modulus
 
    !> Validity limits of the model for a result; by default gravity, which models leave out.
-   function get_theory_limits(ball, drop, options, sampling, history) result(limits)
+   function get_validity_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
       class(source_model_type), intent(in) :: options
@@ -125,10 +125,10 @@ contains
       !> The force.
       type(force_history_type), intent(in) :: history
       !> The limits: [n_limit].
-      type(theory_limit_type), allocatable :: limits(:)
+      type(validity_limit_type), allocatable :: limits(:)
 
       limits = [get_gravity_limit(drop, history)]
-   end function get_theory_limits
+   end function get_validity_limits
 
    !> Loss factor of the material against frequency, of models that have a material; others refuse.
    subroutine get_loss_factors(ball, options, frequency, loss_factor, error)

@@ -12,7 +12,7 @@ module thud_run
    use thud_kinds, only: wp
    use thud_mesh_files, only: estimate_motion_bytes, get_modes_files, get_motion_files, modes_names, &
       motion_names
-   use thud_report, only: get_channels_csv, get_force_csv, get_levels_csv, get_summary
+   use thud_report, only: get_model_histories_csv, get_force_csv, get_levels_csv, get_summary
    use thud_result_directory, only: check_owner, write_results
    use thud_room_report, only: get_room_files, get_room_table, room_file_names
    use thud_system, only: get_free_bytes
@@ -26,8 +26,8 @@ module thud_run
    !> Files of an impact.
    character(len=13), parameter :: file_names(3) = [character(len=13) :: 'force.csv', 'levels.csv', 'summary.nml']
 
-   !> File of models with channels.
-   character(len=*), parameter :: channel_file = 'channels.csv'
+   !> File of further quantities of the model against time.
+   character(len=*), parameter :: model_histories_file = 'model_histories.csv'
 
    !> Files of a floor that moves.
    character(len=16), parameter :: floor_names(2) = [character(len=16) :: 'floor_force.csv', 'floor_levels.csv']
@@ -82,12 +82,12 @@ contains
    end subroutine add_message
 
    !> Runs a namelist file and writes its results.
-   subroutine run_case(path, output, replace, channels, case, results, outcome, error)
+   subroutine run_case(path, output, replace, write_all, case, results, outcome, error)
       character(len=*), intent(in) :: path
       !> Directory for the results; empty for `outputs/<name of the case>`.
       character(len=*), intent(in) :: output
-      !> Files that thud has not written are replaced, too; the channels of the histories are written, too.
-      logical, intent(in) :: replace, channels
+      !> Files that thud has not written are replaced, too; further quantities of the model against time, too.
+      logical, intent(in) :: replace, write_all
       type(case_type), target, intent(out) :: case
       type(results_type), intent(out) :: results
       !> Table, verdict and directory of the results.
@@ -97,19 +97,19 @@ contains
 
       call load_case(path, case, error)
       if (allocated(error)) return
-      call store_case(path, case, output, replace, channels, results, outcome, error)
+      call store_case(path, case, output, replace, write_all, results, outcome, error)
       if (allocated(error)) error%message = path//': '//error%message
    end subroutine run_case
 
    !> Computes a case and writes its results.
-   subroutine store_case(path, case, output, replace, channels, results, outcome, error)
+   subroutine store_case(path, case, output, replace, write_all, results, outcome, error)
       !> The file of the case.
       character(len=*), intent(in) :: path
       type(case_type), intent(in), target :: case
       !> Directory for the results; empty for `outputs/<name of the case>`.
       character(len=*), intent(in) :: output
-      !> Files that thud has not written are replaced, too; the channels of the histories are written, too.
-      logical, intent(in) :: replace, channels
+      !> Files that thud has not written are replaced, too; further quantities of the model against time, too.
+      logical, intent(in) :: replace, write_all
       type(results_type), intent(out) :: results
       !> Table, verdict and directory of the results.
       type(outcome_type), intent(out) :: outcome
@@ -128,7 +128,7 @@ contains
       if (.not. allocated(error)) call check_space(case, outcome%directory, error)
       if (.not. allocated(error)) call compute(case, scope_type(), results, error)
       if (allocated(error)) return
-      call describe(case, results, channels, files, outcome)
+      call describe(case, results, write_all, files, outcome)
       call write_results(outcome%directory, input, files, [path], replace, differs, error)
       if (allocated(error)) return
       if (differs) call outcome%add_message(path, replaces//outcome%directory)
@@ -156,11 +156,11 @@ contains
    end subroutine check_space
 
    !> Table, verdict and files of results.
-   subroutine describe(case, results, channels, files, outcome)
+   subroutine describe(case, results, write_all, files, outcome)
       type(case_type), intent(in) :: case
       type(results_type), intent(in) :: results
       !> Channels of the histories, too.
-      logical, intent(in) :: channels
+      logical, intent(in) :: write_all
       !> The files: [n_file].
       type(text_file_type), allocatable, intent(out) :: files(:)
       !> Gets table and verdict.
@@ -183,7 +183,7 @@ contains
       call add_file(files, file_names(1), get_force_csv(results%impact%history))
       call add_file(files, file_names(2), get_levels_csv(case, results%impact%assessment))
       summary = get_summary(case, results%impact%history, results%impact%assessment, results%warning)
-      call add_history_files(results%impact%history, '', channels, files)
+      call add_history_files(results%impact%history, '', write_all, files)
       if (allocated(results%on_floor)) then
          call get_floor_table(case, results%impact, results%on_floor, results%floor, text)
          outcome%table = outcome%table//newline//text
@@ -193,7 +193,7 @@ contains
          call add_file(files, floor_names(2), text)
          call get_floor_summary(results%on_floor, text)
          summary = summary//text
-         call add_history_files(results%on_floor, 'floor_', channels, files)
+         call add_history_files(results%on_floor, 'floor_', write_all, files)
       end if
       call add_file(files, file_names(3), summary)
       if (case%has_room) then
@@ -209,17 +209,18 @@ contains
       outcome%table = outcome%table//newline//get_compression_table(results%compression)
    end subroutine describe
 
-   !> Adds the files of a history of models that have channels or snapshots.
-   subroutine add_history_files(history, prefix, channels, files)
+   !> Adds the files of a history of models that have further quantities or snapshots.
+   subroutine add_history_files(history, prefix, write_all, files)
       type(force_history_type), intent(in) :: history
       !> Beginning of their names.
       character(len=*), intent(in) :: prefix
       !> Channels, too.
-      logical, intent(in) :: channels
+      logical, intent(in) :: write_all
       !> The files: [n_file].
       type(text_file_type), allocatable, intent(inout) :: files(:)
 
-      if (channels .and. allocated(history%channel)) call add_file(files, prefix//channel_file, get_channels_csv(history))
+      if (write_all .and. allocated(history%model_history)) call add_file(files, prefix//model_histories_file, &
+         get_model_histories_csv(history))
       if (history%motion%n_frame == 0) return
       call extend(files, size(motion_names))
       call get_motion_files(history%motion, prefix, files(size(files) - size(motion_names) + 1:))

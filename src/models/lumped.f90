@@ -20,7 +20,7 @@ module thud_lumped
 contains
 
    !> Force history of one drop.
-   subroutine solve_lumped(source, drop, sampling, component_name, history, error, receiver, n_step, channel_name)
+   subroutine solve_lumped(source, drop, sampling, component_name, history, error, receiver, n_step, model_history_name)
       !> The source before first touch.
       class(contact_source_type), intent(inout) :: source
       type(drop_type), intent(in) :: drop
@@ -36,14 +36,14 @@ contains
       type(receiver_type), intent(in), optional :: receiver
       !> Steps in each sampling interval (default: the substeps).
       integer, intent(in), optional :: n_step
-      !> Names of channels that the source records: [n_channel].
-      character(len=*), intent(in), optional :: channel_name(:)
+      !> Names, with units, of further quantities against time: [n_model_history].
+      character(len=*), intent(in), optional :: model_history_name(:)
       real(wp) :: state(source%n_state)
       integer :: steps
 
       steps = sampling%substeps
       if (present(n_step)) steps = n_step
-      history = new_force_history(sampling%sample_rate, get_sample_count(sampling), component_name, channel_name)
+      history = new_force_history(sampling%sample_rate, get_sample_count(sampling), component_name, model_history_name)
       history%impact_velocity = get_impact_velocity(drop)
       if (is_rigid(receiver)) then
          call march(source, drop, sampling, steps, history, state, error)

@@ -65,12 +65,9 @@ contains
 
       fields = [ &
          list_field('frequency', options%frequency, 'Hz', 'natural frequencies of the ball on the floor', &
-         '[0.001, 1000000]'), &
-         list_field('damping_ratio', options%damping_ratio, '', 'damping ratios, one per mode', &
-         '[0, 1)'), &
-         list_field('effective_mass', options%effective_mass, 'kg', 'effective masses, one per mode', &
-         '[1e-12, 1000000]'), &
-         logical_field('allow_mass_mismatch', options%allow_mass_mismatch, &
+         '[0.001, 1000000]'), list_field('damping_ratio', options%damping_ratio, '', 'damping ratios, one per mode', &
+         '[0, 1)'), list_field('effective_mass', options%effective_mass, 'kg', 'effective masses, one per mode', &
+         '[1e-12, 1000000]'), logical_field('allow_mass_mismatch', options%allow_mass_mismatch, &
          'effective masses need not add up to the mass of the ball')]
    end function get_fields
 
@@ -124,7 +121,7 @@ contains
       march: do i = 1, size(history%floor_force)
          call check_interrupt(error)
          if (allocated(error)) return
-         call get_motion(modes, v0, (i - 1)*step, history%deflection(i), history%velocity(i), history%part(i, 1))
+         call get_motion(modes, v0, (i - 1)*step, history%deflection(i), history%velocity(i), history%component(i, 1))
          do j = 1, substeps
             time = (i - 1 + real(j, wp)/substeps)*step
             call get_motion(modes, v0, time, deflection, velocity, force)
@@ -138,9 +135,9 @@ contains
          return
       end if
       ! Dashpots start with a jump; a sample of a jump is the mean of its two sides.
-      history%part(1, 1) = history%part(1, 1)/2
-      history%elastic_force = history%part(:, 1)
-      history%floor_force = history%part(:, 1)
+      history%component(1, 1) = history%component(1, 1)/2
+      history%elastic_force = history%component(:, 1)
+      history%floor_force = history%component(:, 1)
       call finish(modes, release_time(modes, v0, time - step/substeps, time), history, error)
       if (.not. allocated(error)) call check_history(history, sampling, error)
       if (.not. allocated(error)) call check_samples(history, error)
@@ -228,7 +225,6 @@ contains
 
    !> Time at which the force first falls to zero, to rounding, by bisection.
    pure function release_time(modes, impact_velocity, before, after) result(time)
-      !> The modes: [n_mode].
       type(mode_type), intent(in) :: modes(:)
       !> Velocity at first touch, m/s.
       real(wp), intent(in) :: impact_velocity
@@ -250,7 +246,6 @@ contains
    !> Scalars of the impact. The equation of each mode makes the impulse the change of momentum;
    !> quadrature of the force checks it.
    subroutine finish(modes, contact_time, history, error)
-      !> The modes: [n_mode].
       type(mode_type), intent(in) :: modes(:)
       !> Time of release, s.
       real(wp), intent(in) :: contact_time

@@ -47,12 +47,12 @@ contains
       history%deflection(i) = state(at_deflection)
       history%velocity(i) = state(at_velocity)
       if (.not. self%touching) return
-      call self%get_components(state, history%part(i, :), history%elastic_force(i))
+      call self%get_components(state, history%component(i, :), history%elastic_force(i))
       history%peak_elastic_force = max(history%peak_elastic_force, history%elastic_force(i))
-      history%peak_force = max(history%peak_force, history%peak_elastic_force, sum(history%part(i, :)))
+      history%peak_force = max(history%peak_force, history%peak_elastic_force, sum(history%component(i, :)))
       ! A component that starts with a jump at first touch: a sample of a jump is the mean of its two sides.
-      if (i == 1) history%part(i, :) = history%part(i, :)/2
-      history%floor_force(i) = sum(history%part(i, :))
+      if (i == 1) history%component(i, :) = history%component(i, :)/2
+      history%floor_force(i) = sum(history%component(i, :))
    end subroutine record_sample
 
    !> Raises the maxima of deflection and elastic force.
@@ -60,7 +60,7 @@ contains
       class(single_mass_type), intent(in) :: self
       real(wp), intent(in) :: state(:)
       type(force_history_type), intent(inout) :: history
-      real(wp) :: components(size(history%part, 2))
+      real(wp) :: components(size(history%component, 2))
       real(wp) :: elastic_force
 
       call self%get_components(state, components, elastic_force)

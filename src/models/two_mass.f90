@@ -43,8 +43,8 @@ module thud_two_mass
       real(wp) :: belt_mass = 2.0_wp
       !> Inflation pressure p, Pa.
       real(wp) :: inflation_pressure = 2.4e5_wp
-      !> Contact area over deflection w, m.
-      real(wp) :: area_growth = 0.40_wp
+      !> Width w of the contact, its area over the deflection, m.
+      real(wp) :: contact_width = 0.40_wp
       !> Stiffness c of the carcass, force over deflection at `carcass_deflection`, N/m.
       real(wp) :: carcass_stiffness = 9.0e4_wp
       !> Exponent n of the carcass.
@@ -92,12 +92,11 @@ contains
          real_field('belt_mass', options%belt_mass, 'kg', 'mass of belt and tread, less than the mass of the source', &
          '(0, 1000000)'), &
          real_field('inflation_pressure', options%inflation_pressure, 'Pa', 'inflation pressure', '[0, 1e8]'), &
-         real_field('area_growth', options%area_growth, 'm', 'contact area over deflection of the patch', '[0, 100]'), &
+         real_field('contact_width', options%contact_width, 'm', 'contact area over deflection of the patch', '[0, 100]'), &
          real_field('carcass_stiffness', options%carcass_stiffness, 'N/m', &
          'force of the carcass over its deflection at 20 mm', '[0, 1e12]'), &
          real_field('carcass_exponent', options%carcass_exponent, '', 'exponent of the deflection of the carcass', &
-         '[1.5, 5]'), &
-         real_field('contact_damping', options%contact_damping, 's/m', &
+         '[1.5, 5]'), real_field('contact_damping', options%contact_damping, 's/m', &
          'damping of the contact over its elastic force and velocity', '[0, 100]'), &
          real_field('belt_frequency', options%belt_frequency, 'Hz', &
          'natural frequency of the belt on the sidewall, the rim held', '(0, 1000000]'), &
@@ -114,10 +113,10 @@ contains
       if (.not. options%belt_mass < ball%mass) then
          error = input_error('&two_mass: belt_mass = '//to_text(options%belt_mass)//' kg leaves no rim; allowed: below ' &
             //'&ball mass = '//to_text(ball%mass)//' kg')
-      else if (.not. options%inflation_pressure*options%area_growth + options%carcass_stiffness > 0.0_wp) then
+      else if (.not. options%inflation_pressure*options%contact_width + options%carcass_stiffness > 0.0_wp) then
          error = input_error('&two_mass: carcass_stiffness = '//to_text(options%carcass_stiffness) &
-            //' N/m with inflation_pressure = '//to_text(options%inflation_pressure)//' Pa and area_growth = ' &
-            //to_text(options%area_growth)//' m bears no load; allowed: a carcass or an inflated patch')
+            //' N/m with inflation_pressure = '//to_text(options%inflation_pressure)//' Pa and contact_width = ' &
+            //to_text(options%contact_width)//' m bears no load; allowed: a carcass or an inflated patch')
       end if
    end subroutine check
 
@@ -153,7 +152,7 @@ contains
       omega = 2*pi*options%belt_frequency
       tyre = tyre_type(mass=mass, n_mass=2, n_state=n_state, belt_mass=options%belt_mass, &
          rim_mass=mass - options%belt_mass, &
-         law=contact_law_type(stiffness=options%inflation_pressure*options%area_growth, &
+         law=contact_law_type(stiffness=options%inflation_pressure*options%contact_width, &
          factor=options%carcass_stiffness/carcass_deflection**(options%carcass_exponent - 1), &
          exponent=options%carcass_exponent, damping=options%contact_damping), &
          sidewall_stiffness=options%belt_mass*omega**2, &
@@ -186,7 +185,6 @@ contains
    !> Bound of the fastest rate of the motion, rad/s: of its frequencies by the trace, and of its decay.
    pure function get_fastest_rate(tyre, impact_velocity) result(rate)
       type(tyre_type), intent(in) :: tyre
-      !> Velocity at first touch, m/s.
       real(wp), intent(in) :: impact_velocity
       !> The bound, rad/s.
       real(wp) :: rate
@@ -322,12 +320,12 @@ contains
       center = self%get_center(state)
       history%deflection(i) = center(1)
       history%velocity(i) = center(2)
-      history%channel(i, :) = state([at_belt, at_rim])
+      history%model_history(i, :) = state([at_belt, at_rim])
       if (allocated(history%floor_displacement)) then
-         history%channel(i, :) = history%channel(i, :) + history%floor_displacement(i)
+         history%model_history(i, :) = history%model_history(i, :) + history%floor_displacement(i)
       end if
-      history%part(i, :) = get_components(self, state)
-      history%elastic_force(i) = sum(history%part(i, :))
+      history%component(i, :) = get_components(self, state)
+      history%elastic_force(i) = sum(history%component(i, :))
       history%floor_force(i) = history%elastic_force(i)
    end subroutine record_sample
 

@@ -117,7 +117,9 @@ def test_figure_shows_force_and_levels() -> None:
 def test_dataset_of_an_impact_has_units_and_provenance(tmp_path: Path) -> None:
     found = impact().to_xarray()
     np.testing.assert_array_equal(found["floor_force"], impact().floor_force)
-    np.testing.assert_array_equal(found["contact_radius"], impact().channels["contact_radius_m"])
+    np.testing.assert_array_equal(
+        found["contact_radius"], impact().model_histories["contact_radius_m"]
+    )
     assert found["contact_radius"].attrs["units"] == "m"
     assert found["velocity"].attrs["units"] == "m/s"
     assert found["minimum_volume_ratio"].attrs["units"] == "1"
@@ -166,4 +168,4 @@ def test_table_of_an_impact_has_the_columns_of_its_files() -> None:
         "floor_force_N",
     ]
     np.testing.assert_array_equal(table["floor_force_N"], impact().floor_force)
-    assert set(impact().channels) < set(table)
+    assert set(impact().model_histories) < set(table)

@@ -41,20 +41,20 @@ def test_every_input_runs_and_agrees_with_the_driver(run: Run, tmp_path: Path, p
     assert result.returncode == 0, result.stderr
     directory = tmp_path / "outputs" / path.stem
     impact = thud.solve(thud.read_case(path))
-    more = ["channels.csv"] if impact.channels else []
+    more = ["model_histories.csv"] if impact.model_histories else []
     more += ["snapshots.xmf", "pressure.csv"] if impact.motion else []
     assert sorted(file.name for file in directory.iterdir()) == sorted(FILES + more)
-    if impact.channels:
-        table = np.genfromtxt(directory / "channels.csv", delimiter=",", names=True)
-        for channel, values in impact.channels.items():
+    if impact.model_histories:
+        table = np.genfromtxt(directory / "model_histories.csv", delimiter=",", names=True)
+        for channel, values in impact.model_histories.items():
             assert np.array_equal(table[channel], values)
 
     columns = np.genfromtxt(directory / "force.csv", delimiter=",", names=True)
     # The same library: not one bit may differ.
     assert np.array_equal(columns["elastic_force_N"], impact.elastic_force)
     assert np.array_equal(columns["floor_force_N"], impact.floor_force)
-    assert impact.parts
-    for name, part in impact.parts.items():
+    assert impact.components
+    for name, part in impact.components.items():
         assert np.array_equal(columns[f"{name}_N"], part)
     assert np.array_equal(columns["deflection_m"], impact.deflection)
     assert np.array_equal(columns["velocity_m_per_s"], impact.velocity)

@@ -146,7 +146,7 @@ def test_a_shorter_run_leaves_nothing_of_a_longer_one(case_file: CaseFile, tmp_p
     folder = tmp_path / "outputs/case"
     assert cli.main(["run", "-q", str(case_file(SNAPSHOTS)), "--all", "--animation"]) == 0
     assert (folder / "motion.gif").read_bytes()[:4] == b"GIF8"
-    assert (folder / "channels.csv").exists()
+    assert (folder / "model_histories.csv").exists()
     assert len(thud.read_results(folder).motion.time) > 20  # type: ignore[union-attr]
     assert cli.main(["run", "-q", "--no-figures", str(case_file(IMPACT))]) == 0
     assert {path.name for path in folder.iterdir()} == {
@@ -155,13 +155,13 @@ def test_a_shorter_run_leaves_nothing_of_a_longer_one(case_file: CaseFile, tmp_p
 
 
 def test_channels_keep_the_balance_of_energy(impact: thud.Impact) -> None:
-    total = sum(values for name, values in impact.channels.items() if "energy_J" in name)
+    total = sum(values for name, values in impact.model_histories.items() if "energy_J" in name)
     assert abs(total - total[0]).max() < 0.005 * 2.5 * 9.81
     assert impact.energy_residual < 0.005
     assert impact.impulse_residual < 1e-8
-    assert impact.channels["contact_radius_m"].max() < 0.089
+    assert impact.model_histories["contact_radius_m"].max() < 0.089
     # K = 200 mu and E = 9 K mu/(3 K + mu).
-    assert impact.facts["bulk_modulus"] == pytest.approx(601 / 9 * 1.6e6)
+    assert impact.model_quantities["bulk_modulus"] == pytest.approx(601 / 9 * 1.6e6)
     np.testing.assert_allclose(
         impact.floor_force.sum() / impact.sample_rate, impact.impulse, rtol=1e-12
     )
@@ -172,7 +172,7 @@ def test_record_goes_on_as_free_flight(impact: thud.Impact) -> None:
     np.testing.assert_allclose(np.diff(impact.velocity[end:]) * impact.sample_rate, 9.81, rtol=0.02)
     fall = np.diff(impact.deflection[end:]) * impact.sample_rate
     np.testing.assert_allclose(fall, impact.velocity[end:-1], atol=9.81 / impact.sample_rate)
-    assert (impact.channels["minimum_volume_ratio"] > 0).all()
+    assert (impact.model_histories["minimum_volume_ratio"] > 0).all()
     long = thud.solve(
         model="finite_element", duration=1.0, sample_rate=16000, snapshot_interval=0, **COARSE
     )
@@ -189,7 +189,7 @@ def test_flight_ends_before_a_contact_that_is_not_asked_for() -> None:
         model="finite_element", duration=1.5, flight_after=1.4, snapshot_interval=0, **COARSE
     )
     np.testing.assert_allclose(long.levels(), short.levels(), atol=1e-6)
-    assert long.channels["contact_radius_m"][1500:].max() == 0
+    assert long.model_histories["contact_radius_m"][1500:].max() == 0
 
 
 def test_peak_is_that_of_the_recorded_band() -> None:

@@ -194,6 +194,6 @@ def test_measured_contact_time_is_that_of_the_record_around_the_contact() -> Non
 def test_part_that_a_model_has_not_is_told() -> None:
     impact = thud.solve()
     for name in ("shell_force", "gas_force", "flux_force"):
-        assert getattr(impact, name) is impact.parts[name]
+        assert getattr(impact, name) is impact.components[name]
     with pytest.raises(AttributeError, match=naming("gas_force")):
         _ = thud.solve(model="hunt_crossley", contact_time=0.02).gas_force

@@ -48,7 +48,7 @@ def test_examples_are_measured_as_they_were_made(
     monkeypatch.chdir(tmp_path)
     files = [str(FOLDER / drop["file"]) for drop in DROPS]
     config = str(FOLDER / "lab.toml")
-    monkeypatch.setattr("thud.cli.measure_command.SHOWN", 2)
+    monkeypatch.setattr("thud.cli.recordings.SHOWN", 2)
     # The ball of finite elements with its default law lies 0.3 dB below the limit at 500 Hz.
     assert cli.main(["measure", *files, "--config", config, "--check", "-o", "out"]) == 3
     shown = capsys.readouterr().out
@@ -367,22 +367,22 @@ def test_interrupted_measurement_goes_on_where_it_ended(
 
     monkeypatch.setattr(measure_drops, "measure_window", measure)
     with pytest.raises(KeyboardInterrupt):
-        thud.read_recording(file, config=config, keep=folder)
+        thud.read_recording(file, config=config, checkpoint=folder)
     parts = sorted(folder.iterdir())
     assert len(parts) == 2
     # What is damaged or is no data is measured again, and nothing of it is called.
     parts[0].write_bytes(pickle.dumps(Call(tmp_path / "called")))
     measured.clear()
-    found = thud.read_recording(file, config=config, keep=folder)
+    found = thud.read_recording(file, config=config, checkpoint=folder)
     assert [name[-1] for name in measured] == ["1", "3"]
     assert not (tmp_path / "results").exists()
     assert not (tmp_path / "called").exists()
     measured.clear()
     with pytest.raises(KeyboardInterrupt):
-        thud.read_recording(file, config=config, keep=folder)
+        thud.read_recording(file, config=config, checkpoint=folder)
     measured.clear()
     with pytest.raises(KeyboardInterrupt):
-        thud.read_recording(file, config=replace(config, mass=2.4), keep=folder)
+        thud.read_recording(file, config=replace(config, mass=2.4), checkpoint=folder)
     assert len(measured) == 2
     measured.clear()
     monkeypatch.setattr(measure_drops, "measure_window", measure_window)

@@ -43,7 +43,7 @@ def _tyre_steps(case: thud.Case) -> float:
     """Return about how many steps a tyre takes."""
     tyre = case.model
     assert isinstance(tyre, thud.TwoMass)
-    stiffness = tyre.inflation_pressure * tyre.area_growth + tyre.carcass_stiffness
+    stiffness = tyre.inflation_pressure * tyre.contact_width + tyre.carcass_stiffness
     rate = 2 * math.pi * tyre.belt_frequency * max(1, 2 * tyre.belt_damping)
     rate /= math.sqrt(1 - tyre.belt_mass / case.ball.mass)
     sampling = case.sampling
@@ -220,7 +220,7 @@ def _rough_contact_time(case: thud.Case) -> float:
         length = (ball.mass * velocity**2 / model.stiffness) ** (1 / (model.exponent + 1))
         return 3 * length / velocity
     if isinstance(model, thud.TwoMass):
-        stiffness = model.inflation_pressure * model.area_growth + model.carcass_stiffness
+        stiffness = model.inflation_pressure * model.contact_width + model.carcass_stiffness
         return 4 * math.sqrt(ball.mass / stiffness)
     shell = 8 * ball.youngs_modulus * ball.wall_thickness**2 / ball.outer_radius / 3
     gas = 2 * math.pi * ball.outer_radius * ball.gauge_pressure

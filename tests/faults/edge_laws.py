@@ -59,7 +59,7 @@ def _laws(impact: thud.Impact) -> dict[str, bool]:
     if isinstance(impact, thud.FloorImpact):
         power = force * impact.floor_velocity
         # Contact takes or gives some energy within the steps of the modal ball.
-        missing = balance * energy + abs(impact.facts.get("contact_loss", 0.0))
+        missing = balance * energy + abs(impact.model_quantities.get("contact_loss", 0.0))
         spread = step * (
             np.abs(np.diff(power, prepend=0, append=0)).sum() + 2 * np.abs(power).max()
         )

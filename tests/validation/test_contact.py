@@ -86,7 +86,7 @@ def test_friction_stays_in_its_cone_and_costs_energy() -> None:
     assert (abs(shear) <= friction * pressure * (1 + 1e-12)).all()
     # Bending shortens the outer surface as it flattens: the floor holds it outwards, later inwards.
     assert shear.min() < -0.9 * friction * pressure.max() / 2 < 0 < shear.max()
-    rubbed = impact.channels["friction_energy_J"]
+    rubbed = impact.model_histories["friction_energy_J"]
     assert np.diff(rubbed[: np.argmax(rubbed) + 1]).min() > -1e-9
     assert 0.05 < rubbed[-1] < 0.1 * 2.5 * 9.81
     assert impact.energy_residual < 5e-4

@@ -86,7 +86,7 @@ def tyre_reference(
     m1, m2 = options.belt_mass, mass - options.belt_mass
     w = 2 * np.pi * options.belt_frequency
     stiffness, damping = m1 * w**2, 2 * options.belt_damping * m1 * w
-    patch = options.inflation_pressure * options.area_growth
+    patch = options.inflation_pressure * options.contact_width
     carcass = options.carcass_stiffness / 0.02 ** (options.carcass_exponent - 1)
 
     def right_hand_side(_: float, y: np.ndarray, touching: float) -> list[float]:
@@ -130,7 +130,7 @@ def tyre_reference(
         (
             thud.TwoMass(
                 belt_mass=1.0,
-                area_growth=8,
+                contact_width=8,
                 belt_frequency=70,
                 belt_damping=0.01,
                 contact_damping=0.01,

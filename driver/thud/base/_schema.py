@@ -488,8 +488,8 @@ class TwoMass(Group):
         Mass of belt and tread, less than the mass of the source, kg; 0 < belt_mass < 1e+06.
     inflation_pressure : float
         Inflation pressure, Pa; 0 <= inflation_pressure <= 1e+08.
-    area_growth : float
-        Contact area over deflection of the patch, m; 0 <= area_growth <= 100.
+    contact_width : float
+        Contact area over deflection of the patch, m; 0 <= contact_width <= 100.
     carcass_stiffness : float
         Force of the carcass over its deflection at 20 mm, N/m; 0 <= carcass_stiffness <= 1e+12.
     carcass_exponent : float
@@ -507,7 +507,7 @@ class TwoMass(Group):
     name: ClassVar[ModelName] = "two_mass"
     belt_mass: float = 2.0
     inflation_pressure: float = 240000.0
-    area_growth: float = 0.4
+    contact_width: float = 0.4
     carcass_stiffness: float = 90000.0
     carcass_exponent: float = 2.5
     contact_damping: float = 0.06
@@ -1009,7 +1009,7 @@ KEYS = (
     Key("hunt_crossley", "hunt_crossley", "restitution", "real", "", "wanted coefficient of restitution; 0: from damping", (), 0.0, 1.0),
     Key("two_mass", "two_mass", "belt_mass", "real", "kg", "mass of belt and tread, less than the mass of the source", (), 0.0, 1000000.0),
     Key("two_mass", "two_mass", "inflation_pressure", "real", "Pa", "inflation pressure", (), 0.0, 100000000.0),
-    Key("two_mass", "two_mass", "area_growth", "real", "m", "contact area over deflection of the patch", (), 0.0, 100.0),
+    Key("two_mass", "two_mass", "contact_width", "real", "m", "contact area over deflection of the patch", (), 0.0, 100.0),
     Key("two_mass", "two_mass", "carcass_stiffness", "real", "N/m", "force of the carcass over its deflection at 20 mm", (), 0.0, 1000000000000.0),
     Key("two_mass", "two_mass", "carcass_exponent", "real", "", "exponent of the deflection of the carcass", (), 1.5, 5.0),
     Key("two_mass", "two_mass", "contact_damping", "real", "s/m", "damping of the contact over its elastic force and velocity", (), 0.0, 100.0),

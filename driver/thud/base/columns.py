@@ -53,15 +53,7 @@ NUMBERS = {decimal: _numbers(decimal) for decimal in MARKS}
 
 
 class DecimalMark(NamedTuple):
-    """The decimal mark of all numbers of a table.
-
-    Attributes
-    ----------
-    mark : str
-        Point or comma.
-    line : int
-        Number of the line that shows it; 0 if none is needed.
-    """
+    """The decimal mark of all numbers of a table, and the line that shows it, 0 for none."""
 
     mark: str = "."
     line: int = 0
@@ -84,16 +76,11 @@ def read_titled(
 ) -> tuple[list[str], NDArray[np.float64]]:
     """Return the titles of a file of columns and its numbers, shape (n_row, n_column).
 
-    The titles are the cells of the line above the first number, if there is such a line.
-
-    Commas, semicolons, tabs or blanks separate the columns, as in the first line of numbers; cells
-    may stand in quotes. The decimal mark is that of the whole table, see `find_decimal`. Empty
-    lines, comments after ``#`` and lines above the first number are skipped.
-
-    Raises
-    ------
-    InputError
-        Names the file, and the line that is not numeric or of another width.
+    The titles are the cells of the line above the first number, if there is such a line. Commas,
+    semicolons, tabs or blanks separate the columns, as in the first line of numbers; cells may
+    stand in quotes. The decimal mark is that of the whole table, see `find_decimal`. Empty lines,
+    comments after ``#`` and lines above the first number are skipped. Raise InputError with the
+    file, and the line that is not numeric or of another width.
     """
     try:
         if not Path(path).is_file():  # opening a pipe could block
@@ -137,10 +124,7 @@ def read_titled(
 def read_lines(text: TextIO, name: str, allowed: str) -> Iterator[str]:
     """Yield the lines of a text without line ends.
 
-    Raises
-    ------
-    InputError
-        Names the line that is too long or holds zero bytes.
+    Raise InputError with the line that is too long or holds zero bytes.
     """
     for number, ended in enumerate(iter(lambda: text.readline(MAX_LINE + 1), ""), start=1):
         line = ended.removesuffix("\n")
@@ -212,12 +196,8 @@ def find_decimal(
     """Return the decimal mark of a table from its lines: number, cells, and quotation.
 
     The first number that is valid with only one of the marks decides: ``0,5``, ``1.234,5`` and
-    ``1,2345`` show a decimal comma, ``1,575`` shows nothing.
-
-    Raises
-    ------
-    InputError
-        Names the line of an ambiguous number if no number of the table decides.
+    ``1,2345`` show a decimal comma, ``1,575`` shows nothing. Raise InputError with the line of an
+    ambiguous number if no number of the table decides.
     """
     ambiguous: tuple[int, str] | None = None
     for line, cells, are_quoted in rows:

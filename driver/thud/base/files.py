@@ -269,12 +269,8 @@ def checksum(content: bytes) -> str:
 def read_manifest(folder: Path) -> dict[str, Entry]:
     """Return the entries of the manifest of a directory, none without a manifest.
 
-    The last checksum of a file is that of its latest content.
-
-    Raises
-    ------
-    InputError
-        Where another file has its name.
+    The last checksum of a file is that of its latest content. Raise InputError where another file
+    has its name.
     """
     path = folder / MANIFEST
     if not os.path.lexists(path):
@@ -311,7 +307,7 @@ def _is_listed(path: Path, listed: Mapping[str, Entry]) -> bool:
 def locked(folder: Path, kind: int = fcntl.LOCK_EX) -> Iterator[None]:
     """Hold the lock of a result directory, so that no other run replaces or extends it.
 
-    Raises BlockingIOError where another run holds it and `kind` has LOCK_NB.
+    Raise BlockingIOError where another run holds it and `kind` has LOCK_NB.
     """
     with _held(folder, os.O_RDONLY | os.O_DIRECTORY, kind) as (_, _, is_locked):
         if kind & fcntl.LOCK_EX and not is_locked:

@@ -21,15 +21,7 @@ if TYPE_CHECKING:
 def process_pool(
     width: int, prepare: Callable[[], object] | None = None
 ) -> Iterator[ProcessPoolExecutor]:
-    """Open a pool of processes; an interrupt ends their work.
-
-    Parameters
-    ----------
-    width
-        Number of processes.
-    prepare
-        Called in each process before its first work.
-    """
+    """Open a pool of processes that call `prepare` first; an interrupt ends their work."""
     # Forked processes would inherit locks of threads that they do not have.
     context = get_context("spawn")
     end, held = context.Pipe(duplex=False)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NoReturn
 from thud.base.bridge import version
 from thud.base.checks import suggestion
 from thud.base.errors import InputError, NumericalError, ThudError
-from thud.cli.calibrate_command import CALIBRATE
+from thud.cli.cases import EXAMPLES, EXPORT, compare_cases, draw_figures, run_cases
 from thud.cli.command import (
     FORMAT,
     NO_FIGURES,
@@ -20,21 +20,14 @@ from thud.cli.command import (
     Command,
     argument,
     exit_code,
+    message_of,
     output,
-    sentence,
     shown_at_once,
 )
-from thud.cli.examples_command import EXAMPLES
-from thud.cli.explore_command import EXPLORE
-from thud.cli.export_command import EXPORT
-from thud.cli.figures_command import compare_cases, draw_figures
-from thud.cli.floor_command import FLOOR
-from thud.cli.history_command import run_history
-from thud.cli.measure_command import MEASURE
-from thud.cli.mobility_command import MOBILITY
-from thud.cli.rate_command import RATE
-from thud.cli.run_command import run_cases
-from thud.cli.studies_command import study_commands
+from thud.cli.explore import EXPLORE
+from thud.cli.floors import FLOOR, MOBILITY, RATE
+from thud.cli.recordings import CALIBRATE, MEASURE, run_history
+from thud.cli.studies import study_commands
 from thud.level.levels import FORCES, SOURCES
 
 if TYPE_CHECKING:
@@ -59,7 +52,7 @@ COMMANDS = {
             argument(
                 "--all",
                 action="store_true",
-                help="write also the quantities of the model against time (channels.csv), and "
+                help="write also quantities of the model against time (model_histories.csv) and "
                 "every figure",
             ),
             argument(
@@ -152,7 +145,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if isinstance(error, OSError) and error.filename is None:
             # Standard output is full: discard what is still buffered.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        print(f"thud-driver: {sentence(error)}", file=sys.stderr)
+        print(f"thud-driver: {message_of(error)}", file=sys.stderr)
         return exit_code(error)
     except MemoryError as error:
         cause = f" ({error})" if str(error) else ""

@@ -21,27 +21,18 @@ if TYPE_CHECKING:
     from thud.floors.mobility_fit import MobilityFit
     from thud.floors.survey import RoomLevels
 
+# Exit code of `--check` if a source does not conform.
+NOT_CONFORMING = 3
 # Names or flags of an argument, and its settings for argparse.
 Argument = tuple[tuple[str, ...], dict[str, Any]]
 
 
 class Command(NamedTuple):
-    """A row of the table of commands.
-
-    Attributes
-    ----------
-    help : str
-        What it does.
-    arguments : tuple of Argument
-        Its arguments.
-    function : callable
-        Runs it; returns the exit code.
-    kept : str
-        What remains after an interrupt, for its message.
-    """
+    """A row of the table of commands; `kept` is the message on results after an interrupt."""
 
     help: str
     arguments: tuple[Argument, ...]
+    # Returns the exit code.
     function: Callable[[argparse.Namespace], int]
     kept: str = "finished results are kept"
 
@@ -64,16 +55,9 @@ def output(meaning: str) -> tuple[Argument, Argument]:
 def results_of(
     options: argparse.Namespace, default: str, inputs: Iterable[str | None] = ()
 ) -> Results:
-    """Return the directory for the results of a command.
+    """Return the directory for the results of a command, by default one below ``outputs``.
 
-    Parameters
-    ----------
-    options
-        The options of the command.
-    default
-        Name of the directory below ``outputs`` where there is no option.
-    inputs
-        Files that the command reads.
+    The inputs, which the command reads, are never replaced.
     """
     return Results(
         Path(options.output or Path("outputs", default)),
@@ -123,7 +107,7 @@ def shown_at_once() -> Iterator[None]:
 def save_result(  # noqa: PLR0913, PLR0917 - each of them differs
     options: argparse.Namespace,
     source: str,
-    found: MobilityFit | RoomLevels,
+    result: MobilityFit | RoomLevels,
     shown: str,
     file: tuple[str, bytes],
     figure: str,
@@ -132,17 +116,17 @@ def save_result(  # noqa: PLR0913, PLR0917 - each of them differs
 
     The source is the file that the result is from.
     """
-    results = results_of(options, found.name, [source])
+    results = results_of(options, result.name, [source])
     contents = dict([file])
     if not options.no_figures:
         with left_out(figure):
             from thud.plot.files import figure_files
 
-            contents |= figure_files(draw_all({figure: found.plot}))
+            contents |= figure_files(draw_all({figure: result.plot}))
     results.write(contents)
     if not options.quiet:
         print(shown)
-    print_notes(found.warnings)
+    print_notes(result.warnings)
     if not options.quiet:
         print(f"Results: {results.folder}")
     return 0
@@ -153,9 +137,9 @@ def exit_code(error: Exception) -> int:
     return error.exit_code if isinstance(error, ThudError) else InputError.exit_code
 
 
-def sentence(error: Exception) -> str:
-    """Return an error as one sentence."""
+def message_of(error: Exception) -> str:
+    """Return the message of an error in one line."""
     if isinstance(error, OSError):
-        place = error.filename or "standard output"
-        return f"{place}: {error.strerror}; allowed: a place that you may write to"
+        path = error.filename or "standard output"
+        return f"{path}: {error.strerror}; allowed: a path that you may write to"
     return str(error)

@@ -178,7 +178,7 @@ def _motion(impact: Impact) -> Answer | None:
     """
     until = impact.touch_time + MARGIN * impact.contact_time
     motion = impact.motion
-    if motion is None and "shell_force" not in impact.parts:
+    if motion is None and "shell_force" not in impact.components:
         return None
     times = impact.time if motion is None else motion.time
     chosen = _some(np.flatnonzero(times <= until), MAX_INSTANTS)

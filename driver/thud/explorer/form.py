@@ -25,7 +25,7 @@ SHORT, PART = 3.0, 0.1
 # Part of such a range that is left out at its ends.
 INSET = 0.01
 _RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
-# Groups that the page leaves out: name, free modes, slow compression, files.
+# Groups that the page leaves out: name, free modes, quasi-static compression, files.
 LEFT_OUT = ("case", "modes", "compression", "output")
 
 

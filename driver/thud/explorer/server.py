@@ -80,7 +80,7 @@ def new_application(
     Raises
     ------
     InputError
-        Where the token is empty: requests without one would carry it.
+        If the token is empty: requests without one would carry it.
     """
     if not token:
         refuse("the token is empty", "one that nobody can guess")

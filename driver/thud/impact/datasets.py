@@ -61,7 +61,9 @@ def impact_dataset(impact: Impact, histories: Mapping[str, NDArray[np.float64]])
     variables["conforms"] = ((), conforms, attributes(SAMPLE_RESULTS["conforms"]))
     coordinates = {"time": _time(impact.time), **band_coordinates(BANDWIDTHS)}
     warnings = {"warnings": "\n".join(impact.warnings)}
-    found = xr.Dataset(variables, coordinates, origin(impact.case) | impact.facts | warnings)
+    found = xr.Dataset(
+        variables, coordinates, origin(impact.case) | impact.model_quantities | warnings
+    )
     # The arrays of the impact are read-only.
     return found.copy(deep=True)
 

@@ -57,11 +57,11 @@ class Impact(ImpactQuantities, Displayed):
         Force of shell and gas, the ball force of the paper (eq. 1), N.
     floor_force : ndarray, shape (n_sample,)
         Total force on the floor, flux of momentum included, N.
-    parts : dict of str to ndarray, shape (n_sample,)
+    components : dict of str to ndarray, shape (n_sample,)
         Components of the force that the model distinguishes, N.
-    channels : dict of str to ndarray, shape (n_sample,)
+    model_histories : dict of str to ndarray, shape (n_sample,)
         Other histories of the model, such as the contact radius; the names end with units.
-    facts : dict of str to float
+    model_quantities : dict of str to float
         Other numbers of the model, such as the bulk modulus; SI units.
     warnings : tuple of str
         What is possible but not plausible, such as a wall with the density of no rubber.
@@ -78,9 +78,9 @@ class Impact(ImpactQuantities, Displayed):
     velocity: NDArray[np.float64]
     elastic_force: NDArray[np.float64]
     floor_force: NDArray[np.float64]
-    parts: dict[str, NDArray[np.float64]]
-    channels: dict[str, NDArray[np.float64]]
-    facts: dict[str, float]
+    components: dict[str, NDArray[np.float64]]
+    model_histories: dict[str, NDArray[np.float64]]
+    model_quantities: dict[str, float]
     warnings: tuple[str, ...]
     motion: Motion | None
     on_floor: FloorImpact | None = None
@@ -129,23 +129,23 @@ class Impact(ImpactQuantities, Displayed):
     @property
     def shell_force(self) -> NDArray[np.float64]:
         """Force of the shell F_B, N, shape (n_sample,)."""
-        return self._part("shell_force")
+        return self._component("shell_force")
 
     @property
     def gas_force(self) -> NDArray[np.float64]:
         """Force of the enclosed gas F_G, N, shape (n_sample,)."""
-        return self._part("gas_force")
+        return self._component("gas_force")
 
     @property
     def flux_force(self) -> NDArray[np.float64]:
         """Flux of momentum of the wall into the floor F_M, N, shape (n_sample,)."""
-        return self._part("flux_force")
+        return self._component("flux_force")
 
-    def _part(self, name: str) -> NDArray[np.float64]:
-        if name not in self.parts:
-            message = f"this model has no {name}; available: {', '.join(self.parts)}"
+    def _component(self, name: str) -> NDArray[np.float64]:
+        if name not in self.components:
+            message = f"this model has no {name}; available: {', '.join(self.components)}"
             raise AttributeError(message)
-        return self.parts[name]
+        return self.components[name]
 
     def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:
         """Return the ``"floor"`` or the ``"elastic"`` force, N, shape (n_sample,).
@@ -253,7 +253,7 @@ class Impact(ImpactQuantities, Displayed):
         return impact_dataset(self, self.histories())
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return the histories over time, with the columns of ``force.csv`` and `channels`.
+        """Return the histories over time, with the columns of ``force.csv`` and `model_histories`.
 
         Raise InputError where pandas is not installed.
         """
@@ -270,8 +270,8 @@ class Impact(ImpactQuantities, Displayed):
             "elastic_force_N": self.elastic_force,
             "floor_force_N": self.floor_force,
             **self._floor_histories(),
-            **{f"{name}_N": values for name, values in self.parts.items()},
-            **self.channels,
+            **{f"{name}_N": values for name, values in self.components.items()},
+            **self.model_histories,
         }
 
     def _floor_histories(self) -> dict[str, NDArray[np.float64]]:
@@ -286,9 +286,9 @@ def history(case: Case, found: Bundle, warnings: tuple[str, ...]) -> dict[str, A
         "case": case,
         "time": np.arange(len(samples["deflection"])) / quantities["sample_rate"],
         **samples,
-        "parts": found["parts"],
-        "channels": found.get("channels", {}),
-        "facts": found.get("facts", {}),
+        "components": found["components"],
+        "model_histories": found.get("model_histories", {}),
+        "model_quantities": found.get("model_quantities", {}),
         "warnings": warnings,
         "motion": new_motion(**found["motion"]) if "motion" in found else None,
         **quantities,

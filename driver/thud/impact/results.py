@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Columns of every history, by the names of an impact; parts of the force follow the first three.
+# Columns of every history, by the names of an impact; components follow the first three.
 _OWN = {
     "time": "time_s",
     "deflection": "deflection_m",
@@ -106,7 +106,7 @@ def _new_impact(files: _Files) -> Impact:
     """Return the impact of a result directory."""
     case = Case.from_text(files.read("effective.nml"))
     numbers = f90nml.reads(files.read("summary.nml"))
-    history, _ = _read_history(files, "", numbers["summary"], numbers.get("facts", {}))
+    history, _ = _read_history(files, "", numbers["summary"], numbers.get("model_quantities", {}))
     found = _texts(numbers.get("warnings", {}).get("warning", []))
     if not files.listed:
         warning = f"{MANIFEST} is missing: nothing shows that the files belong together"
@@ -114,8 +114,8 @@ def _new_impact(files: _Files) -> Impact:
         found += (warning,)
     on_floor = None
     if "floor_summary" in numbers:
-        scalars, facts = numbers["floor_summary"], numbers.get("floor_facts", {})
-        moving, columns = _read_history(files, "floor_", scalars, facts)
+        scalars, own = numbers["floor_summary"], numbers.get("floor_model_quantities", {})
+        moving, columns = _read_history(files, "floor_", scalars, own)
         on_floor = FloorImpact(
             case=case,
             warnings=(),
@@ -130,20 +130,22 @@ def _new_impact(files: _Files) -> Impact:
 
 
 def _read_history(
-    files: _Files, prefix: str, scalars: Mapping[str, float], facts: Mapping[str, float]
+    files: _Files, prefix: str, scalars: Mapping[str, float], model_quantities: Mapping[str, float]
 ) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:
     """Return what the files of a history hold, and further columns of its forces."""
     force = _table(files.read(f"{prefix}force.csv"))
-    channels = f"{prefix}channels.csv"
-    found = _table(files.read(channels)) if channels in files else {}
+    further = f"{prefix}model_histories.csv"
+    found = _table(files.read(further)) if further in files else {}
     # Parts of the force stand before the whole one, further columns behind.
     columns = list(force)
     last = columns.index("floor_force_N")
     history = {
         **{name: force[column] for name, column in _OWN.items()},
-        "parts": {name[: -len("_N")]: force[name] for name in columns[len(_MOTION) : last - 1]},
-        "channels": {name: values for name, values in found.items() if name != "time_s"},
-        "facts": dict(facts),
+        "components": {
+            name[: -len("_N")]: force[name] for name in columns[len(_MOTION) : last - 1]
+        },
+        "model_histories": {name: values for name, values in found.items() if name != "time_s"},
+        "model_quantities": dict(model_quantities),
         "motion": _read_motion(files, prefix) if f"{prefix}snapshots.xmf" in files else None,
         **{name: scalars[name] for name in IMPACT_QUANTITIES},
     }

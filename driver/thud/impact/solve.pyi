@@ -80,7 +80,7 @@ class HuntCrossleyOptions(SamplingOptions, total=False):
 class TwoMassOptions(SamplingOptions, total=False):
     belt_mass: float
     inflation_pressure: float
-    area_growth: float
+    contact_width: float
     carcass_stiffness: float
     carcass_exponent: float
     contact_damping: float

@@ -166,7 +166,7 @@ def common_source(impacts: Mapping[str, Curve], source: LimitsSource | None = No
     Raises
     ------
     InputError
-        Where they differ in it.
+        If they differ in it.
     """
     if source is not None:
         return source

@@ -38,15 +38,11 @@ SEARCHED = (
 
 
 def average_estimates(estimates: Sequence[Estimate], *systematic: Contribution) -> Estimate:
-    """Return the mean of one quantity over drops.
+    """Return the mean of one quantity over drops, without unknown values.
 
-    Parameters
-    ----------
-    estimates
-        Value of each drop with the uncertainty that differs from drop to drop: its noise, which the
-        repeatability of two or more drops includes. Unknown values are left out.
-    systematic
-        Contributions that all drops share and an average does not reduce (calibration, height).
+    The uncertainty of each estimate is its noise, which the repeatability of two or more drops
+    includes; systematic contributions are shared by all drops, so that the average does not reduce
+    them (calibration, height).
     """
     known = [estimate for estimate in estimates if math.isfinite(estimate.value)]
     if not known:
@@ -68,15 +64,8 @@ def level_estimates(
 ) -> tuple[Estimate, ...]:
     """Return average levels with their budgets, dB, shape (n_band,).
 
-    Parameters
-    ----------
-    levels
-        Average over drops.
-    calibration
-        Relative standard uncertainty of the force; None if unknown.
-    plate : ndarray, shape (n_band,), optional
-        Standard uncertainty from the correction of the force plate, dB; zero if that of its
-        resonance is not stated.
+    The calibration is the relative standard uncertainty of the force, None if unknown; that of the
+    correction of the force plate is in dB, shape (n_band,), zero if not stated.
     """
     count = len(levels.names)
     parts = dict(levels.contributions)

@@ -25,6 +25,8 @@ MAX_IN_MEMORY = 2**27
 # Maximum number of characters of a library's message that are shown.
 MAX_SHOWN = 100
 MIB = 2**20
+# Minimum number of samples of a recording.
+MIN_SAMPLES = 8
 
 
 @dataclass(frozen=True, eq=False)

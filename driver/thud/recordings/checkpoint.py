@@ -103,13 +103,7 @@ class Checkpoint:
         return sorted(filter(is_regular, found))
 
     def add(self, start: int, drop: Drop) -> None:
-        """Store a drop by its first sample; it is on disk after some seconds.
-
-        Raises
-        ------
-        OSError
-            Where it cannot be written.
-        """
+        """Store a drop by its first sample; it is on disk after some seconds."""
         if self.folder is None:
             return
         self._new[start] = drop

@@ -143,18 +143,10 @@ def _spread(rate: float, plate: Plate | None) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """Posteriors of first touch and release, and the background before and after.
+    """Posteriors of first touch, and of release in reversed time, s from the first sample.
 
-    Attributes
-    ----------
-    touch, release : Posterior
-        First touch, and release in reversed time, s from the first sample of the window.
-    background : Background
-        The fitted noise.
-    offset : float
-        Median of the background, which was removed before, N.
-    limits : tuple of int
-        Stop index of the background before, and first index of that after the contact.
+    `limits` are the stop index of the background before, and the first index of that after the
+    contact; the offset, N, is the median of both, which was removed before.
     """
 
     touch: Posterior

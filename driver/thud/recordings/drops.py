@@ -62,22 +62,10 @@ MIN_RATE = 2_000.0
 class Window:
     """Section of a signal around one drop.
 
-    Attributes
-    ----------
-    name : str
-        Name of the drop, as ``"file.wav, drop 3"``.
-    signal : Signal
-        The signal, which is read when the force is requested.
-    start, stop : int
-        First and stop index of the section in the signal.
-    contact : tuple of int
-        First and stop index of the contact within the section, to about 1 ms.
-    bounces : tuple of Window
-        Windows of the later bounces, in order.
-    warnings : tuple of str
-        What may be wrong with the pulse as a whole.
-    plate : Plate, optional
-        The plate whose resonance was corrected in the signal.
+    The name is that of the drop, as ``"file.wav, drop 3"``; the signal is read when the force is
+    requested. First and stop index of the section are those in the signal, of the contact, to about
+    1 ms, those in the section. The bounces are the windows of later bounces, the warnings those of
+    the pulse as a whole, and the plate is the one whose resonance was corrected in the signal.
     """
 
     name: str
@@ -114,12 +102,8 @@ class _Pulse:
 def find_windows(signal: Signal, *, progress: bool = False) -> list[Window]:
     """Return the windows of the drops in a signal, in order.
 
-    The signal is read twice: in blocks for the search, then around each drop.
-
-    Raises
-    ------
-    InputError
-        Where there is no impact, or the rate is too low.
+    The signal is read twice: in blocks for the search, then around each drop. Raise InputError
+    where there is no impact, or the rate is too low.
     """
     rate, name = signal.sample_rate, signal.name
     if not rate >= MIN_RATE:

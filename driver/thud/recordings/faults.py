@@ -35,10 +35,7 @@ MAX_REPAIRED = 1e-3
 def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
     """Return the force with its dropouts filled, what was done, and warnings.
 
-    Raises
-    ------
-    InputError
-        Where the pulse is cut, clipped, doubled or has long dropouts.
+    Raise InputError where the pulse is cut, clipped, doubled or has long dropouts.
     """
     rate, (first, stop), name = window.sample_rate, window.contact, window.name
     minimum = min_background(rate)

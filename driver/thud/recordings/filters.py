@@ -49,28 +49,12 @@ def band_filters(bands: BandSet, sample_rate: float) -> NDArray[np.float64]:
 def filter_levels(
     force: ArrayLike, sample_rate: float, bands: BandSet = "octave"
 ) -> NDArray[np.float64]:
-    """Return the levels of a force record by filters of class 1, dB re 1 N and 1 s.
+    """Return the levels of a force by filters of class 1, dB re 1 N and 1 s, shape (n_band,).
 
-    Parameters
-    ----------
-    force : array_like, shape (n_sample,)
-        Force, N; zero before its first and after its last sample. The filters start at rest, which
-        is what silence of any length before the record leaves; after it they ring out.
-    sample_rate
-        Samples per second, Hz.
-    bands
-        ``"octave"`` (31.5 to 500 Hz) or ``"third"`` (25 to 630 Hz).
-
-    Returns
-    -------
-    ndarray, shape (n_band,)
-        Levels; NaN where the upper band edge is not below half the sample rate.
-
-    Raises
-    ------
-    InputError
-        Where the record is empty, zero throughout or not finite, or the rate or the bands are
-        invalid.
+    The force, N, shape (n_sample,), is zero before its first and after its last sample: the filters
+    start at rest and ring out. Levels are NaN where the upper band edge is not below half the
+    sample rate, Hz. Raise InputError where the record is empty, zero throughout or not finite, or
+    the rate or the bands are invalid.
     """
     record = require_real("force", require_array("force", force, dimensions=(1,)))
     if not np.isfinite(record).all() or not record.any():

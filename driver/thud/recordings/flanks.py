@@ -106,24 +106,11 @@ DELAY = np.concatenate([np.linspace(0, 0.5, 51), np.linspace(0.55, 4, 70)])
 
 @dataclass(frozen=True, eq=False)
 class Flank:
-    """The start of a pulse; the end of one is a flank in reversed time.
+    """The start of a pulse, or with `release` its end in reversed time.
 
-    Attributes
-    ----------
-    time : ndarray, shape (n_cell,)
-        Middles of the cells, s.
-    force : ndarray, shape (n_cell,)
-        Mean force of each cell, background removed, N.
-    covariance : ndarray, shape (n_cell, n_cell)
-        Covariance of their noise, N2.
-    peak : float
-        Peak force of the pulse, N.
-    interval : float
-        Sampling interval, s.
-    release : bool
-        Whether this is the end of a pulse.
-    plate : Plate, optional
-        The plate whose resonance was corrected.
+    Times are the middles of cells, s; force and covariance are those of their means without the
+    background, N and N2; the peak force is in N and the sampling interval in s. The resonance of
+    the plate, if any, was corrected.
     """
 
     time: NDArray[np.float64]
@@ -137,20 +124,11 @@ class Flank:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Posterior of the first touch of a flank.
+    """Posterior of the first touch of a flank, or with `release` of the end of a pulse.
 
-    Attributes
-    ----------
-    time : ndarray, shape (n_time,)
-        Uniform times of first touch, s.
-    kinds : ndarray, shape (n_kind,)
-        Possible kinds of the flank, as indices of `KINDS`.
-    weight : ndarray, shape (n_kind, n_time)
-        Probabilities of the times by kind.
-    factors : ndarray, shape (n_kind, n_time, n_column, n_column)
-        Factors of the information on the shapes; their last row is the data.
-    release : bool
-        Whether this is the end of a pulse.
+    `kinds` are indices of `KINDS`, and times are uniform, s. By kind and time it has probabilities,
+    [n_kind, n_time], and factors of the information on the shapes, whose last row is the data,
+    [n_kind, n_time, n_column, n_column].
     """
 
     time: NDArray[np.float64]

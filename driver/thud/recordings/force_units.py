@@ -124,16 +124,9 @@ def newtons_per_unit(
 ) -> tuple[float, str, float | None]:
     """Return N per unit of the values, its description, and its relative uncertainty or None.
 
-    Parameters
-    ----------
-    unit
-        Unit of the values, `ASSUMED`, or empty if the calibration is a number of N per value.
-    calibration
-        N per unit, a chain of factors, or None if the values are forces.
-    counts
-        Counts of full scale if the values are integers, else None.
-    place
-        File and channel, for messages.
+    The unit is that of the values, `ASSUMED`, or empty if the calibration is a number of N per
+    value; the calibration is None if the values are forces. `counts` are those of full scale if the
+    values are integers, and `place` is the file and channel for messages.
     """
     if unit == ASSUMED:
         return 1.0, "values assumed to be in N", None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from concurrent.futures import BrokenExecutor
-from contextlib import ExitStack, nullcontext
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -38,15 +38,7 @@ LONG = 600.0
 
 @dataclass(frozen=True)
 class Origin:
-    """Signal that drops come from.
-
-    Attributes
-    ----------
-    name, path, checksum, date, calibration, sample_rate, steps, warnings
-        As those of the `Signal`; the checksum is SHA-256.
-    drops : int
-        Number of drops.
-    """
+    """Signal that a number of drops come from; its attributes are those of `Signal`."""
 
     name: str
     path: str
@@ -71,32 +63,31 @@ def measure_signals(
     *,
     progress: bool = False,
     workers: int = 1,
-    keep: str | os.PathLike[str] | Checkpoint | None = None,
+    checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
 ) -> tuple[tuple[Drop, ...], tuple[Origin, ...], float | None]:
     """Return the drops of signals, their origins, and the relative uncertainty of the force.
 
     The uncertainty is the largest of all signals, None if it is unknown for one. The arguments are
-    those of `read_recording`.
-
-    Raises
-    ------
-    InputError
-        Where there are no signals, or a drop cannot be measured.
+    those of `read_recording`. Raise InputError where there are no signals, or a drop cannot be
+    measured.
     """
     drops: list[Drop] = []
     origins: list[Origin] = []
     uncertainties: list[float | None] = []
     # Threads slow down the many small products.
-    keeping = nullcontext(keep) if isinstance(keep, Checkpoint) else Checkpoint(keep)
-    with threadpool_limits(1, "blas"), keeping as kept, _Processes(workers) as processes:
-        for given in signals:
-            signal = given
+    if isinstance(checkpoint, Checkpoint):
+        opened: AbstractContextManager[Checkpoint] = nullcontext(checkpoint)
+    else:
+        opened = Checkpoint(checkpoint)
+    with threadpool_limits(1, "blas"), opened as stored, _Processes(workers) as processes:
+        for signal in signals:
             if config.calibration_uncertainty is not None:
-                signal = replace(given, calibration_uncertainty=config.calibration_uncertainty)
+                signal = replace(signal, calibration_uncertainty=config.calibration_uncertainty)  # noqa: PLW2901
             # Processes start while the signal is searched.
-            processes.start(worth=signal.path and signal.n_sample > LONG * signal.sample_rate)
+            if signal.path and signal.n_sample > LONG * signal.sample_rate:
+                processes.start()
             windows = find_windows(signal, progress=progress)
-            drops += _measure(windows, config, kept, processes, progress=progress)
+            drops += _measure(windows, config, stored, processes, progress=progress)
             uncertainties.append(signal.calibration_uncertainty)
             origins.append(Origin.of(signal, len(windows)))
     if not drops:
@@ -109,17 +100,18 @@ def measure_signals(
 def _measure(
     windows: Sequence[Window],
     config: Config,
-    kept: Checkpoint,
+    checkpoint: Checkpoint,
     processes: _Processes,
     *,
     progress: bool,
 ) -> list[Drop]:
     """Return the drops in the windows of one signal, including those of the checkpoint."""
     signal = windows[0].signal
-    found = kept.open(signal, config)
-    left = [window for window in windows if window.start not in found]
+    measured = checkpoint.open(signal, config)
+    left = [window for window in windows if window.start not in measured]
     # A signal in memory would be copied to the processes with each window.
-    processes.start(worth=signal.path and len(left) >= MIN_FOR_POOL)
+    if signal.path and len(left) >= MIN_FOR_POOL:
+        processes.start()
     call = partial(measure_window, config=config)
     results = processes.map(call, left) if signal.path else map(call, left)
     with tqdm(
@@ -127,23 +119,23 @@ def _measure(
         disable=not progress,
     ) as bar:  # fmt: skip
         for window, drop in zip(left, results, strict=True):
-            kept.add(window.start, drop)
-            found[window.start] = drop
+            checkpoint.add(window.start, drop)
+            measured[window.start] = drop
             bar.update()
-    return [found[window.start] for window in windows]
+    return [measured[window.start] for window in windows]
 
 
 class _Processes(ExitStack):
-    """Pool of processes that measure drops, started if it pays off; a context manager."""
+    """Pool of processes that measure drops; a context manager."""
 
     def __init__(self, workers: int) -> None:
         super().__init__()
         self.workers = workers
         self._pool: ProcessPoolExecutor | None = None
 
-    def start(self, *, worth: object) -> None:
-        """Start the processes if they pay off, without waiting for them."""
-        if not worth or self.workers < 2 or self._pool:  # noqa: PLR2004 - 1 is this process
+    def start(self) -> None:
+        """Start the processes, without waiting for them."""
+        if self.workers < 2 or self._pool:  # noqa: PLR2004 - 1 is this process
             return
         self._pool = self.enter_context(
             process_pool(self.workers, partial(threadpool_limits, 1, "blas"))

@@ -123,10 +123,7 @@ class Drop(Immutable):
 def measure_drop(window: Window, conditions: DropConditions) -> Drop:
     """Measure one drop in the window around it.
 
-    Raises
-    ------
-    InputError
-        Where the pulse is clipped, cut, doubled or full of dropouts.
+    Raise InputError where the pulse is clipped, cut, doubled or full of dropouts.
     """
     force, steps, warnings = repair(window)
     try:

@@ -48,14 +48,9 @@ TOLERANCE = 0.02
 class Noise:
     """Noise of a recording: white, pink and brown.
 
-    Attributes
-    ----------
-    deviation : float
-        Standard deviation of one sample, N.
-    source : str
-        ``"before and after"``, ``"before"`` or ``"after"``: the background that shows it.
-    white, pink, brown : float
-        One-sided spectral densities at 1 Hz, N2/Hz: constant, proportional to 1/f and to 1/f2.
+    The deviation is that of one sample, N. Densities at 1 Hz are one-sided, N2/Hz: constant,
+    proportional to 1/f and to 1/f2. The source is the background that shows them: ``"before and
+    after"``, ``"before"`` or ``"after"``.
     """
 
     deviation: float
@@ -123,17 +118,10 @@ def _waves(cells: Cells) -> NDArray[np.float64]:
 class Background(Immutable):
     """Background under the force, predicted linearly from cells next to the contact.
 
-    Attributes
-    ----------
-    cells : Cells
-        Begins and ends of the cells, s.
-    mean : ndarray, shape (n_cell,)
-        Their mean forces, N.
-    draws : ndarray, shape (n_draw, 5)
-        Draws of the variances: densities of white, pink and brown noise, N2/Hz, and variances of
-        hum of 50 and of 60 Hz, N2; one draw if they are known.
-    peak : float
-        Scale of the priors of offset and drift, N.
+    Begins and ends of the cells are in s, their mean forces in N, [n_cell]. The draws of the
+    variances, [n_draw, 5], are densities of white, pink and brown noise, N2/Hz, and variances of
+    hum of 50 and of 60 Hz, N2; a single draw if they are known. The peak force, N, scales the
+    priors of offset and drift.
     """
 
     cells: Cells
@@ -239,14 +227,8 @@ def covariances(cells: Cells) -> NDArray[np.float64]:
 def fit_background(cells: Cells, mean: NDArray[np.float64], peak: float) -> Background:
     """Return the background with variances drawn from their posterior.
 
-    Parameters
-    ----------
-    cells
-        Begins and ends of the cells, s from about the middle of the contact.
-    mean : ndarray, shape (n_cell,)
-        Mean force of each, N.
-    peak
-        Peak force, N.
+    Cells are given by begins and ends, s from about the middle of the contact, and their mean
+    forces, N, shape (n_cell,); the peak force is in N.
     """
     unit = covariances(cells)
     scale = np.array([np.mean(np.diagonal(unit[0])), 1.0, np.pi**2 * 0.02, 1.0, 1.0])

@@ -26,14 +26,8 @@ ROUNDING = 1e-9
 class Outlier:
     """A drop that differs from the others by more than chance: marked, never excluded.
 
-    Attributes
-    ----------
-    name, quantity : str
-        Name of the drop, and the quantity in which it differs.
-    value : float
-        Its value.
-    score, critical : float
-        Deviation from the mean in standard deviations, and the largest one that chance explains.
+    Name of the drop, quantity and value, deviation from the mean in standard deviations, and the
+    largest one that chance explains.
     """
 
     name: str
@@ -60,21 +54,10 @@ def find_outliers(
     """Return the drops whose value differs from that of the others.
 
     Grubbs' two-sided test, exact for three and more normal values; with ten or more values,
-    Rosner's generalization searches one outlier in five. A deviation within the expanded
-    uncertainty (1.96 times the standard one) of the value itself marks no drop.
-
-    Parameters
-    ----------
-    values : array_like, shape (n_drop,)
-        Values; those that are not finite are excluded.
-    names
-        Names of the drops.
-    quantity
-        Quantity, for the message.
-    uncertainty : array_like, shape (n_drop,), optional
-        Standard uncertainties of the values.
-    significance
-        Probability that a drop is marked if all differ by chance.
+    Rosner's generalization searches one outlier in five. The significance is the probability that a
+    drop is marked if all differ by chance. Values that are not finite are excluded, and a deviation
+    within the expanded uncertainty (1.96 times the standard one) of the value itself marks no drop.
+    Values and their standard uncertainties have the shape (n_drop,).
     """
     data = np.asarray(values, dtype=np.float64)
     own = np.zeros(data.shape) if uncertainty is None else np.nan_to_num(uncertainty)

@@ -41,14 +41,7 @@ RINGING = 2.0
 class Plate:
     """A force plate as a mass on a spring, whose deformation is measured.
 
-    Attributes
-    ----------
-    frequency : float
-        First resonance, Hz.
-    quality : float
-        Quality factor of the resonance.
-    frequency_uncertainty : float
-        Relative standard uncertainty of the resonance.
+    First resonance, Hz, its quality factor, and the relative standard uncertainty of the resonance.
     """
 
     frequency: float
@@ -98,16 +91,9 @@ class Plate:
 
 @dataclass(frozen=True)
 class PlateCheck:
-    """One demand on the force plate.
+    """A demand on the force plate, whether it is met, None if unknown, and the reason.
 
-    Attributes
-    ----------
-    demand : str
-        ``"flat above"`` (0.2 Hz), ``"flat below"`` (1000 Hz), ``"range"`` or ``"linear"``.
-    met : bool or None
-        Whether it is met; None if unknown.
-    sentence : str
-        Reason, with numbers.
+    Demands are ``"flat above"`` (0.2 Hz), ``"flat below"`` (1000 Hz), ``"range"`` and ``"linear"``.
     """
 
     demand: str
@@ -121,23 +107,9 @@ def correct_plate(
     """Return the force that was applied to a plate, N, shape (n_sample,), from the measured one.
 
     F = F_m + F_m' / (w0 Q) + F_m'' / w0**2, by the Fourier transform. Up to twice the resonance it
-    is exact; above, where it would only amplify noise, it falls to zero within an octave.
-
-    Parameters
-    ----------
-    force : ndarray, shape (n_sample,)
-        Measured force, N; background at both ends.
-    sample_rate
-        Samples per second, Hz.
-    plate
-        Resonance and quality factor.
-    bands
-        Bands of the levels of the force.
-
-    Raises
-    ------
-    InputError
-        Where the resonance is below 1.41 times the highest band edge.
+    is exact; above, where it would only amplify noise, it falls to zero within an octave. The
+    measured force, N, has background at both ends; the rate is in Hz. Raise InputError where the
+    resonance is below 1.41 times the highest edge of the bands of its levels.
     """
     edge = get_bands(bands).upper[-1]
     if plate.frequency < MIN_RATIO * edge:
@@ -164,10 +136,7 @@ def correct_plate(
 def correct_window(window: Window, plate: Plate) -> tuple[Window, tuple[str, ...], tuple[str, ...]]:
     """Return a window of the force that was applied to a plate, the processing, and warnings.
 
-    Raises
-    ------
-    InputError
-        Where the pulse is cut, clipped, doubled or has long dropouts.
+    Raise InputError where the pulse is cut, clipped, doubled or has long dropouts.
     """
     # Clipping and dropouts are faults of the recorded force; corrected, a dropout would ring.
     force, steps, warnings = repair(window)
@@ -211,16 +180,9 @@ def check_plate(
 ) -> tuple[PlateCheck, ...]:
     """Check a plate by the standard: flat from 0.2 to 1000 Hz, 0 to 5000 N, linear within 2 %.
 
-    Parameters
-    ----------
-    plate
-        Resonance, which is corrected; without it the upper frequency is unknown.
-    time_constant
-        Time constant of the amplifier, s (a charge amplifier's high-pass); infinite if static.
-    full_scale
-        Largest force that the plate and its recorder can read, N.
-    linearity : sequence of tuple
-        Forces applied and indicated, N.
+    The resonance of the plate is corrected; the time constant, s, is that of the amplifier (a
+    high-pass), infinite if static; full scale of plate and recorder is in N, and the linearity has
+    pairs of a force applied and the force indicated, N. What is not stated is unknown.
     """
     return (
         _check_low(time_constant),

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Peak forces of heavy/soft sources, N: from drops of some centimetres to the tyre on stiff floors.
+# Peak forces of heavy/soft sources, N: from drops of some centimeters to the tyre on stiff floors.
 PEAKS = (300.0, 15000.0)
 # Factor outside of these that no drop height explains.
 MAX_FACTOR = 20.0

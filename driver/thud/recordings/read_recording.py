@@ -37,7 +37,7 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     config: Config | str | os.PathLike[str] | None = None,
     progress: bool = False,
     workers: int = 1,
-    keep: str | os.PathLike[str] | Checkpoint | None = None,
+    checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
 ) -> Recording:
     """Measure recorded drops of one source, from files with one or more drops each.
 
@@ -66,7 +66,7 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     workers
         Processes that measure the drops of one file. Scripts with more than one need
         ``if __name__ == "__main__":``.
-    keep
+    checkpoint
         Directory of measured drops while others are measured, or a `Checkpoint`. After an interrupt
         the same call measures the remaining drops, if neither files nor configuration have changed.
         They are removed at the end, those of a `Checkpoint` when it is closed.
@@ -103,4 +103,6 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
             sample_rate=settings.sample_rate,
         )
     )
-    return Recording.from_signals(signals, settings, progress=progress, workers=workers, keep=keep)
+    return Recording.from_signals(
+        signals, settings, progress=progress, workers=workers, checkpoint=checkpoint
+    )

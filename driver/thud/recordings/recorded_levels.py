@@ -122,24 +122,9 @@ def measure_levels(
     """Return the levels of drops, corrected for the background, with their uncertainty.
 
     The force is zero outside the gate of each drop. ``"exact"`` is its band energy, ``"fft"`` the
-    sum of the 1 Hz bins of a window of 1 s, ``"filter"`` the energy after filters of class 1. The
-    expected energy of the noise is subtracted.
-
-    Parameters
-    ----------
-    drops
-        Drops of recordings.
-    bands
-        ``"octave"`` or ``"third"``.
-    method
-        ``"exact"``, ``"fft"`` or ``"filter"``.
-    low_pass
-        Low-pass the force at 1.25 kHz before, as in the paper.
-
-    Raises
-    ------
-    InputError
-        Where the method or the bands are not known.
+    sum of the 1 Hz bins of a window of 1 s, ``"filter"`` the energy after filters of class 1, each
+    after a low-pass at 1.25 kHz with `low_pass`, as in the paper. The expected energy of the noise
+    is subtracted. Raise InputError where the method or the bands are unknown.
     """
     require_choice("method", method, METHODS)
     noise = band_noise(drops, get_bands(bands))
@@ -184,10 +169,7 @@ def compare_methods(
 def average_levels(estimates: Sequence[DropLevels]) -> AverageLevels:
     """Return the energy average of the levels of drops, their spread and their outliers.
 
-    Raises
-    ------
-    InputError
-        Where there are no drops, or their bands or methods differ.
+    Raise InputError where there are no drops, or their bands or methods differ.
     """
     if len({(e.bands, e.method) for e in estimates}) != 1:
         refuse("the drops differ in bands or method, or there are none", "levels of one kind")

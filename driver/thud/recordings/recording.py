@@ -135,7 +135,7 @@ class Recording(Displayed):
         *,
         progress: bool = False,
         workers: int = 1,
-        keep: str | os.PathLike[str] | Checkpoint | None = None,
+        checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     ) -> Recording:
         """Measure the drops of signals; other arguments as for `read_recording`.
 
@@ -145,7 +145,11 @@ class Recording(Displayed):
             Where a drop cannot be measured.
         """
         drops, origins, uncertainty = measure_signals(
-            signals, checked_config(config), progress=progress, workers=workers, keep=keep
+            signals,
+            checked_config(config),
+            progress=progress,
+            workers=workers,
+            checkpoint=checkpoint,
         )
         name = Path(origins[0].path or origins[0].name).stem
         return cls(name, drops, origins, config, uncertainty)

@@ -93,19 +93,7 @@ class Signal(Immutable):
     def read(self, start: int, stop: int) -> NDArray[np.float64]:
         """Return the force of the samples from start to before stop, N, positive in compression.
 
-        Parameters
-        ----------
-        start, stop
-            Numbers of samples, 0 to `n_sample`.
-
-        Returns
-        -------
-        ndarray, shape (stop - start,)
-
-        Raises
-        ------
-        InputError
-            Where the file has changed, is damaged, or holds values that are not finite.
+        Raise InputError where the file has changed, is damaged, or holds non-finite values.
         """
         if not 0 <= start <= stop <= self.n_sample:
             refuse(f"{self.name}: samples {start} to {stop}", f"samples 0 to {self.n_sample}")

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse, require_choice, require_kind, require_number, shown
-from thud.recordings.channel import MIB, Channel, shown_path, shown_text
+from thud.recordings.channel import MIB, MIN_SAMPLES, Channel, shown_path, shown_text
 from thud.recordings.force_units import (
     ALLOWED,
     ASSUMED,
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 # Minimum and maximum sample rate, Hz: the octave of 500 Hz needs 1.42 kHz and a filter.
 RATES = (2500.0, 1e8)
-MIN_SAMPLES = 8
 # Minimum stored fraction of a file, which else is sparse, and maximum number of inspected pieces.
 MIN_STORED = 0.01
 MAX_PIECES = 1000

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from thud.base.checks import refuse
+from thud.recordings.channel import MIN_SAMPLES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,23 +21,12 @@ ROUNDED_TOLERANCE = 0.25
 MAX_COUNTED = 2**16
 # Significant decimal digits of a float.
 FLOAT_DIGITS = 17
-# Minimum number of samples of a record, and maximum force, N: its square is finite.
-MIN_ROWS = 8
+# Maximum force, N: its square is finite.
 MAX_FORCE = 1e12
 
 
 class Record(NamedTuple):
-    """A force over time.
-
-    Attributes
-    ----------
-    time : ndarray, shape (n_sample,)
-        Time, s, uniformly spaced.
-    force : ndarray, shape (n_sample,)
-        Force, N.
-    sample_rate : float
-        Samples per second, Hz.
-    """
+    """A force, N, over uniformly spaced times, s, both of shape (n_sample,), and its rate, Hz."""
 
     time: NDArray[np.float64]
     force: NDArray[np.float64]
@@ -47,12 +37,8 @@ def uniform_grid(time: NDArray[np.float64], name: str) -> tuple[float, float, tu
     """Return start and step, s, of the uniform grid that fits times best, and notes.
 
     Times, s, shape (n_sample,), may miss it by their rounding to the last written digit: at
-    44.1 kHz, the sixth decimal is a twentieth of a step.
-
-    Raises
-    ------
-    InputError
-        Names the time off the grid, or the step that is not allowed.
+    44.1 kHz, the sixth decimal is a twentieth of a step. Raise InputError with the time off the
+    grid, or the step that is not allowed.
     """
     if not np.isfinite(time).all():
         refuse(f"{name}: a time is not finite", "real numbers, s")
@@ -102,17 +88,14 @@ def last_digit(time: NDArray[np.float64]) -> float:
 def read_record(table: NDArray[np.float64], name: str = "record") -> Record:
     """Return the record of a table with the columns time, s, and force, N.
 
-    Raises
-    ------
-    InputError
-        Where it has fewer than eight samples, times that are not uniformly spaced, or a force that
-        is not mainly positive.
+    Raise InputError where it has fewer than eight samples, times that are not uniformly spaced, or
+    a force that is not mainly positive.
     """
     rows, columns = table.shape
-    if rows < MIN_ROWS or columns != 2:  # noqa: PLR2004 - time and force
+    if rows < MIN_SAMPLES or columns != 2:  # noqa: PLR2004 - time and force
         refuse(
             f"{name}: {rows} rows of {columns} numbers",
-            f"{MIN_ROWS} rows or more of time, s, and force, N",
+            f"{MIN_SAMPLES} rows or more of time, s, and force, N",
         )
     if not np.isfinite(table).all():
         refuse(f"{name}: a value is not finite", "real numbers")

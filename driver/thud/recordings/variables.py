@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.checks import refuse
-from thud.recordings.channel import Channel
+from thud.recordings.channel import MIN_SAMPLES, Channel
 from thud.recordings.header_aliases import (
     DATE,
     TIME_UNITS,
@@ -25,9 +25,8 @@ from thud.recordings.uniform_grid import uniform_grid
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Maximum number of columns of a matrix of channels, and minimum number of samples.
+# Maximum number of columns of a matrix of channels.
 MAX_COLUMNS = 256
-MIN_SAMPLES = 8
 
 
 def channels_of_variables(values: dict[str, NDArray[np.generic]], name: str) -> list[Channel]:

@@ -186,7 +186,7 @@ def read_history(
     Raises
     ------
     InputError
-        Where a report cannot be read or has no date, or the balls differ.
+        If a report cannot be read or has no date, or the balls differ.
     """
     files = list(dict.fromkeys(file for path in paths for file in _files(Path(path))))
     if not files:
@@ -210,7 +210,7 @@ def _require_same(
     *,
     different_balls: bool,
 ) -> None:
-    """Raise InputError where a report is not of the source, or the ball, of the first."""
+    """Raise InputError if a report is not of the source, or the ball, of the first."""
     one, other = ([c["name"] for c in r["criteria"]] for r in (report, first))
     if report["source"] != first["source"] or one != other:
         what = f"{file}: its source {report['source']!r} or its criteria are not those of {origin}"

@@ -43,14 +43,14 @@ def write_report(
     Raises
     ------
     InputError
-        Where a file is in the way.
+        If a file is in the way.
     OSError
-        Where a file cannot be written.
+        If a file cannot be written.
 
     Warns
     -----
     ReportWarning
-        Where WeasyPrint is missing, so that there is no PDF, or a font for some letters; and
+        If WeasyPrint is missing, so that there is no PDF, or a font for some letters; and
         where the report of another recording is replaced.
     """
     # SciPy takes its time.

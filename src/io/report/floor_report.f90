@@ -9,7 +9,7 @@ module thud_floor_report
    use thud_kinds, only: wp
    use thud_quantities, only: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
       sample_quantity_count
-   use thud_report, only: get_fact_group, get_force_csv, get_quantity_lines, line
+   use thud_report, only: get_model_quantities, get_force_csv, get_quantity_lines, line
    use thud_table, only: is_peak_of_other
    use thud_text, only: fixed, flush_right, newline, padded, to_text
    implicit none (type, external)
@@ -80,7 +80,7 @@ contains
 
       text = newline//'&floor_summary'//newline//get_quantity_lines(contact)//line('floor_work', &
          to_text(contact%floor_work), 'J')//'/'//newline
-      if (size(contact%fact) > 0) text = text//newline//get_fact_group('floor_facts', contact)
+      if (size(contact%model_quantity) > 0) text = text//newline//get_model_quantities('floor_model_quantities', contact)
    end subroutine get_floor_summary
 
    !> The drop on the floor beside the blocked one.

@@ -13,7 +13,7 @@ module thud_report
    implicit none (type, external)
    private
 
-   public :: get_channels_csv, get_fact_group, get_force_csv, get_levels_csv, get_quantity_lines
+   public :: get_model_histories_csv, get_model_quantities, get_force_csv, get_levels_csv, get_quantity_lines
    public :: get_summary, get_word, line
 
 contains
@@ -31,45 +31,45 @@ contains
       real(wp), allocatable :: values(:, :)
       integer :: n_part, n_own, i
 
-      n_part = size(history%part_name)
+      n_part = size(history%component_name)
       n_own = n_part + 4
       header = 'time_s,deflection_m,velocity_m_per_s'
       do i = 1, n_part
-         header = header//','//trim(history%part_name(i))//'_N'
+         header = header//','//trim(history%component_name(i))//'_N'
       end do
       header = header//',elastic_force_N,floor_force_N'
       if (present(names)) then
          do i = 1, size(names)
             header = header//','//trim(names(i))
          end do
-         allocate (values(size(history%part, 1), n_own + size(names)))
+         allocate (values(size(history%component, 1), n_own + size(names)))
          values(:, n_own + 1:) = columns
       else
-         allocate (values(size(history%part, 1), n_own))
+         allocate (values(size(history%component, 1), n_own))
       end if
       values(:, 1) = history%deflection
       values(:, 2) = history%velocity
-      values(:, 3:n_part + 2) = history%part
+      values(:, 3:n_part + 2) = history%component
       values(:, n_part + 3) = history%elastic_force
       values(:, n_own) = history%floor_force
       text = get_history_csv(header, get_times(history), values)
    end function get_force_csv
 
-   !> Channels of the model against time.
-   function get_channels_csv(history) result(text)
-      !> The history, with channels.
+   !> Further quantities of the model against time.
+   function get_model_histories_csv(history) result(text)
+      !> The history, with such quantities.
       type(force_history_type), intent(in) :: history
-      !> Text of `channels.csv`.
+      !> Text of `model_histories.csv`.
       character(len=:), allocatable :: text
       character(len=:), allocatable :: header
       integer :: i
 
       header = 'time_s'
-      do i = 1, size(history%channel_name)
-         header = header//','//trim(history%channel_name(i))
+      do i = 1, size(history%model_history_name)
+         header = header//','//trim(history%model_history_name(i))
       end do
-      text = get_history_csv(header, get_times(history), history%channel)
-   end function get_channels_csv
+      text = get_history_csv(header, get_times(history), history%model_history)
+   end function get_model_histories_csv
 
    !> Times of the samples, s: [n_time].
    pure function get_times(history) result(times)
@@ -120,7 +120,8 @@ contains
 
       text = '! thud '//version//': results of case '//trim(case%name)//', SI units, levels in dB re 1 N'//newline &
          //newline//'&summary'//newline//line('case', quoted(case%name), '')//line('model', quoted(case%model), '') &
-         //get_quantity_lines(history)//'/'//newline//newline//get_fact_group('facts', history)//warning_group(warning) &
+         //get_quantity_lines(history)//'/'//newline//newline//get_model_quantities('model_quantities', history) &
+         //warning_group(warning) &
          //'&verdict'//newline &
          //line('source', quoted(case%source), '') &
          //line('level_method', quoted(case%level_method), '') &
@@ -151,7 +152,7 @@ contains
    end function get_quantity_lines
 
    !> Numbers that the model chose or found as a namelist group.
-   function get_fact_group(name, history) result(text)
+   function get_model_quantities(name, history) result(text)
       !> Name of the group.
       character(len=*), intent(in) :: name
       type(force_history_type), intent(in) :: history
@@ -160,13 +161,14 @@ contains
       integer :: i
 
       text = ''
-      if (size(history%fact) == 0) return
+      if (size(history%model_quantity) == 0) return
       text = '&'//name//newline
-      do i = 1, size(history%fact_name)
-         text = text//line(trim(history%fact_name(i)), to_text(history%fact(i)), trim(history%fact_unit(i)))
+      do i = 1, size(history%model_quantity_name)
+         text = text//line(trim(history%model_quantity_name(i)), to_text(history%model_quantity(i)), &
+            trim(history%model_quantity_unit(i)))
       end do
       text = text//'/'//newline//newline
-   end function get_fact_group
+   end function get_model_quantities
 
    !> Warnings as a namelist group.
    function warning_group(warning) result(text)

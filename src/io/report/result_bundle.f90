@@ -13,7 +13,7 @@ module thud_result_bundle
    implicit none (type, external)
    private
 
-   public :: add_compression, add_history, add_warnings, add_results, add_room_level
+   public :: add_compression, add_history, add_results, add_room_level, add_warnings
 
 contains
 
@@ -58,8 +58,8 @@ contains
       do i = 1, history_quantity_count
          call bundle%add_number(prefix//'quantities.'//quantities(i)%name, values(i))
       end do
-      do i = 1, size(history%fact)
-         call bundle%add_number(prefix//'facts.'//history%fact_name(i), history%fact(i))
+      do i = 1, size(history%model_quantity)
+         call bundle%add_number(prefix//'model_quantities.'//history%model_quantity_name(i), history%model_quantity(i))
       end do
       call bundle%add_array(prefix//'samples.deflection', n, history%deflection)
       call bundle%add_array(prefix//'samples.velocity', n, history%velocity)
@@ -70,12 +70,12 @@ contains
          call bundle%add_array(prefix//'floor.floor_velocity', n, history%floor_velocity)
          call bundle%add_number(prefix//'floor.floor_work', history%floor_work)
       end if
-      do i = 1, size(history%part_name)
-         call bundle%add_array(prefix//'parts.'//history%part_name(i), n, history%part(:, i))
+      do i = 1, size(history%component_name)
+         call bundle%add_array(prefix//'components.'//history%component_name(i), n, history%component(:, i))
       end do
-      if (allocated(history%channel)) then
-         do i = 1, size(history%channel_name)
-            call bundle%add_array(prefix//'channels.'//history%channel_name(i), n, history%channel(:, i))
+      if (allocated(history%model_history)) then
+         do i = 1, size(history%model_history_name)
+            call bundle%add_array(prefix//'model_histories.'//history%model_history_name(i), n, history%model_history(:, i))
          end do
       end if
       associate (motion => history%motion, n_frame => history%motion%n_frame)

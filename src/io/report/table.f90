@@ -15,7 +15,7 @@ module thud_table
    implicit none (type, external)
    private
 
-   public :: get_defaults_line, get_compression_table, get_force_title, get_modes_table, get_span_row, get_table
+   public :: get_compression_table, get_defaults_line, get_force_title, get_modes_table, get_span_row, get_table
    public :: is_peak_of_other
 
 contains
@@ -55,7 +55,7 @@ contains
             if (is_peak_of_other(quantities(i), case)) cycle
             text = text//quantity_row(quantities(i), values(i))
          end do
-         text = text//facts(history)//newline
+         text = text//model_quantity_rows(history)//newline
          text = text//'  The source '//trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
             //' to the limits of the '//replaced(trim(case%source), '_', ' ')//': it meets ' &
             //to_text(count(conforms(criteria)))//' of '//to_text(size(criteria))//' criteria.'//newline &
@@ -196,7 +196,7 @@ contains
    end function get_span_row
 
    !> Numbers that the model chose or found, as rows.
-   function facts(history) result(rows)
+   function model_quantity_rows(history) result(rows)
       type(force_history_type), intent(in) :: history
       character(len=:), allocatable :: rows
       character(len=*), parameter :: prefixes(-3:3) = ['n', 'u', 'm', ' ', 'k', 'M', 'G']
@@ -204,15 +204,15 @@ contains
       integer :: i, power
 
       rows = ''
-      do i = 1, size(history%fact_name)
+      do i = 1, size(history%model_quantity_name)
          power = 0
-         if (history%fact_unit(i) /= '') power = floor(log10(max(abs(history%fact(i)), tiny(1.0_wp)))/3)
+         if (history%model_quantity_unit(i) /= '') power = floor(log10(max(abs(history%model_quantity(i)), tiny(1.0_wp)))/3)
          if (abs(power) > 3) power = 0
          scale = 10.0_wp**(-3*power)
-         rows = rows//row(replaced(trim(history%fact_name(i)), '_', ' '), history%fact(i)*scale, 3, &
-            trim(adjustl(prefixes(power)//history%fact_unit(i))))
+         rows = rows//row(replaced(trim(history%model_quantity_name(i)), '_', ' '), history%model_quantity(i)*scale, 3, &
+            trim(adjustl(prefixes(power)//history%model_quantity_unit(i))))
       end do
-   end function facts
+   end function model_quantity_rows
 
    !> A limit with up to three decimals and no trailing zeros.
    pure function short(value) result(text)

@@ -23,7 +23,7 @@ module thud_impact_record
    !> Maximum error of the impulse of the record, over the change of momentum.
    real(wp), parameter :: max_impulse_residual = 1.0e-8_wp
 
-   !> Columns of the channels.
+   !> Columns of the further quantities.
    integer, parameter :: at_radius = 1, at_pressure = 2, at_kinetic = 3, at_gravity = 6, at_floor = 11
 
 contains
@@ -39,16 +39,16 @@ contains
 
       history = new_force_history(sampling%sample_rate, get_sample_count(sampling), ['contact_force'])
       history%impact_velocity = impact_velocity
-      history%channel_name = [character(len=24) :: 'contact_radius_m', 'cavity_pressure_Pa', 'kinetic_energy_J', &
+      history%model_history_name = [character(len=24) :: 'contact_radius_m', 'cavity_pressure_Pa', 'kinetic_energy_J', &
          'strain_energy_J', 'gas_energy_J', 'gravity_energy_J', 'contact_energy_J', 'friction_energy_J', &
          'dissipated_energy_J', 'minimum_volume_ratio']
       if (present(receiver)) then
          if (.not. is_rigid(receiver)) then
-            history%channel_name = [history%channel_name, [character(len=24) :: 'floor_energy_J']]
+            history%model_history_name = [history%model_history_name, [character(len=24) :: 'floor_energy_J']]
             allocate (history%floor_displacement, history%floor_velocity, mold=history%floor_force)
          end if
       end if
-      allocate (history%channel(size(history%floor_force), size(history%channel_name)), source=0.0_wp)
+      allocate (history%model_history(size(history%floor_force), size(history%model_history_name)), source=0.0_wp)
    end function new_impact_record
 
    !> Writes one sample of everything but the force.
@@ -64,14 +64,14 @@ contains
       history%deflection(i) = start - get_mean_height(run)
       history%velocity(i) = -get_mean_velocity(run)
       associate (r => run%position(:, ubound(run%position, 2), 1))
-         history%channel(i, at_radius) = maxval(r, mask=run%floor_force(:, 2) > 0.0_wp)
-         if (.not. any(run%floor_force(:, 2) > 0.0_wp)) history%channel(i, at_radius) = 0.0_wp
+         history%model_history(i, at_radius) = maxval(r, mask=run%floor_force(:, 2) > 0.0_wp)
+         if (.not. any(run%floor_force(:, 2) > 0.0_wp)) history%model_history(i, at_radius) = 0.0_wp
       end associate
-      history%channel(i, at_pressure:at_floor - 1) = [run%state%gas_pressure, run%kinetic, run%state%strain_energy, &
+      history%model_history(i, at_pressure:at_floor - 1) = [run%state%gas_pressure, run%kinetic, run%state%strain_energy, &
          run%state%gas_energy, run%potential, run%contact_energy + run%contact_loss, run%friction_loss, run%dissipated, &
          run%state%min_jacobian]
       if (.not. run%floor%moves) return
-      history%channel(i, at_floor) = run%floor%work
+      history%model_history(i, at_floor) = run%floor%work
       history%floor_displacement(i) = run%floor%displacement
       ! That of the direct mobility follows from the sampled force, when it is known.
       history%floor_velocity(i) = run%floor%velocity
@@ -97,12 +97,12 @@ contains
             time = min(time, (i - last)/history%sample_rate)
             speed = upwards - run%gravity*time
             rise = first + (upwards - run%gravity*time/2)*time
-            history%channel(i, :) = history%channel(last, :)
-            history%channel(i, at_kinetic) = history%channel(last, at_kinetic) + mass/2*(speed**2 - upwards**2)
+            history%model_history(i, :) = history%model_history(last, :)
+            history%model_history(i, at_kinetic) = history%model_history(last, at_kinetic) + mass/2*(speed**2 - upwards**2)
          end associate
          history%velocity(i) = -speed
          history%deflection(i) = -rise
-         history%channel(i, at_gravity) = mass*run%gravity*(start + rise)
+         history%model_history(i, at_gravity) = mass*run%gravity*(start + rise)
       end do
       if (run%floor%moves) call continue_freely(run%floor, run%time, history%sample_rate, last + 1, &
          history%floor_displacement, history%floor_velocity)
@@ -128,7 +128,7 @@ contains
          history%deflection = history%deflection - history%floor_displacement
          history%velocity = history%velocity - history%floor_velocity
       end if
-      history%part(:, 1) = history%floor_force
+      history%component(:, 1) = history%floor_force
       history%elastic_force = history%floor_force
       ! Nodes that touch one by one make spikes, the higher the shorter the steps.
       call get_low_pass(history%floor_force, history%sample_rate, recorded_band, recorded)
@@ -137,10 +137,11 @@ contains
       call continue_to_zero(history)
       history%max_deflection = maxval(history%deflection)
       associate (material => run%body%material)
-         history%fact_name = [character(len=24) :: 'shear_modulus', 'bulk_modulus', 'simulated_time', 'minimum_step', &
-            'maximum_penetration']
-         history%fact_unit = [character(len=8) :: 'Pa', 'Pa', 's', 's', 'm']
-         history%fact = [material%shear_modulus, material%bulk_modulus, run%time, run%shortest_interval, run%penetration]
+         history%model_quantity_name = [character(len=24) :: 'shear_modulus', 'bulk_modulus', 'simulated_time', &
+            'minimum_step', 'maximum_penetration']
+         history%model_quantity_unit = [character(len=8) :: 'Pa', 'Pa', 's', 's', 'm']
+         history%model_quantity = [material%shear_modulus, material%bulk_modulus, run%time, run%shortest_interval, &
+            run%penetration]
       end associate
       gain = ball%mass*(get_mean_velocity(run) + speed + run%gravity*run%time)
       history%impulse_residual = abs(sum(history%floor_force)/history%sample_rate - gain)/gain

@@ -16,7 +16,7 @@ module thud_hollow_sphere
    use thud_single_mass, only: at_deflection, at_impulse, at_loss, at_velocity, single_mass_type
    use thud_source_model, only: source_model_type
    use thud_text, only: fixed, join_quoted, quoted, to_text
-   use thud_theory_limit, only: get_gravity_limit, get_wall_limits, theory_limit_type
+   use thud_validity_limit, only: get_gravity_limit, get_wall_limits, validity_limit_type
    implicit none (type, external)
    private
 
@@ -32,7 +32,7 @@ module thud_hollow_sphere
       procedure, pass(options) :: get_fields
       procedure, pass(options) :: solve => solve_hollow_sphere
       procedure, pass(options) :: get_paper_modulus
-      procedure, pass(options) :: get_theory_limits
+      procedure, pass(options) :: get_validity_limits
       procedure, pass(options) :: compress
    end type hollow_sphere_type
 
@@ -86,18 +86,18 @@ contains
    end function get_paper_modulus
 
    !> Limits of shell theory, of a wall that stays near the sphere, and of a contact without gravity.
-   function get_theory_limits(ball, drop, options, sampling, history) result(limits)
+   function get_validity_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
       class(hollow_sphere_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(force_history_type), intent(in) :: history
-      type(theory_limit_type), allocatable :: limits(:)
+      type(validity_limit_type), allocatable :: limits(:)
 
-      limits = [theory_limit_type('ball', 'wall_thickness over outer_radius', ball%wall_thickness/ball%outer_radius, &
+      limits = [validity_limit_type('ball', 'wall_thickness over outer_radius', ball%wall_thickness/ball%outer_radius, &
          highest=0.4_wp, reason="shells are thin; the paper's ball has 0.36"), &
          get_wall_limits(ball, history), get_gravity_limit(drop, history)]
-   end function get_theory_limits
+   end function get_validity_limits
 
    !> Force on each of two plates in a quasi-static compression: each flattens a cap of half their approach.
    subroutine compress(ball, options, deflection, force, error)

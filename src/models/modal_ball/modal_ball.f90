@@ -27,7 +27,7 @@ module thud_modal_ball
    use thud_sphere_modes, only: basis_type, family_type, get_family, get_static_family, new_basis
    use thud_surface_rings, only: new_surface_rings, outermost_angle, surface_rings_type
    use thud_text, only: to_text
-   use thud_theory_limit, only: get_gravity_limit, get_wall_limits, theory_limit_type
+   use thud_validity_limit, only: get_gravity_limit, get_wall_limits, validity_limit_type
    implicit none (type, external)
    private
 
@@ -39,7 +39,7 @@ module thud_modal_ball
    !> Fraction of the energy at first touch that closing gaps within a step may take.
    real(wp), parameter :: max_contact_loss = 0.02_wp
 
-   !> Families whose energies are separate channels, from n = 0 on.
+   !> Families whose energies are recorded separately, from n = 0 on.
    integer, parameter :: n_family = 6
 
    !> The model.
@@ -49,7 +49,7 @@ module thud_modal_ball
       procedure, pass(options) :: compress
       procedure, pass(options) :: get_cost
       procedure, pass(options) :: get_paper_modulus
-      procedure, pass(options) :: get_theory_limits
+      procedure, pass(options) :: get_validity_limits
    end type modal_ball_type
 
 contains
@@ -86,31 +86,31 @@ contains
 
    !> Limits of linear modes, and of what rings and harmonics resolve: beyond them the octave of 500 Hz is off by more than
    !> about 0.5 dB (docs/modal_ball.md).
-   function get_theory_limits(ball, drop, options, sampling, history) result(limits)
+   function get_validity_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
       class(modal_ball_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(force_history_type), intent(in) :: history
-      type(theory_limit_type), allocatable :: limits(:)
+      type(validity_limit_type), allocatable :: limits(:)
       real(wp) :: angle
 
-      angle = asin(min(1.0_wp, maxval(history%channel(:, 1))/ball%outer_radius))
+      angle = asin(min(1.0_wp, maxval(history%model_history(:, 1))/ball%outer_radius))
       limits = [get_wall_limits(ball, history), &
-         theory_limit_type('sampling', 'sample_rate in Hz times substeps', &
+         validity_limit_type('sampling', 'sample_rate in Hz times substeps', &
          sampling%sample_rate*real(sampling%substeps, wp), lowest=16000.0_wp, &
          reason='longer steps leave fast modes out'), &
-         theory_limit_type('modal_ball', 'radial_modes', real(options%radial_modes, wp), lowest=5.0_wp, &
+         validity_limit_type('modal_ball', 'radial_modes', real(options%radial_modes, wp), lowest=5.0_wp, &
          reason='with fewer the level at 500 Hz is off, by up to 13 dB'), &
-         theory_limit_type('modal_ball', 'rings in contact', angle/outermost_angle*options%rings, lowest=14.0_wp, &
+         validity_limit_type('modal_ball', 'rings in contact', angle/outermost_angle*options%rings, lowest=14.0_wp, &
          reason='fewer rings do not resolve the contact'), &
-         theory_limit_type('modal_ball', 'harmonics times the angle of the contact', options%harmonics*angle, &
+         validity_limit_type('modal_ball', 'harmonics times the angle of the contact', options%harmonics*angle, &
          lowest=11.0_wp, reason='fewer harmonics do not resolve the contact'), &
-         theory_limit_type('modal_ball', 'harmonics times wall_thickness over outer_radius', &
+         validity_limit_type('modal_ball', 'harmonics times wall_thickness over outer_radius', &
          options%harmonics*ball%wall_thickness/ball%outer_radius, lowest=2.0_wp, &
          reason='fewer harmonics do not resolve a wall so thin')]
       if (.not. options%contact_gravity) limits = [limits, get_gravity_limit(drop, history)]
-   end function get_theory_limits
+   end function get_validity_limits
 
    !> Force on each of two plates in a quasi-static compression.
    subroutine compress(ball, options, deflection, force, error)
@@ -146,9 +146,9 @@ contains
       interval = 1/(sampling%sample_rate*real(sampling%substeps, wp))
       history = new_force_history(sampling%sample_rate, n_sample, ['contact_force'])
       history%impact_velocity = get_impact_velocity(drop)
-      history%channel_name = [character(len=24) :: 'contact_radius_m', ('energy_n'//to_text(i)//'_J', i=0, n_family - 1), &
-         'energy_rest_J']
-      allocate (history%channel(n_sample, n_family + 2), source=0.0_wp)
+      history%model_history_name = [character(len=24) :: 'contact_radius_m', ('energy_n'//to_text(i)//'_J', &
+         i=0, n_family - 1), 'energy_rest_J']
+      allocate (history%model_history(n_sample, n_family + 2), source=0.0_wp)
       call use_one_blas_thread()
       rings = new_surface_rings(options%rings, options%static_harmonics, options%floor_friction == 'stick')
       call prepare(ball, options, rings, floor, interval, step, contact, error)
@@ -202,7 +202,6 @@ contains
       !> Modes.
       class(modal_ball_options_type), intent(in) :: options
       type(surface_rings_type), intent(in) :: rings
-      !> Length of a step, s.
       real(wp), intent(in) :: interval
       !> Gets frequencies, harmonics and shapes of the modes.
       type(mode_step_type), intent(inout) :: step
@@ -254,7 +253,6 @@ contains
    subroutine march(ball, sampling, interval, rings, step, contact, state, history, error)
       type(ball_type), intent(in) :: ball
       type(sampling_type), intent(in) :: sampling
-      !> Length of a step, s.
       real(wp), intent(in) :: interval
       type(surface_rings_type), intent(in) :: rings
       type(mode_step_type), intent(in) :: step
@@ -283,8 +281,8 @@ contains
             if (contact%last > 0) then
                last = n_step
                history%impulse = history%impulse + impulse
-               history%part(i, 1) = history%part(i, 1) + impulse*sampling%sample_rate
-               history%channel(i, 1) = max(history%channel(i, 1), ball%outer_radius*rings%radius(contact%last))
+               history%component(i, 1) = history%component(i, 1) + impulse*sampling%sample_rate
+               history%model_history(i, 1) = max(history%model_history(i, 1), ball%outer_radius*rings%radius(contact%last))
             end if
             if (contact%last == size(rings%radius)) then
                error = numerical_error('&drop: '//to_text(1.0e3_wp*n_step*interval)//' ms after first touch the ball lies ' &
@@ -350,8 +348,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: energy, gain, initial
 
-      history%elastic_force = history%part(:, 1)
-      history%floor_force = history%part(:, 1)
+      history%elastic_force = history%component(:, 1)
+      history%floor_force = history%component(:, 1)
       history%peak_force = maxval(history%floor_force)
       history%peak_elastic_force = history%peak_force
       call continue_to_zero(history)
@@ -360,9 +358,9 @@ contains
       gain = ball%mass*(history%impact_velocity + state%speed + state%gravity*time)
       history%impulse_residual = abs(history%impulse - gain)/gain
       history%floor_work = state%floor_work
-      history%fact_name = [character(len=len(history%fact_name)) :: 'contact_loss']
-      history%fact_unit = [character(len=len(history%fact_unit)) :: 'J']
-      history%fact = [state%contact_loss]
+      history%model_quantity_name = [character(len=len(history%model_quantity_name)) :: 'contact_loss']
+      history%model_quantity_unit = [character(len=len(history%model_quantity_unit)) :: 'J']
+      history%model_quantity = [state%contact_loss]
       initial = ball%mass/2*history%impact_velocity**2
       energy = ball%mass*(state%speed**2/2 + state%gravity*(state%height - ball%outer_radius)) &
          + sum(get_energies(step, state%motion)) + state%loss + state%contact_loss + state%floor_work
@@ -396,7 +394,7 @@ contains
       history%max_deflection = max(history%max_deflection, history%deflection(i))
       do k = 1, size(energy)
          column = 2 + min(step%harmonic(k), n_family)
-         history%channel(i, column) = history%channel(i, column) + energy(k)
+         history%model_history(i, column) = history%model_history(i, column) + energy(k)
       end do
    end subroutine record_motion
 

@@ -20,19 +20,10 @@ HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 class Format(NamedTuple):
-    """A format.
+    """A format: name, module that reads it, suffixes, and whether the first bytes match it.
 
-    Attributes
-    ----------
-    name, module : str
-        Name for messages, and name of its module.
-    suffixes : tuple of str
-        Suffixes of its files.
-    matches : callable
-        Whether the first bytes of a file are of this format.
-    is_probed : bool
-        Whether its library may hang, crash or fill memory on damaged files, so that it is probed in
-        a subprocess first.
+    It is probed in a subprocess first if its library may hang, crash or fill memory on damaged
+    files.
     """
 
     name: str
@@ -78,10 +69,7 @@ OTHERS = {
 def read_channels(path: Path) -> list[Channel]:
     """Return the channels of a file; its content shows the format.
 
-    Raises
-    ------
-    InputError
-        Where the format is unknown or the file is damaged.
+    Raise InputError where the format is unknown or the file is damaged.
     """
     with guarded(path, "a file"), path.open("rb") as file:
         head = file.read(HEAD)

@@ -65,7 +65,7 @@ def read_channels(path: Path) -> list[Channel]:
             "FLAC files with their length: encode it again, as by `ffmpeg -i OLD.flac NEW.flac`",
         )
     # A FLAC file that is cut off lacks its last sample.
-    if count < 1 or (is_flac and not _is_complete(path, count)):
+    if count < 1 or (is_flac and _read(path, 0, count - 1, count).size != 1):
         refuse(f"{name}: is cut off or has no samples", "a complete file")
     counts = SUBTYPES[kind]
     return [
@@ -81,11 +81,6 @@ def read_channels(path: Path) -> list[Channel]:
         )
         for column in range(columns)
     ]
-
-
-def _is_complete(path: Path, count: int) -> bool:
-    """Whether the last sample of a file is there."""
-    return _read(path, 0, count - 1, count).size == 1
 
 
 def _read_chunks(file: BinaryIO, name: str) -> str:

@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.base.checks import refuse
-from thud.recordings.channel import MIB, Channel, guarded, library, shown_path, shown_text
+from thud.recordings.channel import (
+    MIB,
+    MIN_SAMPLES,
+    Channel,
+    guarded,
+    library,
+    shown_path,
+    shown_text,
+)
 from thud.recordings.header_aliases import (
     DATE,
     TIME_UNITS,
@@ -26,7 +34,7 @@ from thud.recordings.header_aliases import (
     text_of,
 )
 from thud.recordings.uniform_grid import uniform_grid
-from thud.recordings.variables import MAX_COLUMNS, MIN_SAMPLES
+from thud.recordings.variables import MAX_COLUMNS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

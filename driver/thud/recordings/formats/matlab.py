@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from typing import TYPE_CHECKING
 
@@ -27,21 +28,27 @@ def read_channels(path: Path) -> list[Channel]:
     """Return the numeric vectors of a MATLAB file, also those in structures."""
     name = shown_path(path)
     require_small(path, "a MATLAB file")
-    found = scipy.io.loadmat(os.fsencode(path), simplify_cells=True)
+    file = os.fsencode(path)
+    _require_size(sum(8 * math.prod(shape) for _, shape, _ in scipy.io.whosmat(file)), name)
     variables = {
         key: value
-        for title, content in found.items()
+        for title, content in scipy.io.loadmat(file, simplify_cells=True).items()
         if not title.startswith("__")
         for key, value in _arrays(title, content, name)
     }
     if len(variables) > MAX_VARIABLES:
         refuse(f"{name}: more than {MAX_VARIABLES} variables", "a recording")
-    if sum(value.nbytes for value in variables.values()) > MAX_IN_MEMORY:
+    _require_size(sum(value.nbytes for value in variables.values()), name)
+    return channels_of_variables(variables, name)
+
+
+def _require_size(size: int, name: str) -> None:
+    """Raise InputError where variables are too large."""
+    if size > MAX_IN_MEMORY:
         refuse(
             f"{name}: the variables unpack to more than {MAX_IN_MEMORY // MIB} MiB",
             "longer recordings as WAV, RF64, FLAC, HDF5 or TDMS",
         )
-    return channels_of_variables(variables, name)
 
 
 def _arrays(key: str, content: object, name: str) -> Iterator[tuple[str, NDArray[np.generic]]]:

@@ -22,7 +22,14 @@ from thud.base.columns import (
     strip_comment,
     to_number,
 )
-from thud.recordings.channel import MAX_IN_MEMORY, Channel, require_small, shown_path, shown_text
+from thud.recordings.channel import (
+    MAX_IN_MEMORY,
+    MIN_SAMPLES,
+    Channel,
+    require_small,
+    shown_path,
+    shown_text,
+)
 from thud.recordings.force_units import find_unit
 from thud.recordings.header_aliases import (
     DATE,
@@ -38,7 +45,7 @@ from thud.recordings.header_aliases import (
 )
 from thud.recordings.signal import read_array
 from thud.recordings.uniform_grid import uniform_grid
-from thud.recordings.variables import MAX_COLUMNS, MIN_SAMPLES
+from thud.recordings.variables import MAX_COLUMNS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -11,8 +11,9 @@ from thud.base.checks import refuse, refuse_value, require_choice, require_numbe
 from thud.base.immutable import Immutable
 from thud.impact.impact import Impact
 from thud.level.levels import FORCES, RECORDED_BAND
+from thud.recordings.channel import MIN_SAMPLES
 from thud.recordings.recording import Recording
-from thud.recordings.uniform_grid import MIN_ROWS, Record, read_record
+from thud.recordings.uniform_grid import Record, read_record
 from thud.studies.fitting.force_misfit import ForceMisfit
 from thud.studies.fitting.misfit import require_positive
 from thud.studies.fitting.record_noise import MIN_HUM, find_pulse, trimmed
@@ -174,7 +175,7 @@ def _cut(
     except (TypeError, ValueError, OverflowError):
         begin = end = np.nan
     inside = (time >= begin) & (time <= end)
-    if np.count_nonzero(inside) < MIN_ROWS or not force[inside].max() > 0:
+    if np.count_nonzero(inside) < MIN_SAMPLES or not force[inside].max() > 0:
         refuse_value(
             "target: window",
             window,

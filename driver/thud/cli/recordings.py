@@ -1,15 +1,18 @@
-"""The command that measures recordings: levels, verdict, figures, report."""
+"""Commands on recordings: measure, calibrate, and the history of a ball."""
 
 from __future__ import annotations
 
 import os
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from thud.base.display import draw_all
 from thud.base.tables import format_rows
 from thud.cli.command import (
     NO_FIGURES,
+    NOT_CONFORMING,
     QUIET,
     Command,
     argument,
@@ -23,7 +26,7 @@ from thud.recordings.channel import channel_of
 if TYPE_CHECKING:
     import argparse
 
-NOT_CONFORMING = 3
+
 # Drops that the screen shows.
 SHOWN = 50
 
@@ -57,7 +60,7 @@ def measure(options: argparse.Namespace) -> int:
             config=options.config,
             progress=not options.quiet and sys.stderr.isatty(),
             workers=len(os.sched_getaffinity(0)) if options.workers is None else options.workers,
-            keep=kept,
+            checkpoint=kept,
         )
         verdict = recording.assess()
         recording_files.save(recording, files, figures=figures)
@@ -120,3 +123,67 @@ MEASURE = Command(
     measure,
     "drops of an interrupted measurement are taken up by the same command",
 )
+
+
+def run_calibrate(options: argparse.Namespace) -> int:
+    """Print the lines of a configuration that a calibration record gives; return the exit code."""
+    from thud.recordings.calibration import calibrate
+
+    result = calibrate(
+        options.record,
+        force=options.force,
+        mass=options.mass,
+        channel=channel_of(options.channel),
+        unit=options.unit,
+        uncertainty=options.uncertainty,
+    )
+    print(f'calibration = "{result.chain}"')
+    print(f"calibration_uncertainty = {result.uncertainty:.2g}")
+    if not options.quiet:
+        print(f"# {result.origin}")
+    if not options.uncertainty:
+        print_notes(["uncertainty of the known force not stated: not included (--uncertainty)"])
+    return 0
+
+
+CALIBRATE = Command(
+    "N per unit from a record in which a known force is put on or taken off the plate",
+    (
+        argument("record", metavar="FILE", help="record of the known force"),
+        argument("--mass", type=float, metavar="KG", help="known mass"),
+        argument("--force", type=float, metavar="N", help="or known force"),
+        argument(
+            "--uncertainty",
+            type=float,
+            default=0.0,
+            metavar="FRACTION",
+            help="its relative standard uncertainty, such as 0.001",
+        ),
+        argument("--channel", metavar="NAME|NUMBER", help="channel of the force"),
+        argument("--unit", help="unit of the recorded values, if the file does not state it"),
+        QUIET,
+    ),
+    run_calibrate,
+    "nothing is written",
+)
+
+
+def run_history(options: argparse.Namespace) -> int:
+    """Draw the control chart of the reports of a ball; return the exit code."""
+    # Matplotlib and SciPy take their time.
+    from thud.plot.files import figure_files
+    from thud.report.ball_history import read_history
+    from thud.report.ball_history_figure import draw_history
+
+    history = read_history(options.reports, different_balls=options.different_balls)
+    results = results_of(options, "history", options.reports)
+    drawn = draw_all({"history": partial(draw_history, history)})
+    paths = results.write(figure_files(drawn))
+    if not options.quiet:
+        print(history.title)
+        print(format_rows(history.table()))
+        for warning in history.warnings():
+            print(warning)
+        if paths:
+            print(f"Chart: {paths[0]}")
+    return 0

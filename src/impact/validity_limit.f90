@@ -1,6 +1,6 @@
 !> Validity limits of a theory: a quantity, the range in which the theory holds, and why. Results outside are computed, with
 !> a warning.
-module thud_theory_limit
+module thud_validity_limit
    use thud_ball, only: ball_type, get_density
    use thud_drop, only: drop_type
    use thud_force_history, only: force_history_type
@@ -9,28 +9,28 @@ module thud_theory_limit
    implicit none (type, external)
    private
 
-   public :: get_gravity_limit, get_limit_sentence, get_wall_limits, get_wave_limit, is_outside, theory_limit_type
+   public :: get_gravity_limit, get_limit_message, get_wall_limits, get_wave_limit, is_outside, validity_limit_type
 
    !> Length of the message on a limit.
    integer, parameter :: sentence_length = 240
 
    !> A limit.
-   type :: theory_limit_type
+   type :: validity_limit_type
       !> Group of the keys that decide.
       character(len=24) :: group = ''
       !> What is limited, a pure number or with its unit.
       character(len=72) :: quantity = ''
-      !> What it is, and the range in which the theory holds.
+      !> Its value, and the range in which the theory holds.
       real(wp) :: value = 0.0_wp, lowest = -huge(1.0_wp), highest = huge(1.0_wp)
       !> Reason, as the end of a message.
       character(len=96) :: reason = ''
-   end type theory_limit_type
+   end type validity_limit_type
 
 contains
 
    !> Whether a result lies outside.
    pure function is_outside(limit) result(yes)
-      type(theory_limit_type), intent(in) :: limit
+      type(validity_limit_type), intent(in) :: limit
       logical :: yes
 
       ! Written so that NaN is outside too.
@@ -38,8 +38,8 @@ contains
    end function is_outside
 
    !> Message on a result outside the limits.
-   pure function get_limit_sentence(limit) result(sentence)
-      type(theory_limit_type), intent(in) :: limit
+   pure function get_limit_message(limit) result(sentence)
+      type(validity_limit_type), intent(in) :: limit
       character(len=sentence_length) :: sentence
       logical :: below
 
@@ -47,7 +47,7 @@ contains
       sentence = '&'//trim(limit%group)//': '//trim(limit%quantity)//' is '//trim(rounded(limit%value)) &
          //', the theory holds '//trim(merge('from ', 'up to', below))//' ' &
          //trim(rounded(merge(limit%lowest, limit%highest, below)))//': '//limit%reason
-   end function get_limit_sentence
+   end function get_limit_message
 
    !> A number of three digits.
    pure function rounded(value) result(text)
@@ -69,9 +69,9 @@ contains
    pure function get_gravity_limit(drop, history) result(limit)
       type(drop_type), intent(in) :: drop
       type(force_history_type), intent(in) :: history
-      type(theory_limit_type) :: limit
+      type(validity_limit_type) :: limit
 
-      limit = theory_limit_type('drop', 'gravity times contact time over velocity at first touch', &
+      limit = validity_limit_type('drop', 'gravity times contact time over velocity at first touch', &
          drop%gravity*history%contact_time/history%impact_velocity, highest=0.2_wp, &
          reason='gravity acts before first touch only')
    end function get_gravity_limit
@@ -82,9 +82,9 @@ contains
       type(force_history_type), intent(in) :: history
       !> Fraction of the wave velocity up to which the theory holds.
       real(wp), intent(in) :: highest
-      type(theory_limit_type) :: limit
+      type(validity_limit_type) :: limit
 
-      limit = theory_limit_type('drop', 'velocity at first touch over sqrt(youngs_modulus/density)', &
+      limit = validity_limit_type('drop', 'velocity at first touch over sqrt(youngs_modulus/density)', &
          history%impact_velocity/sqrt(ball%youngs_modulus/get_density(ball)), highest=highest, &
          reason='it is the order of the strain of the wall')
    end function get_wave_limit
@@ -94,19 +94,19 @@ contains
       type(ball_type), intent(in) :: ball
       type(force_history_type), intent(in) :: history
       !> The limits: [4].
-      type(theory_limit_type) :: limits(4)
+      type(validity_limit_type) :: limits(4)
 
       associate (radius => ball%outer_radius, wall => ball%wall_thickness)
          limits = [ &
-            theory_limit_type('drop', 'deflection over outer_radius', history%max_deflection/radius, highest=0.5_wp, &
+            validity_limit_type('drop', 'deflection over outer_radius', history%max_deflection/radius, highest=0.5_wp, &
             reason='the wall outside the contact stays spherical'), &
-            theory_limit_type('drop', 'deflection over wall_thickness', history%max_deflection/wall, highest=2.0_wp, &
+            validity_limit_type('drop', 'deflection over wall_thickness', history%max_deflection/wall, highest=2.0_wp, &
             reason='a wall that is pressed further buckles inwards'), &
             get_wave_limit(ball, history, 0.25_wp), &
-            theory_limit_type('ball', 'stress of the wall by gauge_pressure over youngs_modulus', &
+            validity_limit_type('ball', 'stress of the wall by gauge_pressure over youngs_modulus', &
             ball%gauge_pressure*(radius - wall)/(2*wall*ball%youngs_modulus), highest=0.1_wp, &
             reason='the wall is free of stress before first touch')]
       end associate
    end function get_wall_limits
 
-end module thud_theory_limit
+end module thud_validity_limit

@@ -1,0 +1,255 @@
+"""Commands on cases: run, compare, export, and the figures and inputs of the documentation."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import warnings
+from importlib import resources
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from tqdm import tqdm
+
+from thud.base.bridge import ask, text
+from thud.base.checks import refuse
+from thud.base.display import draw_all, left_out
+from thud.base.errors import InputError, PlausibilityWarning, ThudError
+from thud.base.files import Results, own_path
+from thud.base.tables import format_rows
+from thud.case.case import Case, read_case
+from thud.cli.command import (
+    NOT_CONFORMING,
+    PAGE,
+    QUIET,
+    Command,
+    argument,
+    exit_code,
+    message_of,
+    output,
+    print_notes,
+    results_of,
+)
+from thud.impact.compression import new_curve
+from thud.impact.compute import compute, new_impact
+from thud.impact.free_modes import new_modes
+
+if TYPE_CHECKING:
+    import argparse
+
+    from thud.base.bridge import Bundle
+    from thud.level.impact_result import ImpactResult
+
+
+def run_cases(options: argparse.Namespace) -> int:
+    """Run all cases, even where one fails; return the exit code."""
+    worst = 0
+    options.done = {}
+    for path in tqdm(
+        options.cases, unit="case", disable=len(options.cases) == 1 or options.quiet or None
+    ):
+        try:
+            conforms = _run_case(path, options)
+        except (ThudError, OSError) as error:
+            if isinstance(error, OSError) and error.filename is None:
+                raise  # of the screen, which is no better for the other cases
+            tqdm.write(f"thud-driver: {message_of(error)}", file=sys.stderr)
+            failure = exit_code(error)
+            worst = failure if worst in (0, NOT_CONFORMING) else max(worst, failure)
+        else:
+            if options.check and not conforms and worst == 0:
+                worst = NOT_CONFORMING
+    return worst
+
+
+def _run_case(path: str, options: argparse.Namespace) -> bool:
+    """Run one case as the executable does, then draw it; return whether it conforms."""
+    case = read_case(path)
+    output = options.output or ""
+    if output and len(options.cases) > 1:
+        output = os.path.join(output, case.name)  # noqa: PTH118 - may be ""
+    if case.name in options.done:
+        message = (
+            f"{path}: its name {case.name!r} is that of {options.done[case.name]}, "
+            "whose results it would replace; allowed: different names, or separate runs"
+        )
+        raise InputError(message)
+    options.done[case.name] = path
+    answer = ask(
+        "run", path=os.fsencode(path), output=os.fsencode(output), replace=options.replace,
+        all=options.all, progress=not options.quiet,
+    )  # fmt: skip
+    for warning in answer.get("messages", {}).values():
+        tqdm.write(f"thud-driver: {text(warning)}", file=sys.stderr)
+    folder = Path(output or os.fsdecode(answer["directory"]))
+    figures = _figures(answer, options)
+    if figures:
+        results = Results(folder, inputs=(path,), replace=options.replace)
+        results.write(figures, marker=answer["case"])
+    if not options.quiet:
+        tqdm.write(f"{text(answer['table'])}\n  Results: {folder}\n")
+    return bool(answer["conforms"])
+
+
+def _figures(answer: Bundle, options: argparse.Namespace) -> dict[str, bytes]:
+    """Return the files of the figures of a run, drawn from its results in memory."""
+    contents: dict[str, bytes] = {}
+    if options.no_figures and not options.animation:
+        return contents
+    case = Case.from_text(text(answer["case"]))
+    impact = new_impact(case, answer) if "samples" in answer else None
+    modes = new_modes(case.ball, answer) if "modes" in answer else None
+    curve = new_curve(case, answer) if "compression" in answer else None
+    moving = {"motion": impact, "floor_motion": impact and impact.on_floor}
+    with TemporaryDirectory() as folder, left_out("a figure"):
+        from thud import plot
+
+        if not options.no_figures:
+            count = None if options.all else plot.DEFAULT_COUNT
+            contents = plot.figure_files(
+                plot.case_figures(impact, modes, curve, count), options.format
+            )
+        for name, drop in moving.items():
+            if options.animation and drop and drop.motion:
+                path = Path(folder, f"{name}.gif")
+                with left_out(path.name):
+                    plot.animate(drop, path)
+                    contents[path.name] = path.read_bytes()
+    return contents
+
+
+def compare_cases(options: argparse.Namespace) -> int:
+    """Compare cases and recordings; return the exit code."""
+    from thud.comparison import comparison
+
+    results = results_of(options, "comparison", options.cases)
+    results.require(f"comparison{ending}" for ending in PAGE)
+    found = comparison.read_all(options.cases)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PlausibilityWarning)
+        page = comparison.compare(
+            found,
+            options.force,
+            options.source,
+            progress=not options.quiet and sys.stderr.isatty(),
+        )
+    print_notes(page.warnings)
+    paths = results.write(page.files())
+    if not options.quiet:
+        print(format_rows(page.table()))
+        print(f"Page: {paths[-1]}")
+    return 0
+
+
+def draw_figures(options: argparse.Namespace) -> int:
+    """Draw the figures of the paper and of the documentation; return the exit code."""
+    from thud.plot import documentation, figure_files
+
+    results = results_of(options, "figures")
+    for name, draw in tqdm(
+        documentation.FIGURES.items(), unit="figure", disable=options.quiet or None, leave=False
+    ):
+        results.write(figure_files(draw_all({name: draw}), options.format))
+    if not options.quiet:
+        print(f"Figures: {results.folder}")
+    return 0
+
+
+# By option: what it writes.
+KINDS = {
+    "wav": "32-bit floats, with their scale in a text file beside it",
+    "csv": "table of time and force",
+    "uff": "universal file, data set 58",
+    "mat": "MATLAB file of time, force and spectrum",
+    "spectrum": "table of the complex spectrum",
+}
+
+
+def run_export(options: argparse.Namespace) -> int:
+    """Write the blocked force in the formats that are asked for; return the exit code."""
+    from thud.export import force_files
+
+    chosen = [kind for kind in KINDS if getattr(options, kind)]
+    if not chosen:
+        refuse("export: no format is given", ", ".join(f"--{kind}" for kind in KINDS))
+    source = _read_source(options.source, options.config)
+    print_notes(source.warnings)
+    force = force_files.blocked_force(source, drop=options.drop, rate=options.rate)
+    contents: dict[str, bytes] = {}
+    for kind in chosen:
+        ending, make = force_files.EXPORTS[kind]
+        contents |= make(force, f"{force.name}{ending}")
+    paths = results_of(options, "export", [options.source, options.config]).write(contents)
+    if not options.quiet:
+        print(*paths, sep="\n")
+    return 0
+
+
+def _read_source(path: str, config: str | None) -> ImpactResult:
+    """Return the impact of a case, or the recording, of a file."""
+    from thud.recordings.formats import FORMATS
+    from thud.recordings.read_recording import read_recording
+
+    endings = {ending for one in FORMATS for ending in one.suffixes}
+    if os.path.splitext(path)[1].lower() in endings:  # noqa: PTH122 - may hold a zero byte
+        return read_recording(path, config=config)
+    if config is not None:
+        refuse(f"{path}: --config {config} is of recordings", "none for a case")
+    return compute(read_case(path))
+
+
+EXPORT = Command(
+    "write the blocked force of a case or a recording for other programs",
+    (
+        argument("source", metavar="CASE.nml|RECORDING", help="namelist file, or recording"),
+        *(argument(f"--{kind}", action="store_true", help=what) for kind, what in KINDS.items()),
+        *output("the files (default: outputs/export)"),
+        argument("--rate", type=float, metavar="HZ", help="resample to this rate"),
+        argument("--drop", type=int, default=1, help="drop of a recording (default: 1)"),
+        argument("--config", metavar="LAB.toml", help="configuration of a recording"),
+        QUIET,
+    ),
+    run_export,
+)
+
+
+def copy_examples(options: argparse.Namespace) -> int:
+    """Copy the inputs into a directory of their own; return the exit code."""
+    target = Path(options.directory)
+    if target.exists() or target.is_symlink():
+        refuse(f"{target} exists", "a directory that is to be made")
+    with resources.as_file(resources.files("thud") / "inputs") as source:
+        if not source.is_dir():
+            refuse("this package has no inputs", "an installed one; in a clone they are in inputs/")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        part = own_path(target.with_name(f".{target.name}.part"))
+        try:
+            # Installers compile the scripts.
+            shutil.copytree(source, part, ignore=shutil.ignore_patterns("__pycache__"))
+            part.rename(target)
+        except shutil.Error as error:
+            refuse(f"{target} cannot be written", "a place with space that you may write to", error)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+    if not options.quiet:
+        print(f"Inputs: {target}")
+    return 0
+
+
+EXAMPLES = Command(
+    "copy the inputs of the documentation: cases, studies, recordings, floors",
+    (
+        argument(
+            "directory",
+            nargs="?",
+            default="inputs",
+            metavar="DIR",
+            help="directory that is made (default: inputs)",
+        ),
+        QUIET,
+    ),
+    copy_examples,
+    "what was copied is kept",
+)
