@@ -192,19 +192,7 @@ def _require_options(options: Mapping[str, Any]) -> None:
 
 @dataclass(frozen=True)
 class FitStudy(Study):
-    """A fit as a file describes it.
-
-    Attributes
-    ----------
-    targets : tuple of ForceTarget and LevelTarget
-        What is fitted.
-    tables : dict
-        The file as JSON holds it.
-    options : dict
-        Confidence of the intervals, starts, seed and maximum number of steps.
-    surrogate : Surrogate or None
-        What answers the drops instead of the model.
-    """
+    """A fit as a file describes it: targets, the file as JSON holds it, options of the search."""
 
     targets: tuple[Target, ...] = ()
     tables: dict[str, Any] = field(default_factory=dict)

@@ -435,17 +435,7 @@ def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
 
 @dataclass(frozen=True)
 class Plan:
-    """How a surrogate is trained.
-
-    Attributes
-    ----------
-    error : float
-        Bound of the error of what is assessed, dB.
-    size : int
-        Maximum number of drops.
-    seed : int
-        Seed of their design, scrambled points of Sobol.
-    """
+    """How a surrogate is trained: maximum error, dB, and number of drops, seed."""
 
     error: float = 0.1
     size: int = 1024
