@@ -135,7 +135,7 @@ contains
       end do
    end subroutine copy_values
 
-   !> Leaves a bundle to be collected, or the message of an error alone.
+   !> Stores a bundle to be collected, or the message of an error alone.
    subroutine leave(bundle, error, status, handle, n_byte, n_value)
       type(bundle_type), pointer, intent(inout) :: bundle
       !> What went wrong.
@@ -164,7 +164,7 @@ contains
 
    !> The bundle of a handle; the caller frees it.
    subroutine take(handle, bundle)
-      !> Handle of a bundle that was left and not yet taken.
+      !> Handle of a bundle that was stored and not yet taken.
       integer(int64), intent(in) :: handle
       type(bundle_type), pointer, intent(out) :: bundle
       type(c_ptr) :: address

@@ -5,7 +5,7 @@ module thud_error
    implicit none (type, external)
    private
 
-   public :: error_type, bad_input, signal_base, numerical_failure, input_error, numerical_error, get_status
+   public :: error_type, bad_input, signal_base, numerical_failure, input_error, numerical_error
 
    !> The input cannot be used; also the exit code of the executable.
    integer, parameter :: bad_input = 1
@@ -52,21 +52,5 @@ contains
 
       error = error_type(code=numerical_failure, message=message)
    end function numerical_error
-
-   !> An error as status and message.
-   pure subroutine get_status(error, status, message)
-      !> The error, if any.
-      type(error_type), allocatable, intent(in) :: error
-      !> Its code, or 0.
-      integer, intent(out) :: status
-      !> Its message, or blanks.
-      character(len=*), intent(out) :: message
-
-      status = 0
-      message = ''
-      if (.not. allocated(error)) return
-      status = error%code
-      message = error%message
-   end subroutine get_status
 
 end module thud_error

@@ -186,7 +186,6 @@ contains
    !> Whether a list holds numbers, some with repeats such as `3*0.1`; others are mistakes, which the reader of namelists
    !> skips without an error (`-`), or takes for null values (`1*`).
    pure function are_numbers(text) result(yes)
-      !> Text after the equals sign.
       character(len=*), intent(in) :: text
       logical :: yes
       character(len=len(text) + 1) :: rest

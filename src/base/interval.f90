@@ -91,7 +91,6 @@ contains
       class(interval_type), intent(in) :: self
       !> Index of the key.
       integer, intent(in) :: key
-      !> Names of the keys: [n_key].
       character(len=*), intent(in) :: keys(:)
       !> Their values: [n_set, n_key].
       real(wp), intent(in) :: values(:, :)
@@ -118,9 +117,7 @@ contains
    pure function evaluate_one(expression, keys, values) result(value)
       !> Such as `static_harmonics/2`.
       character(len=*), intent(in) :: expression
-      !> Names of the keys: [n_key].
       character(len=*), intent(in) :: keys(:)
-      !> Their values: [n_key].
       real(wp), intent(in) :: values(:)
       real(wp) :: value
       real(wp) :: only(1)
@@ -131,11 +128,8 @@ contains
 
    !> Value of a product or quotient of numbers and keys; not within any range where a key is unknown.
    pure function evaluate_sets(expression, keys, values) result(value)
-      !> Such as `static_harmonics/2`.
       character(len=*), intent(in) :: expression
-      !> Names of the keys: [n_key].
       character(len=*), intent(in) :: keys(:)
-      !> Their values: [n_set, n_key].
       real(wp), intent(in) :: values(:, :)
       !> The values: [n_set].
       real(wp) :: value(size(values, 1))

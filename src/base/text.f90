@@ -273,7 +273,6 @@ contains
 
    !> Length of a joined list.
    pure function joined_length(words) result(length)
-      !> The words: [n_word].
       character(len=*), intent(in) :: words(:)
       !> Characters of the words in quotes with commas and blanks between.
       integer :: length

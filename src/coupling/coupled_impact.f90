@@ -19,7 +19,7 @@ module thud_coupled_impact
 
    public :: solve_coupled
 
-   !> Touches, releases and turning points in one step; more than a few are a fault of the steps.
+   !> Touches, releases and turning points in one step; more than a few mean that steps are too long.
    integer, parameter :: max_events = 100
 
 contains
@@ -120,7 +120,6 @@ contains
       !> Length of the rest, s: before and after.
       real(wp), intent(inout) :: remaining
       type(impact_type), intent(inout) :: impact
-      !> The equations fail.
       type(error_type), allocatable, intent(out) :: error
       type(zero_search_type) :: search
 
@@ -146,7 +145,6 @@ contains
       real(wp), intent(in) :: length
       type(impact_type), intent(in) :: impact
       type(coupled_state_type), intent(out) :: end
-      !> The equations fail.
       type(error_type), allocatable, intent(out) :: error
       logical :: valid, converged
 

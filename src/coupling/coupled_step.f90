@@ -216,7 +216,7 @@ contains
       end associate
    end function get_residual
 
-   !> Mass of the cap at the stages; a step past release goes on without it.
+   !> Mass of the cap at the stages, 0 after release.
    pure function get_cap_mass(source, trial) result(mass)
       class(contact_source_type), intent(in) :: source
       type(trial_type), intent(in) :: trial

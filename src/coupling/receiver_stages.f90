@@ -57,7 +57,7 @@ contains
             if (i == n_stage) stages%decay(k) = phi(0)
             stages%free_velocity(k, i) = receiver%residue(k)*phi(0)
             stages%free_displacement(k, i) = receiver%residue(k)*time*phi(1)
-            ! The force (t/h)**m gives x_k = m! c**m (c h) phi_(m+1), its integral has one c h and one number more.
+            ! The force (t/h)**m gives x_k = m! c**m (c h) phi_(m+1), its integral one more factor c h and phi_(m+2).
             gain = matmul(phi(1:n_stage)*weight(:, i), radau_monomial)*time
             travel = matmul(phi(2:n_stage + 1)*weight(:, i), radau_monomial)*time**2
             if (i == n_stage) stages%gain(k, :) = gain

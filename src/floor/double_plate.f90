@@ -1,5 +1,5 @@
-!> Two simply supported plates with a resilient layer between them: the receiver that the upper one is, and the power that
-!> reaches the lower one.
+!> Two simply supported plates with a resilient layer between them: the receiver that the upper plate is, and the
+!> power that reaches the lower plate.
 module thud_double_plate
    use thud_constants, only: pi
    use thud_error, only: error_type

@@ -10,7 +10,7 @@ module thud_flanking
 
    public :: get_junction_rate, get_vibration_reduction, get_wall_fields, get_walls, walls_type
 
-   !> Words of rigid junctions, and of one with a given index.
+   !> Choices of the junction: rigid ones, and one by its index.
    character(len=*), parameter :: junctions(*) = [character(len=5) :: 'cross', 't', 'index']
 
    !> Reference frequency of the vibration reduction index, Hz (ISO 12354-1).
@@ -28,8 +28,8 @@ module thud_flanking
       real(wp) :: wave_speed = 3500.0_wp
       !> Internal loss factor.
       real(wp) :: loss_factor = 0.005_wp
-      !> Rigid junction: the wall goes on above the floor, which goes on behind it (`cross`) or ends there (`t`), or a
-      !> junction of a given index.
+      !> Rigid junction at which the wall continues above the floor, and the floor behind the wall (`cross`) or not (`t`),
+      !> or a junction by its index.
       character(len=name_length) :: junction = 'cross'
       !> Vibration reduction index between floor and wall, dB, of the junction `index`.
       real(wp) :: index = 10.0_wp
@@ -94,7 +94,7 @@ contains
       index = max(index, 10*log10(wall%length*(1/(floor%length*floor%width) + 1/(wall%length*wall%width))))
    end function get_vibration_reduction
 
-   !> Rate at which energy of the floor goes into a wall.
+   !> Rate of the flow of energy from the floor into a wall.
    !>
    !> The index is K = D + 10 lg(l/sqrt(a1 a2)), D the mean of the velocity level differences of both directions and
    !> a = pi**2 S eta sqrt(1000 Hz f)/c0 (ISO 12354-1). With D = 5 lg(eta1 eta2/(eta12 eta21)) and

@@ -60,7 +60,7 @@ module thud_floor_model
 
 contains
 
-   !> Keys of the points, which floors with sides add to their own.
+   !> Keys of the points, for rectangular floors.
    function get_point_fields(options) result(fields)
       class(floor_model_type), intent(in), target :: options
       !> The keys: [2].
@@ -110,7 +110,7 @@ contains
       !> The floor has no such point.
       type(error_type), allocatable, intent(out) :: error
 
-      error = input_error('&floor: name: this floor has no points but that under the source; allowed: one with sides')
+      error = input_error('&floor: name: this floor has no points but that under the source; allowed: a rectangular one')
    end subroutine get_transfer
 
    !> The plate that radiates into the room below, and the power that a force of unit mean square on the floor gives to

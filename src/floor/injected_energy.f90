@@ -3,8 +3,8 @@
 !>
 !> The spectrum of a force of the duration D is a polynomial of degree 15 over a step of 1/(2 D), to 2e-15. The mobility is a
 !> sum of poles: those near the step are integrated with the polynomial in closed form, by Legendre functions of the second
-!> kind, all others by Gauss-Legendre quadrature, so that narrow resonances cost no more than wide ones. The floor swings on
-!> after the record: its velocity then is that of the receiver, whose transform is known in closed form.
+!> kind, all others by Gauss-Legendre quadrature, so that narrow resonances cost no more than wide ones. The floor keeps
+!> moving after the record: its velocity then is that of the receiver, whose transform is known in closed form.
 module thud_injected_energy
    use thud_band, only: band_type
    use thud_constants, only: pi
@@ -129,7 +129,6 @@ contains
       type(receiver_type), intent(in) :: receiver
       !> The force, N, and the velocity of the floor, m/s: [n_sample].
       real(wp), intent(in) :: force(:), velocity(:)
-      !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
       type(record_type) :: record
       type(receiver_step_type) :: step

@@ -201,7 +201,7 @@ contains
       corner = 1/(get_sheathing_resistance(options)*sqrt(2.0_wp)*get_local_compliance(options))
    end function get_local_corner
 
-   !> The smeared plate, which gets what it gets as an infinite one and what the sheathing gets between joists.
+   !> The smeared plate, with the power of the infinite plate and of the sheathing between joists.
    subroutine get_radiator(options, frequency, plate, conductance, error)
       class(joist_floor_type), intent(in) :: options
       real(wp), intent(in) :: frequency(:)

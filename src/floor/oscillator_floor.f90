@@ -15,7 +15,7 @@ module thud_oscillator_floor
    !> apart: the mobility changes by its square, and as much cancels in the sum over both.
    real(wp), parameter :: apart = 6.0e-6_wp
 
-   !> The floor; the default swings at 25 Hz with a loss factor of 0.05.
+   !> The floor; the default resonates at 25 Hz with a loss factor of 0.05.
    type, extends(floor_model_type) :: oscillator_floor_type
       !> Mass, kg.
       real(wp) :: mass = 100.0_wp

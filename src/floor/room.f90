@@ -55,7 +55,7 @@ module thud_room
       type(ceiling_type) :: ceiling
    end type room_type
 
-   !> A prediction by one-third-octave bands.
+   !> A prediction in one-third-octave bands.
    type :: room_level_type
       !> The one-third-octave bands: [n_band].
       type(band_type), allocatable :: bands(:)

@@ -17,7 +17,7 @@ module thud_transient_energy
    !> Duration of the search, s. A later maximum would need energy that is held back for longer than any room's decay.
    real(wp), parameter :: search_time = 20.0_wp
 
-   !> Error of the time of a maximum, s: that of the maximum goes with its square. Newton's steps; halvings alone would do.
+   !> Error of the time of a maximum, s; the error of the maximum is of second order. Maximum number of Newton's steps.
    real(wp), parameter :: time_error = 1.0e-13_wp
    integer, parameter :: max_refine = 60
 
@@ -25,7 +25,7 @@ contains
 
    !> Maximum of the Fast detector on a weighted sum of energies, dE/dt = -A E, y' = 8/s (w.E - y), y(0) = 0.
    pure subroutine get_fast_maximum(loss, start, weight, maximum, time)
-      !> A, 1/s; column j is what leaves subsystem j, on the diagonal, and where it goes: [n, n].
+      !> A, 1/s; column j has the losses of subsystem j on the diagonal and their targets: [n, n].
       real(wp), intent(in) :: loss(:, :)
       !> Energies at the start: [n].
       real(wp), intent(in) :: start(:)
@@ -92,7 +92,6 @@ contains
 
    !> Sign and size of the detector's change.
    pure function get_rise(weight, state) result(rise)
-      !> Weights: [n].
       real(wp), intent(in) :: weight(:)
       !> Energies and detector: [n + 1].
       real(wp), intent(in) :: state(:)

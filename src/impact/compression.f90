@@ -12,7 +12,7 @@ module thud_compression
    public :: check_compression, compression_options_type, compression_type, get_compression_fields, get_deflections, &
       get_pressed_ball
 
-   !> What the group `&compression` asks for.
+   !> Options of the group `&compression`.
    type :: compression_options_type
       !> Maximum approach of the plates, m.
       real(wp) :: max_deflection = 0.04_wp

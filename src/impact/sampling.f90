@@ -52,7 +52,7 @@ contains
 
    !> Refuses a record with too many samples or steps.
    subroutine check_sampling(sampling, error)
-      !> The sampling, each value of it inside its own range.
+      !> The sampling, each value inside its own range.
       type(sampling_type), intent(in) :: sampling
       !> Names the keys, their product and the allowed range.
       type(error_type), allocatable, intent(out) :: error

@@ -20,7 +20,7 @@ module thud_validity_limit
       character(len=24) :: group = ''
       !> What is limited, a pure number or with its unit.
       character(len=72) :: quantity = ''
-      !> What it is, and the range in which the theory holds.
+      !> Its value, and the range in which the theory holds.
       real(wp) :: value = 0.0_wp, lowest = -huge(1.0_wp), highest = huge(1.0_wp)
       !> Reason, as the end of a message.
       character(len=96) :: reason = ''

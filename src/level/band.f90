@@ -29,7 +29,7 @@ module thud_band
    !> The set that assessments use.
    character(len=24), parameter :: octave_set = band_set_names(1)
 
-   !> What a case can ask for: one set, or `both` for all: [n_set + 1].
+   !> Choices of a case: one set, or `both` for all: [n_set + 1].
    character(len=24), parameter :: band_choices(*) = [band_set_names, [character(len=24) :: 'both']]
 
    !> One band.
@@ -78,7 +78,7 @@ contains
       bands = pack(all_bands, all_bands%set == name)
    end function get_bands
 
-   !> Bands of a set that must be known.
+   !> Bands of a set, or an error.
    subroutine find_bands(name, bands, error)
       character(len=*), intent(in) :: name
       !> The bands, ascending: [n_band].
@@ -91,13 +91,13 @@ contains
          //join_quoted(band_set_names))
    end subroutine find_bands
 
-   !> Bands of the levels of a case: the octaves, which assessments use, then the other bands asked for.
+   !> Bands of the levels of a case: the octaves, which assessments use, then the other bands of the case.
    pure subroutine get_level_bands(choice, bands, first)
       !> One of `band_choices`.
       character(len=*), intent(in) :: choice
       !> The bands, octaves first: [n_band].
       type(band_type), allocatable, intent(out) :: bands(:)
-      !> Index of the first band that is asked for.
+      !> Index of the first band of the choice.
       integer, intent(out) :: first
 
       bands = [get_octaves(), pack(all_bands, all_bands%set /= octave_set &

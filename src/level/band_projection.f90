@@ -31,7 +31,7 @@ module thud_band_projection
    !> More sequences than ever matter beyond 2 W T: 1e-22 is reached after 12 to 20.
    integer, parameter :: margin = 32
 
-   !> Samples times the square of the sequences up to which these are found within some two seconds. Beyond, they
+   !> Samples times the square of the sequences up to which these are computed within some two seconds. Beyond, they
    !> would pay only for thousands of records.
    real(wp), parameter :: max_work = 5.0e8_wp
 
@@ -98,7 +98,6 @@ contains
 
    !> Number of sequences that may matter.
    pure function get_rank(n_sample, half_width) result(rank)
-      !> Samples of the records.
       integer, intent(in) :: n_sample
       !> W over the sampling rate.
       real(wp), intent(in) :: half_width
@@ -142,7 +141,6 @@ contains
    !> The sequences: eigenvectors of Slepian's tridiagonal matrix.
    subroutine set_sequences(projection, half_width, failed)
       type(band_projection_type), intent(inout) :: projection
-      !> W over the sampling rate.
       real(wp), intent(in) :: half_width
       !> LAPACK does not find them.
       logical, intent(out) :: failed
@@ -169,7 +167,6 @@ contains
 
    !> Nodes of the quadrature over each band.
    subroutine get_nodes(bands, duration, node, root_weight, last_node)
-      !> The bands: [n_band].
       type(band_type), intent(in) :: bands(:)
       !> Length of the record, s.
       real(wp), intent(in) :: duration
@@ -295,7 +292,6 @@ contains
    !> Spectra of folded records.
    subroutine project(n_record, folded, sequences, spectra, spectrum)
       integer, intent(in) :: n_record
-      !> Halves of the sequences: [n_half, n_sequence].
       real(wp), intent(in) :: sequences(:, :)
       !> Weighted spectra of the sequences: [n_sequence, n_node].
       real(wp), intent(in) :: spectra(:, :)

@@ -78,9 +78,7 @@ contains
    subroutine check_record(force, sample_rate, bands, error)
       !> Force, N: [n_sample].
       real(wp), intent(in) :: force(:)
-      !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
-      !> The bands: [n_band].
       type(band_type), intent(in) :: bands(:)
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: min_rate
@@ -106,11 +104,8 @@ contains
    !> The window is 1 s as in the paper (section 3), or the next whole number of seconds that
    !> holds the record.
    function get_bin_energy(force, sample_rate, bands) result(energy)
-      !> Force, N: [n_sample].
       real(wp), intent(in) :: force(:)
-      !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
-      !> The bands: [n_band].
       type(band_type), intent(in) :: bands(:)
       !> Energy of each band, N^2 s: [n_band].
       real(wp) :: energy(size(bands))
@@ -134,9 +129,7 @@ contains
 
    !> Energies of a record between band edges, N^2 s; see the head of the module.
    function get_energy(force, sample_rate, lower, upper, spacing) result(energy)
-      !> Force, N: [n_sample].
       real(wp), intent(in) :: force(:)
-      !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
       !> Edges, Hz: [n_band].
       real(wp), intent(in) :: lower(:), upper(:)

@@ -129,7 +129,7 @@ contains
       rating = nint(inverse_a_curve(size(inverse_a_curve))) + shift
    end function get_inverse_a_rating
 
-   !> What a standardized level is above the measured one: 10 lg(V/V0) - 10 lg(g(C)/g(C0)) (ISO 16283-2).
+   !> Standardized level minus measured level: 10 lg(V/V0) - 10 lg(g(C)/g(C0)) (ISO 16283-2).
    !>
    !> g(C) is the maximum of a decay of reverberation time T as the Fast detector shows it, over that of a decay
    !> without end: C**(-1/(C - 1)) with C = T/1.7275 s; the printed form is the same with more terms.

@@ -225,7 +225,6 @@ contains
 
    !> Time at which the force first falls to zero, to rounding, by bisection.
    pure function release_time(modes, impact_velocity, before, after) result(time)
-      !> The modes: [n_mode].
       type(mode_type), intent(in) :: modes(:)
       !> Velocity at first touch, m/s.
       real(wp), intent(in) :: impact_velocity
@@ -247,7 +246,6 @@ contains
    !> Scalars of the impact. The equation of each mode makes the impulse the change of momentum;
    !> quadrature of the force checks it.
    subroutine finish(modes, contact_time, history, error)
-      !> The modes: [n_mode].
       type(mode_type), intent(in) :: modes(:)
       !> Time of release, s.
       real(wp), intent(in) :: contact_time

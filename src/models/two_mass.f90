@@ -185,7 +185,6 @@ contains
    !> Bound of the fastest rate of the motion, rad/s: of its frequencies by the trace, and of its decay.
    pure function get_fastest_rate(tyre, impact_velocity) result(rate)
       type(tyre_type), intent(in) :: tyre
-      !> Velocity at first touch, m/s.
       real(wp), intent(in) :: impact_velocity
       !> The bound, rad/s.
       real(wp) :: rate

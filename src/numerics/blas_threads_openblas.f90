@@ -7,7 +7,7 @@ module thud_blas_threads
 
    public :: restore_blas_threads, use_one_blas_thread
 
-   !> Pieces of work that use one thread now, and the threads that the process had before the first of them.
+   !> Number of callers that use one thread now, and the number of threads before the first of them.
    integer :: n_work = 0
    integer(c_int) :: count_before = 1_c_int
 

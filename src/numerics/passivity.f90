@@ -9,7 +9,7 @@ module thud_passivity
 
    public :: find_violations, make_passive, solve_dual
 
-   !> Rounds of the correction; each adds the worst frequencies of the one before.
+   !> Rounds of the correction; each adds the worst frequencies of the previous round.
    integer, parameter :: n_round = 30
 
    !> Maximum number of sweeps of Hildreth's method.
@@ -26,7 +26,7 @@ module thud_passivity
 
 contains
 
-   !> Frequencies at which the real part is least and negative, one in each interval where it is negative.
+   !> Frequencies of the negative minima of the real part, one in each interval where it is negative.
    !>
    !> With the real state space A, b, c, d the real part vanishes at the squares of frequencies that are eigenvalues of
    !> A (b c/d - A) (half-size test; Gustavsen and Semlyen, IEEE Trans. Power Delivery 24, 2009): between two of them it has
@@ -55,7 +55,7 @@ contains
       call get_eigenvalues(state, square, failed)
       allocate (omega(0))
       if (failed) return
-      ! A candidate that is no zero does not harm; one that rounding has moved off the real axis must not be missed.
+      ! Candidates that are no zeros do not matter; zeros that rounding has moved off the real axis must not be missed.
       border = scale*[0.0_wp, sorted(pack(sqrt(abs(square)), square%re > 0.0_wp))]
       border = [border, 2*max(border(size(border)), scale)]
       do j = 1, size(border) - 1
@@ -117,7 +117,7 @@ contains
       failed = .true.
    end subroutine make_passive
 
-   !> The least change x of the coefficients, x' N x, that makes the real part at least `least` at some frequencies.
+   !> The smallest change x of the coefficients, by x' N x, that raises the real part to `minimum` at some frequencies.
    function get_correction(pole, residue, direct, omega, normal, length, minimum) result(x)
       !> Poles, 1/s, and residues: [n].
       complex(wp), intent(in) :: pole(:), residue(:)
@@ -127,7 +127,7 @@ contains
       real(wp), intent(in) :: omega(:)
       !> N for coefficients times the lengths: [n_x, n_x].
       real(wp), intent(in) :: normal(:, :), length(:)
-      !> The real part to be had.
+      !> Minimum of the real part.
       real(wp), intent(in) :: minimum
       !> Changes of the coefficients and of the constant part: [n_x].
       real(wp) :: x(size(length))
@@ -160,7 +160,7 @@ contains
       real(wp), intent(in) :: missing(:)
       !> The forces: [n].
       real(wp), intent(out) :: force(:)
-      !> Sweeps that were made; the last one has changed nothing, unless they are `max_sweeps` or an interrupt came.
+      !> Number of sweeps; the last one changed nothing, unless it is `max_sweeps` or an interrupt came.
       integer, intent(out) :: n_sweep
       real(wp) :: before(size(force))
       integer :: i
@@ -176,9 +176,8 @@ contains
       n_sweep = max_sweeps
    end subroutine solve_dual
 
-   !> Angular frequency between two others at which the real part is least: golden sections.
+   !> Angular frequency between two others of the minimum of the real part: golden sections.
    pure function get_minimum(pole, residue, direct, lower, upper) result(omega)
-      !> Poles, 1/s, and residues: [n].
       complex(wp), intent(in) :: pole(:), residue(:)
       !> Constant part; the ends, rad/s.
       real(wp), intent(in) :: direct, lower, upper
@@ -203,7 +202,6 @@ contains
 
    !> Real part at a frequency.
    pure function get_real_part(pole, residue, direct, omega) result(part)
-      !> Poles, 1/s, and residues: [n].
       complex(wp), intent(in) :: pole(:), residue(:)
       !> Constant part; angular frequency, rad/s.
       real(wp), intent(in) :: direct, omega
@@ -214,9 +212,7 @@ contains
 
    !> Value at a frequency.
    pure function get_response(pole, residue, direct, omega) result(response)
-      !> Poles, 1/s, and residues, those of pairs doubled: [n].
       complex(wp), intent(in) :: pole(:), residue(:)
-      !> Constant part; angular frequency, rad/s.
       real(wp), intent(in) :: direct, omega
       complex(wp) :: response
 

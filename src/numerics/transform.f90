@@ -98,15 +98,13 @@ contains
 
    !> Transform of a zero-padded record.
    subroutine transform_padded(record, length, signal, spectrum, plans)
-      !> Samples: [n].
       real(wp), intent(in) :: record(:)
-      !> Length of the transform, at least n.
       integer, intent(in) :: length
       !> The padded record: [length].
       real(wp), allocatable, intent(out) :: signal(:)
       !> Its transform: [length/2 + 1].
       complex(wp), allocatable, intent(out) :: spectrum(:)
-      !> Plans in use, to be given back.
+      !> Plans in use, to be released.
       type(plans_type), intent(out) :: plans
 
       allocate (signal(length), spectrum(length/2 + 1))
@@ -122,7 +120,7 @@ contains
       complex(wp), intent(inout) :: spectrum(:)
       !> The record: [n].
       real(wp), intent(inout) :: signal(:)
-      !> Plans from `transform_padded`, given back.
+      !> Plans from `transform_padded`; released.
       type(plans_type), intent(inout) :: plans
 
       call fftw_execute_dft_c2r(plans%back, spectrum, signal)

@@ -160,7 +160,6 @@ contains
    subroutine fit_residues(s, response, weight, pole, coefficient, misfit)
       !> Complex frequencies and values: [n_frequency].
       complex(wp), intent(in) :: s(:), response(:)
-      !> Weights: [n_frequency].
       real(wp), intent(in) :: weight(:)
       !> The poles: [n].
       complex(wp), intent(in) :: pole(:)

@@ -1,4 +1,4 @@
-!> Interrupt flag: set by the signal handler in system.c, polled by long loops.
+!> Interrupt flag, set by the signal handler in system.c; long loops check it.
 module thud_interrupt
    use, intrinsic :: iso_c_binding, only: c_int
    use thud_error, only: error_type, signal_base
@@ -7,12 +7,12 @@ module thud_interrupt
 
    public :: check_interrupt, is_interrupted, latest_signal
 
-   !> Number of the signal that asks to end the work, 0 for none; defined in system.c.
+   !> Number of the signal to end the work, 0 for none; defined in system.c.
    integer(c_int), volatile, bind(c, name='thud_latest_signal') :: latest_signal
 
 contains
 
-   !> Whether the work is to end; threads in a parallel region then skip what is left.
+   !> Whether the work is to end; threads in a parallel region then skip the rest.
    function is_interrupted() result(yes)
       !> It is.
       logical :: yes

@@ -1,4 +1,4 @@
-!> Memory that large work needs, asked for before it begins.
+!> Check of the memory that large work needs, before it begins.
 module thud_memory
    use, intrinsic :: iso_c_binding, only: c_double, c_int
    use thud_error, only: error_type, numerical_error

@@ -18,7 +18,7 @@
 #include <time.h>
 #include <unistd.h>
 
-// Number of the signal that asks to end the work, 0 for none; polled by long loops through the module thud_interrupt.
+// Number of the signal to end the work, 0 for none; long loops check it through the module thud_interrupt.
 volatile sig_atomic_t thud_latest_signal = 0;
 
 static volatile sig_atomic_t deferred = 0;
@@ -75,13 +75,13 @@ void thud_end_process(int code)
 int thud_has_memory(double bytes, int behind)
 {
    size_t wanted = bytes < 1e18 ? (size_t)bytes : (size_t)1e18;
-   void *place = mmap(NULL, wanted, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+   void *block = mmap(NULL, wanted, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
    char line[128];
    double kilobytes, free = -1.0;
    FILE *file;
 
-   if (place == MAP_FAILED) return 0;
-   munmap(place, wanted);
+   if (block == MAP_FAILED) return 0;
+   munmap(block, wanted);
    if (!behind) return 1;
    // Linux promises more than it has, and then ends a process that writes to it.
    file = fopen("/proc/meminfo", "re");
@@ -94,12 +94,12 @@ int thud_has_memory(double bytes, int behind)
    return free < 0.0 || bytes <= free;
 }
 
-// Handlers of the process that `note` calls first, and the library's calls that are running.
+// Handlers of the process that `record_signal` calls first, and the library's calls that are running.
 static struct sigaction handlers[2];
 static volatile sig_atomic_t running = 0;
 static pthread_mutex_t calls = PTHREAD_MUTEX_INITIALIZER;
 
-static void note(int number, siginfo_t *information, void *context)
+static void record_signal(int number, siginfo_t *information, void *context)
 {
    static volatile sig_atomic_t nested = 0;
    const struct sigaction *handler = &handlers[number == SIGTERM];
@@ -115,7 +115,7 @@ static void note(int number, siginfo_t *information, void *context)
 
 // A fork is waiting for the running calls, and the time that it waits, ms.
 static volatile sig_atomic_t forking = 0;
-enum { fork_patience = 1000 };
+enum { max_fork_wait = 1000 };
 
 static void pause_calls(void)
 {
@@ -125,22 +125,22 @@ static void pause_calls(void)
 }
 
 // A call in another thread may be within OpenBLAS, whose lock a forked process would find locked for ever. Calls that
-// take longer than the patience are hardly ever.
+// take longer than this are rare.
 static void wait_for_calls(void)
 {
    pthread_mutex_lock(&calls);
    forking = 1;
-   for (int i = 0; running && i < fork_patience; i++) pause_calls();
+   for (int i = 0; running && i < max_fork_wait; i++) pause_calls();
 }
 
-static void go_on(void)
+static void resume_calls(void)
 {
    forking = 0;
    pthread_mutex_unlock(&calls);
 }
 
 // A forked process has none of the threads that were at work.
-static void forget(void)
+static void reset_after_fork(void)
 {
    pthread_mutex_init(&calls, NULL);
    forking = 0;
@@ -148,9 +148,9 @@ static void forget(void)
    thud_latest_signal = 0;
 }
 
-static void heed_forks(void)
+static void register_fork_handlers(void)
 {
-   pthread_atfork(wait_for_calls, go_on, forget);
+   pthread_atfork(wait_for_calls, resume_calls, reset_after_fork);
 }
 
 // From now on a signal that the process handles ends the running calls, too.
@@ -159,15 +159,15 @@ void thud_begin_call(void)
    static pthread_once_t once = PTHREAD_ONCE_INIT;
    struct sigaction action;
 
-   pthread_once(&once, heed_forks);
+   pthread_once(&once, register_fork_handlers);
    pthread_mutex_lock(&calls);
    while (forking) pause_calls();
    running++;
    for (int i = 0; i < 2; i++) {
-      if (sigaction(ending_signals[i], NULL, &action) != 0 || action.sa_sigaction == note
+      if (sigaction(ending_signals[i], NULL, &action) != 0 || action.sa_sigaction == record_signal
           || action.sa_handler == SIG_DFL || action.sa_handler == SIG_IGN) continue;
       handlers[i] = action;
-      action.sa_sigaction = note;
+      action.sa_sigaction = record_signal;
       action.sa_flags |= SA_SIGINFO;
       sigaction(ending_signals[i], &action, NULL);
    }
@@ -201,7 +201,7 @@ void thud_pass_interrupts(int written)
    deferred = 0;
 }
 
-// Sentence of an error, at most `length` bytes with the zero at its end.
+// Message of an error, at most `length` bytes with the zero at its end.
 void thud_get_error_text(int number, char *text, size_t length)
 {
    snprintf(text, length, "%s", strerror(number));

@@ -43,15 +43,15 @@ module thud_finite_element
    real(wp), parameter :: max_work = 2.0e10_wp
 
    !> Time between two checks of the step, s: the ball deforms little in it.
-   real(wp), parameter :: look_interval = 0.25e-3_wp
+   real(wp), parameter :: check_interval = 0.25e-3_wp
 
    !> The contacts of a run.
    type :: contacts_type
       !> Time after the last contact at which it counts as over, s: shear waves crossed the ball.
-      real(wp) :: quiet = 0.0_wp
+      real(wp) :: settling_time = 0.0_wp
       !> First and latest instant of the present contact, s.
       real(wp) :: first = 0.0_wp, latest = 0.0_wp
-      !> There is a contact, or there was one less than `quiet` ago.
+      !> There is a contact, or there was one less than `settling_time` ago.
       logical :: active = .false.
       !> Contacts that are over.
       integer :: n_over = 0
@@ -197,16 +197,16 @@ contains
       end if
       call new_material(options%material, ball, material, error)
       if (allocated(error)) return
-      contacts%quiet = 2*ball%outer_radius/sqrt(material%shear_modulus/material%density)
-      if (contacts%quiet > huge(1.0_wp)) then
+      contacts%settling_time = 2*ball%outer_radius/sqrt(material%shear_modulus/material%density)
+      if (contacts%settling_time > huge(1.0_wp)) then
          error = input_error('&ball: youngs_modulus = '//to_text(ball%youngs_modulus)//' Pa is too low to compute with; ' &
             //'allowed: a higher one')
          return
       end if
-      if (sampling%duration <= options%flight_before + contacts%quiet) then
+      if (sampling%duration <= options%flight_before + contacts%settling_time) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s is too short: a contact is over ' &
-            //'after '//to_text(contacts%quiet)//' s without touch, in which shear waves cross the ball; allowed: ' &
-            //'above '//to_text(options%flight_before + contacts%quiet)//' s')
+            //'after '//to_text(contacts%settling_time)//' s without touch, in which shear waves cross the ball; allowed: ' &
+            //'above '//to_text(options%flight_before + contacts%settling_time)//' s')
          return
       end if
       run = new_impact_run(ball, options, material, drop%gravity, gap, speed, receiver)
@@ -229,17 +229,17 @@ contains
       !> The ball cannot be computed, or the record is too short.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: interval, time, first_energy
-      integer :: i, k, n_step, n_sample, stride, look, latest
+      integer :: i, k, n_step, n_sample, stride, check_stride, latest
 
       n_sample = size(history%floor_force)
       interval = 1/sampling%sample_rate
       n_step = 0
-      look = max(1, nint(look_interval*sampling%sample_rate))
+      check_stride = max(1, nint(check_interval*sampling%sample_rate))
       stride = huge(stride)
       if (size(history%motion%time) > 0) stride = get_stride(options, sampling)
       samples: do i = 1, n_sample
          time = (i - 1)*interval
-         if (mod(i - 1, look) == 0) call look_at_step(run, time, options, sampling, n_sample, n_step, error)
+         if (mod(i - 1, check_stride) == 0) call check_step(run, time, options, sampling, n_sample, n_step, error)
          if (allocated(error)) return
          do k = 0, n_step - 1
             time = (i - 1)*interval + k*(interval/n_step)
@@ -262,20 +262,20 @@ contains
             call update_position(run, interval/n_step)
          end do
          if (contacts%n_over < options%bounces) cycle samples
-         if (time > contacts%latest + max(contacts%quiet, options%flight_after)) exit samples
+         if (time > contacts%latest + max(contacts%settling_time, options%flight_after)) exit samples
       end do samples
       if (run%floor%moves .and. run%impulse > 0.0_wp) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends while the ball is on the floor' &
             //', which gives way; allowed: longer than the contact, which has no end on a floor too light for the ball')
       else if (contacts%n_over < options%bounces) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
-            //to_text(contacts%quiet)//' s after contact '//to_text(options%bounces)//'; allowed: longer than that')
+            //to_text(contacts%settling_time)//' s after contact '//to_text(options%bounces)//'; allowed: longer than that')
       end if
       if (.not. allocated(error)) call continue_flight(run, latest, start, history)
    end subroutine march
 
    !> Chooses the number of steps in the next sampling intervals. Refuses a run that takes too long.
-   subroutine look_at_step(run, time, options, sampling, n_sample, n_step, error)
+   subroutine check_step(run, time, options, sampling, n_sample, n_step, error)
       type(impact_run_type), intent(inout) :: run
       !> Time since the record began, s.
       real(wp), intent(in) :: time
@@ -295,11 +295,11 @@ contains
       call choose_step(run, interval, options%step_safety, sampling%substeps, n_step)
       associate (n_node => size(run%position)/2)
          if (n_step <= max_steps .and. real(n_step, wp)*n_sample*n_node <= max_work) return
-         error = numerical_error(trim(place(time))//' stability asks for steps below '//to_text(interval/n_step) &
+         error = numerical_error(trim(event_prefix(time))//' stability asks for steps below '//to_text(interval/n_step) &
             //' s, too many for '//to_text(sampling%duration)//' s of '//to_text(n_node) &
             //' nodes; allowed: a shorter duration, fewer elements, a lower bulk_ratio, less viscosity')
       end associate
-   end subroutine look_at_step
+   end subroutine check_step
 
    !> Adds the impulse of the floor in one step to the record, as part of the means around two samples.
    pure subroutine add_impulse(impulse, interval, i, share, history)
@@ -346,13 +346,12 @@ contains
    end function get_contact_stress
 
    !> Beginning of a message with the time of an event.
-   function place(time) result(text)
-      !> Time since the record began, s.
+   function event_prefix(time) result(text)
       real(wp), intent(in) :: time
       character(len=64) :: text
 
       text = '&finite_element: '//to_text(1.0e3_wp*time)//' ms after the start'
-   end function place
+   end function event_prefix
 
    !> Follows the contacts: when they begin and end, and what they leave of the velocity.
    subroutine follow_contact(run, contacts, time, step, history)
@@ -368,7 +367,7 @@ contains
          if (.not. contacts%active) contacts%first = time - step/2
          contacts%active = .true.
          contacts%latest = time + step/2
-      else if (contacts%active .and. time > contacts%latest + contacts%quiet) then
+      else if (contacts%active .and. time > contacts%latest + contacts%settling_time) then
          contacts%active = .false.
          contacts%n_over = contacts%n_over + 1
          if (contacts%n_over > 1) return
@@ -393,10 +392,10 @@ contains
       call check_interrupt(error)
       if (allocated(error)) return
       if (run%state%failure == cavity_closed) then
-         error = numerical_error(trim(place(time))//' the cavity has no volume left; ' &
+         error = numerical_error(trim(event_prefix(time))//' the cavity has no volume left; ' &
             //'allowed: a lower height, a stiffer ball')
       else if (run%state%failure /= no_failure) then
-         error = numerical_error(trim(place(time))//' an element is turned inside out (ratio of volumes ' &
+         error = numerical_error(trim(event_prefix(time))//' an element is turned inside out (ratio of volumes ' &
             //to_text(run%state%min_jacobian)//'); allowed: a lower height, a stiffer ball, more polar_elements')
       else if (run%contact%layer_stiffness > 0.0_wp &
          .and. run%penetration > max_penetration*(run%body%mesh%z(0, 0) - run%body%mesh%z(0, run%body%mesh%n_radial))) then
@@ -406,7 +405,7 @@ contains
       else
          residual = abs(get_energy(run) - first_energy)/(sum(run%mass(:, :, 2))/2*history%impact_velocity**2)
          if (.not. residual < unstable_residual) then
-            error = numerical_error(trim(place(time))//' the run is unstable (energy off by '//to_text(residual) &
+            error = numerical_error(trim(event_prefix(time))//' the run is unstable (energy off by '//to_text(residual) &
                //' of that at first touch); allowed: a smaller step_safety')
          else
             history%energy_residual = max(history%energy_residual, residual)

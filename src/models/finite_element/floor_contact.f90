@@ -28,7 +28,7 @@ module thud_floor_contact
    public :: contact_options_type, floor_contact_type, get_contact_fields, get_contact_forces, get_contact_stiffness, &
       new_floor_contact, slow_by_friction, stop_at_floor
 
-   !> What the group asks for.
+   !> Options of the group.
    type :: contact_options_type
       !> Coefficient of friction between ball and floor.
       real(wp) :: friction = 0.0_wp

@@ -27,7 +27,7 @@ module thud_free_modes
    !> Highest harmonic that a mode is looked for in.
    integer, parameter :: max_harmonic = 64
 
-   !> What is asked for.
+   !> Options of the modes.
    type :: modes_options_type
       !> Number of elastic modes; 0 where none are asked for.
       integer :: count = 6

@@ -19,7 +19,7 @@ module thud_material
    !> Maximum number of Maxwell branches.
    integer, parameter :: max_branches = 16
 
-   !> What the group asks for.
+   !> Options of the group.
    type :: material_options_type
       !> Law of elasticity: `neo_hookean` or `mooney_rivlin`.
       character(len=name_length) :: law = 'neo_hookean'

@@ -91,7 +91,6 @@ contains
 
    !> Isochoric right Cauchy-Green tensors at one Gauss point.
    pure subroutine get_isochoric(n, f, jacobian, isochoric_factor, c)
-      !> Number of elements.
       integer, intent(in) :: n
       !> Deformation gradients: [n, component].
       real(wp), intent(in) :: f(n, n_component)
@@ -117,7 +116,6 @@ contains
 
    !> Adds the stress of one Maxwell branch at one Gauss point, its energy and its loss, and updates its viscous tensor.
    pure subroutine take_branch_step(n, modulus, time, ratio, part, commit, weight, c, viscous, branch_stress, energy, power)
-      !> Number of elements.
       integer, intent(in) :: n
       !> Shear modulus, Pa; relaxation time, s; length of the step over it.
       real(wp), intent(in) :: modulus, time, ratio
@@ -165,15 +163,12 @@ contains
 
    !> Takes the viscous tensors of one Maxwell branch at one Gauss point to the end of a step.
    pure subroutine update_internal_variables(n, ratio, c, trace, viscous)
-      !> Number of elements.
       integer, intent(in) :: n
       !> Length of the step over the relaxation time.
       real(wp), intent(in) :: ratio
-      !> Isochoric right Cauchy-Green tensors: [n, symmetric].
       real(wp), intent(in) :: c(n, n_symmetric)
       !> Traces of their products with the inverses of the viscous tensors Cv within the step: [n].
       real(wp), intent(in) :: trace(n)
-      !> Viscous tensors Cv: [n, symmetric].
       real(wp), intent(inout) :: viscous(n, n_symmetric)
       real(wp) :: determinant(n), root(n), strain_weight(n), mixed(n, n_symmetric)
       real(wp) :: growth
@@ -191,13 +186,11 @@ contains
 
    !> Mixtures of viscous tensor and deformation at one Gauss point, and their determinants, which are near 1.
    pure subroutine mix(n, usual_share, strain_weight, c, viscous, tensor, determinant)
-      !> Number of elements.
       integer, intent(in) :: n
       !> Weight of the deformation beside the viscous tensor by which the norm is taken off.
       real(wp), intent(in) :: usual_share
       !> Weights of the deformation: [n].
       real(wp), intent(in) :: strain_weight(n)
-      !> Isochoric right Cauchy-Green tensors: [n, symmetric].
       real(wp), intent(in) :: c(n, n_symmetric)
       !> Viscous tensors Cv: [n, symmetric].
       real(wp), intent(in) :: viscous(n, n_symmetric)
@@ -220,19 +213,15 @@ contains
 
    !> Adds the stresses of all branches at one Gauss point.
    pure subroutine add_branch_stresses(n, isochoric_factor, c, branch_stress, f, cofactor, jacobian, stress)
-      !> Number of elements.
       integer, intent(in) :: n
       !> Determinants to the power -2/3: [n].
       real(wp), intent(in) :: isochoric_factor(n)
-      !> Isochoric right Cauchy-Green tensors: [n, symmetric].
       real(wp), intent(in) :: c(n, n_symmetric)
       !> Sum of moduli times inverses of the viscous tensors, Pa: [n, symmetric].
       real(wp), intent(in) :: branch_stress(n, n_symmetric)
-      !> Deformation gradients: [n, component].
       real(wp), intent(in) :: f(n, n_component)
       !> Their cofactors: [n, component].
       real(wp), intent(in) :: cofactor(n, n_component)
-      !> Their determinants: [n].
       real(wp), intent(in) :: jacobian(n)
       !> Stresses, Pa: [n, component].
       real(wp), intent(inout) :: stress(n, n_component)

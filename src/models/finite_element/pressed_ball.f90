@@ -250,7 +250,6 @@ contains
 
    !> Change of the positions that balances the forces.
    subroutine get_newton_step(pressed, force, fixed, shift, change, failed)
-      !> The ball; it stays as it is.
       type(pressed_ball_type), intent(inout) :: pressed
       !> Forces where it is, N.
       real(wp), intent(in) :: force(0:, 0:, :)

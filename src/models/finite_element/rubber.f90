@@ -45,7 +45,7 @@ contains
 
    !> x**(-1/3) of positive numbers.
    pure subroutine get_inverse_cube_root(n, x, root)
-      !> How many.
+      !> Count.
       integer, intent(in) :: n
       !> The numbers: [n].
       real(wp), intent(in) :: x(n)
@@ -136,7 +136,6 @@ contains
 
    !> Adds the stresses of the second invariant, modulus/2 (J^(-4/3) I2 - 3), at one Gauss point.
    pure subroutine add_second_invariant(n, modulus, weight, f, cofactor, jacobian, root, stress, energy)
-      !> Number of elements.
       integer, intent(in) :: n
       !> Its part of the shear modulus, Pa.
       real(wp), intent(in) :: modulus

@@ -35,7 +35,7 @@ module thud_impact_batch
       type(shell_batch_type) :: shell
       !> Factor s of the flux term in restitution.
       real(wp) :: restitution_weight
-      !> Slot of the present state: that at release or, where a lane did not get there, at the beginning of
+      !> Slot of the present state: that at release or, where a ball did not get there, at the beginning of
       !> its last step.
       integer :: now
       !> The ball was released: [batch_size].
@@ -48,12 +48,12 @@ module thud_impact_batch
 
 contains
 
-   !> Takes a step, or part of one, from the present state to the other slot. Lanes that go beyond the
+   !> Takes a step, or part of one, from the present state to the other slot. Balls that go beyond the
    !> reach of their series take it one by one as the single solver does, powers and all.
    pure subroutine advance(impacts, active, length, elastic_force, floor_force, missed)
       !> The impacts; the new velocity is NaN where a stage has left the domain of the equation.
       type(impact_batch_type), intent(inout) :: impacts
-      !> The result for the lane matters: [batch_size].
+      !> The result for the ball matters: [batch_size].
       logical, intent(in) :: active(batch_size)
       !> Length of the step: [batch_size].
       real(wp), intent(in) :: length(batch_size)
@@ -61,7 +61,7 @@ contains
       real(wp), intent(out) :: elastic_force(batch_size)
       !> Force on the floor, likewise, N: [batch_size].
       real(wp), intent(out) :: floor_force(batch_size)
-      !> There are such lanes.
+      !> There are such balls.
       logical, intent(out) :: missed
       integer :: i, then
 
@@ -75,7 +75,7 @@ contains
       end do
    end subroutine advance
 
-   !> The step of one lane by the single solver.
+   !> The step of one ball by the single solver.
    pure subroutine take_single_step(impacts, i, length)
       !> The impacts; the new velocity stays NaN where a stage leaves the domain of the equation.
       type(impact_batch_type), intent(inout) :: impacts
@@ -94,7 +94,7 @@ contains
       impacts%states(3 - impacts%now)%velocity(i) = new(at_velocity)
    end subroutine take_single_step
 
-   !> The equation of one lane as the single solver has it, in the units of the lanes.
+   !> The equation of one ball as the single solver has it, in the units of the balls.
    pure function get_single(shell, i) result(single)
       type(shell_batch_type), intent(in) :: shell
       !> Index of the ball.
@@ -122,13 +122,13 @@ contains
    end function is_finite
 
    !> Parts of the step at whose end the phase ends, to rounding: `locate_zero` of `thud_rk4` for all
-   !> lanes at once. Lanes without such an end get the whole step.
+   !> balls at once. Balls without such an end get the whole step.
    subroutine locate(impacts, compressing, ends, length)
       !> The impacts, at the beginning of the step.
       type(impact_batch_type), intent(inout) :: impacts
       !> The phase ends with the velocity, not with the deflection.
       logical, intent(in) :: compressing
-      !> The phase of the lane ends in this step: [batch_size].
+      !> The phase of the ball ends in this step: [batch_size].
       logical, intent(in) :: ends(batch_size)
       !> The parts: [batch_size].
       real(wp), intent(out) :: length(batch_size)
@@ -174,9 +174,7 @@ contains
 
    !> Where a part of the step would lead.
    subroutine try_length(impacts, compressing, active, length, value)
-      !> The impacts, at the beginning of the step.
       type(impact_batch_type), intent(inout) :: impacts
-      !> The phase ends with the velocity, not with the deflection.
       logical, intent(in) :: compressing
       !> The result for the ball matters: [batch_size].
       logical, intent(in) :: active(batch_size)
@@ -203,11 +201,11 @@ contains
       if (compressing) watched = state%velocity
    end function get_watched
 
-   !> Takes a part of a step in some of the lanes.
+   !> Takes a part of a step in some of the balls.
    subroutine finish_step(impacts, active, length, elastic_force, floor_force)
       !> The impacts; their series are expanded at the end.
       type(impact_batch_type), intent(inout) :: impacts
-      !> The lane takes the step: [batch_size].
+      !> The ball takes the step: [batch_size].
       logical, intent(in) :: active(batch_size)
       !> Its length: [batch_size].
       real(wp), intent(in) :: length(batch_size)
@@ -236,7 +234,7 @@ contains
    pure subroutine add_end(impacts, active, value_factor, rate_factor)
       !> The impacts, in reach of their series.
       type(impact_batch_type), intent(inout) :: impacts
-      !> The lane takes part: [batch_size].
+      !> The ball takes part: [batch_size].
       logical, intent(in) :: active(batch_size)
       !> Factor of the values at the end: [batch_size].
       real(wp), intent(in) :: value_factor(batch_size)

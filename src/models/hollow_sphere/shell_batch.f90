@@ -19,7 +19,7 @@ module thud_shell_batch
    !> few enough that their forces stay in cache.
    integer, parameter :: batch_size = 32
 
-   !> The equations, one sample a vector lane.
+   !> The equations, one ball per lane.
    type, bind(c) :: shell_batch_type
       !> K, stiffness of the shell: [batch_size].
       real(wp) :: stiffness(batch_size)

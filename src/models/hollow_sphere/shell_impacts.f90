@@ -1,9 +1,9 @@
 !> Impacts of many balls side by side: the march of `thud_lumped`, with the same steps and the same
 !> change of phase at the turning point and at release, located on the step itself.
 !>
-!> Lanes run in step, so that sample i of all forces is written at once. A lane that has reached its
+!> Balls run in step, so that sample i of all forces is written at once. A ball that has reached its
 !> turning point waits until all others have, or closed; then the turning points are located
-!> together, and each lane active on at its own time.
+!> together, and each ball goes on at its own time.
 module thud_shell_impacts
    use thud_impact_batch, only: add_end, advance, finish_step, get_watched, impact_batch_type, is_finite, locate
    use thud_interrupt, only: is_interrupted
@@ -60,12 +60,12 @@ contains
       force(:, 1) = force(:, 1)/2
    end subroutine solve_impacts
 
-   !> Marches until every lane has reached the end of its phase or of the record.
+   !> Marches until every ball has reached the end of its phase or of the record.
    subroutine march(impacts, compressing, start, last, n_step, substeps, n_sample, force, last_step)
       type(impact_batch_type), intent(inout) :: impacts
       !> The phase ends with the velocity, not with the deflection.
       logical, intent(in) :: compressing
-      !> Step with which each lane begins: [batch_size].
+      !> Step with which each ball begins: [batch_size].
       real(wp), intent(in) :: start(batch_size)
       !> Step in which its phase ends, or in which it fails; `never` if neither: [batch_size].
       real(wp), intent(out) :: last(batch_size)
@@ -73,7 +73,7 @@ contains
       integer, intent(in) :: n_step, substeps, n_sample
       !> Forces, N: [2 batch_size, n_sample].
       real(wp), intent(inout) :: force(2*batch_size, n_sample)
-      !> Last step of any lane; unchanged where none began.
+      !> Last step of any ball; unchanged where none began.
       integer, intent(inout) :: last_step
       real(wp), dimension(batch_size) :: elastic_force, floor_force
       real(wp) :: latest
@@ -111,11 +111,10 @@ contains
       where (.not. start < never) last = never
    end subroutine march
 
-   !> A new series for each lane that begins or out_of_range and, asked at fixed times, where the old one will
-   !> not last: nothing that depends on other lanes.
+   !> A new series for each ball that begins or went out of range and, checked at fixed times, where the old one will
+   !> not last: nothing that depends on other balls.
    pure subroutine renew_series(impacts, start, n)
       type(impact_batch_type), intent(inout) :: impacts
-      !> Step with which each lane begins: [batch_size].
       real(wp), intent(in) :: start(batch_size)
       !> Index of the step.
       integer, intent(in) :: n
@@ -130,8 +129,8 @@ contains
       impacts%out_of_range = .false.
    end subroutine renew_series
 
-   !> Forces of one sample: those of moving lanes, none after the contact; lanes whose turn is still to
-   !> come keep what they have.
+   !> Forces of one sample: those of moving balls, none after the contact; balls that have yet to turn keep
+   !> theirs.
    pure subroutine record(elastic_force, floor_force, n, start, last, force)
       !> Elastic forces, N: [batch_size].
       real(wp), intent(in) :: elastic_force(batch_size)
@@ -139,7 +138,6 @@ contains
       real(wp), intent(in) :: floor_force(batch_size)
       !> Index of the step.
       real(wp), intent(in) :: n
-      !> Step with which each lane begins: [batch_size].
       real(wp), intent(in) :: start(batch_size)
       !> Step in which it has ended: [batch_size].
       real(wp), intent(in) :: last(batch_size)
@@ -149,20 +147,17 @@ contains
       where ([start, start] <= n) force = merge([elastic_force, floor_force], 0.0_wp, [last, last] >= n)
    end subroutine record
 
-   !> Takes over a step where it stays inside the phase; other lanes stop in front of it.
+   !> Takes over a step where it stays inside the phase; other balls stop in front of it.
    pure subroutine commit_step(impacts, compressing, n, start, last, undisturbed, done)
       type(impact_batch_type), intent(inout) :: impacts
-      !> The phase ends with the velocity, not with the deflection.
       logical, intent(in) :: compressing
-      !> Index of the step.
       real(wp), intent(in) :: n
-      !> Step with which each lane begins: [batch_size].
       real(wp), intent(in) :: start(batch_size)
       !> Step in which it ends: [batch_size].
       real(wp), intent(inout) :: last(batch_size)
-      !> All lanes are under way; false from the first that stops on.
+      !> All balls are under way; false from the first that stops on.
       logical, intent(inout) :: undisturbed
-      !> All lanes have stopped.
+      !> All balls have stopped.
       logical, intent(out) :: done
       logical, dimension(batch_size) :: on, stays
 
@@ -186,10 +181,9 @@ contains
       impacts%now = 3 - impacts%now
    end subroutine commit_step
 
-   !> Whether all lanes stay inside the phase.
+   !> Whether all balls stay inside the phase.
    pure function all_stay(state, compressing) result(all_do)
       type(state_batch_type), intent(in) :: state
-      !> The phase ends with the velocity, not with the deflection.
       logical, intent(in) :: compressing
       logical :: all_do
       real(wp) :: lost
@@ -214,7 +208,7 @@ contains
    !> To the turning point and on to the end of its step, with the flux term of restitution.
    subroutine turn(impacts, turning)
       type(impact_batch_type), intent(inout) :: impacts
-      !> The lane has a turning point: [batch_size].
+      !> The ball has a turning point: [batch_size].
       logical, intent(in) :: turning(batch_size)
       real(wp), dimension(batch_size) :: length, elastic_force, floor_force
 

@@ -1,6 +1,6 @@
 !> The Runge-Kutta step of `thud_shell_batch`, its forces taken from Taylor series.
 !>
-!> Powers and quotients are slow and a ball moves little from step to step: each lane has an expansion
+!> Powers and quotients are slow and a ball moves little from step to step: each ball has an expansion
 !> point, a deflection about which c and 1/(1 - y) are expanded, and needs nothing but multiplications and
 !> additions while it stays near.
 !>
@@ -36,7 +36,7 @@ module thud_shell_series
 
    !> The series.
    type, bind(c) :: series_batch_type
-      !> Deflection about which a lane is expanded: [batch_size].
+      !> Deflection about which a ball is expanded: [batch_size].
       real(wp) :: expansion_point(batch_size)
       !> Distance up to which the series is used: [batch_size].
       real(wp) :: reach(batch_size)
@@ -48,7 +48,7 @@ module thud_shell_series
 
 contains
 
-   !> Whether the series of a lane lasts for the next `series_steps`, in the inner part of its reach.
+   !> Whether the series of a ball lasts for the next `series_steps`, in the inner part of its reach.
    elemental function will_last(expansion_point, reach, deflection, velocity) result(lasts)
       real(wp), intent(in) :: expansion_point
       !> Its reach; y; z.
@@ -59,11 +59,11 @@ contains
          inner*reach
    end function will_last
 
-   !> Expands lanes about the middle of the way that lies before them; the present deflection is in reach.
+   !> Expands balls about the middle of their next way; the present deflection is in reach.
    pure subroutine expand_series(shell, state, wanted, series)
       type(shell_batch_type), intent(in) :: shell
       type(state_batch_type), intent(in) :: state
-      !> The lane is expanded again: [batch_size].
+      !> The ball is expanded again: [batch_size].
       logical, intent(in) :: wanted(batch_size)
       type(series_batch_type), intent(inout) :: series
       real(wp), dimension(batch_size) :: expansion_point, inverse, power
@@ -125,7 +125,6 @@ contains
 
    !> Distance from a deflection up to which its series is used.
    elemental function get_reach(deflection) result(reach)
-      !> y.
       real(wp), intent(in) :: deflection
       real(wp) :: reach
 
@@ -203,7 +202,7 @@ contains
       real(wp), intent(out) :: elastic_force(batch_size)
       !> Force on the floor, N: [batch_size].
       real(wp), intent(out) :: floor_force(batch_size)
-      !> A lane was out of reach.
+      !> A ball was out of reach.
       logical, intent(out) :: missed
       real(wp) :: half, sixth, y2, y3, y4, z2, z3, z4, d1, d2, d3, d4, a1, a2, a3, a4, elastic, whole, outside, outsides
       integer :: i

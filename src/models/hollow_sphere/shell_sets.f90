@@ -1,4 +1,4 @@
-!> Many drops of `thud_hollow_sphere`, a block of lanes at a time: the same equation, steps and checks
+!> Many drops of `thud_hollow_sphere`, a block of balls at a time: the same equation, steps and checks
 !> as `solve_hollow_sphere`, and the same numbers to 1e-10; the impulse to the residual of its balance.
 !>
 !> Sets that cannot be computed have NaN; they leave the others as they are.
@@ -80,7 +80,7 @@ contains
       values = [transfer(set%ball, values), transfer(set%drop, values)]
    end function get_numbers
 
-   !> Blocks of the sets that can be computed: of one choice of the flux term, so that lanes share their
+   !> Blocks of the sets that can be computed: of one choice of the flux term, so that balls share their
    !> equation, and with similar contact times, because a block takes as long as its longest contact.
    subroutine get_blocks(sets, valid, order, first)
       !> The sets: [n_set].
@@ -122,7 +122,6 @@ contains
 
    !> Whether the values of each set lie inside their ranges.
    subroutine check_sets(sets, valid)
-      !> The sets: [n_set].
       type(set_type), intent(in) :: sets(:)
       !> Whether they do: [n_set].
       logical, intent(out) :: valid(:)
@@ -184,7 +183,7 @@ contains
       impacts%shell%weight = compression_weights(sets(1)%flux)
       impacts%restitution_weight = restitution_weights(sets(1)%flux)
       do i = 1, block_size
-         ! Lanes without a set repeat the last one.
+         ! Balls without a set repeat the last one.
          call set_lane(impacts, i, sets(min(i, size(sets))), step)
       end do
       call solve_impacts(impacts, get_sample_count(sampling), sampling%substeps, force, last_sample)
@@ -204,7 +203,7 @@ contains
       end do
    end subroutine solve_block
 
-   !> Equation and beginning of one lane; see `thud_shell_batch` for the units.
+   !> Equation and beginning of one ball; see `thud_shell_batch` for the units.
    pure subroutine set_lane(impacts, i, set, step)
       type(impact_batch_type), intent(inout) :: impacts
       !> Index of the ball.
@@ -226,10 +225,9 @@ contains
       end associate
    end subroutine set_lane
 
-   !> Whether a lane has a result: the checks of `solve_lumped`.
+   !> Whether a ball has a result: the checks of `solve_lumped`.
    function is_computed(impacts, i, set, sampling) result(computed)
       type(impact_batch_type), intent(in) :: impacts
-      !> Index of the ball.
       integer, intent(in) :: i
       type(set_type), intent(in) :: set
       type(sampling_type), intent(in) :: sampling

@@ -202,7 +202,6 @@ contains
       !> Modes.
       class(modal_ball_options_type), intent(in) :: options
       type(surface_rings_type), intent(in) :: rings
-      !> Length of a step, s.
       real(wp), intent(in) :: interval
       !> Gets frequencies, harmonics and shapes of the modes.
       type(mode_step_type), intent(inout) :: step
@@ -254,7 +253,6 @@ contains
    subroutine march(ball, sampling, interval, rings, step, contact, state, history, error)
       type(ball_type), intent(in) :: ball
       type(sampling_type), intent(in) :: sampling
-      !> Length of a step, s.
       real(wp), intent(in) :: interval
       type(surface_rings_type), intent(in) :: rings
       type(mode_step_type), intent(in) :: step

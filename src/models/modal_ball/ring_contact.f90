@@ -109,7 +109,6 @@ contains
    !> Impulses that close the gaps of the touching rings, and those of the rings that are held.
    subroutine close_gaps(contact, gap, failed)
       type(ring_contact_type), intent(inout) :: contact
-      !> Gaps without contact, m: [n_gap].
       real(wp), intent(in) :: gap(:)
       !> The response of the touching rings is not positive definite.
       logical, intent(out) :: failed

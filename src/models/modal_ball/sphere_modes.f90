@@ -158,9 +158,7 @@ contains
 
       !> `product_of` both ways.
       function mixed(a, b) result(matrix)
-         !> Values at the radii: [n_node, n].
          real(wp), intent(in) :: a(:, :)
-         !> Values at the radii: [n_node, n].
          real(wp), intent(in) :: b(:, :)
          !> The integrals: [n, n].
          real(wp) :: matrix(size(a, 2), size(a, 2))
@@ -241,7 +239,6 @@ contains
    !> Stiffness, mass and surface displacements of one harmonic in the basis.
    subroutine assemble(basis, harmonic, stiffness, mass, surface)
       type(basis_type), intent(in) :: basis
-      !> Harmonic n.
       integer, intent(in) :: harmonic
       !> Stiffness matrix, N/m: [n, n].
       real(wp), allocatable, intent(out) :: stiffness(:, :)
@@ -279,9 +276,7 @@ contains
    !> The same for n = 0, where U = S/r^2 with S a polynomial, a constant if incompressible.
    subroutine assemble_breathing(basis, stiffness, mass, surface)
       type(basis_type), intent(in) :: basis
-      !> Stiffness matrix, N/m: [n, n].
       real(wp), allocatable, intent(out) :: stiffness(:, :)
-      !> Mass matrix, kg: [n, n].
       real(wp), allocatable, intent(out) :: mass(:, :)
       !> U at the outer surface, V = 0: [2, n].
       real(wp), allocatable, intent(out) :: surface(:, :)
