@@ -28,7 +28,7 @@ from thud.case.case import Case, case_text
 from thud.case.keys import OF_FILES, value_in, with_values
 from thud.level.assessment import get_criteria
 from thud.level.levels import get_bands
-from thud.studies.result import StudyResult
+from thud.studies.study_result import StudyResult
 
 if TYPE_CHECKING:
     import os

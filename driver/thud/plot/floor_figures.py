@@ -11,7 +11,7 @@ from thud.base._schema import FloorOptions, Plate
 from thud.base.checks import refuse_value, require_kind, require_whole
 from thud.impact.mobility import mobility
 from thud.level.levels import BANDWIDTHS, get_bands, record_force
-from thud.plot.impacts import TIME_LABEL
+from thud.plot.impact_figures import TIME_LABEL
 from thud.plot.style import (
     COLORS,
     LINES,
