@@ -8,7 +8,7 @@ module thud_answer
    use thud_error, only: error_type, input_error
    use thud_floor_answers, only: answer_floor_energy, answer_floor_impact, answer_mobility, answer_mobility_fit, &
       answer_point_velocity, answer_radiator, answer_room_level
-   use thud_level_answers, only: answer_background, answer_levels, answer_peak_count, answer_rating, answer_recorded_force, &
+   use thud_level_answers, only: answer_background, answer_levels, answer_low_pass, answer_peak_count, answer_rating, &
       answer_standardization
    use thud_request, only: request_type
    use thud_text, only: quoted
@@ -72,8 +72,8 @@ contains
          call answer_levels(request, bundle, error)
       case ('peak_count')
          call answer_peak_count(request, bundle)
-      case ('recorded_force')
-         call answer_recorded_force(request, bundle)
+      case ('low_pass')
+         call answer_low_pass(request, bundle)
       case ('rating')
          call answer_rating(request, bundle)
       case ('standardization')

@@ -2,7 +2,6 @@
 module thud_level_answers
    use thud_band, only: band_type, find_bands, octave_set
    use thud_bundle, only: bundle_type
-   use thud_constants, only: recorded_band
    use thud_error, only: error_type
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_kinds, only: wp
@@ -14,7 +13,7 @@ module thud_level_answers
    implicit none (type, external)
    private
 
-   public :: answer_background, answer_levels, answer_peak_count, answer_rating, answer_recorded_force
+   public :: answer_background, answer_levels, answer_low_pass, answer_peak_count, answer_rating
    public :: answer_standardization
 
 contains
@@ -48,17 +47,17 @@ contains
          request%get_number('sample_rate')), wp))
    end subroutine answer_peak_count
 
-   !> `force`, N, at `sample_rate`, Hz, as a force plate records it: low-passed at 1.25 kHz.
-   subroutine answer_recorded_force(request, bundle)
+   !> `force`, N, at `sample_rate`, Hz, low-passed at `cutoff`, Hz.
+   subroutine answer_low_pass(request, bundle)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      real(wp), allocatable :: force(:), recorded(:)
+      real(wp), allocatable :: force(:), low(:)
 
       force = request%get_array('force')
-      allocate (recorded, mold=force)
-      call get_low_pass(force, request%get_number('sample_rate'), recorded_band, recorded)
-      call bundle%add_array('force', shape(recorded), recorded)
-   end subroutine answer_recorded_force
+      allocate (low, mold=force)
+      call get_low_pass(force, request%get_number('sample_rate'), request%get_number('cutoff'), low)
+      call bundle%add_array('force', shape(low), low)
+   end subroutine answer_low_pass
 
    !> Single numbers of `levels` in a room, dB, in the rated bands of the set `bands`: A-weighted, as stated, class (0 for
    !> none), and, of octaves, by the inverse A-weighted curve.

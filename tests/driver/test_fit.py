@@ -360,7 +360,7 @@ def test_levels_and_what_else_is_known(bands: str) -> None:
         impact.levels(bands, force="floor"),
         uncertainty=0.2,
         bands=bands,
-        restitution=(impact.restitution, 0.01),
+        quantities={"restitution": (impact.restitution, 0.01)},
     )
     fit = thud.fit(target, list(truth), MODAL)
     assert fit.values == pytest.approx(truth, rel=1e-6)
@@ -543,11 +543,13 @@ def test_contact_times_that_jump_hide_no_parameter() -> None:
     case = thud.Case(ball=thud.Ball(youngs_modulus=1.71513e6), model=model)
     impact = thud.solve(case)
     target = thud.LevelTarget(
-        impact.levels(force="floor").tolist(), 0.3, contact_time=(impact.exact_contact_time, 1e-4)
+        impact.levels(force="floor").tolist(),
+        0.3,
+        quantities={"contact_time": (impact.exact_contact_time, 1e-4)},
     )
     found = quiet_fit(target, {"youngs_modulus": 1.71513e6}, case)
     # Of levels alone the error is larger.
-    alone = quiet_fit(replace(target, contact_time=None), {"youngs_modulus": 1.71513e6}, case)
+    alone = quiet_fit(replace(target, quantities={}), {"youngs_modulus": 1.71513e6}, case)
     assert not found.warnings
     assert found.standard_errors["youngs_modulus"] < alone.standard_errors["youngs_modulus"]
     expected = 2 * 1e-4 / impact.exact_contact_time * 1.71513e6

@@ -77,7 +77,7 @@ RECORD = IMPACT.time, IMPACT.floor_force + np.random.default_rng(1).normal(size=
             naming("target", "force", "'gas'", "'elastic'", "'floor'"),
         ),
         (
-            thud.LevelTarget([39.0] * 5, restitution=(0.8, 0.1)),
+            thud.LevelTarget([39.0] * 5, quantities={"restitution": (0.8, 0.1)}),
             ["mass"],
             {},
             naming("uncertainty"),

@@ -11,7 +11,7 @@ from conftest import REPOSITORY, naming
 from PIL import Image
 
 import thud
-from thud.level.levels import record_force
+from thud.level.levels import low_pass
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -41,7 +41,7 @@ def test_force_history_shows_every_curve_with_units() -> None:
     assert names(figure) == list(impacts)
     for line, impact in zip(axes.lines, impacts.values(), strict=True):
         shown = len(line.get_ydata())
-        recorded = record_force(impact.elastic_force, impact.sample_rate)
+        recorded = low_pass(impact.elastic_force, impact.sample_rate)
         np.testing.assert_array_equal(line.get_ydata(), 1e-3 * recorded[:shown])
         assert line.get_ydata().max() == pytest.approx(1e-3 * impact.elastic_force.max(), rel=0.01)
     assert len({(line.get_color(), line.get_linestyle()) for line in axes.lines}) == 3

@@ -11,7 +11,7 @@ from scipy import stats
 from scipy.ndimage import uniform_filter1d
 from synthetic import half_sine, make_drop
 
-from thud.level.levels import record_force
+from thud.level.levels import low_pass
 from thud.recordings import calibration, contact, drops, flanks, measured_drop
 from thud.recordings.contact import Contact, cells_between, uniform_edges
 from thud.recordings.plate import Plate, correct_plate
@@ -117,7 +117,7 @@ def test_peak_has_the_uncertainty_of_its_place() -> None:
     # That of the background grows from cell to cell; the peak lies in the middle one.
     slope = replace(quiet, covariance=np.diag(np.arange(1.0, n_cell + 1)))
     found = measured_drop._peak(slope)  # noqa: SLF001
-    low = record_force(np.pad(quiet.gated, 2), RATE)
+    low = low_pass(np.pad(quiet.gated, 2), RATE)
     assert found.value == pytest.approx(low.max())
     cell = np.argmax(low) / len(low) * n_cell
     assert found.uncertainty**2 == pytest.approx(cell + 0.5, abs=1.0)
@@ -126,7 +126,7 @@ def test_peak_has_the_uncertainty_of_its_place() -> None:
 def test_peak_is_less_what_noise_adds_and_as_uncertain() -> None:
     """Maxima of many noisy records: their mean error is part of their uncertainty."""
     found = [measured_drop._peak(make_drop(20.0, RATE, seed=seed).contact) for seed in range(40)]  # noqa: SLF001
-    clean = record_force(np.pad(make_drop(0.0, RATE).contact.gated, 2), RATE).max()
+    clean = low_pass(np.pad(make_drop(0.0, RATE).contact.gated, 2), RATE).max()
     error = np.array([one.value for one in found]) - clean
     stated = np.array([one.uncertainty for one in found])
     # White noise below 1.25 kHz: 20 N sqrt(1250/12800); more for what is subtracted.

@@ -26,7 +26,7 @@ import thud
 from thud.base.errors import ReportWarning
 from thud.base.files import Results
 from thud.level.estimate import Estimate
-from thud.level.levels import record_force
+from thud.level.levels import low_pass
 from thud.plot.recording_figures import recording_forces, recording_levels
 from thud.recordings.config import Config, PlateConfig
 from thud.recordings.read_recording import read_recording
@@ -446,7 +446,7 @@ def test_figures_show_every_drop_the_average_and_the_limits(one: Recording, coun
     assert len(drops) == (count if count <= 40 else 0)
     if count == 3:
         drop = recording.drops[1]
-        recorded = record_force(drop.force, drop.sample_rate)
+        recorded = low_pass(drop.force, drop.sample_rate)
         assert np.max(drops[1].get_ydata()) == pytest.approx(1e-3 * recorded.max(), rel=1e-3)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels[0] == "permitted contact time, 18 to 22 ms"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import platform
 import re
 from datetime import UTC, datetime
@@ -78,8 +79,9 @@ def recording_dataset(recording: ImpactResult) -> xr.Dataset:
             if force == "floor"
         },
         **{
-            name: ((), getattr(recording, name), attributes(schema.QUANTITIES[name]))
-            for name in ("sample_rate", "contact_time", "peak_force", "restitution", "impulse")
+            name: ((), recording.quantity(name), attributes(quantity))
+            for name, quantity in schema.QUANTITIES.items()
+            if not math.isnan(recording.quantity(name))
         },
     }
     coordinates = {"time": _time(recording.time), **band_coordinates(BANDWIDTHS)}

@@ -122,14 +122,16 @@ def force_exposure_levels(
     return levels
 
 
-def record_force(force: NDArray[np.float64], sample_rate: float) -> NDArray[np.float64]:
-    """Return a force as a force plate records it, below 1.25 kHz (paper, section 3).
+def low_pass(
+    force: NDArray[np.float64], sample_rate: float, cutoff: float = RECORDED_BAND
+) -> NDArray[np.float64]:
+    """Return a force low-passed at a frequency, by default as a force plate records it.
 
-    Forces, N, have the shape (n_sample,) and start and end at zero; the rate is in Hz.
+    Forces, N, have the shape (n_sample,) and start and end at zero; rate and cutoff are in Hz.
     """
-    recorded: NDArray[np.float64]
-    recorded = ask("recorded_force", force=force, sample_rate=sample_rate)["force"]
-    return recorded
+    low: NDArray[np.float64]
+    low = ask("low_pass", force=force, sample_rate=sample_rate, cutoff=cutoff)["force"]
+    return low
 
 
 def peak_count(force: ArrayLike, sample_rate: float) -> int:

@@ -10,7 +10,7 @@ from matplotlib.ticker import FixedLocator, NullLocator
 from thud.base._schema import FloorOptions, Plate
 from thud.base.checks import refuse_value, require_kind, require_whole
 from thud.impact.mobility import mobility
-from thud.level.levels import BANDWIDTHS, get_bands, record_force
+from thud.level.levels import BANDWIDTHS, get_bands, low_pass
 from thud.plot.impact_figures import TIME_LABEL
 from thud.plot.style import (
     COLORS,
@@ -79,7 +79,7 @@ def _draw_histories(history: Axes, motion: Axes, impact: FloorImpact) -> None:
     shown = (time >= 0) & (time <= 1e3 * _SHOWN * impact.contact_time)
     forces = {"blocked force": impact.blocked_force, "contact force": impact.floor_force}
     for i, (name, force) in enumerate(forces.items()):
-        recorded = 1e-3 * record_force(force, impact.sample_rate)
+        recorded = 1e-3 * low_pass(force, impact.sample_rate)
         history.plot(time[shown], recorded[shown], label=name, **line_style(i))
     history.set_ylabel("Force on the floor,\nlow-passed, kN")
     motion.plot(time[shown], 1e3 * impact.floor_velocity[shown], color=COLORS[2], linewidth=1)

@@ -15,7 +15,7 @@ from thud.base._schema import (
 )
 from thud.base.checks import refuse
 from thud.level.assessment import octave_limits
-from thud.level.levels import record_force
+from thud.level.levels import low_pass
 from thud.plot.style import (
     empty_axes,
     escape_label,
@@ -89,7 +89,7 @@ def contact_force(
     Force plates record no more (paper, section 3); above it, meshes and modes ring.
     """
     time = impact.time - impact.touch_time
-    recorded = record_force(impact.force(kind), impact.sample_rate)
+    recorded = low_pass(impact.force(kind), impact.sample_rate)
     end = time[recorded > NOISE * recorded.max()][-1]
     shown = (time >= -MARGIN * end) & (time <= (1 + MARGIN) * end)
     return 1e3 * time[shown], 1e-3 * recorded[shown]

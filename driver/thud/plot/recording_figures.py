@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.base.checks import require_choice
-from thud.level.levels import BANDWIDTHS, record_force
+from thud.level.levels import BANDWIDTHS, low_pass
 from thud.plot.impact_figures import MARGIN, TIME_LABEL, draw_tolerance
 from thud.plot.style import COLORS, GREY, empty_axes, legend_above, octave_axis, own_style
 
@@ -73,7 +73,7 @@ def _recorded(drop: Drop, time: NDArray[np.float64]) -> NDArray[np.float64]:
         int
     )
     first, stop = np.clip(ends, 0, len(drop.force))
-    force = record_force(drop.force[first:stop], drop.sample_rate)
+    force = low_pass(drop.force[first:stop], drop.sample_rate)
     return np.interp(time, drop.time[first:stop], force)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from thud.base.checks import refuse
 from thud.base.immutable import Immutable
 from thud.level.estimate import Estimate
-from thud.level.levels import RECORDED_BAND, record_force
+from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.contact import Contact, find_contact, find_edges
 from thud.recordings.faults import min_background, repair
 from thud.recordings.noise import Noise
@@ -43,6 +43,8 @@ MIN_CONTACT_RATIO = 4.0
 MAX_BOUNCE_RATIO = 3.0
 # Standard deviations of a difference that is noted.
 NOTABLE = 3.0
+# Quantities of the table that are estimated for each drop.
+ESTIMATES = ("contact_time", "restitution", "peak_force", "impulse", "effective_mass")
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,12 +229,12 @@ def _peak(contact: Contact) -> Estimate:
     strong noise; it also counts as standard uncertainty.
     """
     force = np.pad(contact.gated, 2)
-    low = record_force(force, contact.sample_rate)
+    low = low_pass(force, contact.sample_rate)
     cell = int(np.argmax(low)) * len(contact.covariance) // len(low)
     density, _ = contact.background.density(RECORDED_BAND)
     deviation = math.sqrt(density * contact.sample_rate / 2)
     draws = np.random.default_rng(0).normal(scale=deviation, size=(PEAK_DRAWS, len(force)))
-    maxima = [record_force(force + noise, contact.sample_rate).max() for noise in draws]
+    maxima = [low_pass(force + noise, contact.sample_rate).max() for noise in draws]
     bias = max(float(np.mean(maxima) - low.max()), 0.0)
     variance = density * min(RECORDED_BAND, contact.sample_rate / 2) + bias**2
     variance += contact.covariance[cell, cell]

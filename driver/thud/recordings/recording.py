@@ -25,6 +25,7 @@ from thud.recordings.budgets import (
 from thud.recordings.config import Config, checked_config
 from thud.recordings.filters import describe_low_pass
 from thud.recordings.measure_drops import measure_signals
+from thud.recordings.measured_drop import ESTIMATES
 from thud.recordings.polarity import check_peak, scan
 from thud.recordings.recorded_levels import average_levels, compare_methods, measure_levels
 from thud.recordings.signal import Signal
@@ -280,6 +281,8 @@ class Recording(Displayed):
 
     def quantity(self, name: str) -> float:
         """Return a quantity of the table by its name, SI units; NaN if unknown."""
+        if name in ESTIMATES and not hasattr(self, name):
+            return float(np.mean([getattr(drop, name).value for drop in self.drops]))
         return float(getattr(self, name, math.nan))
 
     def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - of the protocol

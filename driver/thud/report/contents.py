@@ -12,6 +12,7 @@ from thud.base.bridge import version
 from thud.level.assessment import get_criteria
 from thud.level.estimate import CONFIDENCE
 from thud.level.levels import BANDWIDTHS, get_bands
+from thud.recordings.measured_drop import ESTIMATES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -176,11 +177,10 @@ def _levels(recording: Recording, bands: BandSet) -> dict[str, Any]:
 
 def _drop(drop: Drop) -> dict[str, Any]:
     """Return the results of a drop."""
-    estimates = ("contact_time", "restitution", "peak_force", "impulse", "effective_mass")
     return {
         "name": drop.name,
         "onset": drop.onset,
-        **{name: _estimate(getattr(drop, name)) for name in estimates},
+        **{name: _estimate(getattr(drop, name)) for name in ESTIMATES},
         "restitution_method": drop.restitution_method,
         "restitutions": {name: _estimate(by) for name, by in drop.restitutions.items()},
         "bounces": list(drop.bounces),

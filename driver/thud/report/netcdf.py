@@ -8,19 +8,14 @@ import h5netcdf  # noqa: F401 - xarray names a missing one late
 import numpy as np
 import xarray as xr
 
+from thud.base._schema import QUANTITIES
+from thud.recordings.measured_drop import ESTIMATES
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from numpy.typing import NDArray
 
-# Unit and meaning of the numbers of each drop.
-ESTIMATES = {
-    "contact_time": ("s", "contact time"),
-    "restitution": ("1", "coefficient of restitution"),
-    "peak_force": ("N", "maximum force, low-passed at 1.25 kHz"),
-    "impulse": ("N s", "impulse of the contact"),
-    "effective_mass": ("kg", "impulse over the change of velocity"),
-}
 # Name and meaning of the levels of the average, by their keys in a report.
 LEVELS = {
     "level": ("level", "force exposure level of the average, re 1 N and 1 s"),
@@ -47,13 +42,14 @@ def recording_dataset(data: dict[str, Any]) -> xr.Dataset:
     drops, files = data["drops"], data["files"]
     onset = {"units": "s", "long_name": "time of first touch in the file"}
     variables: dict[str, Any] = {"onset": ("drop", _numbers(d["onset"] for d in drops), onset)}
-    for name, (unit, meaning) in ESTIMATES.items():
+    for name in ESTIMATES:
         for key, suffix, of in (
             ("value", "", ""),
             ("uncertainty", "_uncertainty", "standard uncertainty of the "),
         ):
             values = _numbers(drop[name][key] for drop in drops)
-            about = {"units": unit, "long_name": of + meaning}
+            quantity = QUANTITIES[name]
+            about = {"units": quantity.unit or "1", "long_name": of + quantity.meaning}
             variables[name + suffix] = ("drop", values, about)
     coordinates: dict[str, Any] = {"drop": ("drop", _texts(drop["name"] for drop in drops))}
     for bands, levels in data["levels"].items():

@@ -8,9 +8,11 @@ import math
 import re
 from typing import TYPE_CHECKING, Any
 
+from thud.base._schema import QUANTITIES
 from thud.base.display import left_out
 from thud.level.assessment import RESULTS
 from thud.plot.style import own_style
+from thud.recordings.measured_drop import ESTIMATES
 from thud.recordings.recorded_levels import BACKGROUND, MARGIN
 from thud.report.fonts import FAMILY, font_faces
 from thud.report.notes import group_places, shorten
@@ -190,16 +192,13 @@ def _rule(data: dict[str, Any]) -> str:
 
 def _means(drops: Sequence[dict[str, Any]]) -> list[str]:
     """Return sentences on means of the drops that are no criteria."""
-    names = {
-        "peak_force": ("peak force, low-passed at 1.25 kHz", "N", 0),
-        "impulse": ("impulse", "N s", 2),
-    }
-    names["effective_mass"] = ("effective mass", "kg", 3)
     means = []
-    for key, (title, unit, decimals) in names.items():
-        known = [drop[key]["value"] for drop in drops if drop[key]["value"] is not None]
-        if known:
-            means.append(f"{title} {number(sum(known) / len(known), decimals)} {unit}")
+    for name in ESTIMATES:
+        known = [drop[name]["value"] for drop in drops if drop[name]["value"] is not None]
+        if known and name not in {"contact_time", "restitution"}:
+            quantity = QUANTITIES[name]
+            unit = f" {quantity.display_unit}" if quantity.display_unit else ""
+            means.append(f"{quantity.title} {quantity.show(sum(known) / len(known))}{unit}")
     methods: dict[str, list[float]] = {}
     for drop in drops:
         for method, estimate in drop["restitutions"].items():

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.checks import refuse, require_choice, shown
+from thud.base._schema import SAMPLE_QUANTITIES
+from thud.base.checks import refuse, require_choice, require_words, shown
 from thud.base.immutable import Plain, freeze
 from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 from thud.studies.fitting.misfit import Misfit, numbers, require_positive
@@ -42,8 +43,9 @@ class LevelTarget(Plain):
         ``"octave"`` or ``"third"``.
     frequencies : sequence of float or None
         Nominal mid frequencies of the levels, Hz; None: all bands.
-    contact_time, restitution : tuple of float or None
-        Value and standard deviation, s and 1.
+    quantities : mapping of str to tuple of float
+        Value and standard deviation of other quantities by name, such as ``"contact_time"``, in SI
+        units; see `SampleQuantities`.
     force : str or None
         ``"floor"`` or ``"elastic"``: the force of the model whose levels are compared; None: that
         which its case assesses.
@@ -53,8 +55,7 @@ class LevelTarget(Plain):
     uncertainty: float | Sequence[float] | None = None
     bands: BandSet = "octave"
     frequencies: Sequence[float] | None = None
-    contact_time: tuple[float, float] | None = None
-    restitution: tuple[float, float] | None = None
+    quantities: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     force: LevelsForce | None = None
     fixed: Mapping[str, object] = field(default_factory=dict)
 
@@ -81,14 +82,14 @@ class LevelTarget(Plain):
             if isinstance(entries, float | int):
                 entries = [entries] * len(levels)
             deviation = numbers("uncertainty", entries, len(levels))
-        extra = {"contact_time": self.contact_time, "restitution": self.restitution}
-        known = {name: numbers(name, pair, 2) for name, pair in extra.items() if pair is not None}
+        require_words("target: quantities", self.quantities, SAMPLE_QUANTITIES)
+        known = {name: numbers(name, pair, 2) for name, pair in self.quantities.items()}
         if known and self.uncertainty is None:
             refuse("target: uncertainty of the levels is missing", "dB, above 0")
         target = np.concatenate([levels, [pair[0] for pair in known.values()]])
         deviation = np.concatenate([deviation, [pair[1] for pair in known.values()]])
         for value in deviation.tolist():
-            require_positive("uncertainty", value, "dB, s or 1")
+            require_positive("uncertainty", value, "dB or SI units")
         return LevelMisfit(self, [nominal.index(f) for f in wanted], target, deviation, list(known))
 
 
@@ -118,8 +119,9 @@ class LevelMisfit(Misfit):
     def values(self, impact: Impact) -> Array:
         """Return levels, dB, and what else is compared, s and 1, of an impact, shape (size,)."""
         levels = impact.levels(self.bands, force=self.kind)[self.indices]
-        known = {"contact_time": impact.exact_contact_time, "restitution": impact.restitution}
-        return np.concatenate([levels, [known[name] for name in self.extra]])
+        exact = {"contact_time": "exact_contact_time"}
+        extra = [impact.quantity(exact.get(name, name)) for name in self.extra]
+        return np.concatenate([levels, extra])
 
     def residual(self, impact: Impact, own: Array) -> Array:  # noqa: ARG002
         """Return model minus target over standard deviation, shape (size,)."""

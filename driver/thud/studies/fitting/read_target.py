@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from thud.base._schema import QUANTITIES, SAMPLE_QUANTITIES
 from thud.base.checks import refuse, refuse_value, require_number, require_words
 from thud.base.columns import read_table
 from thud.base.units import power_of, scaled
@@ -24,7 +25,10 @@ if TYPE_CHECKING:
 
 # What [target] may hold, and the units of its numbers.
 _FORCE_KEYS = ("file", "config", *(f.name for f in fields(ForceTarget) if f.name != "record"))
-_LEVEL_KEYS = tuple(f.name for f in fields(LevelTarget))
+_LEVEL_KEYS = (
+    *(f.name for f in fields(LevelTarget) if f.name != "quantities"),
+    *SAMPLE_QUANTITIES,
+)
 _UNITS = {
     "noise": "N", "below": "Hz", "window": "s", "frequencies": "Hz", "hum": "Hz", "gain": "",
 }  # fmt: skip
@@ -42,10 +46,12 @@ def read_target(table: dict[str, Any], folder: Path) -> Target:
         for name, value in table.items()
     }
     if "levels" in table:
-        for name, unit in (("contact_time", "s"), ("restitution", "")):
-            if name in options:
-                options[name] = _measured(f"[target] {name}", options[name], unit)
-        return LevelTarget(**options)
+        known = {
+            name: _measured(f"[target] {name}", options.pop(name), QUANTITIES[name].unit)
+            for name in SAMPLE_QUANTITIES
+            if name in options
+        }
+        return LevelTarget(**options, quantities=known)
     paths = {word: options.pop(word) for word in ("file", "config") if word in options}
     for word, name in paths.items():
         if not isinstance(name, str) or not name.strip():
