@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import thud
-from thud.plot.impacts import draw_forces, draw_levels
+from thud.plot.impact_figures import draw_forces, draw_levels
 from thud.plot.style import LEVEL, WIDTH, legend_above, new_figure, own_style
 
 if TYPE_CHECKING:

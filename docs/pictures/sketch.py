@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch, Rectangle
 
-from thud.plot.style import COLORS, WIDTH, new_figure
+from thud.plot.style import COLORS, WIDTH
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 INK = "0.15"
 BLUE, RED, GREEN = COLORS[:3]
@@ -24,7 +24,7 @@ def panels(
     limits: list[tuple[float, float, float, float]], height: float, width: float = 2 * WIDTH
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure and its panels, one for each range (left, right, bottom, top)."""
-    figure = new_figure(height, width)
+    figure = Figure(figsize=(width, height), dpi=300, layout="constrained")
     wide = [right - left for left, right, _, _ in limits]
     found = figure.subplots(1, len(limits), squeeze=False, gridspec_kw={"width_ratios": wide})[0]
     for axes, (left, right, bottom, top) in zip(found, limits, strict=True):

@@ -97,9 +97,9 @@ from .studies.design import (
     design as design,
 )
 from .studies.fit import fit as fit
+from .studies.fitting.fit_result import Fit as Fit
 from .studies.fitting.force_target import ForceTarget as ForceTarget
 from .studies.fitting.level_target import LevelTarget as LevelTarget
-from .studies.fitting.result import Fit as Fit
 from .studies.kinds import read_study as read_study
 from .studies.parameter import Parameter as Parameter
 from .studies.sensitivity import (

@@ -24,8 +24,8 @@ module thud_room
    !> Sets of bands of a prediction.
    character(len=*), parameter :: third_set = 'third', octave_set = 'octave'
 
-   !> Thirds of an octave.
-   integer, parameter :: n_third = 3
+   !> One-third-octave bands of an octave.
+   integer, parameter :: bands_per_octave = 3
 
    !> Reference of sound pressure, Pa.
    real(wp), parameter :: reference_pressure = 2.0e-5_wp
@@ -213,12 +213,12 @@ contains
       call find_rated_bands(octave_set, prediction%octaves, error)
       n = size(energies(1)%start)
       allocate (prediction%octave_level(size(prediction%octaves)), prediction%octave_time(size(prediction%octaves)))
-      allocate (start(n_third*n), weight(n_third*n))
+      allocate (start(bands_per_octave*n), weight(bands_per_octave*n))
       do i = 1, size(prediction%octaves)
-         allocate (loss(n_third*n, n_third*n), source=0.0_wp)
-         do j = 1, n_third
+         allocate (loss(bands_per_octave*n, bands_per_octave*n), source=0.0_wp)
+         do j = 1, bands_per_octave
             at = (j - 1)*n
-            associate (third => energies(n_third*(i - 1) + j))
+            associate (third => energies(bands_per_octave*(i - 1) + j))
                loss(at + 1:at + n, at + 1:at + n) = third%loss
                start(at + 1:at + n) = third%start
                weight(at + 1:at + n) = third%weight

@@ -35,7 +35,7 @@ module thud_quantities
       quantity_type('peak_force', 'peak force', 'F_{max}', 'N', 'N', 1.0_wp, 1, 'maximum force on the floor'), &
       quantity_type('peak_elastic_force', 'peak elastic force', 'F_{E,max}', 'N', 'N', 1.0_wp, 1, &
       'maximum elastic force'), &
-      quantity_type('max_deflection', 'maximum deflection', 'd_{max}', 'm', 'mm', 1.0e3_wp, 3, 'maximum deflection'), &
+      quantity_type('max_deflection', 'peak deflection', 'd_{max}', 'm', 'mm', 1.0e3_wp, 3, 'maximum deflection'), &
       quantity_type('restitution', 'restitution', 'e', '', '', 1.0_wp, 4, 'coefficient of restitution'), &
       quantity_type('impulse', 'impulse', 'I', 'N s', 'N s', 1.0_wp, 3, 'time integral of the force on the floor'), &
       quantity_type('impact_velocity', 'impact velocity', 'v_0', 'm/s', 'm/s', 1.0_wp, 3, 'velocity at first touch'), &

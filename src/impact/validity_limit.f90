@@ -12,7 +12,7 @@ module thud_validity_limit
    public :: get_gravity_limit, get_limit_message, get_wall_limits, get_wave_limit, is_outside, validity_limit_type
 
    !> Length of the message on a limit.
-   integer, parameter :: sentence_length = 240
+   integer, parameter :: message_length = 240
 
    !> A limit.
    type :: validity_limit_type
@@ -38,13 +38,13 @@ contains
    end function is_outside
 
    !> Message on a result outside the limits.
-   pure function get_limit_message(limit) result(sentence)
+   pure function get_limit_message(limit) result(message)
       type(validity_limit_type), intent(in) :: limit
-      character(len=sentence_length) :: sentence
+      character(len=message_length) :: message
       logical :: below
 
       below = limit%value < limit%lowest
-      sentence = '&'//trim(limit%group)//': '//trim(limit%quantity)//' is '//trim(rounded(limit%value)) &
+      message = '&'//trim(limit%group)//': '//trim(limit%quantity)//' is '//trim(rounded(limit%value)) &
          //', the theory holds '//trim(merge('from ', 'up to', below))//' ' &
          //trim(rounded(merge(limit%lowest, limit%highest, below)))//': '//limit%reason
    end function get_limit_message

@@ -48,7 +48,7 @@ static void interrupt(int number)
 }
 
 // Prepares the process of the executable: a write to a full file or a closed pipe is an error and not the end, no
-// file gets the number of a closed screen, and SIGINT or SIGTERM ends the process with a sentence.
+// file gets the number of a closed screen, and SIGINT or SIGTERM ends the process with a message.
 void thud_prepare_process(void)
 {
    struct sigaction action = {.sa_handler = SIG_IGN}, before;

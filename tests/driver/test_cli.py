@@ -270,7 +270,7 @@ def test_interruption_is_not_a_traceback(
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(sys.modules["thud.cli.cases"], "ask", interrupt)
+    monkeypatch.setattr(sys.modules["thud.cli.case_commands"], "ask", interrupt)
     assert cli.main(["run", str(case_file(MINIMAL))]) == 130
     assert "interrupted" in capsys.readouterr().err
 

@@ -89,7 +89,7 @@ def test_table_gives_every_criterion_beside_its_limits() -> None:
         "mass, kg": "2.500",
         "drop height, m": "1.000",
         "peak force, N": "1574.3",
-        "maximum deflection, mm": "29.020",
+        "peak deflection, mm": "29.020",
         "impulse, N s": "20.923",
         "verdict": "does not conform",
     }

@@ -434,7 +434,7 @@ def test_study_of_no_moves_gets_a_sentence(client: TestClient, moved: object) ->
     answer = client.post("/download/study.toml", json=SHELL | {"moved": moved})
     assert answer.status_code == 400
     assert moved == [] or "move" in answer.text
-    assert "want of memory" not in answer.text
+    assert "lack of memory" not in answer.text
 
 
 def test_study_varies_model_floor_and_room(client: TestClient, tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from scipy.sparse.linalg import eigsh
 from synthetic import make_recording
 
 import thud
-from thud.cli.cases import EXPORT, KINDS
+from thud.cli.case_commands import EXPORT, KINDS
 from thud.export.force_files import EXPORTS, BlockedForce, blocked_force
 from thud.recordings.read_recording import read_recording
 from thud.recordings.signal_files import open_signals

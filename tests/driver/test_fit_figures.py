@@ -11,7 +11,7 @@ import pytest
 from scipy import stats
 
 import thud
-from thud.plot.fits import LINE, _label, confidence, draw_fit, target_and_fit
+from thud.plot.fit_figures import LINE, _label, confidence, draw_fit, target_and_fit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -113,7 +113,7 @@ def command(executable: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     """Run a command of the table."""
     monkeypatch.chdir(tmp_path)
     # To draw them takes long, and is tested elsewhere.
-    monkeypatch.setattr("thud.plot.files._content", lambda *_: b"figure")
+    monkeypatch.setattr("thud.plot.save_figures._content", lambda *_: b"figure")
     monkeypatch.setattr("thud.plot.documentation.FIGURES", {"figure1": object})
     monkeypatch.setattr("thud.report.write.page_contents", lambda *_: {"report.html": b"page"})
     monkeypatch.setattr(

@@ -15,7 +15,7 @@ from conftest import naming
 from scipy.stats import binom
 
 import thud
-from thud.cli.recordings import run_history
+from thud.cli.recording_commands import run_history
 from thud.level.assessment import RESULTS, assess
 from thud.level.estimate import Contribution, Estimate
 from thud.level.levels import get_bands

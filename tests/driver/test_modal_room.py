@@ -13,7 +13,7 @@ from conftest import naming
 import thud
 from thud.floors import modal_room as module
 from thud.floors.modal_room import SAMPLE_RATE, fast_levels, plate_frequencies
-from thud.plot.floors import plate_modes
+from thud.plot.floor_figures import plate_modes
 
 if TYPE_CHECKING:
     from collections.abc import Callable

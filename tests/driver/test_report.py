@@ -27,7 +27,7 @@ from thud.base.errors import ReportWarning
 from thud.base.files import Results
 from thud.level.estimate import Estimate
 from thud.level.levels import record_force
-from thud.plot.recordings import recording_forces, recording_levels
+from thud.plot.recording_figures import recording_forces, recording_levels
 from thud.recordings.config import Config, PlateConfig
 from thud.recordings.read_recording import read_recording
 from thud.recordings.recording import Recording

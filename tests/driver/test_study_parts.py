@@ -549,7 +549,7 @@ def test_answers_are_the_verdict_of_what_is_predicted() -> None:
             ("residuals", (64, 12)))),
     ],
 )  # fmt: skip
-def test_surrogate_whose_parts_do_not_fit_is_not_whole(change: dict[str, Any]) -> None:
+def test_surrogate_whose_parts_do_not_fit_is_not_complete(change: dict[str, Any]) -> None:
     assert answering().is_complete
     assert not replace(answering(), **change).is_complete
 

@@ -903,7 +903,7 @@ QUANTITIES = {
     "contact_time": Quantity("contact_time", "contact time", "T", "s", "ms", 1000.0, 3, "contact time"),
     "peak_force": Quantity("peak_force", "peak force", "F_{max}", "N", "N", 1.0, 1, "maximum force on the floor"),
     "peak_elastic_force": Quantity("peak_elastic_force", "peak elastic force", "F_{E,max}", "N", "N", 1.0, 1, "maximum elastic force"),
-    "max_deflection": Quantity("max_deflection", "maximum deflection", "d_{max}", "m", "mm", 1000.0, 3, "maximum deflection"),
+    "max_deflection": Quantity("max_deflection", "peak deflection", "d_{max}", "m", "mm", 1000.0, 3, "maximum deflection"),
     "restitution": Quantity("restitution", "restitution", "e", "", "", 1.0, 4, "coefficient of restitution"),
     "impulse": Quantity("impulse", "impulse", "I", "N s", "N s", 1.0, 3, "time integral of the force on the floor"),
     "impact_velocity": Quantity("impact_velocity", "impact velocity", "v_0", "m/s", "m/s", 1.0, 3, "velocity at first touch"),

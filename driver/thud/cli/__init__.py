@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NoReturn
 from thud.base.bridge import version
 from thud.base.checks import suggestion
 from thud.base.errors import InputError, NumericalError, ThudError
-from thud.cli.cases import EXAMPLES, EXPORT, compare_cases, draw_figures, run_cases
+from thud.cli.case_commands import EXAMPLES, EXPORT, compare_cases, draw_figures, run_cases
 from thud.cli.command import (
     FORMAT,
     NO_FIGURES,
@@ -24,10 +24,10 @@ from thud.cli.command import (
     output,
     shown_at_once,
 )
-from thud.cli.explore import EXPLORE
-from thud.cli.floors import FLOOR, MOBILITY, RATE
-from thud.cli.recordings import CALIBRATE, MEASURE, run_history
-from thud.cli.studies import study_commands
+from thud.cli.explore_command import EXPLORE
+from thud.cli.floor_commands import FLOOR, MOBILITY, RATE
+from thud.cli.recording_commands import CALIBRATE, MEASURE, run_history
+from thud.cli.study_commands import study_commands
 from thud.level.levels import FORCES, SOURCES
 
 if TYPE_CHECKING:

@@ -120,7 +120,7 @@ def save_result(  # noqa: PLR0913, PLR0917 - each of them differs
     contents = dict([file])
     if not options.no_figures:
         with left_out(figure):
-            from thud.plot.files import figure_files
+            from thud.plot.save_figures import figure_files
 
             contents |= figure_files(draw_all({figure: result.plot}))
     results.write(contents)

@@ -25,9 +25,9 @@ from thud.case.case import Case, read_case
 from thud.impact.compute import compute
 from thud.level.impact_result import ImpactResult
 from thud.level.levels import FORCES, SOURCES
-from thud.plot.files import page_files
-from thud.plot.impacts import common_source
+from thud.plot.impact_figures import common_source
 from thud.plot.pages import comparison_html, comparison_page
+from thud.plot.save_figures import page_files
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -20,7 +20,7 @@ from thud.impact.compute import compute
 from thud.impact.ensemble import get_cost
 from thud.impact.floor_impact import FloorImpact
 from thud.level.levels import get_bands
-from thud.plot.impacts import contact_force
+from thud.plot.impact_figures import contact_force
 from thud.plot.style import FORCE_WORDS
 from thud.recordings.read_recording import read_recording
 

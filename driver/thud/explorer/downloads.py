@@ -1,4 +1,4 @@
-"""Files that the page offers: the case, its force, a report, a study over what was moved."""
+"""Files that the page offers: case, force, report, and a study over the moved sliders."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 # Points of a grid along one parameter, and samples of a design with more than two.
 POINTS = 11
-SETS = 256
-# Group of a request that is no group of the case: the ends of the moves of sliders, by group.key.
+SAMPLES = 256
+# Group of a request beside those of the case: ends of the moves of sliders, by group.key.
 MOVED = "moved"
 
 
@@ -55,13 +55,13 @@ def force(values: Values) -> bytes:
 def report(values: Values) -> bytes:
     """Return the page of a comparison with the case alone."""
     impact = compute(new_case(values))
-    found = compare({impact.case.name: impact})
+    comparison = compare({impact.case.name: impact})
     source = impact.case.limits.source
-    return comparison_html(found.impacts, None, source, found.table()).encode()
+    return comparison_html(comparison.impacts, None, source, comparison.table()).encode()
 
 
 def study(values: Values) -> bytes:
-    """Return the file of a sweep over the keys that were moved, between the ends of their moves."""
+    """Return the file of a sweep over the moved keys, between the ends of their moves."""
     moved = _moves(values.pop(MOVED, {}))
     case = new_case(values)
     check_case(case)
@@ -69,14 +69,14 @@ def study(values: Values) -> bytes:
     ranges = {names[key]: ends for key, ends in moved.items() if key in names and ends[0] < ends[1]}
     if not ranges:
         refuse("move a slider first", "a study of one or more")
-    lines = ["# A sweep over what was moved: thud-driver sweep <this file>"]
+    lines = ["# A sweep over the moved keys: thud-driver sweep <this file>"]
     for group, keys in case.to_namelist().items():
         if group in values:
-            given = [f"{key} = {_toml(keys[key])}" for key in keys if key in values[group]]
-            lines += ["", f"[case.{group}]", *given]
+            stated = [f"{key} = {_toml(keys[key])}" for key in keys if key in values[group]]
+            lines += ["", f"[case.{group}]", *stated]
     grid = len(ranges) <= 2  # noqa: PLR2004 - more would be many samples
     lines += ["", "[design]"]
-    lines += ['kind = "grid"'] if grid else ['kind = "sobol"', f"size = {SETS}", "seed = 1"]
+    lines += ['kind = "grid"'] if grid else ['kind = "sobol"', f"size = {SAMPLES}", "seed = 1"]
     lines += ["", "[parameters]"]
     for name, (low, high) in ranges.items():
         key = find_key(name, key_owners(case))[0]
@@ -112,7 +112,7 @@ def _toml(value: object) -> str:
     return repr(value)
 
 
-# What makes a file of the values, and its media type, by the name of the request.
+# Function that makes a file of the values, and media type, by the name of the request.
 DOWNLOADS: dict[str, tuple[Callable[[Values], bytes], str]] = {
     "case.nml": (namelist, "text/plain"),
     "force.csv": (force, "text/csv"),

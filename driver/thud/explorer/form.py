@@ -17,20 +17,20 @@ if TYPE_CHECKING:
 
     from thud.base.key import Group, Key
 
-# A slider spans this part to this multiple of the value that it starts with.
+# A logarithmic slider spans its initial value divided and multiplied by this.
 SPAN = 3.0
-# A slider spans the whole range where that is positive, no longer than this, and the value lies
-# at least at this part of it.
-SHORT, PART = 3.0, 0.1
-# Part of such a range that is left out at its ends.
+# A linear slider spans an allowed range that is positive and up to this long, if its initial value
+# lies above this fraction of it.
+MAX_LENGTH, MIN_FRACTION = 3.0, 0.1
+# Fraction of such a range that is left out at its ends.
 INSET = 0.01
 _RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
-# Groups that the page leaves out: name, free modes, quasi-static compression, files.
+# Groups without fields on the page: name, free modes, quasi-static compression, files.
 LEFT_OUT = ("case", "modes", "compression", "output")
 
 
 def form() -> list[dict[str, Any]]:
-    """Return the groups of fields: name, title, what they belong to, and the fields.
+    """Return the groups of fields: name, title, owner, and the fields.
 
     A field has the group and the name of its key, label, kind, help, choices and default. A number
     also has a unit, the power of ten that brings it to that of the key, limits of the allowed range
@@ -75,7 +75,7 @@ def _field(key: Key, default: object) -> dict[str, Any]:
         "power": 0,
     }
     if key.kind in {"real", "whole"} and isinstance(default, int | float):
-        # Times stay in seconds: a reverberation time of 500 ms is none that anybody knows.
+        # Times stay in seconds: nobody states a reverberation time as 500 ms.
         unit = key.unit if key.unit == "s" else display_unit(key.unit, default)[0]
         power = power_of(unit or "1", key.unit, key.name)
         after = "" if isinstance(key.upper, str) else f" {_typeset(unit)}"
@@ -122,10 +122,10 @@ def _end(end: float | str, power: int) -> str:
 def _slider(
     value: float, lower: float | None, upper: float | None, *, whole: bool
 ) -> dict[str, Any] | None:
-    """Return ends and scale of a slider around a value; None where the value says no scale."""
+    """Return ends and scale of a slider around a value; None if the value has no scale."""
     if lower is not None and upper is not None and lower >= 0:
         length = upper - lower
-        if length <= SHORT and (value <= 0 or value >= lower + PART * length):
+        if length <= MAX_LENGTH and (value <= 0 or value >= lower + MIN_FRACTION * length):
             # Only the default shows that an end itself is allowed.
             inner = lower + INSET * length, upper - INSET * length
             return {"ends": [min(value, inner[0]), max(value, inner[1])], "log": False}

@@ -1,4 +1,4 @@
-"""Works in processes of their own, which end when nobody waits for them."""
+"""Computations in processes of their own, which end when nobody waits for them."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ WORKS: dict[str, Callable[..., Any]] = {
     "recording": answer_recording,
     "download": lambda what, values: DOWNLOADS[what][0](values),
 }
-# What bad values raise: those of wrong types stop where they are first used.
+# Errors of bad values: those of wrong types are raised at their first use.
 REFUSALS = (ThudError, TypeError, ValueError, KeyError, OverflowError)
 # Time between two reports, s.
 INTERVAL = 0.05
@@ -42,7 +42,7 @@ MEMORY = 4_000_000_000
 
 
 class Jobs:
-    """Processes that do a few works at a time; others wait."""
+    """Processes that compute a few answers at a time; other requests wait."""
 
     def __init__(
         self, width: int, longest: float, *, late: Report | None = None, kept: bool = False
@@ -65,7 +65,7 @@ class Jobs:
         self._context.set_forkserver_preload([__name__])
         forkserver.ensure_running()
         # What ends the reports need not be the task that asked for them.
-        self._places = anyio.Semaphore(width)
+        self._slots = anyio.Semaphore(width)
         self._longest = longest
         message = f"the work takes longer than {longest:g} s; allowed: less"
         self._late = late or {"error": message}
@@ -80,7 +80,7 @@ class Jobs:
         """
         report: Report = {"done": 0.0}
         yield report
-        async with self._places:
+        async with self._slots:
             with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
                 process, near, far = self._take()
                 kept = False
@@ -95,14 +95,14 @@ class Jobs:
                         report = await self._call(end, near.recv)
                     kept = self._kept and report is not self._late
                 except (EOFError, OSError):
-                    message = "the work ended without an answer, perhaps for want of memory"
+                    message = "the work ended without an answer, perhaps for lack of memory"
                     report = {"error": message}
                 finally:
                     if kept:
                         self._idle.append((process, near))
                     else:
                         _kill(process)
-        # The place is free by now: whoever asked may be slow to read.
+        # The slot is free by now: the reader may be slow.
         yield report
 
     def close(self) -> None:
@@ -114,7 +114,7 @@ class Jobs:
         """Return a process and its connection; of one still to be started also its own end."""
         while self._idle:
             process, near = self._idle.pop()
-            # Of one that has ended the end of its words can be read.
+            # The connection of a process that has ended is at its end.
             if not near.poll():
                 return process, near, None
             _kill(process)

@@ -80,7 +80,7 @@ class FloorComparison(Displayed):
 
     def files(self) -> dict[str, bytes]:
         """Return ``floors.svg`` and ``floors.html`` by name."""
-        from thud.plot.files import page_files
+        from thud.plot.save_figures import page_files
 
         return page_files("floors", self.figure, self.html())
 

@@ -161,7 +161,7 @@ class BallImpedance(Displayed):
         floors
             Floors by their names in the legend.
         """
-        from thud.plot.floors import ball_impedances
+        from thud.plot.floor_figures import ball_impedances
 
         return ball_impedances({"": self}, floors or {})
 

@@ -185,7 +185,7 @@ class MobilityFit(Displayed):
 
     def plot(self) -> Figure:
         """Draw the measured mobility and the fit."""
-        from thud.plot.floors import mobility_fit
+        from thud.plot.floor_figures import mobility_fit
 
         return mobility_fit(self)
 

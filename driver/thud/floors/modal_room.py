@@ -134,7 +134,7 @@ class ModalRoom(Displayed):
 
     def plot(self) -> Figure:
         """Draw the levels of all positions against the statistical answer."""
-        from thud.plot.rooms import draw_modal_room
+        from thud.plot.room_figures import draw_modal_room
 
         return draw_modal_room(self)
 

@@ -189,7 +189,7 @@ class RoomPrediction(Displayed):
 
     def plot(self, measured: RoomLevels | None = None) -> Figure:
         """Draw the chain: force, energy, floor and room, with measured levels if given."""
-        from thud.plot.rooms import draw_prediction
+        from thud.plot.room_figures import draw_prediction
 
         return draw_prediction(self, measured)
 

@@ -207,7 +207,7 @@ class RoomLevels(Displayed):
 
     def plot(self) -> Figure:
         """Draw the levels of positions, their mean, the standardized ones and the background."""
-        from thud.plot.rooms import room_levels
+        from thud.plot.room_figures import room_levels
 
         return room_levels(self)
 

@@ -54,7 +54,7 @@ class CompressionCurve(Displayed):
 
     def plot(self) -> Figure:
         """Return a figure of the force against the deflection."""
-        from thud.plot.ball import compression
+        from thud.plot.ball_figures import compression
 
         return compression({"": self})
 

@@ -154,7 +154,7 @@ class FloorImpact(Impact):
 
     def plot(self) -> Figure:
         """Draw contact against blocked force, their levels, and the mobility of the floor."""
-        from thud.plot.floors import draw_floor
+        from thud.plot.floor_figures import draw_floor
 
         return draw_floor(self)
 

@@ -238,7 +238,7 @@ class Impact(ImpactQuantities, Displayed):
 
     def plot(self) -> Figure:
         """Return a figure of the force that the case assesses, and of its octave levels."""
-        from thud.plot.impacts import overview
+        from thud.plot.impact_figures import overview
 
         return overview(self)
 

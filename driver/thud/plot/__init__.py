@@ -22,7 +22,7 @@ except ValueError as error:
 
 from thud.base._schema import Plate
 from thud.base.display import draw_all, left_out
-from thud.plot.ball import (
+from thud.plot.ball_figures import (
     animate as animate,
     compression as compression,
     draw_material as draw_material,
@@ -30,37 +30,37 @@ from thud.plot.ball import (
     mode_shapes as mode_shapes,
     motion as motion,
 )
-from thud.plot.files import (
-    FORMATS as FORMATS,
-    figure_files as figure_files,
-    save as save,
-    save_all as save_all,
-)
-from thud.plot.fits import draw_fit as draw_fit, target_and_fit as target_and_fit
-from thud.plot.floors import (
+from thud.plot.fit_figures import draw_fit as draw_fit, target_and_fit as target_and_fit
+from thud.plot.floor_figures import (
     ball_impedances as ball_impedances,
     draw_floor as draw_floor,
     floor_mobilities as floor_mobilities,
     mobility_fit as mobility_fit,
     plate_modes as plate_modes,
 )
-from thud.plot.impacts import (
+from thud.plot.impact_figures import (
     force_history as force_history,
     level_changes as level_changes,
     levels as levels,
 )
 from thud.plot.pages import comparison_page as comparison_page
-from thud.plot.recordings import (
+from thud.plot.recording_figures import (
     recording_forces as recording_forces,
     recording_levels as recording_levels,
 )
-from thud.plot.rooms import (
+from thud.plot.room_figures import (
     draw_decay as draw_decay,
     draw_positions as draw_positions,
     draw_prediction as draw_prediction,
     room_levels as room_levels,
 )
-from thud.plot.studies import (
+from thud.plot.save_figures import (
+    FORMATS as FORMATS,
+    figure_files as figure_files,
+    save as save,
+    save_all as save_all,
+)
+from thud.plot.study_figures import (
     draw_design as draw_design,
     draw_sensitivity as draw_sensitivity,
     draw_surrogate as draw_surrogate,

@@ -21,9 +21,9 @@ from thud.floors.impedance import ball_impedance
 from thud.impact.compression import compress
 from thud.impact.free_modes import free_modes
 from thud.impact.solve import solve
-from thud.plot.ball import compression, loss_factor, mode_shapes, motion
-from thud.plot.floors import ball_impedances, draw_floor, floor_mobilities
-from thud.plot.impacts import force_history, level_changes, levels
+from thud.plot.ball_figures import compression, loss_factor, mode_shapes, motion
+from thud.plot.floor_figures import ball_impedances, draw_floor, floor_mobilities
+from thud.plot.impact_figures import force_history, level_changes, levels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

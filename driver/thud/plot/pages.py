@@ -17,7 +17,13 @@ from plotly.offline import get_plotlyjs
 from thud.base._schema import CLASS_LIMITS
 from thud.level.assessment import octave_limits
 from thud.level.levels import get_bands
-from thud.plot.impacts import TIME_LABEL, contact_force, draw_forces, draw_levels, force_label
+from thud.plot.impact_figures import (
+    TIME_LABEL,
+    contact_force,
+    draw_forces,
+    draw_levels,
+    force_label,
+)
 from thud.plot.style import (
     BAND_WORDS,
     COLORS,

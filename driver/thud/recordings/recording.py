@@ -356,7 +356,7 @@ class Recording(Displayed):
 
     def plot(self, what: Literal["levels", "force"] = "levels") -> Figure:
         """Draw the levels of the drops over the tolerance band, or their forces."""
-        from thud.plot.recordings import recording_figure
+        from thud.plot.recording_figures import recording_figure
 
         return recording_figure(self, what)
 

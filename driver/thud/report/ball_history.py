@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 YEAR = timedelta(days=365.25)
-# Probability that a trend is told of any criterion of a ball that does not change.
+# Probability of a reported trend in any criterion of a ball that does not change.
 SIGNIFICANCE = 0.05
 # Reports that make a trend: two lie on any line.
 MIN_REPORTS = 3
-# Later dates are not told, years after the last report.
+# Later dates are not reported, years after the last report.
 FARTHEST = 100.0
 # Reports in the table: the first, and the last ones.
 MAX_COLUMNS = 8
@@ -60,7 +60,7 @@ class Trend(Immutable):
         Times of the first and the last report, years since the first, and the line there.
     reached, earliest, latest : float
         Time at which the line reaches a limit, and between what (95 %), years since the first
-        report; NaN where there is no such time or the trend is not significant.
+        report; NaN if there is no such time or the trend is not significant.
     """
 
     slope: float
@@ -102,15 +102,16 @@ class History:
 
     def criteria(self) -> list[list[dict[str, Any]]]:
         """Return the entries of each criterion, in the order of the dates."""
-        return [list(one) for one in zip(*(r["criteria"] for r in self.reports), strict=True)]
+        reports = (report["criteria"] for report in self.reports)
+        return [list(entries) for entries in zip(*reports, strict=True)]
 
     def trends(self) -> list[Trend | None]:
         """Return the trend of each criterion; None with fewer than three dates, or equal values."""
-        series = [(one, self._known(one)) for one in self.criteria()]
+        series = [(entries, self._known(entries)) for entries in self.criteria()]
         able = [len(set(years)) >= MIN_REPORTS and np.ptp(v) > 0 for _, (years, v, _) in series]
         return [
-            _trend(*known, limits_of(one[-1]), SIGNIFICANCE / sum(able)) if is_able else None
-            for (one, known), is_able in zip(series, able, strict=True)
+            _trend(*known, limits_of(entries[-1]), SIGNIFICANCE / sum(able)) if is_able else None
+            for (entries, known), is_able in zip(series, able, strict=True)
         ]
 
     def _known(
@@ -118,9 +119,9 @@ class History:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Return times, values and standard uncertainties; upper bounds are no values."""
         rows = [
-            (year, one["value"], one["uncertainty"] or 0.0)
-            for year, one in zip(self.years, entries, strict=True)
-            if one["value"] is not None and not one["upper_bound"]
+            (year, entry["value"], entry["uncertainty"] or 0.0)
+            for year, entry in zip(self.years, entries, strict=True)
+            if entry["value"] is not None and not entry["upper_bound"]
         ]
         columns = np.array(rows, dtype=np.float64).reshape(-1, 3)
         return columns[:, 0], columns[:, 1], columns[:, 2]
@@ -128,12 +129,13 @@ class History:
     def table(self) -> list[tuple[str, ...]]:
         """Return rows of text: values of each report, the last ones of many, drifts and limits."""
         criteria, last = self.criteria(), len(self.dates) - 1
-        styles = [style_of(one[0]) for one in criteria]
+        styles = [style_of(entries[0]) for entries in criteria]
         columns = [("", *(style.title for style in styles), "verdict")]
         for i in range(last + 1):
             if 0 < i <= last + 1 - MAX_COLUMNS:
                 continue
-            cells = (criterion_row(one[i])[1] + WORDS[one[i]["verdict"]] for one in criteria)
+            column = [entries[i] for entries in criteria]
+            cells = (criterion_row(entry)[1] + WORDS[entry["verdict"]] for entry in column)
             day = self.dates[i].date().isoformat()
             columns.append((day, *cells, self.reports[i]["verdict"]))
         together = list(zip(styles, self.trends(), strict=True))
@@ -142,26 +144,26 @@ class History:
         return list(zip(*columns, strict=True))
 
     def warnings(self) -> list[str]:
-        """Return a sentence for each criterion with a trend that is more than chance."""
-        found = []
-        for one, trend in zip(self.criteria(), self.trends(), strict=True):
+        """Return a warning for each criterion with a significant trend."""
+        warnings = []
+        for entries, trend in zip(self.criteria(), self.trends(), strict=True):
             if trend is None or not trend.significant:
                 continue
-            style = style_of(one[0])
-            told = f"{style.title}: changes by {_slope(style, trend).rstrip(' *')} per year"
-            day = self._told(trend.reached)
-            if day:
-                ends = [self._told(end) or "later" for end in (trend.earliest, trend.latest)]
+            style = style_of(entries[0])
+            text = f"{style.title}: changes by {_slope(style, trend).rstrip(' *')} per year"
+            date = self._date(trend.reached)
+            if date:
+                ends = [self._date(end) or "later" for end in (trend.earliest, trend.latest)]
                 word = "reached" if trend.reached < self.years[-1] else "reaches"
-                told += f"; {word} a limit on {day} (95 %: {ends[0]} to {ends[1]})"
-            found.append(told)
-        return found
+                text += f"; {word} a limit on {date} (95 %: {ends[0]} to {ends[1]})"
+            warnings.append(text)
+        return warnings
 
     def _limit(self, trend: Trend | None) -> str:
-        return "–" if trend is None else self._told(trend.reached) or "–"
+        return "–" if trend is None else self._date(trend.reached) or "–"
 
-    def _told(self, years: float) -> str:
-        """Return the day of a time; nothing where it is not known or far."""
+    def _date(self, years: float) -> str:
+        """Return the date of a time; empty if unknown or far."""
         last = float(self.years[-1])
         if not -FARTHEST < years - last < FARTHEST:
             return ""
@@ -287,10 +289,10 @@ def _trend(
     limits: tuple[float, float],
     significance: float,
 ) -> Trend:
-    """Return the line of least squares, weighted by 1/uncertainty2, and what it tells.
+    """Return the line of least squares, weighted by 1/uncertainty2, with its uncertainty.
 
     Its uncertainty is the larger of that which the values state and that which they show by their
-    scatter, of n - 2 degrees of freedom: a line that only one of them supports is not told.
+    scatter, of n - 2 degrees of freedom: a line that only one of them supports is not reported.
     """
     count = len(time)
     stated = bool((uncertainty > 0).all())

@@ -187,7 +187,7 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
     }
     if figures and _has_matplotlib():
         # Matplotlib takes its time.
-        from thud.plot.files import figure_files
+        from thud.plot.save_figures import figure_files
 
         drawn = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
         contents |= page_contents(data, list(drawn.values()), results.folder)

@@ -121,7 +121,7 @@ class Blocks:
         try:
             with _named(self.path):
                 for i in range(0, len(names), together):
-                    result = _join(paths, names[i : i + together], known_whole=i > 0)
+                    result = _join(paths, names[i : i + together], known_intact=i > 0)
                     grid = grid_of(self._study, result)
                     grid.to_zarr(part, mode="a" if i else "w", consolidated=False)
                 part.rename(self.path)
@@ -177,15 +177,15 @@ def read_dataset(path: Path) -> xr.Dataset:
 
 
 def _join(
-    paths: list[Path], names: list[str] | None = None, *, known_whole: bool = False
+    paths: list[Path], names: list[str] | None = None, *, known_intact: bool = False
 ) -> xr.Dataset:
     """Return blocks as one dataset, or some variables of them with all coordinates.
 
-    Of blocks that are known to be whole only these are read.
+    Of blocks that are known to be intact only these are read.
     """
     parts = []
     for path in paths:
-        with _open(path, known_whole=known_whole) as dataset:
+        with _open(path, known_intact=known_intact) as dataset:
             parts.append(_loaded(dataset if names is None else dataset[names]))
     return xr.concat(
         parts, "sample", data_vars="minimal", coords="minimal", compat="override",
@@ -204,7 +204,7 @@ def _loaded(dataset: xr.Dataset) -> xr.Dataset:
 
 
 @contextmanager
-def _open(path: Path, *, known_whole: bool = False) -> Iterator[xr.Dataset]:
+def _open(path: Path, *, known_intact: bool = False) -> Iterator[xr.Dataset]:
     with _readable(path):
         with uninterrupted():
             if path.suffix == ".zarr":
@@ -214,8 +214,8 @@ def _open(path: Path, *, known_whole: bool = False) -> Iterator[xr.Dataset]:
                     raise ValueError(message)
                 dataset = _open_zarr(path)
             else:
-                if not known_whole:
-                    _require_whole(path)
+                if not known_intact:
+                    _require_intact(path)
                 # Whole files are renamed to this name, so that no lock is needed; some file
                 # systems have none.
                 dataset = xr.open_dataset(
@@ -249,7 +249,7 @@ def _write(dataset: xr.Dataset, path: Path) -> None:
         replace_file(path, content + _SEAL + sha256(content).digest())
 
 
-def _require_whole(path: Path) -> None:
+def _require_intact(path: Path) -> None:
     """Raise ValueError for a damaged NetCDF file: HDF5 may never return from one."""
     content, _, digest = read_input(path).rpartition(_SEAL)
     if sha256(content).digest() != digest:

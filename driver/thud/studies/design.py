@@ -10,9 +10,9 @@ from thud.base.checks import refuse
 from thud.case.case import Case
 from thud.case.keys import DENSITY, value_in
 from thud.impact.quantities import RATING
-from thud.studies.result import SampleResult
 from thud.studies.sample_kind import SampleKind
 from thud.studies.study import wall_volume
+from thud.studies.study_result import SampleResult
 
 if TYPE_CHECKING:
     import os

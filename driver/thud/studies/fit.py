@@ -15,11 +15,11 @@ from thud.base.files import read_input
 from thud.base.key import check_keywords
 from thud.case.case import Case, check_case
 from thud.studies.directory import FORMATS
+from thud.studies.fitting.fit_result import Fit, file_ends
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.inference import require_confidence
 from thud.studies.fitting.ranges import bound_parameters, fitted_parameter, get_ranges
 from thud.studies.fitting.read_target import Target, read_target
-from thud.studies.fitting.result import Fit, file_ends
 from thud.studies.fitting.search import search
 from thud.studies.kind import Kind
 from thud.studies.study import Study, fix_keys, table_of, with_density
@@ -192,19 +192,7 @@ def _require_options(options: Mapping[str, Any]) -> None:
 
 @dataclass(frozen=True)
 class FitStudy(Study):
-    """A fit as a file describes it.
-
-    Attributes
-    ----------
-    targets : tuple of ForceTarget and LevelTarget
-        What is fitted.
-    tables : dict
-        The file as JSON holds it.
-    options : dict
-        Confidence of the intervals, starts, seed and maximum number of steps.
-    surrogate : Surrogate or None
-        What answers the drops instead of the model.
-    """
+    """A fit as a file describes it: targets, the file as JSON holds it, options of the search."""
 
     targets: tuple[Target, ...] = ()
     tables: dict[str, Any] = field(default_factory=dict)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypedDict, Ty
 
 from thud.base.checks import refuse, require_words
 from thud.studies.directory import take
-from thud.studies.result import StudyResult
 from thud.studies.study import Study, named_files, read_common, read_tables
+from thud.studies.study_result import StudyResult
 from thud.studies.trained_surrogate import get_surrogate
 
 if TYPE_CHECKING:

@@ -15,10 +15,10 @@ from thud.studies.dataset import disk_space
 from thud.studies.directory import FORMATS
 from thud.studies.kind import Kind
 from thud.studies.parameter import varied
-from thud.studies.result import StudyResult
 from thud.studies.samples import SampleStudy
 from thud.studies.sampling import read_design
 from thud.studies.study import table_of
+from thud.studies.study_result import StudyResult
 from thud.studies.surrogate_training import surrogate_name, train
 from thud.studies.temperature import read_temperature
 from thud.studies.trained_surrogate import Surrogate, read_plan

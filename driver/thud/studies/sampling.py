@@ -87,31 +87,24 @@ def unit_samples(  # noqa: PLR0913, PLR0917 - the numbers of a design
             # The whole is a power of 2; its parts need not be.
             warnings.simplefilter("ignore", UserWarning)
             return _float(points.random(stop - start))
-    return _whole(design, dimension, size, seed)[start:stop]
+    return _all_points(design, dimension, size, seed)[start:stop]
 
 
 @lru_cache(maxsize=1)
-def _whole(design: str, dimension: int, size: int, seed: int) -> NDArray[np.float64]:
+def _all_points(design: str, dimension: int, size: int, seed: int) -> NDArray[np.float64]:
     """Return all points of a design that cannot be sampled in parts."""
     try:
-        return _sampled(design, dimension, size, seed)
+        if design == "latin_hypercube":
+            from scipy.stats import qmc
+
+            return _float(qmc.LatinHypercube(dimension, rng=seed).random(size))
+        from SALib.sample import sobol as saltelli
+
+        names = list(map(str, range(dimension)))
+        cube = {"num_vars": dimension, "names": names, "bounds": [[0.0, 1.0]] * dimension}
+        return _float(saltelli.sample(cube, size, calc_second_order=False, seed=seed))
     except MemoryError as error:
         refuse(f"[design] size = {size} of kind {design} does not fit in memory", "fewer", error)
-
-
-def _sampled(design: str, dimension: int, size: int, seed: int) -> NDArray[np.float64]:
-    if design == "latin_hypercube":
-        from scipy.stats import qmc
-
-        return _float(qmc.LatinHypercube(dimension, rng=seed).random(size))
-    from SALib.sample import sobol as saltelli
-
-    cube = {
-        "num_vars": dimension,
-        "names": list(map(str, range(dimension))),
-        "bounds": [[0.0, 1.0]] * dimension,
-    }
-    return _float(saltelli.sample(cube, size, calc_second_order=False, seed=seed))
 
 
 def _float(points: Any) -> NDArray[np.float64]:  # noqa: ANN401 - of libraries without types

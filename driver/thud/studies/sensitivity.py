@@ -11,9 +11,9 @@ import xarray as xr
 from thud.base.checks import refuse
 from thud.impact.quantities import FLOOR_QUANTITIES
 from thud.level.levels import get_bands
-from thud.studies.result import SampleResult
 from thud.studies.sample_kind import SampleKind
 from thud.studies.sampling import MIN_BASE_SAMPLES
+from thud.studies.study_result import SampleResult
 
 if TYPE_CHECKING:
     import os

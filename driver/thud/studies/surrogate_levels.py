@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
     from thud.case.case import Case
     from thud.impact.impact import Impact
+    from thud.studies.fitting.fit_result import Fit
     from thud.studies.fitting.misfit import Misfit
     from thud.studies.fitting.ranges import Range
-    from thud.studies.fitting.result import Fit
     from thud.studies.trained_surrogate import Surrogate
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Unpack
 
 from thud.level.levels import BANDWIDTHS
 from thud.studies.blocks import read_dataset
-from thud.studies.result import SampleResult
 from thud.studies.sample_kind import SampleKind
+from thud.studies.study_result import SampleResult
 
 if TYPE_CHECKING:
     import os

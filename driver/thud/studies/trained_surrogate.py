@@ -28,7 +28,7 @@ from thud.case.case import Case, case_text
 from thud.case.keys import OF_FILES, value_in, with_values
 from thud.level.assessment import get_criteria
 from thud.level.levels import get_bands
-from thud.studies.result import StudyResult
+from thud.studies.study_result import StudyResult
 
 if TYPE_CHECKING:
     import os
@@ -435,17 +435,7 @@ def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
 
 @dataclass(frozen=True)
 class Plan:
-    """How a surrogate is trained.
-
-    Attributes
-    ----------
-    error : float
-        Bound of the error of what is assessed, dB.
-    size : int
-        Maximum number of drops.
-    seed : int
-        Seed of their design, scrambled points of Sobol.
-    """
+    """How a surrogate is trained: maximum error, dB, and number of drops, seed."""
 
     error: float = 0.1
     size: int = 1024

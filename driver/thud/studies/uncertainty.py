@@ -13,8 +13,8 @@ from thud.base.checks import refuse
 from thud.impact.quantities import RATING
 from thud.level.assessment import octave_limits
 from thud.level.levels import get_bands
-from thud.studies.result import SampleResult
 from thud.studies.sample_kind import SampleKind
+from thud.studies.study_result import SampleResult
 
 if TYPE_CHECKING:
     import os

@@ -1,6 +1,6 @@
 !> Impacts of many balls side by side: their state, steps and parts of a step, and where in a step a phase ends.
 module thud_impact_batch
-   use, intrinsic :: iso_c_binding, only: c_bool
+   use, intrinsic :: iso_c_binding, only: c_bool, c_int
    use thud_constants, only: pi
    use thud_hollow_sphere, only: shell_type
    use thud_kinds, only: wp
@@ -37,7 +37,7 @@ module thud_impact_batch
       real(wp) :: restitution_weight
       !> Slot of the present state: that at release or, where a ball did not get there, at the beginning of
       !> its last step.
-      integer :: now
+      integer(c_int) :: now
       !> The ball was released: [batch_size].
       logical(c_bool) :: released(batch_size)
       !> A stage has left the domain of the equation: [batch_size].

@@ -10,7 +10,7 @@ import numpy as np
 from thud.base.key import check_keywords
 from thud.base.units import display_unit
 from thud.studies.fitting.inference import coverage_factor
-from thud.studies.result import StudyResult
+from thud.studies.study_result import StudyResult
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -13,6 +13,7 @@ from tqdm import tqdm
 from thud.base.checks import refuse
 from thud.base.errors import NumericalError, ThudError
 from thud.base.units import display_unit
+from thud.studies.fitting.fit_result import Fit, FittedTarget
 from thud.studies.fitting.inference import (
     INSEPARABLE,
     UNLIKELY,
@@ -26,7 +27,6 @@ from thud.studies.fitting.inference import (
     worst_directions,
 )
 from thud.studies.fitting.objective import Objective, new_terms
-from thud.studies.fitting.result import Fit, FittedTarget
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -8,7 +8,7 @@ import numpy as np
 
 from thud.base.checks import require_choice
 from thud.level.levels import BANDWIDTHS, record_force
-from thud.plot.impacts import MARGIN, TIME_LABEL, draw_tolerance
+from thud.plot.impact_figures import MARGIN, TIME_LABEL, draw_tolerance
 from thud.plot.style import COLORS, GREY, empty_axes, legend_above, octave_axis, own_style
 
 if TYPE_CHECKING:

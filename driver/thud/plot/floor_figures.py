@@ -11,7 +11,7 @@ from thud.base._schema import FloorOptions, Plate
 from thud.base.checks import refuse_value, require_kind, require_whole
 from thud.impact.mobility import mobility
 from thud.level.levels import BANDWIDTHS, get_bands, record_force
-from thud.plot.impacts import TIME_LABEL
+from thud.plot.impact_figures import TIME_LABEL
 from thud.plot.style import (
     COLORS,
     LINES,
@@ -81,7 +81,7 @@ def _draw_histories(history: Axes, motion: Axes, impact: FloorImpact) -> None:
     for i, (name, force) in enumerate(forces.items()):
         recorded = 1e-3 * record_force(force, impact.sample_rate)
         history.plot(time[shown], recorded[shown], label=name, **line_style(i))
-    history.set_ylabel("Force, low-passed\nat 1.25 kHz, kN")
+    history.set_ylabel("Force on the floor,\nlow-passed, kN")
     motion.plot(time[shown], 1e3 * impact.floor_velocity[shown], color=COLORS[2], linewidth=1)
     motion.set_ylabel("Velocity of\nthe floor, mm/s")
     motion.set_xlabel(TIME_LABEL)

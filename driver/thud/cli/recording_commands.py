@@ -171,7 +171,7 @@ CALIBRATE = Command(
 def run_history(options: argparse.Namespace) -> int:
     """Draw the control chart of the reports of a ball; return the exit code."""
     # Matplotlib and SciPy take their time.
-    from thud.plot.files import figure_files
+    from thud.plot.save_figures import figure_files
     from thud.report.ball_history import read_history
     from thud.report.ball_history_figure import draw_history
 

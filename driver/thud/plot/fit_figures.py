@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from thud.studies.fitting.fit_result import Fit, FittedTarget
     from thud.studies.fitting.force_misfit import ForceMisfit
     from thud.studies.fitting.level_target import LevelMisfit
-    from thud.studies.fitting.result import Fit, FittedTarget
 
 
 # More names of bands are rotated.
