@@ -13,10 +13,10 @@ module thud_floor_answers
    use thud_mobility_fit, only: fit_mobility
    use thud_plate, only: get_critical_frequency, get_plate_radiation, get_surface_mass, get_total_loss, plate_type
    use thud_receiver, only: get_mobility, receiver_type
-   use thud_warnings, only: add_floor_warning, warning_length
    use thud_request, only: request_type
    use thud_result_bundle, only: add_history, add_warnings, add_room_level
    use thud_room, only: get_room_bands, room_level_type
+   use thud_warnings, only: add_floor_warning, warning_length
    implicit none (type, external)
    private
 

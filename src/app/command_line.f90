@@ -9,8 +9,8 @@ module thud_command_line
    use thud_memory, only: require_memory
    use thud_progress_line, only: begin_progress, end_progress
    use thud_run, only: outcome_type, run_case
-   use thud_schema, only: get_schema
    use thud_samples_run, only: run_samples
+   use thud_schema, only: get_schema
    use thud_suggestion, only: get_suggestion
    use thud_system, only: get_system_message, is_closed, prepare_process, standard_error, standard_output, write_text
    use thud_text, only: newline, quoted

@@ -13,11 +13,11 @@ module thud_compute
    use thud_memory, only: require_memory
    use thud_plate, only: plate_type
    use thud_receiver, only: is_rigid, receiver_type
-   use thud_warnings, only: get_warnings, warning_length
    use thud_room, only: check_below, get_room_bands, get_room_level, room_level_type
    use thud_sampling, only: get_sample_count
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type
+   use thud_warnings, only: get_warnings, warning_length
    implicit none (type, external)
    private
 

@@ -9,12 +9,12 @@ module thud_samples_run
    use thud_error, only: error_type, input_error
    use thud_file, only: text_file_type
    use thud_kinds, only: wp
-   use thud_sweep, only: new_sweep, solve_sweep, sweep_type
    use thud_progress, only: report_progress
    use thud_result_directory, only: add_text, begin_file, check_owner, close_results, open_results, result_directory_type
    use thud_run, only: load_case, outcome_type, replaces
    use thud_sample_report, only: get_sample_header, get_sample_rows
    use thud_sample_table, only: open_sample_table, read_samples, sample_table_type
+   use thud_sweep, only: new_sweep, solve_sweep, sweep_type
    use thud_system, only: path_length
    use thud_table, only: get_defaults_line, get_force_title, get_span_row
    use thud_text, only: newline, replaced, to_text

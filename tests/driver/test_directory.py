@@ -71,9 +71,9 @@ def test_blocks_are_compared_with_their_checksums_once_for_all_variables(
 ) -> None:
     checked = Counter[Path]()
     written = []
-    require, grid = blocks._require_whole, blocks.grid_of  # noqa: SLF001
+    require, grid = blocks._require_intact, blocks.grid_of  # noqa: SLF001
     monkeypatch.setattr(
-        blocks, "_require_whole", lambda path: (checked.update([path]), require(path))
+        blocks, "_require_intact", lambda path: (checked.update([path]), require(path))
     )
     monkeypatch.setattr(blocks, "grid_of", lambda *some: (written.append(some), grid(*some))[1])
     # Each variable is written by itself.

@@ -117,7 +117,7 @@ def test_executable_knows_what_was_added(copy: Path, tmp_path: Path) -> None:
         command = [copy / "build/src/thud", "case.nml", *arguments]
         subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
     expected = math.pi * math.sqrt(2.5 / 62000)
-    with (tmp_path / "outputs/case_sets/samples.csv").open(newline="") as file:
+    with (tmp_path / "outputs/case_samples/samples.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert float(rows[0]["contact_time_s"]) == pytest.approx(expected, rel=1e-9)
     assert float(rows[1]["contact_time_s"]) == pytest.approx(expected * math.sqrt(2), rel=1e-9)

@@ -15,7 +15,7 @@ from sentences import fault_of
 
 import thud
 from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS, Compression, Modes, Room
-from thud.base.bridge import api, call, ensemble_api
+from thud.base.bridge import ask
 from thud.case.case import case_text
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def attempt(chance: random.Random) -> tuple[str, str]:
     path.write_bytes(text.encode(errors="surrogateescape"))
     effective = b""
     try:
-        effective = call(api.effective_case, str(path).encode())["case"]
+        effective = ask("effective_case", path=str(path))["case"]
         word, detail = _tried(path, effective, chance)
     except thud.ThudError as error:
         detail = fault_of(error, "case.nml", text)
@@ -83,7 +83,7 @@ def _tried(path: Path, effective: bytes, chance: random.Random) -> tuple[str, st
             return "mixed", "the case of Python is another one"
     fraction = WITHOUT_MODEL
     if name:
-        cost = call(ensemble_api.size_many, effective, b"", 0)["cost"]
+        cost = ask("samples", case=effective, keys="", key_count=0)["cost"]
         fraction = MEAN_TIME / (cost + FILE_TIME)
     if any(b"'%s'" % floor.encode() in effective for floor in RADIATORS):
         fraction *= OVER_RADIATOR
@@ -101,7 +101,7 @@ def _effective(text: bytes) -> bytes:
     path = Path("again.nml")
     path.write_bytes(text)
     try:
-        found: bytes = call(api.effective_case, b"again.nml")["case"]
+        found: bytes = ask("effective_case", path="again.nml")["case"]
     except thud.InputError as error:
         return str(error).encode()
     finally:
@@ -112,7 +112,7 @@ def _effective(text: bytes) -> bytes:
 def _computed(path: Path, effective: bytes, *, has_model: bool, again: bool) -> tuple[str, str]:
     """Run a case as the executable does, and look at all that it leaves."""
     out = Path("o")
-    found = call(api.run, str(path), str(out), 0, 0)
+    found = ask("run", path=str(path), output=str(out), replace=0, progress=0)
     if wrong := _no_numbers("", found):
         return "NaN", wrong
     files = {one.name: one.read_bytes() for one in out.iterdir() if one.is_file()}
@@ -139,7 +139,7 @@ def _differing(files: dict[str, bytes]) -> list[str]:
     Path("o/effective.nml").rename("effective.nml")
     shutil.rmtree("o")
     try:
-        call(api.run, "effective.nml", "o", 0, 0)
+        ask("run", path="effective.nml", output="o", replace=0, progress=0)
     finally:
         Path("effective.nml").unlink()
     again = {one.name: one.read_bytes() for one in Path("o").iterdir() if one.is_file()}

@@ -17,7 +17,7 @@ from mutate_recordings import mutate, mutated_text
 from sentences import INNER, fault_of
 
 import thud
-from thud.base.bridge import api, call
+from thud.base.bridge import ask
 from thud.base.columns import read_table
 from thud.base.tables import format_rows
 from thud.floors.mobility_fit import fit_mobility
@@ -139,7 +139,7 @@ def _read_mobility(path: Path, chance: random.Random) -> str:
     order = chance.choice([2, 4, 8, 8, 8, None if chance.random() < 0.1 else 1])
     found = fit_mobility(path, order=order)
     said = format_rows(found.rows()) + "".join(found.warnings) + repr(found)
-    call(api.check_text, f"&ball / &drop / &model / {found.namelist()}".encode())
+    ask("check", case=f"&ball / &drop / &model / {found.namelist()}")
     return said if INNER.search(said) else ""
 
 

@@ -4,8 +4,8 @@ module thud_sample_report
    use thud_force_history, only: force_count, force_names
    use thud_kinds, only: wp
    use thud_quantities, only: quantities, sample_quantity_count
-   use thud_sweep, only: sweep_type
    use thud_sample_table, only: sample_table_type
+   use thud_sweep, only: sweep_type
    use thud_text, only: newline, replaced, to_text
    implicit none (type, external)
    private
