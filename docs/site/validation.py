@@ -153,7 +153,7 @@ def draw_laws(curves: dict[str, Any]) -> Figure:
 FIGURES = {
     "validation_orders": (draw_orders, "order of accuracy"),
     "validation_codes": (draw_codes, "element codes"),
-    "validation_laws": (draw_laws, "laws of the loss"),
+    "validation_laws": (draw_laws, "damping laws"),
 }
 
 

@@ -141,7 +141,7 @@ contains
 
       lowest = 0.0_wp
       highest = get_smeared_limit(options)
-      reason = 'half a bending wave of the sheathing is shorter than the spacing of the joists, which cannot be smeared'
+      reason = 'half a bending wave of the sheathing is shorter than the spacing of the joists: the plate is not homogeneous'
    end subroutine get_validity
 
    !> Frequency at which half a bending wave of the sheathing is as long as the distance between joists.

@@ -1,4 +1,4 @@
-"""Print the table of the laws of the loss in docs/finite_elements.md: run with .venv/bin/python.
+"""Print the table of the damping laws in docs/finite_elements.md: run with .venv/bin/python.
 
 For each law the loss factor that gives the restitution of the flagship, by the secant method.
 """

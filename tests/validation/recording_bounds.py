@@ -42,7 +42,7 @@ NOISES = (60, 50, 40, 30, 20)
 COLOURS = ("white", "pink", "brown")
 RATES = (8e3, 16e3, 24e3, 44.1e3, 48e3, 51.2e3, 96e3)
 # Shapes of pulses: file of the model, and how often they are drawn. Both finite elements are the
-# standard ball, with the law of the loss of Kelvin and Voigt and with the fractional one.
+# standard ball, with the damping law of Kelvin and Voigt and with the fractional one.
 SHAPES = {
     "half sine": ("", 0.4),
     "shell": ("100cm", 0.18),

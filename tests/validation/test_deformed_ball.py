@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 FLAGSHIP = thud.Ball(youngs_modulus=2.08e6)
 NOMINAL = [39, 31, 23, 17, 12.5]
 OCTAVES = thud.get_bands().nominal
-# The law of the loss whose high octaves are the strongest: they converge last.
+# The damping law whose high octaves are the strongest: they converge last.
 VISCOUS = {"viscosity": "kelvin_voigt", "loss_factor": 0.2}
 
 
@@ -135,7 +135,7 @@ def test_slow_impact_loses_what_the_modal_ball_of_the_same_law_loses(
         )  # fmt: skip
         assert finite.contact_time == pytest.approx(linear.contact_time, rel=0.025)
         oracle(
-            "slow impact by elements and by exact modes, laws of the loss: restitution",
+            "slow impact by elements and by exact modes, damping laws: restitution",
             "other model",
             finite.restitution - linear.restitution,
             0.004,

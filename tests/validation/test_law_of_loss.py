@@ -1,4 +1,4 @@
-"""The laws of the loss against an independent element code."""
+"""The damping laws against an independent element code."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_band_of_the_laws_is_that_of_the_independent_code(
     levels = found["floor_level"].sel(octave=[63, 250, 500])
     # The default mesh, and four digits of the loss factor.
     oracle(
-        "laws of the loss by quadratic elements: 63, 250 and 500 Hz",
+        "damping laws by quadratic elements: 63, 250 and 500 Hz",
         "independent code",
         levels - REFERENCE[:, 2:],
         0.08,
@@ -47,9 +47,9 @@ def test_band_of_the_laws_is_that_of_the_independent_code(
     )
     for place, octave in enumerate((63, 250, 500)):
         curve(
-            "laws of the loss",
+            "damping laws",
             f"{octave} Hz: quadratic elements",
             REFERENCE[:, 0],
             REFERENCE[:, 2 + place],
         )
-        curve("laws of the loss", f"{octave} Hz: thud", REFERENCE[:, 0], levels.sel(octave=octave))
+        curve("damping laws", f"{octave} Hz: thud", REFERENCE[:, 0], levels.sel(octave=octave))

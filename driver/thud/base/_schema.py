@@ -119,7 +119,7 @@ class Ball(Group):
         With its modulus, 2.08 MPa, the first free modes are those that the paper computed by finite
         elements, 74, 118 and 168 Hz: it is inferred from them, not measured. By
         ``thud.solve(thud.Ball.standard(), model="finite_element")`` it conforms to the standards up
-        to 250 Hz; the octave of 500 Hz depends on the law of the loss (docs/finite_elements.md).
+        to 250 Hz; the octave of 500 Hz depends on the damping law (docs/finite_elements.md).
         The shell model has another modulus, the default.
         """
         return cls(youngs_modulus=2.08e6)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from thud.studies.parameter import Parameter
 
 _WORDS = ("reference", "coefficient", "c1", "c2")
-# Keys that hold the law of the loss; its order where the law is not the fractional one.
+# Keys that hold the damping law; its order where the law is not the fractional one.
 _LAW_KEYS = ("viscosity", "damping_law")
 _ORDERS = {"kelvin_voigt": 1.0, "rising": 1.0}
 
@@ -88,7 +88,7 @@ class Temperature:
 
 
 def _loss_law(case: Case) -> str:
-    """Return the law of the loss of a case."""
+    """Return the damping law of a case."""
     options = vars(case.model)
     return next((options[key] for key in _LAW_KEYS if key in options), "none")
 
@@ -122,7 +122,7 @@ def read_temperature(
 
 
 def _require_shift(case: Case, parameters: tuple[Parameter, ...]) -> None:
-    """Raise InputError where the law of the loss cannot be shifted."""
+    """Raise InputError where the damping law cannot be shifted."""
     law = _loss_law(case)
     names = {parameter.name for parameter in parameters}
     varied = next((key for key in _LAW_KEYS if key in names), None)

@@ -86,7 +86,7 @@ contains
          //fixed(few_modes, 0)//' modes, where the statistical mean is doubtful.'
       text = text//newline//'  Spread: expected standard deviation of one position of source and microphone.'//newline
       if (.not. coupled .and. contact_time*resistance < firm*case%ball%mass) text = text &
-         //'  The floor gives way under the source, and the force on a rigid floor is used: see docs/rooms.md.'//newline
+         //'  The floor yields under the source, but the force on a rigid floor is used: see docs/rooms.md.'//newline
    end subroutine get_room_table
 
    !> Adds the ratings of octaves and of one-third octaves.

@@ -26,7 +26,7 @@ module thud_modal_ball
    use thud_source_model, only: typical_contact
    use thud_sphere_modes, only: basis_type, family_type, get_family, get_static_family, new_basis
    use thud_surface_rings, only: new_surface_rings, outermost_angle, surface_rings_type
-   use thud_text, only: to_text
+   use thud_text, only: fixed, to_text
    use thud_validity_limit, only: get_gravity_limit, get_wall_limits, validity_limit_type
    implicit none (type, external)
    private
@@ -367,8 +367,8 @@ contains
       history%energy_residual = abs(energy - initial)/initial
       ! Written so that NaN fails too.
       if (.not. abs(state%contact_loss)/initial <= max_contact_loss) then
-         error = numerical_error('&sampling: substeps is too low: contact loses '//to_text(state%contact_loss/initial) &
-            //' of the energy; allowed: up to '//to_text(max_contact_loss))
+         error = numerical_error('&sampling: substeps is too low: the contact changes the energy by ' &
+            //fixed(-100*state%contact_loss/initial, 1)//' %; allowed: at most '//fixed(100*max_contact_loss, 0)//' %')
       else if (.not. history%energy_residual <= max_residual) then
          error = numerical_error('&sampling: substeps is too low: the balance of energy misses by ' &
             //to_text(history%energy_residual)//'; allowed: up to '//to_text(max_residual))
