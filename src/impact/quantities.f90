@@ -24,47 +24,58 @@ module thud_quantities
       integer :: decimals = 3
       !> What it is.
       character(len=72) :: meaning = ''
+      !> Results that have it: `of_sample`, `of_impact` or `of_others`.
+      integer :: results = 0
    end type quantity_type
 
-   !> Of the table the first quantities are those of each sample of a sweep, the next ones those of single impacts too.
-   integer, parameter :: sample_quantity_count = 6, history_quantity_count = 12
+   !> Every sample of a sweep and every impact has the quantity, every impact, or some other result.
+   integer, parameter :: of_sample = 1, of_impact = 2, of_others = 3
 
-   !> The quantities; those of an impact first, in the order of `get_quantities`.
+   !> The quantities: those of samples, of impacts, in the order of `get_quantities`, and of other results.
    type(quantity_type), parameter :: quantities(*) = [ &
-      quantity_type('contact_time', 'contact time', 'T', 's', 'ms', 1.0e3_wp, 3, 'contact time'), &
-      quantity_type('peak_force', 'peak force', 'F_{max}', 'N', 'N', 1.0_wp, 1, 'maximum force on the floor'), &
+      quantity_type('contact_time', 'contact time', 'T', 's', 'ms', 1.0e3_wp, 3, 'contact time', of_sample), &
+      quantity_type('peak_force', 'peak force', 'F_{max}', 'N', 'N', 1.0_wp, 1, 'maximum force on the floor', of_sample), &
       quantity_type('peak_elastic_force', 'peak elastic force', 'F_{E,max}', 'N', 'N', 1.0_wp, 1, &
-      'maximum elastic force'), &
-      quantity_type('max_deflection', 'peak deflection', 'd_{max}', 'm', 'mm', 1.0e3_wp, 3, 'maximum deflection'), &
-      quantity_type('restitution', 'restitution', 'e', '', '', 1.0_wp, 4, 'coefficient of restitution'), &
-      quantity_type('impulse', 'impulse', 'I', 'N s', 'N s', 1.0_wp, 3, 'time integral of the force on the floor'), &
-      quantity_type('impact_velocity', 'impact velocity', 'v_0', 'm/s', 'm/s', 1.0_wp, 3, 'velocity at first touch'), &
+      'maximum elastic force', of_sample), &
+      quantity_type('max_deflection', 'peak deflection', 'd_{max}', 'm', 'mm', 1.0e3_wp, 3, &
+      'maximum deflection', of_sample), &
+      quantity_type('restitution', 'restitution', 'e', '', '', 1.0_wp, 4, 'coefficient of restitution', of_sample), &
+      quantity_type('impulse', 'impulse', 'I', 'N s', 'N s', 1.0_wp, 3, &
+      'time integral of the force on the floor', of_sample), &
+      quantity_type('impact_velocity', 'impact velocity', 'v_0', 'm/s', 'm/s', 1.0_wp, 3, &
+      'velocity at first touch', of_impact), &
       quantity_type('exact_contact_time', 'exact contact time', 'T', 's', 'ms', 1.0e3_wp, 3, &
-      'contact time between steps'), &
+      'contact time between steps', of_impact), &
       quantity_type('touch_time', 'time of first touch', 't_0', 's', 'ms', 1.0e3_wp, 3, &
-      'time of first touch in the record'), &
-      quantity_type('sample_rate', 'sample rate', 'f_s', 'Hz', 'kHz', 1.0e-3_wp, 3, 'samples per second'), &
+      'time of first touch in the record', of_impact), &
+      quantity_type('sample_rate', 'sample rate', 'f_s', 'Hz', 'kHz', 1.0e-3_wp, 3, 'samples per second', of_impact), &
       quantity_type('impulse_residual', 'impulse residual', '', '', '', 1.0_wp, 6, &
-      'relative residual of the balance of momentum'), &
+      'relative residual of the balance of momentum', of_impact), &
       quantity_type('energy_residual', 'energy residual', '', '', '', 1.0_wp, 6, &
-      'relative residual of the balance of energy'), &
-      quantity_type('peak_count', 'peaks of the force', '', '', '', 1.0_wp, 0, 'number of peaks of the assessed force'), &
-      quantity_type('mass', 'mass', 'M', 'kg', 'kg', 1.0_wp, 3, 'mass of the source'), &
-      quantity_type('drop_height', 'drop height', 'h', 'm', 'm', 1.0_wp, 3, 'drop height'), &
-      quantity_type('effective_mass', 'effective mass', 'M', 'kg', 'kg', 1.0_wp, 3, 'impulse over the change of velocity'), &
+      'relative residual of the balance of energy', of_impact), &
+      quantity_type('peak_count', 'peaks of the force', '', '', '', 1.0_wp, 0, &
+      'number of peaks of the assessed force', of_others), &
+      quantity_type('mass', 'mass', 'M', 'kg', 'kg', 1.0_wp, 3, 'mass of the source', of_others), &
+      quantity_type('drop_height', 'drop height', 'h', 'm', 'm', 1.0_wp, 3, 'drop height', of_others), &
+      quantity_type('effective_mass', 'effective mass', 'M', 'kg', 'kg', 1.0_wp, 3, &
+      'impulse over the change of velocity', of_others), &
       quantity_type('margin', 'margin', '', 'dB', 'dB', 1.0_wp, 2, &
-      'minimum distance of the assessed octave levels to a limit, > 0 inside'), &
+      'minimum distance of the assessed octave levels to a limit, > 0 inside', of_others), &
       quantity_type('floor_work', 'energy to the floor', 'W', 'J', 'mJ', 1.0e3_wp, 3, &
-      'energy that the source gives to the floor'), &
+      'energy that the source gives to the floor', of_others), &
       quantity_type('room_rating', 'level in the room', 'L_{iA,Fmax}', 'dB', 'dB', 1.0_wp, 1, &
-      'A-weighted maximum Fast level in the room, re 20 uPa'), &
+      'A-weighted maximum Fast level in the room, re 20 uPa', of_others), &
       quantity_type('standardized_rating', 'standardized level', "L'_{iA,Fmax,V,T}", 'dB', 'dB', 1.0_wp, 1, &
-      'A-weighted maximum Fast level, standardized, re 20 uPa')]
+      'A-weighted maximum Fast level, standardized, re 20 uPa', of_others)]
+
+   !> Numbers of quantities that samples have, and that impacts have.
+   integer, parameter :: sample_quantity_count = count(quantities%results == of_sample)
+   integer, parameter :: history_quantity_count = count(quantities%results <= of_impact)
 
 contains
 
    !> The values of the quantities.
-   pure function get_quantities(history) result(values)
+   function get_quantities(history) result(values)
       type(force_history_type), intent(in) :: history
       !> Values, SI units: [history_quantity_count].
       real(wp) :: values(history_quantity_count)

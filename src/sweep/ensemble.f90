@@ -16,7 +16,6 @@ module thud_ensemble
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
-   use thud_quantities, only: sample_quantity_count
    use thud_sampling, only: check_sampling, get_sample_count, sampling_type
    use thud_shell_sets, only: block_size, get_blocks, set_outcome_type, set_type, solve_block
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
@@ -154,7 +153,7 @@ contains
          type(set_outcome_type) :: found(size(members))
          real(wp) :: found_levels(size(levels, 1), force_count, size(members))
          logical :: found_met(force_count, size(members))
-         integer :: i
+         integer :: i, j
 
          call solve_workspace(workspace, sets(members), sampling, with_levels, projections, found, found_levels, found_met)
          do i = 1, size(members)
@@ -162,22 +161,17 @@ contains
             levels(:, :, members(i)) = found_levels(:, :, i)
             met(:, members(i)) = found_met(:, i)
             if (.not. found(i)%computed) cycle
-            quantity(:, members(i)) = get_set_quantities(found(i))
-            if (size(forces) > 0) call copy_forces(workspace, i, forces(:, :, members(i)))
+            associate (set => found(i))
+               quantity(:, members(i)) = [set%contact_time, set%peak_force, set%peak_elastic_force, set%max_deflection, &
+                  set%restitution, set%impulse]
+            end associate
+            do j = 1, merge(force_count, 0, size(forces) > 0)
+               forces(:, j, members(i)) = get_record(workspace, i, j, sampling)
+            end do
          end do
       end subroutine run_block
 
    end subroutine solve_ensemble
-
-   !> The first of the table of quantities, of one set.
-   pure function get_set_quantities(outcome) result(values)
-      type(set_outcome_type), intent(in) :: outcome
-      !> Values, SI units: [sample_quantity_count].
-      real(wp) :: values(sample_quantity_count)
-
-      values = [outcome%contact_time, outcome%peak_force, outcome%peak_elastic_force, outcome%max_deflection, &
-         outcome%restitution, outcome%impulse]
-   end function get_set_quantities
 
    !> Arrays of a thread. Memory beyond the longest contact is never touched.
    subroutine set_workspace(workspace, sampling, limits, n_row)
@@ -353,21 +347,18 @@ contains
       met = all(conforms(criteria))
    end function is_conforming
 
-   !> Copies the forces of one set.
-   subroutine copy_forces(workspace, i, forces)
+   !> One force of one set, N: [n_time].
+   function get_record(workspace, i, j, sampling) result(record)
       type(workspace_type), intent(in), target :: workspace
-      !> Index of the set in the block.
-      integer, intent(in) :: i
-      !> Its forces, N: [n_sample, force_count].
-      real(wp), intent(out) :: forces(:, :)
+      !> Index of the set in the block, and of the force in `force_names`.
+      integer, intent(in) :: i, j
+      type(sampling_type), intent(in) :: sampling
+      real(wp) :: record(get_sample_count(sampling))
       real(wp), pointer, contiguous :: force(:, :)
-      integer :: j
 
       force => get_force(workspace)
-      do j = 1, force_count
-         forces(:, j) = 0.0_wp
-         forces(:workspace%last_sample, j) = force(i + (j - 1)*block_size, :workspace%last_sample)
-      end do
-   end subroutine copy_forces
+      record = 0.0_wp
+      record(:workspace%last_sample) = force(i + (j - 1)*block_size, :workspace%last_sample)
+   end function get_record
 
 end module thud_ensemble

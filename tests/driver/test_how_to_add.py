@@ -26,6 +26,36 @@ CASE = """&ball mass = 2.5 /
 &levels bands = 'low_third' /
 &limits source = 'sandbag' /
 """
+QUANTITY = """
+import sys, numpy as np, thud
+impact = thud.solve()
+force = np.concatenate([np.zeros_like(impact.floor_force), impact.floor_force])
+frequency = np.fft.rfftfreq(len(force), 1 / impact.sample_rate)
+inside = (44.7 < frequency) & (frequency < 354.8)
+peak = np.fft.irfft(np.fft.rfft(force) * inside, len(force)).max()
+assert abs(impact.mid_peak / peak - 1) < 0.05, (impact.mid_peak, peak)
+assert ("peak, 63 to 250 Hz, N", f"{impact.mid_peak:.1f}", "") in thud.compare([impact]).rows()
+assert impact.to_xarray()["mid_peak"].attrs["units"] == "N"
+many = thud.solve_many({"height": [0.8, 1.0]})
+assert abs(many.mid_peak[1] / impact.mid_peak - 1) < 1e-9, (many.mid_peak, impact.mid_peak)
+assert "peak, 63 to 250 Hz, N" in dict(row[:2] for row in many.rows())
+study = {"parameters": {"height": {"values": [0.8, 1.0]}}}
+assert np.allclose(thud.sweep(study).dataset["mid_peak"], many.mid_peak)
+learned = thud.surrogate({"parameters": {"height": {"low": 0.9, "high": 1.0}}})
+assert "mid_peak" in learned.outputs, learned.outputs
+target = thud.LevelTarget(
+    impact.levels(), 0.2, quantities={"mid_peak": (impact.mid_peak, 1.0)}
+)
+assert target.misfit().size == 6
+recording = thud.read_recording(sys.argv[1], mass=2.5, height=1.0)
+assert abs(recording.quantity("mid_peak") / recording.peak_force - 0.5) < 0.4
+thud.write_report(recording, "report")
+assert "peak, 63 to 250 Hz" in open("report/report.html").read()
+assert "mid_peak" in open("report/report.json").read()
+from thud.explorer.answer import answer_case
+names = [name for name, *_ in answer_case(thud.Case(model=thud.HollowSphere()))["numbers"]]
+assert "peak, 63 to 250 Hz" in names, names
+"""
 DRIVE = """
 import math, sys, thud
 assert thud.LinearSpring().travel == 0.1
@@ -89,6 +119,22 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "sources(*) = [ &\n",
         example(page, "fortran source"),
     )
+    quantities = root / "src/impact/quantities.f90"
+    impulse = "'time integral of the force on the floor', of_sample), &\n"
+    insert(quantities, impulse, example(page, "fortran entry"))
+    value = "get_mid_peak(history%floor_force, history%sample_rate), "
+    insert(quantities, "history%restitution, history%impulse, ", value)
+    insert(quantities, "contains\n\n", example(page, "fortran function"))
+    insert(quantities, "public :: ", "get_mid_peak, ")
+    ensemble = root / "src/sweep/ensemble.f90"
+    insert(ensemble, "set%restitution, set%impulse", example(page, "fortran batch").rstrip("\n"))
+    insert(ensemble, "   use thud_power, only: not_a_number\n",
+           "   use thud_quantities, only: get_mid_peak\n")  # fmt: skip
+    drop = root / "driver/thud/recordings/measured_drop.py"
+    insert(drop, '"impulse", "effective_mass"', ', "mid_peak"')
+    insert(drop, "    effective_mass: Estimate\n", "    mid_peak: Estimate\n")
+    insert(drop, "        impulse=impulse,\n", example(page, "python estimate"))
+    drop.write_text(drop.read_text() + example(page, "python function"))
     configure = [
         *("cmake", "-S", str(root), "-B", str(root / "build"), "-G", "Ninja"),
         *(
@@ -142,6 +188,25 @@ def test_python_knows_what_was_added(copy: Path) -> None:
     assert "model: Literal['linear_spring']" in ast.unparse(
         ast.parse((copy / "driver/thud/impact/solve.pyi").read_text())
     )
+
+
+@pytest.mark.slow
+def test_every_output_has_a_quantity_that_was_added(copy: Path, tmp_path: Path) -> None:
+    (tmp_path / "case.nml").write_text("&ball / &drop / &model /")
+    (tmp_path / "table.csv").write_text("height\n1.0\n")
+    for arguments in ([], ["--samples", "table.csv"]):
+        command = [copy / "build/src/thud", "case.nml", *arguments]
+        shown = subprocess.run(command, cwd=tmp_path, capture_output=True, check=True, text=True)
+        assert arguments or "peak, 63 to 250 Hz" in shown.stdout
+    assert "mid_peak = " in (tmp_path / "outputs/case/summary.nml").read_text()
+    assert ",mid_peak_N," in (tmp_path / "outputs/case_samples/samples.csv").read_text()
+    environment = {**os.environ, "PYTHONPATH": str(copy / "driver")}
+    record = REPOSITORY / "inputs/recordings/drop_1.csv"
+    done = subprocess.run(
+        [sys.executable, "-c", QUANTITY, record],
+        env=environment, cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
 
 
 def test_schema_of_the_repository_is_fresh(executable: str, tmp_path: Path) -> None:

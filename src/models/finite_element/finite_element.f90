@@ -265,8 +265,8 @@ contains
          if (time > contacts%latest + max(contacts%settling_time, options%flight_after)) exit samples
       end do samples
       if (run%floor%moves .and. run%impulse > 0.0_wp) then
-         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends while the ball is on the mobile' &
-            //' floor; allowed: longer than the contact, which never ends on a floor too light for the ball')
+         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends while the ball is on the' &
+            //' mobile floor; allowed: longer than the contact, which never ends on a floor too light for the ball')
       else if (contacts%n_over < options%bounces) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
             //to_text(contacts%settling_time)//' s after contact '//to_text(options%bounces)//'; allowed: longer than that')
