@@ -14,9 +14,8 @@ module thud_floor_answers
    use thud_plate, only: get_critical_frequency, get_plate_radiation, get_surface_mass, get_total_loss, plate_type
    use thud_receiver, only: get_mobility, receiver_type
    use thud_request, only: request_type
-   use thud_result_bundle, only: add_history, add_warnings, add_room_level
+   use thud_result_bundle, only: add_history, add_room_level
    use thud_room, only: get_room_bands, room_level_type
-   use thud_warnings, only: add_floor_warning, warning_length
    implicit none (type, external)
    private
 
@@ -116,15 +115,10 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(room_level_type) :: prediction
       type(band_type), allocatable :: bands(:)
-      character(len=warning_length), allocatable :: warnings(:)
 
       call get_room_bands(bands, error)
       if (.not. allocated(error)) call predict_room_level(case, bands, request%get_array('levels'), prediction, error)
-      if (allocated(error)) return
-      call add_room_level(bundle, prediction)
-      allocate (warnings(0))
-      call add_floor_warning(case, warnings)
-      call add_warnings(bundle, warnings)
+      if (.not. allocated(error)) call add_room_level(bundle, case, prediction)
    end subroutine answer_room_level
 
    !> The plate of a floor that radiates into the room below, at `frequency`, Hz.

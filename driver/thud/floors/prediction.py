@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from thud.base.bridge import ask, text
+from thud.base.bridge import ask
 from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
 from thud.case.case import Case, case_text
 from thud.floors.survey import RoomLevels
 from thud.impact.floor_impact import FloorImpact, new_floor_impact
+from thud.impact.room_level import RoomLevel, new_room_level
 from thud.level.impact_result import ImpactResult
 from thud.level.levels import BANDWIDTHS, get_bands
 from thud.level.rating import Rating, rated_bands, rating, standardized_level
@@ -31,79 +32,31 @@ THIRDS = BANDWIDTHS[1]
 MIN_CHANGE = 0.1
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class RoomPrediction(Displayed):
-    """Level that an impact causes in the room below: energy means over positions, in bands.
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class RoomPrediction(RoomLevel, Displayed):
+    """Level that an impact causes in the room below.
+
+    It has the attributes of `RoomLevel`, and those below.
 
     Attributes
     ----------
     floor, room : Plate and Room
         What it was predicted for.
-    frequency : ndarray, shape (12,)
-        Rounded mid frequencies of the one-third-octave bands 50 to 630 Hz.
-    level : ndarray, shape (12,)
-        Maximum Fast levels L_i,Fmax, dB re 20 uPa.
-    time_of_maximum : ndarray, shape (12,)
-        Their times after the impact, s.
-    energy : ndarray, shape (12,)
-        Energy that the impact gives to the floor, J.
-    radiation_factor, loss_factor : ndarray, shape (12,)
-        Radiation factor and total loss factor of the floor.
-    reverberation_time : ndarray, shape (12,)
-        Reverberation time of the room, s.
-    floor_modes, room_modes : ndarray, shape (12,)
-        Expected number of modes in each band.
-    few_modes : float
-        Number of modes below which the statistical answer of a band is uncertain.
-    mass_per_area : float
-        Mass of the radiating plate over its area, kg/m2.
-    spread : ndarray, shape (12,)
-        Expected standard deviation of the level for one position of the source and one of the
-        microphone, dB: theory of the variance by modal overlap (Langley and Cotoni 2004).
-    octave_level, octave_time : ndarray, shape (4,)
-        Maximum Fast levels of the octaves 63 to 500 Hz, dB, and their times, s: maxima of the sums
-        of their bands.
-    history_time : ndarray, shape (n_time,)
-        Instants after the impact, s.
-    history : ndarray, shape (n_time, 12)
-        What the Fast detector shows in each band then, dB.
-    conductance : ndarray, shape (12,)
-        Power that a force of unit mean square gives to the floor, m/(N s).
     source : Impact or Recording
         The impact on the floor whose force acts, or the impact or recording on a rigid one.
     force : str
-        ``"contact"``: the prediction is of the force on the floor, which moves under the source;
-        ``"blocked"``: of the force on a rigid floor, as recordings and measured modes have it.
+        ``"contact"``: the prediction is of the force on the mobile floor; ``"blocked"``: of the
+        force on a rigid floor, as recordings and measured modes have it.
     force_change : float
         Change of the peak of the force by the floor, dB; of a blocked force that which a linear
         source with the mass and the contact time of the impact would have.
-    floor_warnings : tuple of str
-        Where the floor is not what it claims to be.
     """
 
     floor: FloorOptions
     room: Room
-    frequency: Array
-    level: Array
-    time_of_maximum: Array
-    energy: Array
-    radiation_factor: Array
-    loss_factor: Array
-    reverberation_time: Array
-    floor_modes: Array
-    room_modes: Array
-    conductance: Array
-    few_modes: float
-    mass_per_area: float
-    spread: Array
-    octave_level: Array
-    octave_time: Array
-    history_time: Array
-    history: Array
     source: ImpactResult
     force: Literal["contact", "blocked"]
     force_change: float
-    floor_warnings: tuple[str, ...]
 
     @property
     def rating(self) -> Rating:
@@ -232,32 +185,26 @@ def predict_level(
         )
     asked = replace(case, modes=None, floor=floor, room=room)
     moved = _on_floor(source, asked)
-    levels = (moved or source).levels(THIRDS, force="floor")
-    rated = np.isin(get_bands(THIRDS).nominal, rated_bands(THIRDS))
-    result = ask("room_level", case=case_text(asked), levels=levels[rated])
-    bands = result["room_bands"]
+    level = source.room_level
+    if level is None or (floor, room) != (case.floor, case.room):
+        levels = (moved or source).levels(THIRDS, force="floor")
+        rated = np.isin(get_bands(THIRDS).nominal, rated_bands(THIRDS))
+        level = new_room_level(ask("room_level", case=case_text(asked), levels=levels[rated]))
+        assert level is not None  # noqa: S101 - the library has answered
     if moved:
         blocked = (
             source.blocked_force.max() if isinstance(source, FloorImpact) else source.peak("floor")
         )
         change = 20 * math.log10(moved.peak("floor") / blocked)
     else:
-        change = _force_change(source.mass, source.contact_time, 1 / bands["conductance"].max())
+        change = _force_change(source.mass, source.contact_time, 1 / level.conductance.max())
     return RoomPrediction(
+        **vars(level),
         floor=floor,
         room=room,
         source=moved or source,
         force="contact" if moved else "blocked",
         force_change=change,
-        floor_warnings=tuple(map(text, result.get("warnings", {}).values())),
-        time_of_maximum=bands.pop("time"),
-        few_modes=result["room"]["few_modes"],
-        mass_per_area=result["room"]["surface_mass"],
-        octave_level=result["room_octaves"]["level"],
-        octave_time=result["room_octaves"]["time"],
-        history_time=result["room_history"]["time"],
-        history=result["room_history"]["level"],
-        **bands,
     )
 
 

@@ -11,6 +11,7 @@ from thud.base.errors import InputError
 from thud.case.case import Case, case_text
 from thud.impact.floor_impact import new_floor_impact
 from thud.impact.impact import Impact, history
+from thud.impact.room_level import new_room_level
 
 if TYPE_CHECKING:
     from thud.base.bridge import Bundle
@@ -31,4 +32,8 @@ def new_impact(case: Case, found: Bundle) -> Impact:
     """Return the impact in a bundle of the library."""
     warnings = tuple(map(text, found.get("warnings", {}).values()))
     common = history(case, found, warnings)
-    return Impact(**common, on_floor=new_floor_impact(case, found, common["floor_force"]))
+    return Impact(
+        **common,
+        on_floor=new_floor_impact(case, found, common["floor_force"]),
+        room_level=new_room_level(found),
+    )

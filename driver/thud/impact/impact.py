@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from thud.base.bridge import Bundle
     from thud.case.case import Case
     from thud.impact.floor_impact import FloorImpact
+    from thud.impact.room_level import RoomLevel
     from thud.level.assessment import Verdict
 
 
@@ -70,6 +71,8 @@ class Impact(ImpactQuantities, Displayed):
     on_floor : FloorImpact or None
         The same drop on the floor of the case; None where there is none, it is rigid, or the model
         knows the force on a rigid floor only.
+    room_level : RoomLevel or None
+        Level in the room of the case; None without a room, and of results that were read.
     """
 
     case: Case
@@ -84,6 +87,7 @@ class Impact(ImpactQuantities, Displayed):
     warnings: tuple[str, ...]
     motion: Motion | None
     on_floor: FloorImpact | None = None
+    room_level: RoomLevel | None = None
 
     @property
     def name(self) -> str:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from thud.base._schema import BandSet, LevelsForce, LevelsMethod, LimitsSource
     from thud.case.case import Case
     from thud.impact.floor_impact import FloorImpact
+    from thud.impact.room_level import RoomLevel
     from thud.level.assessment import Verdict
 
 
@@ -137,6 +138,10 @@ class ImpactResult(Protocol):
 
     def quantity(self, name: str) -> float:
         """Return a quantity of the table by its name, SI units; NaN if unknown."""
+
+    @property
+    def room_level(self) -> RoomLevel | None:
+        """Level in the room of the case; None if it is not known."""
 
     def assessed_force(self, force: LevelsForce | None = None) -> LevelsForce:
         """Return a kind of force, by default the assessed one."""

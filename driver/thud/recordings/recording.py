@@ -189,6 +189,10 @@ class Recording(Displayed):
         """None: the force on a mobile floor is not known."""
 
     @property
+    def room_level(self) -> None:
+        """None: a recording has no room."""
+
+    @property
     def limits_source(self) -> LimitsSource | None:
         """Source of the configuration; None if it is the default, which nobody may have stated."""
         return None if self.config.source == Config.source else self.config.source

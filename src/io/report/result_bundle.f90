@@ -10,10 +10,11 @@ module thud_result_bundle
    use thud_quantities, only: get_quantities, history_quantity_count, quantities
    use thud_room, only: few_modes, room_level_type
    use thud_text, only: to_text
+   use thud_warnings, only: add_floor_warning, warning_length
    implicit none (type, external)
    private
 
-   public :: add_compression, add_history, add_results, add_room_level, add_warnings
+   public :: add_compression, add_history, add_results, add_room_level
 
 contains
 
@@ -25,21 +26,23 @@ contains
 
       if (case%has_impact) call add_history(bundle, '', results%impact%history)
       if (allocated(results%on_floor)) call add_history(bundle, 'on_floor.', results%on_floor)
-      if (allocated(results%room%bands)) call add_room_level(bundle, results%room)
+      if (allocated(results%room%bands)) call add_room_level(bundle, case, results%room)
       if (case%has_modes) call add_modes(bundle, results%modes)
       if (case%has_compression) call add_compression(bundle, results%compression)
-      call add_warnings(bundle, results%warning)
+      call add_warnings(bundle, 'warnings.', results%warning)
    end subroutine add_results
 
    !> Adds warnings to a bundle.
-   subroutine add_warnings(bundle, warnings)
+   subroutine add_warnings(bundle, prefix, warnings)
       type(bundle_type), intent(inout) :: bundle
+      !> Beginning of the names of its items.
+      character(len=*), intent(in) :: prefix
       !> Messages: [n].
       character(len=*), intent(in) :: warnings(:)
       integer :: i
 
       do i = 1, size(warnings)
-         call bundle%add_text('warnings.'//to_text(i), trim(warnings(i)))
+         call bundle%add_text(prefix//to_text(i), trim(warnings(i)))
       end do
    end subroutine add_warnings
 
@@ -91,10 +94,12 @@ contains
       end associate
    end subroutine add_history
 
-   !> Adds the level in the room below to a bundle.
-   subroutine add_room_level(bundle, room)
+   !> Adds the level in the room below to a bundle, with warnings on the floor.
+   subroutine add_room_level(bundle, case, room)
       type(bundle_type), intent(inout) :: bundle
+      type(case_type), intent(in) :: case
       type(room_level_type), intent(in) :: room
+      character(len=warning_length), allocatable :: warnings(:)
       integer :: n(1)
 
       n = size(room%bands)
@@ -117,6 +122,9 @@ contains
       call bundle%add_array('room_octaves.time', n, room%octave_time)
       call bundle%add_array('room_history.time', shape(room%history_time), room%history_time)
       call bundle%add_array('room_history.level', shape(room%history), room%history)
+      allocate (warnings(0))
+      call add_floor_warning(case, warnings)
+      call add_warnings(bundle, 'room_warnings.', warnings)
    end subroutine add_room_level
 
    !> Adds free modes to a bundle.

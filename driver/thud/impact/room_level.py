@@ -1,0 +1,95 @@
+"""Level in the room below a floor, as the library predicts it from a force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from thud.base.bridge import text
+from thud.base.immutable import Immutable
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from thud.base.bridge import Bundle
+
+    Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class RoomLevel(Immutable):
+    """Level in the room below: energy means over positions, in bands.
+
+    Attributes
+    ----------
+    frequency : ndarray, shape (12,)
+        Rounded mid frequencies of the one-third-octave bands 50 to 630 Hz.
+    level : ndarray, shape (12,)
+        Maximum Fast levels L_i,Fmax, dB re 20 uPa.
+    time_of_maximum : ndarray, shape (12,)
+        Their times after the impact, s.
+    energy : ndarray, shape (12,)
+        Energy that the impact gives to the floor, J.
+    radiation_factor, loss_factor : ndarray, shape (12,)
+        Radiation factor and total loss factor of the floor.
+    reverberation_time : ndarray, shape (12,)
+        Reverberation time of the room, s.
+    floor_modes, room_modes : ndarray, shape (12,)
+        Expected number of modes in each band.
+    few_modes : float
+        Number of modes below which the statistical answer of a band is uncertain.
+    mass_per_area : float
+        Mass of the radiating plate over its area, kg/m2.
+    spread : ndarray, shape (12,)
+        Expected standard deviation of the level for one position of the source and one of the
+        microphone, dB: theory of the variance by modal overlap (Langley and Cotoni 2004).
+    octave_level, octave_time : ndarray, shape (4,)
+        Maximum Fast levels of the octaves 63 to 500 Hz, dB, and their times, s: maxima of the sums
+        of their bands.
+    history_time : ndarray, shape (n_time,)
+        Instants after the impact, s.
+    history : ndarray, shape (n_time, 12)
+        What the Fast detector shows in each band then, dB.
+    conductance : ndarray, shape (12,)
+        Power that a force of unit mean square gives to the floor, m/(N s).
+    floor_warnings : tuple of str
+        Where the model of the floor is not valid.
+    """
+
+    frequency: Array
+    level: Array
+    time_of_maximum: Array
+    energy: Array
+    radiation_factor: Array
+    loss_factor: Array
+    reverberation_time: Array
+    floor_modes: Array
+    room_modes: Array
+    conductance: Array
+    few_modes: float
+    mass_per_area: float
+    spread: Array
+    octave_level: Array
+    octave_time: Array
+    history_time: Array
+    history: Array
+    floor_warnings: tuple[str, ...]
+
+
+def new_room_level(answer: Bundle) -> RoomLevel | None:
+    """Return the level in a bundle of the library; None without one."""
+    if "room" not in answer:
+        return None
+    bands = {**answer["room_bands"]}
+    return RoomLevel(
+        time_of_maximum=bands.pop("time"),
+        **bands,
+        few_modes=answer["room"]["few_modes"],
+        mass_per_area=answer["room"]["surface_mass"],
+        octave_level=answer["room_octaves"]["level"],
+        octave_time=answer["room_octaves"]["time"],
+        history_time=answer["room_history"]["time"],
+        history=answer["room_history"]["level"],
+        floor_warnings=tuple(map(text, answer.get("room_warnings", {}).values())),
+    )
