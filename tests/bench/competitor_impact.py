@@ -61,7 +61,7 @@ class Impact:
 
     @property
     def rebound_velocity(self) -> float:
-        """Velocity of the centre of mass at the end, from the impulse."""
+        """Velocity of the center of mass at the end, from the impulse."""
         return float(np.trapezoid(self.force, self.time) / MASS - VELOCITY)
 
 

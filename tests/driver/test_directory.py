@@ -147,7 +147,7 @@ def test_ended_study_goes_on_where_it_stopped(
     finished = thud.read_sweep(tmp_path / "long.partial").dataset
     assert 0 < finished.sizes["sample"] < 1000
     known = np.isin(whole["height"], finished["height"])
-    assert values(finished).identical(values(whole.isel(set=known)))
+    assert values(finished).identical(values(whole.isel(sample=known)))
 
     computed = []
     evaluate = samples.evaluate
@@ -181,7 +181,7 @@ def test_full_disk_is_reported_and_loses_nothing(
     assert blocks > 1
     block, end = (
         len(bytes(part.to_netcdf(engine="h5netcdf"))) + 44
-        for part in (whole.isel(set=slice(0, size)), whole)
+        for part in (whole.isel(sample=slice(0, size)), whole)
     )
     # The disk is full for the first block already, then for the end, which is larger.
     for limit, partial in ((block // 2, 0), ((block + end) // 2, blocks)):

@@ -40,9 +40,9 @@ def attenuation(sections: np.ndarray, frequency: np.ndarray, rate: float) -> np.
     return -20 * np.log10(np.maximum(response, 1e-30))
 
 
-def mask_margin(sections: np.ndarray, centre: float, fraction: int, rate: float) -> float:
+def mask_margin(sections: np.ndarray, center: float, fraction: int, rate: float) -> float:
     """Return the distance to the mask, dB; negative outside."""
-    highest = np.log10(0.4999999 * rate / centre)
+    highest = np.log10(0.4999999 * rate / center)
     # The mask's own corners, just inside and just outside the band edge among them.
     corners = breakpoints(PASS[0] + STOP[0], fraction)
     edge = breakpoints([0.5], fraction)[0]
@@ -50,7 +50,7 @@ def mask_margin(sections: np.ndarray, centre: float, fraction: int, rate: float)
     margins = []
     for sign in (-1, 1):
         ratio = grid[sign * grid < highest]
-        found = attenuation(sections, centre * 10 ** (sign * ratio), rate)
+        found = attenuation(sections, center * 10 ** (sign * ratio), rate)
         inside = ratio < edge
         allowed = np.interp(ratio, breakpoints(PASS[0], fraction), PASS[1])
         margins.append((allowed - found)[inside].min())
@@ -82,10 +82,10 @@ def test_each_filter_lies_inside_the_mask_of_class_1(
     bands: str, rate: float, oracle: Callable[..., None]
 ) -> None:
     edges = thud.get_bands(bands)
-    columns = (band_filters(bands, rate), edges.centre, edges.lower, edges.upper)
-    for sections, centre, lower, upper in zip(*columns, strict=True):
+    columns = (band_filters(bands, rate), edges.center, edges.lower, edges.upper)
+    for sections, center, lower, upper in zip(*columns, strict=True):
         # Half a decibel outside the mask's least attenuation, all of it inside the pass band.
-        assert mask_margin(sections, centre, FRACTION[bands], rate) > RIPPLE - 1e-3
+        assert mask_margin(sections, center, FRACTION[bands], rate) > RIPPLE - 1e-3
         # That of the analogue filter is (pi/6)/sin(pi/6), 0.2003 dB; the bilinear transform
         # narrows the skirts.
         width = effective_bandwidth(sections, lower, upper, rate)
@@ -109,19 +109,19 @@ def test_low_rates_are_filtered_inside_the_mask_too(bands: str, rate: float) -> 
     # Levels take the record at the next multiple of the rate, where no filter is missing.
     factor = np.ceil(4 * edges.upper[-1] / rate)
     for own, rated in ((filters, rate), (band_filters(bands, factor * rate), factor * rate)):
-        for sections, centre in zip(own, edges.centre, strict=True):
+        for sections, center in zip(own, edges.center, strict=True):
             if not np.isnan(sections).any():
-                assert mask_margin(sections, centre, FRACTION[bands], rated) > 0
+                assert mask_margin(sections, center, FRACTION[bands], rated) > 0
     assert np.isfinite(filter_levels(half_sine(rate), rate, bands)).all()
 
 
 def test_filter_of_order_2_or_at_a_low_rate_misses_the_mask() -> None:
     # The test itself must be able to fail.
-    lower, centre, upper = 1000 * 10 ** np.array([-0.45, -0.3, -0.15])
+    lower, center, upper = 1000 * 10 ** np.array([-0.45, -0.3, -0.15])
     flat = butter(2, (lower, upper), "bandpass", fs=48000, output="sos")
-    assert mask_margin(flat, centre, 1, 48000) == pytest.approx(-18.2, abs=0.1)
+    assert mask_margin(flat, center, 1, 48000) == pytest.approx(-18.2, abs=0.1)
     warped = butter(3, (lower, upper), "bandpass", fs=2500, output="sos")
-    assert mask_margin(warped, centre, 1, 2500) == pytest.approx(-0.75, abs=0.01)
+    assert mask_margin(warped, center, 1, 2500) == pytest.approx(-0.75, abs=0.01)
 
 
 @pytest.mark.parametrize("rate", [8000.0, 96000.0, 1e6])

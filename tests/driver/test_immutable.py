@@ -184,25 +184,25 @@ def test_read_only_view_of_a_callers_array_is_copied() -> None:
     time = np.arange(3.0)
     view = time[:]
     view.setflags(write=False)
-    bands = dataclasses.replace(thud.get_bands(), centre=view)
+    bands = dataclasses.replace(thud.get_bands(), center=view)
     time += 1
-    assert bands.centre.tolist() == [0.0, 1.0, 2.0]
+    assert bands.center.tolist() == [0.0, 1.0, 2.0]
 
 
 def test_column_of_a_table_is_copied() -> None:
     column = xr.DataArray(np.arange(3.0))
-    bands = dataclasses.replace(thud.get_bands(), centre=column)
+    bands = dataclasses.replace(thud.get_bands(), center=column)
     column += 1
-    assert bands.centre.tolist() == [0.0, 1.0, 2.0]
+    assert bands.center.tolist() == [0.0, 1.0, 2.0]
 
 
 def test_read_only_array_of_a_caller_is_copied() -> None:
     time = np.arange(3.0)
     time.setflags(write=False)
-    bands = dataclasses.replace(thud.get_bands(), centre=time)
+    bands = dataclasses.replace(thud.get_bands(), center=time)
     time.setflags(write=True)
     time += 1
-    assert bands.centre.tolist() == [0.0, 1.0, 2.0]
+    assert bands.center.tolist() == [0.0, 1.0, 2.0]
 
 
 def test_arrays_of_results_are_copied_once() -> None:

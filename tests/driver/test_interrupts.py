@@ -257,7 +257,7 @@ def test_executable_ends_samples_and_leaves_nothing(
     (tmp_path / "samples.csv").write_text("height\n" + "1.0\n" * 8)
     command = [executable, "long.nml", "--samples", "samples.csv", "--threads", "2"]
     with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
-        while not (tmp_path / "outputs/.long_sets.part/samples.csv").exists():
+        while not (tmp_path / "outputs/.long_samples.part/samples.csv").exists():
             time.sleep(0.01)
         # Some callers send a signal to the process and to its group.
         for _ in range(copies - 1):

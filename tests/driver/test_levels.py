@@ -33,7 +33,7 @@ def test_bands_are_complete_and_adjacent() -> None:
     assert octaves.nominal.tolist() == [31.5, 63, 125, 250, 500]
     assert len(thirds.nominal) == 15
     np.testing.assert_allclose(thirds.upper[:-1], thirds.lower[1:], rtol=1e-14)
-    np.testing.assert_allclose(octaves.centre, np.sqrt(octaves.lower * octaves.upper), rtol=1e-14)
+    np.testing.assert_allclose(octaves.center, np.sqrt(octaves.lower * octaves.upper), rtol=1e-14)
 
 
 def test_bands_cannot_be_changed_for_others() -> None:

@@ -427,7 +427,9 @@ def test_fits_by_a_surrogate_find_the_truth(trained: thud.Surrogate) -> None:
     )
     impact = thud.solve(case)
     target = thud.LevelTarget(
-        impact.levels().tolist(), 0.05, contact_time=(impact.exact_contact_time, 2e-5)
+        impact.levels().tolist(),
+        0.05,
+        quantities={"contact_time": (impact.exact_contact_time, 2e-5)},
     )
     starts = {"youngs_modulus": 1.85e6, "wall_thickness": 0.0307}
     with pytest.warns(thud.FitWarning, match=naming("errors", "surrogate")):

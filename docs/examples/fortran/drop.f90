@@ -17,5 +17,5 @@ program drop
    call get_force_exposure_levels(history%floor_force, history%sample_rate, bands, 'exact', level, error)
    if (allocated(error)) error stop error%message
    print '(a, f6.2, a)', 'contact', 1.0e3_wp*history%contact_time, ' ms'
-   print '(f7.1, a, f7.2, a)', (bands(i)%centre, ' Hz', level(i), ' dB', i=1, size(bands))
+   print '(f7.1, a, f7.2, a)', (bands(i)%center, ' Hz', level(i), ' dB', i=1, size(bands))
 end program drop

@@ -43,7 +43,7 @@ class FreeModes(Displayed):
     rigid_frequency : float
         Computed frequency of the rigid motion, Hz; the exact one is 0.
     start : ndarray, shape (n_line, n_ring, 2)
-        Nodes relative to the centre of the ball, m; nine per element.
+        Nodes relative to the center of the ball, m; nine per element.
     shape : ndarray, shape (n_mode, n_line, n_ring, 2)
         Displacements of maximum length 1, the lowest point moving upwards.
     warnings : tuple of str

@@ -32,14 +32,14 @@ class Bands(Displayed):
     ----------
     nominal : ndarray, shape (n_band,)
         Rounded mid frequencies, Hz.
-    centre : ndarray, shape (n_band,)
+    center : ndarray, shape (n_band,)
         Exact mid frequencies, Hz.
     lower, upper : ndarray, shape (n_band,)
         Band edges, Hz.
     """
 
     nominal: NDArray[np.float64]
-    centre: NDArray[np.float64]
+    center: NDArray[np.float64]
     lower: NDArray[np.float64]
     upper: NDArray[np.float64]
 

@@ -39,7 +39,7 @@ contains
          //'"band_sets": {'
       do i = 1, size(band_set_names)
          bands = get_bands(band_set_names(i))
-         text = text//newline//text_value(band_set_names(i))//': {"nominal": '//numbers(bands%nominal)//', "centre": ' &
+         text = text//newline//text_value(band_set_names(i))//': {"nominal": '//numbers(bands%nominal)//', "center": ' &
             //numbers(bands%center)//', "lower": '//numbers(bands%lower)//', "upper": '//numbers(bands%upper)//'}' &
             //trim(merge(',', ' ', i < size(band_set_names)))
       end do
