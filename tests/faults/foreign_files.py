@@ -22,7 +22,15 @@ if TYPE_CHECKING:
 NAMES = [name for name, one in SCENARIOS.items() if one.weight]
 MINE = b"of the user\n"
 # Names that commands read, or write for a while.
-READ = (MANIFEST, PART, "effective.nml", "sets.nml", "sweep.partial", "zarr.partial", "sweep.zarr")
+READ = (
+    MANIFEST,
+    PART,
+    "effective.nml",
+    "samples.nml",
+    "sweep.partial",
+    "zarr.partial",
+    "sweep.zarr",
+)
 
 
 def check_foreign(tries: Tries, folder: Path) -> Iterable[Finding]:

@@ -122,11 +122,11 @@ def slow_calls(folder: Path) -> Calls:
         "from_array": lambda: str(
             Recording.from_array(force, impact.sample_rate, height=1.0, mass=2.5).levels()
         ),
-        "sweep": lambda: thud.sweep({"parameters": HEIGHTS}).peak_elastic_force,
-        "read_sweep": lambda: thud.read_sweep(folder / "kept.nc").peak_elastic_force,
-        "uncertainty": lambda: str(thud.uncertainty(set_study).table()),
-        "sensitivity": lambda: str(thud.sensitivity(set_study).table()),
-        "design": lambda: str(thud.design({"parameters": _plane()}).table()),
+        "sweep": lambda: thud.sweep({"parameters": HEIGHTS}).dataset.peak_elastic_force,
+        "read_sweep": lambda: thud.read_sweep(folder / "kept.nc").dataset.peak_elastic_force,
+        "uncertainty": lambda: str(thud.uncertainty(set_study).rows()),
+        "sensitivity": lambda: str(thud.sensitivity(set_study).rows()),
+        "design": lambda: str(thud.design({"parameters": _plane()}).rows()),
         "surrogate": lambda: str(thud.surrogate({"parameters": MASS})),
         "read_surrogate": lambda: str(thud.read_surrogate(folder / "mass.npz")),
         "plot": saved,

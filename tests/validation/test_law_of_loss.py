@@ -33,7 +33,7 @@ def test_band_of_the_laws_is_that_of_the_independent_code(
     found = thud.sweep(STUDY).dataset
     # The study says so; its loss factors have four digits.
     np.testing.assert_allclose(found["restitution"], 0.805, atol=0.002)
-    found = found.set_index(set="fractional_order").sel(set=REFERENCE[:, 0])
+    found = found.set_index(sample="fractional_order").sel(sample=REFERENCE[:, 0])
     # Release is a glancing contact: two samples of the record, and the digits of the reference.
     np.testing.assert_allclose(1e3 * found["contact_time"], REFERENCE[:, 1], atol=0.06)
     levels = found["floor_level"].sel(octave=[63, 250, 500])

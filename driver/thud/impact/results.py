@@ -105,7 +105,12 @@ class _Files:
 def _new_impact(files: _Files) -> Impact:
     """Return the impact of a result directory."""
     case = Case.from_text(files.read("effective.nml"))
-    numbers = f90nml.reads(files.read("summary.nml"))
+    summary = files.read("summary.nml")
+    # f90nml prints its tables on the screen where a quote is not closed.
+    if re.search("['\"]", re.sub("(?m)^!.*|'[^'\n]*'", "", summary)):
+        message = "a quote in summary.nml is not closed"
+        raise ValueError(message)
+    numbers = f90nml.reads(summary)
     history, _ = _read_history(files, "", numbers["summary"], numbers.get("model_quantities", {}))
     found = _texts(numbers.get("warnings", {}).get("warning", []))
     if not files.listed:
