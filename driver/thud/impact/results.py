@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import re
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
