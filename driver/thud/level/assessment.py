@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -204,7 +205,7 @@ def assess(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
         Where the source is not known, `levels` are not five, or a value is not a number.
     """
     standard = get_criteria(source)
-    octaves = [_estimate("levels", level) for level in levels]
+    octaves = [_estimate("levels", level, "dB") for level in levels]
     nominal = get_bands(BANDWIDTHS[0]).nominal
     if len(octaves) != len(nominal):
         allowed = f"{len(nominal)}, the octaves {nominal[0]:g} to {nominal[-1]:g} Hz"
@@ -213,20 +214,29 @@ def assess(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
         "contact_time": contact_time, "restitution": restitution, "peaks": peaks, "mass": mass,
         "drop_height": drop_height,
     }  # fmt: skip
-    estimates = [*octaves, *(_estimate(name, value) for name, value in others.items())]
+    units = [criterion.unit for criterion in standard[len(nominal) :]]
+    estimates = octaves + [
+        _estimate(name, value, unit)
+        for (name, value), unit in zip(others.items(), units, strict=True)
+    ]
     count = estimates[len(nominal) + list(others).index("peaks")].value
     if not (math.isnan(count) or (0 <= count < _MAX_PEAKS and count.is_integer())):
         refuse_value("peaks", peaks, f"0 <= peaks < {_MAX_PEAKS}, whole")
     criteria = []
     for one, estimate in zip(standard, estimates, strict=True):
         lower, upper = (limits or {}).get(one.name, (one.lower, one.upper))
-        criteria.append(Criterion(one.name, replace(estimate, unit=one.unit), lower, upper))
+        criteria.append(Criterion(one.name, estimate, lower, upper))
     return Verdict(source, tuple(criteria))
 
 
 def get_criteria(source: LimitsSource) -> tuple[Criterion, ...]:
     """Return the criteria of the standards for a source, their values unknown."""
     require_choice("source", source, SOURCES)
+    return _criteria(source)
+
+
+@lru_cache
+def _criteria(source: LimitsSource) -> tuple[Criterion, ...]:
     unknown = Estimate.unknown()
     return tuple(
         Criterion(name, replace(unknown, unit=unit), lower, upper)
@@ -240,6 +250,8 @@ def octave_limits(source: LimitsSource) -> tuple[NDArray[np.float64], NDArray[np
     return np.array([o.lower for o in octaves]), np.array([o.upper for o in octaves])
 
 
-def _estimate(name: str, value: Any) -> Estimate:  # noqa: ANN401 - of a user
-    """Return a value as an estimate; raise InputError where it is no number."""
-    return value if isinstance(value, Estimate) else Estimate(to_float(name, value))
+def _estimate(name: str, value: Any, unit: str) -> Estimate:  # noqa: ANN401 - of a user
+    """Return a value as an estimate with a unit; raise InputError where it is no number."""
+    if not isinstance(value, Estimate):
+        return Estimate(to_float(name, value), unit=unit)
+    return value if value.unit == unit else replace(value, unit=unit)
