@@ -163,13 +163,12 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     work = int(np.clip(_CALL_TIME * width / cost["cost"], 1, max(1, most)))
     parts = []
     try:
-        force = np.empty((len(numbers), len(FORCES), length))
+        # What does not fit is refused before it is computed.
+        np.empty((len(numbers), len(FORCES), length))
         with tqdm(total=len(numbers), unit="sample", disable=not progress, leave=False) as bar:
             for start in range(0, max(len(numbers), 1), work):
                 some = numbers[start : start + work]
-                part = _compute(content, columns, some, width, levels=levels, forces=forces)
-                force[start : start + work] = part.pop("force")
-                parts.append(part)
+                parts.append(_compute(content, columns, some, width, levels=levels, forces=forces))
                 bar.update(len(some))
         results = (
             parts[0]
@@ -181,7 +180,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         size += f" with forces of {length} values" if forces else ""
         refuse(f"forces = {forces} for {size} does not fit in memory", "fewer samples", error)
     # They may fill the memory: once is enough.
-    force = freeze(force)
+    force = freeze(results["force"])
     return Ensemble(
         case=base,
         parameters=columns,
