@@ -28,7 +28,7 @@ contains
       !> Number of values.
       integer, intent(in) :: n
       !> Values of the request: [n].
-      real(wp), intent(in) :: values(n)
+      real(wp), intent(in), target :: values(n)
       !> Code of the error, or 0; sizes as in `leave`.
       integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
@@ -49,7 +49,7 @@ contains
       !> As of `ask`.
       character(len=*), intent(in) :: question, header, text
       integer, intent(in) :: n
-      real(wp), intent(in) :: values(n)
+      real(wp), intent(in), target :: values(n)
       integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
 

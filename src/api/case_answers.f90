@@ -167,7 +167,8 @@ contains
    !> Adds the results of samples to a bundle.
    subroutine add_samples(bundle, sweep)
       type(bundle_type), intent(inout) :: bundle
-      type(sweep_type), intent(in) :: sweep
+      !> The results; their forces are moved.
+      type(sweep_type), intent(inout) :: sweep
       type(text_buffer_type) :: reasons
       integer :: i
 
@@ -182,7 +183,7 @@ contains
       call bundle%add_array('margin', shape(sweep%margin), sweep%margin)
       call bundle%add_array('verdict', shape(sweep%verdict), merge(1.0_wp, 0.0_wp, sweep%verdict))
       call bundle%add_array('floor_value', shape(sweep%floor_value), sweep%floor_value)
-      call bundle%add_array('force', shape(sweep%force), sweep%force)
+      call bundle%move_array('force', sweep%force)
    end subroutine add_samples
 
 end module thud_case_answers

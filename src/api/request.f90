@@ -12,8 +12,8 @@ module thud_request
       character(len=:), allocatable :: header
       !> All texts, one after the other.
       character(len=:), allocatable :: text
-      !> All values, one array after the other: [n_value].
-      real(wp), allocatable :: values(:)
+      !> All values, one array after the other, those of the caller: [n_value].
+      real(wp), pointer, contiguous :: values(:) => null()
    contains
       procedure :: has
       procedure :: get_text
@@ -58,16 +58,16 @@ contains
       if (length > 0) number = self%values(first)
    end function get_number
 
-   !> An array, of no size where there is none of the name.
-   pure function get_array(self, name) result(values)
+   !> An array of the request, of no size where there is none of the name.
+   function get_array(self, name) result(values)
       class(request_type), intent(in) :: self
       character(len=*), intent(in) :: name
-      !> The values: [n].
-      real(wp), allocatable :: values(:)
+      !> The values, not copied: [n].
+      real(wp), pointer, contiguous :: values(:)
       integer :: first, length
 
       call find(self, name, 'n', first, length)
-      values = self%values(first:first + length - 1)
+      values => self%values(first:first + length - 1)
    end function get_array
 
    !> Where an item is among those of its kind.

@@ -9,10 +9,12 @@ module thud_bundle
 
    public :: bundle_type, leave, take
 
-   !> Numbers of one item.
+   !> Numbers of one item, in `values` or in `cube`.
    type :: item_type
       !> The numbers, in Fortran's order: [n].
       real(wp), allocatable :: values(:)
+      !> A large array that was moved here: [:, :, :].
+      real(wp), allocatable :: cube(:, :, :)
    end type item_type
 
    !> Texts and arrays, each with its name.
@@ -31,6 +33,7 @@ module thud_bundle
       procedure :: add_text
       procedure :: add_number
       procedure :: add_array
+      procedure :: move_array
       procedure :: count_values
       procedure :: copy_values
    end type bundle_type
@@ -57,7 +60,8 @@ contains
       real(wp), intent(in) :: value
 
       call add_line(self, name, '')
-      call add_item(self, 1, [value])
+      call new_item(self)
+      self%items(self%n_item)%values = [value]
    end subroutine add_number
 
    !> Adds an array of any rank.
@@ -67,6 +71,29 @@ contains
       !> Its extents: [rank].
       integer, intent(in) :: extents(:)
       real(wp), intent(in) :: values(*)
+
+      call add_line(self, name, get_form(extents))
+      call new_item(self)
+      self%items(self%n_item)%values = values(:product(extents))
+   end subroutine add_array
+
+   !> Adds an array of rank 3 without a copy of it.
+   subroutine move_array(self, name, values)
+      class(bundle_type), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      !> The array, not allocated afterwards: [:, :, :].
+      real(wp), allocatable, intent(inout) :: values(:, :, :)
+
+      call add_line(self, name, get_form(shape(values)))
+      call new_item(self)
+      call move_alloc(values, self%items(self%n_item)%cube)
+   end subroutine move_array
+
+   !> Extents as the header has them.
+   pure function get_form(extents) result(form)
+      !> Extents of an array: [rank].
+      integer, intent(in) :: extents(:)
+      !> The extents with commas between.
       character(len=:), allocatable :: form
       integer :: i
 
@@ -74,9 +101,7 @@ contains
       do i = 1, size(extents)
          form = form//to_text(extents(i))//','
       end do
-      call add_line(self, name, form)
-      call add_item(self, product(extents), values)
-   end subroutine add_array
+   end function get_form
 
    !> Adds a line to the header.
    subroutine add_line(self, name, form)
@@ -88,26 +113,23 @@ contains
       self%header = self%header//trim(name)//tab//form//line_feed
    end subroutine add_line
 
-   !> Adds an array.
-   subroutine add_item(self, n, values)
+   !> Adds an empty item.
+   subroutine new_item(self)
       type(bundle_type), intent(inout) :: self
-      !> Number of elements.
-      integer, intent(in) :: n
-      real(wp), intent(in) :: values(n)
       type(item_type), allocatable :: more(:)
       integer :: i
 
-      if (.not. allocated(self%items)) allocate (self%items(16))
+      if (.not. allocated(self%items)) allocate (self%items(4))
       if (self%n_item == size(self%items)) then
          allocate (more(2*self%n_item))
          do i = 1, self%n_item
             call move_alloc(self%items(i)%values, more(i)%values)
+            call move_alloc(self%items(i)%cube, more(i)%cube)
          end do
          call move_alloc(more, self%items)
       end if
       self%n_item = self%n_item + 1
-      self%items(self%n_item)%values = values
-   end subroutine add_item
+   end subroutine new_item
 
    !> Number of all numbers.
    pure function count_values(self) result(n)
@@ -116,11 +138,20 @@ contains
       integer :: n
       integer :: i
 
-      n = sum([(size(self%items(i)%values), i=1, self%n_item)])
+      n = 0
+      do i = 1, self%n_item
+         associate (item => self%items(i))
+            if (allocated(item%cube)) then
+               n = n + size(item%cube)
+            else
+               n = n + size(item%values)
+            end if
+         end associate
+      end do
    end function count_values
 
    !> All numbers in the order of the header.
-   pure subroutine copy_values(self, values)
+   subroutine copy_values(self, values)
       class(bundle_type), intent(in) :: self
       !> The numbers: [count_values].
       real(wp), intent(out) :: values(:)
@@ -128,11 +159,27 @@ contains
 
       at = 0
       do i = 1, self%n_item
-         associate (item => self%items(i)%values)
-            values(at + 1:at + size(item)) = item
-            at = at + size(item)
+         associate (item => self%items(i))
+            if (allocated(item%cube)) then
+               call append(size(item%cube), item%cube)
+            else
+               call append(size(item%values), item%values)
+            end if
          end associate
       end do
+
+   contains
+
+      !> Appends the numbers of one item.
+      subroutine append(n, item)
+         !> Their number.
+         integer, intent(in) :: n
+         real(wp), intent(in) :: item(n)
+
+         values(at + 1:at + n) = item
+         at = at + n
+      end subroutine append
+
    end subroutine copy_values
 
    !> Stores a bundle to be collected, or the message of an error alone.
