@@ -33,6 +33,9 @@ module thud_force_exposure
    !> Maximum sampling rate, Hz: one second of it still fits into memory.
    real(wp), parameter :: max_rate = 1.0e7_wp
 
+   !> Samples whose sines and cosines follow from those of the first of them.
+   integer, parameter :: block = 32
+
 contains
 
    !> Levels of a record in the given bands.
@@ -56,8 +59,14 @@ contains
       call check_record(force, sample_rate, bands, error)
       if (allocated(error)) return
       ! Zeros at the ends add nothing to the energy but take time.
-      first = findloc(abs(force) > 0.0_wp, .true., dim=1)
-      last = findloc(abs(force) > 0.0_wp, .true., dim=1, back=.true.)
+      first = 1
+      do while (.not. abs(force(first)) > 0.0_wp)
+         first = first + 1
+      end do
+      last = size(force)
+      do while (.not. abs(force(last)) > 0.0_wp)
+         last = last - 1
+      end do
       select case (method)
       case ('exact')
          energy = get_energy(force(first:last), sample_rate, bands%lower, bands%upper, 0.0_wp)
@@ -81,14 +90,22 @@ contains
       real(wp), intent(in) :: sample_rate
       type(band_type), intent(in) :: bands(:)
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: min_rate
+      real(wp) :: min_rate, total
+      integer :: i
 
       min_rate = 2*maxval(bands%upper)
+      total = 0.0_wp
+      !$omp simd reduction(+:total)
+      do i = 1, size(force)
+         total = total + force(i)**2
+      end do
       if (.not. (sample_rate >= min_rate .and. sample_rate <= max_rate)) then
          error = input_error('sample_rate = '//to_text(sample_rate)//' Hz is not allowed; allowed: from ' &
             //to_text(min_rate)//' Hz, twice the highest band edge, to '//to_text(max_rate)//' Hz')
       else if (size(force) == 0 .or. size(force) > max_samples) then
          error = input_error('the force has '//to_text(size(force))//' samples; allowed: 1 to '//to_text(max_samples))
+      else if (total > 2*min_energy .and. total < huge(1.0_wp)/size(force)/sample_rate**2) then
+         return  ! Most records; such a sum has no term that is not finite or too large.
       else if (.not. all(ieee_is_finite(force))) then
          error = input_error('the force holds a value that is not finite, first at sample ' &
             //to_text(findloc(ieee_is_finite(force), .false., dim=1))//'; allowed: finite numbers')
@@ -141,8 +158,9 @@ contains
       real(wp) :: step, middle, half_width
       integer :: i, lag
 
-      allocate (correlation(0:size(force) - 1))
-      call get_autocorrelation(force, correlation)
+      ! Zeros fill the last block.
+      allocate (correlation(0:block*((size(force) + block - 2)/block)), source=0.0_wp)
+      call get_autocorrelation(force, correlation(:size(force) - 1))
       step = pi*spacing/sample_rate
       do lag = 1, size(force) - 1
          if (spacing > 0.0_wp) then
@@ -160,7 +178,7 @@ contains
       end do
    end function get_energy
 
-   !> Sum of x(k) cos(m k) sin(h k) over all samples.
+   !> Sum of x(k) cos(m k) sin(h k) over all samples, whose number is a multiple of `block`.
    !>
    !> Sines and cosines are few, those of the starts of blocks and those within a block; they make all
    !> others by the sums of angles.
@@ -170,17 +188,15 @@ contains
       !> Angles per sample of cosine and sine.
       real(wp), intent(in) :: m, h
       real(wp) :: total
-      integer, parameter :: block = 32
       real(wp) :: part(block, 4), start_wave(4), angle(2)
-      integer :: start, last, i
+      integer :: start, i
 
       part = 0.0_wp
       do start = 0, size(x) - 1, block
-         last = min(block, size(x) - start)
          angle = get_angle([m, h], start)
          start_wave = [cos(angle(1))*[sin(angle(2)), cos(angle(2))], -sin(angle(1))*[sin(angle(2)), cos(angle(2))]]
          do i = 1, 4
-            part(:last, i) = part(:last, i) + start_wave(i)*x(start + 1:start + last)
+            part(:, i) = part(:, i) + start_wave(i)*x(start + 1:start + block)
          end do
       end do
       total = 0.0_wp

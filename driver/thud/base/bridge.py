@@ -57,17 +57,21 @@ def _packed(
     header = ""
     texts = b""
     arrays = []
+    count = 0
     for name, value in request.items():
         if isinstance(value, str | bytes):
             encoded = value.encode(errors="surrogateescape") if isinstance(value, str) else value
             header += f"{name}\tt{len(encoded)}\n"
             texts += encoded
         else:
-            array = np.asarray(value, dtype=np.float64).ravel(order="F")
-            header += f"{name}\tn{array.size}\n"
-            arrays.append(array)
-    # f2py knows no empty arrays.
-    return header, texts, np.concatenate(arrays) if arrays else np.zeros(1)
+            size = value.size if isinstance(value, np.ndarray) else 1
+            header += f"{name}\tn{size}\n"
+            arrays.append((slice(count, count + size), value))
+            count += size
+    values = np.zeros(max(1, count))  # f2py knows no empty arrays
+    for where, value in arrays:
+        values[where] = value.ravel(order="F") if isinstance(value, np.ndarray) else value
+    return header, texts, values
 
 
 def _collect(status: int, handle: int, n_byte: int, n_value: int) -> Bundle:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 BANDWIDTHS: tuple[BandSet, ...] = get_args(BandSet)
 SOURCES: tuple[LimitsSource, ...] = get_args(LimitsSource)
+LEVEL_METHODS: tuple[LevelsMethod, ...] = get_args(LevelsMethod)
 FORCES: tuple[LevelsForce, ...] = ("elastic", "floor")
 # Upper limit of the band of a force plate, Hz (paper, section 3).
 RECORDED_BAND = 1250.0
@@ -114,7 +115,7 @@ def force_exposure_levels(
         rate, the bands or the method are invalid.
     """
     require_choice("bands", bands, BANDWIDTHS)
-    require_choice("method", method, get_args(LevelsMethod))
+    require_choice("method", method, LEVEL_METHODS)
     record = _record(force)
     rate = to_float("sample_rate", sample_rate)
     found = ask("levels", force=record, sample_rate=rate, bands=bands, method=method)
