@@ -199,8 +199,8 @@ contains
       call add_history(energies, prediction)
    end subroutine get_room_level
 
-   !> Levels of the octaves: the detector is linear in the energies, those of an octave are the sums of its thirds of an
-   !> octave, and the maximum of the sum is at most the sum of the maxima.
+   !> Levels of the octaves: the detector is linear in the energies, those of an octave are the sums of its one-third
+   !> octaves, and the maximum of the sum is at most the sum of the maxima.
    subroutine add_octaves(energies, prediction)
       !> Energies of the one-third-octave bands, three for each octave: [n_band].
       type(band_energies_type), intent(in) :: energies(:)

@@ -67,7 +67,7 @@ def test_page_is_complete_in_one_file(tmp_path: Path) -> None:
 
 
 def column(comparison: thud.Comparison, number: int = 1) -> dict[str, str]:
-    return {row[0]: row[number] for row in comparison.table()}
+    return {row[0]: row[number] for row in comparison.rows()}
 
 
 def test_table_gives_every_criterion_beside_its_limits() -> None:

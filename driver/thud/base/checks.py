@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NoReturn, get_args
 
 import numpy as np
@@ -42,12 +43,17 @@ def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
         refuse_value(name, value, f"an object of {expected}")
 
 
-def require_choice(name: str, value: object, allowed: Iterable[str]) -> None:
+def require_choice(name: str, value: object, allowed: Collection[str]) -> None:
     """Raise InputError where a word is not one of several."""
-    choices = list(allowed)
-    if not isinstance(value, str) or value not in choices:
-        unknown = f"{name} = {shown(value)} is not known{suggestion(value, choices)}"
-        refuse(unknown, ", ".join(map(repr, choices)))
+    if not isinstance(value, str) or value not in allowed:
+        unknown = f"{name} = {shown(value)} is not known{suggestion(value, allowed)}"
+        refuse(unknown, ", ".join(map(repr, allowed)))
+
+
+def require_mapping(name: str, value: object, entries: str) -> None:
+    """Raise InputError where an argument is not a mapping of names to one or more entries."""
+    if not isinstance(value, Mapping) or not value:
+        refuse(f"{name} are not stated", f"a mapping of names to one or more {entries}")
 
 
 def suggestion(word: object, known: Collection[str]) -> str:

@@ -15,10 +15,11 @@ import threading
 import time
 import warnings
 import zlib
+from abc import ABC, abstractmethod
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, NoReturn
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, NoReturn
 
 from thud.base.checks import refuse
 from thud.base.errors import InputError, LockWarning
@@ -74,6 +75,31 @@ def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
     except ValueError as error:  # a path that no file system can hold
         message = f"{path!r} is not allowed; allowed: the path of a file"
         raise InputError(message) from error
+
+
+class Page(ABC):
+    """Base of comparisons that are written as a figure and a page."""
+
+    # The command that writes them.
+    _command: ClassVar[str]
+
+    @abstractmethod
+    def files(self) -> dict[str, bytes]:
+        """Return the contents of the files by name."""
+
+    def save(self, directory: str | os.PathLike[str], *, replace: bool = False) -> list[Path]:
+        """Write the files of `files` and return their paths.
+
+        Files that thud has not written are replaced with `replace` only.
+
+        Raises
+        ------
+        InputError
+            Where a file is in the way.
+        OSError
+            Where they cannot be written.
+        """
+        return Results(Path(directory), self._command, replace=replace).write(self.files())
 
 
 @dataclass(frozen=True)

@@ -138,7 +138,7 @@ def compare_cases(options: argparse.Namespace) -> int:
     print_notes(page.warnings)
     paths = results.write(page.files())
     if not options.quiet:
-        print(format_rows(page.table()))
+        print(format_rows(page.rows()))
         print(f"Page: {paths[-1]}")
     return 0
 

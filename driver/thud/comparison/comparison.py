@@ -19,7 +19,7 @@ from thud.base._schema import LIMITS, QUANTITIES, SAMPLE_QUANTITIES
 from thud.base.checks import refuse, refuse_value, require_choice, require_kind
 from thud.base.display import Displayed
 from thud.base.errors import InputError, PlausibilityWarning, ThudError
-from thud.base.files import Results
+from thud.base.files import Page
 from thud.base.quantity import Quantity
 from thud.case.case import Case, read_case
 from thud.impact.compute import compute
@@ -40,7 +40,7 @@ NAMELISTS = (".nml", ".namelist", "")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Displayed):
+class Comparison(Displayed, Page):
     """Impacts of the same drop, side by side.
 
     Attributes
@@ -59,6 +59,7 @@ class Comparison(Displayed):
     run_times: dict[str, float]
     force: LevelsForce | None = None
     source: LimitsSource = "rubber_ball"
+    _command = "compare"
 
     @property
     def warnings(self) -> list[str]:
@@ -70,10 +71,6 @@ class Comparison(Displayed):
         return f"<Comparison: {', '.join(self.impacts)}>"
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text."""
-        return self.table()
-
-    def table(self) -> list[tuple[str, ...]]:
         """Return rows of text: names, force, method, criteria, quantities, times, verdicts.
 
         Columns are the impacts and, in the last, the limits.
@@ -96,29 +93,15 @@ class Comparison(Displayed):
 
     def figure(self) -> Figure:
         """Return the page as a matplotlib figure."""
-        return comparison_page(self.impacts, self.force, self.source, self.table())
+        return comparison_page(self.impacts, self.force, self.source, self.rows())
 
     def html(self) -> str:
         """Return the page as self-contained HTML with interactive plots."""
-        return comparison_html(self.impacts, self.force, self.source, self.table())
+        return comparison_html(self.impacts, self.force, self.source, self.rows())
 
     def files(self) -> dict[str, bytes]:
         """Return ``comparison.svg`` and ``comparison.html`` by name."""
         return page_files("comparison", self.figure, self.html())
-
-    def save(self, directory: str | os.PathLike[str], *, replace: bool = False) -> list[Path]:
-        """Write the files of `files` and return their paths.
-
-        Files that thud has not written are replaced with `replace` only.
-
-        Raises
-        ------
-        InputError
-            Where a file is in the way.
-        OSError
-            Where they cannot be written.
-        """
-        return Results(Path(directory), "compare", replace=replace).write(self.files())
 
 
 def _criterion_row(criteria: tuple[Criterion, ...]) -> tuple[str, ...]:
@@ -146,12 +129,12 @@ def _cell(criterion: Criterion, quantity: Quantity) -> str:
 
 
 def _quantity_rows(impacts: Iterable[ImpactResult]) -> list[tuple[str, ...]]:
-    """Return the rows of the quantities that are no criteria, peaks apart, where one is known."""
-    shown = set(SAMPLE_QUANTITIES) - {name for name, *_ in LIMITS[SOURCES[0]]}
+    """Return the rows of the quantities that have no row yet, where one of them is known."""
+    other_rows = {"peak_force", "peak_elastic_force", *(name for name, *_ in LIMITS[SOURCES[0]])}
     rows = []
     for name in SAMPLE_QUANTITIES:
         values = [impact.quantity(name) for impact in impacts]
-        if name in shown - {"peak_force", "peak_elastic_force"} and not np.isnan(values).all():
+        if name not in other_rows and not np.isnan(values).all():
             rows.append((QUANTITIES[name].label, *map(QUANTITIES[name].show, values), ""))
     return rows
 

@@ -57,7 +57,7 @@ def report(values: Values) -> bytes:
     impact = compute(new_case(values))
     comparison = compare({impact.case.name: impact})
     source = impact.case.limits.source
-    return comparison_html(comparison.impacts, None, source, comparison.table()).encode()
+    return comparison_html(comparison.impacts, None, source, comparison.rows()).encode()
 
 
 def study(values: Values) -> bytes:

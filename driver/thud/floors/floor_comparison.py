@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud.base.checks import refuse, require_kind
+from thud.base.checks import refuse, require_kind, require_mapping
 from thud.base.display import Displayed
 from thud.base.errors import ThudError
-from thud.base.files import Results
+from thud.base.files import Page
 from thud.case.case import Case
 from thud.floors.prediction import RoomPrediction, predict_level
 from thud.floors.tapping import has_tapping_level, tapping_level
@@ -21,13 +19,13 @@ from thud.level.levels import get_bands
 from thud.level.rating import CLASSES
 
 if TYPE_CHECKING:
-    import os
+    from collections.abc import Mapping
 
     from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FloorComparison(Displayed):
+class FloorComparison(Displayed, Page):
     """Predictions for several floors and rooms, side by side.
 
     Attributes
@@ -37,6 +35,7 @@ class FloorComparison(Displayed):
     """
 
     predictions: dict[str, RoomPrediction]
+    _command = "floor"
 
     @property
     def warnings(self) -> list[str]:
@@ -84,20 +83,6 @@ class FloorComparison(Displayed):
 
         return page_files("floors", self.figure, self.html())
 
-    def save(self, directory: str | os.PathLike[str], *, replace: bool = False) -> list[Path]:
-        """Write the files of `files` and return their paths.
-
-        Files that thud has not written are replaced with `replace` only.
-
-        Raises
-        ------
-        InputError
-            Where a file is in the way.
-        OSError
-            Where they cannot be written.
-        """
-        return Results(Path(directory), "floor", replace=replace).write(self.files())
-
     def __repr__(self) -> str:
         """Return the names of the floors and their levels."""
         result = (f"{name} {one.rating.rounded} dB" for name, one in self.predictions.items())
@@ -121,8 +106,7 @@ def compare_floors(
     InputError
         Where there is nothing to compare, or a case has no room.
     """
-    if not isinstance(cases, Mapping) or not cases:
-        refuse("cases are not given", "a mapping of names to one or more cases or predictions")
+    require_mapping("cases", cases, "cases or predictions")
     result: dict[str, RoomPrediction] = {}
     for name, given in tqdm(cases.items(), unit="floor", disable=not progress, leave=False):
         require_kind("name", name, str)

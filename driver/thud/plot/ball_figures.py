@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.patheffects import withStroke
 
-from thud.base.checks import require_kind, require_whole
+from thud.base.checks import require_kind, require_mapping, require_whole
 from thud.base.errors import InputError
 from thud.base.files import replace_file
 from thud.impact.compression import CompressionCurve
@@ -23,7 +22,7 @@ from thud.plot.style import WIDTH, add_curves, empty_axes, legend_above, new_fig
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -276,9 +275,7 @@ def loss_factor(models: Mapping[str, FiniteElement]) -> Figure:
     InputError
         If `models` is not a mapping of names to such models, or empty.
     """
-    if not isinstance(models, Mapping) or not models:
-        message = "models are not given; allowed: a mapping of names to models, at least one"
-        raise InputError(message)
+    require_mapping("models", models, "models")
     figure, axes = empty_axes(2.5)
     frequency = np.geomspace(10, 1000, 200)
     add_curves(axes, {name: (frequency, loss_factors(m, frequency)) for name, m in models.items()})
@@ -321,9 +318,7 @@ def compression(curves: Mapping[str, CompressionCurve]) -> Figure:
     InputError
         If `curves` is not a mapping of names to curves, or empty.
     """
-    if not isinstance(curves, Mapping) or not curves:
-        message = "curves are not given; allowed: a mapping of names to curves, at least one"
-        raise InputError(message)
+    require_mapping("curves", curves, "curves")
     for name, curve in curves.items():
         require_kind(name, curve, CompressionCurve)
     figure, axes = empty_axes(2.5)

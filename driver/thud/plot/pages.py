@@ -119,7 +119,7 @@ def _row(cells: Sequence[str], tag: str) -> str:
     return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
 
 
-# Styles that plotly writes into the plots give way to the colors of the page.
+# The colors of the page override the styles that plotly writes into the plots.
 _PAGE = Template("""<!DOCTYPE html>
 <html lang="en">
 <head>

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from textwrap import fill
@@ -14,13 +13,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from thud.base.checks import require_kind
+from thud.base.checks import require_kind, require_mapping
 from thud.base.errors import InputError
 from thud.level.impact_result import ImpactResult
 from thud.level.levels import get_bands
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.legend import Legend
@@ -162,9 +161,7 @@ def iterate_curves(
     InputError
         If `impacts` is not a mapping of names to impacts, or empty.
     """
-    if not isinstance(impacts, Mapping) or not impacts:
-        message = "impacts are not given; allowed: a mapping of names to one or more impacts"
-        raise InputError(message)
+    require_mapping("impacts", impacts, "impacts")
     for name, impact in impacts.items():
         require_kind(name, impact, ImpactResult)
     kinds = [impact.assessed_force(force) for impact in impacts.values()]
