@@ -4,7 +4,7 @@
 !> them. No number of a sample depends on the threads, on the other samples or on its index among them.
 module thud_sweep
    use thud_band, only: band_type, get_level_bands, octave_count
-   use thud_batch_sets, only: fill_sets, suits_batch
+   use thud_batch_samples, only: fill_samples, suits_batch
    use thud_blocked_drop, only: blocked_type, solve_blocked
    use thud_case, only: case_type, check_case, get_active_fields
    use thud_column, only: column_type
@@ -21,7 +21,7 @@ module thud_sweep
    use thud_quantities, only: get_quantities, sample_quantity_count
    use thud_room, only: room_level_type
    use thud_sampling, only: check_sampling, get_sample_count, get_step_count
-   use thud_shell_sets, only: set_type
+   use thud_shell_samples, only: sample_type
    use thud_source_limits, only: conforms, get_source_limits, source_limits_type
    use thud_source_model, only: typical_contact
    use thud_text, only: to_text
@@ -336,17 +336,17 @@ contains
       type(sweep_type), intent(inout) :: sweep
       !> There is no space in memory.
       type(error_type), allocatable, intent(out) :: error
-      type(set_type), allocatable :: sets(:)
+      type(sample_type), allocatable :: samples(:)
       logical, allocatable :: computed(:)
       integer :: i
 
-      allocate (sets(size(values, 2)), computed(size(values, 2)))
-      call fill_sets(case, columns, values, sets)
-      call solve_ensemble(sets, case%sampling, trim(case%source), threads, sweep%levels, sweep%projections, computed, &
+      allocate (samples(size(values, 2)), computed(size(values, 2)))
+      call fill_samples(case, columns, values, samples)
+      call solve_ensemble(samples, case%sampling, trim(case%source), threads, sweep%levels, sweep%projections, computed, &
          sweep%quantity, sweep%level, sweep%conforms, sweep%force, error)
       if (allocated(error)) return
       sweep%status = merge(0, 1, computed)
-      do i = 1, size(sets)
+      do i = 1, size(samples)
          if (sweep%levels .and. computed(i)) call set_verdict(case, i, sweep)
       end do
    end subroutine solve_batch

@@ -21,14 +21,14 @@ module thud_shell_impacts
 contains
 
    !> Impacts from first touch to release, and their forces.
-   subroutine solve_impacts(impacts, n_sample, substeps, force, last_sample)
+   subroutine solve_impacts(impacts, n_sample, substeps, force, n_written)
       type(impact_batch_type), intent(inout) :: impacts
       !> Samples of the record; steps per sampling interval.
       integer, intent(in) :: n_sample, substeps
       !> Elastic forces, then floor forces, N, up to the last contact: [2 batch_size, n_sample].
       real(wp), intent(inout) :: force(2*batch_size, n_sample)
-      !> Index of the last sample that was written.
-      integer, intent(out) :: last_sample
+      !> Number of samples that were written.
+      integer, intent(out) :: n_written
       real(wp), dimension(batch_size) :: start, last, length, elastic_force, floor_force
       logical :: turning(batch_size), released(batch_size)
       integer :: n_step, last_step
@@ -54,8 +54,8 @@ contains
       call locate(impacts, .false., released, length)
       call finish_step(impacts, released, length, elastic_force, floor_force)
       impacts%contact = last + length
-      last_sample = last_step/substeps + 1
-      call get_peaks(force(:, :last_sample), impacts%peak_elastic_force, impacts%peak_force)
+      n_written = last_step/substeps + 1
+      call get_peaks(force(:, :n_written), impacts%peak_elastic_force, impacts%peak_force)
       ! A part that starts with a jump at first touch: a sample of a jump is the mean of its two sides.
       force(:, 1) = force(:, 1)/2
    end subroutine solve_impacts
