@@ -188,15 +188,15 @@ contains
    pure function are_numbers(text) result(yes)
       character(len=*), intent(in) :: text
       logical :: yes
-      character(len=len(text) + 1) :: rest
+      character(len=len(text) + 1) :: remaining
       integer :: last
 
       yes = .true.
-      rest = adjustl(replaced(text, ',', ' '))
-      do while (yes .and. rest /= '')
-         last = index(rest, ' ') - 1
-         yes = is_number(rest(index(rest(:last), '*') + 1:last))
-         rest = adjustl(rest(last + 1:))
+      remaining = adjustl(replaced(text, ',', ' '))
+      do while (yes .and. remaining /= '')
+         last = index(remaining, ' ') - 1
+         yes = is_number(remaining(index(remaining(:last), '*') + 1:last))
+         remaining = adjustl(remaining(last + 1:))
       end do
    end function are_numbers
 

@@ -3,7 +3,7 @@
 !> maximum.
 module thud_room
    use thud_band, only: band_type
-   use thud_ceiling, only: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_share, get_mass_law
+   use thud_ceiling, only: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_fraction, get_mass_law
    use thud_constants, only: pi
    use thud_energy_flow, only: add_subsystem, connect, energy_flow_type, get_loss, new_energy_flow
    use thud_error, only: error_type, input_error
@@ -269,7 +269,7 @@ contains
       type(energy_flow_type) :: flow
       type(plate_type) :: plates(1 + room%walls%lengths%count)
       real(wp), dimension(size(plates)) :: radiated
-      real(wp) :: transmission, share, rest
+      real(wp) :: transmission, forced, free
       integer :: i, at_room, at_cavity
 
       plates = [plate, get_walls(room%walls)]
@@ -283,13 +283,13 @@ contains
             [2*pi*f*plates%loss_factor + radiated, decay_of_60_db/prediction%reverberation_time(band)])
          if (ceiling%mass > 0.0_wp) then
             transmission = get_mass_law(ceiling, air, f)
-            share = get_forced_share(ceiling, air, prediction%radiation_factor(band), third%lower, third%upper)
-            rest = max(1 - share, 0.0_wp)
+            forced = get_forced_fraction(ceiling, air, prediction%radiation_factor(band), third%lower, third%upper)
+            free = max(1 - forced, 0.0_wp)
             call add_subsystem(flow, get_cavity_mode_density(ceiling, air, area, f), 2*pi*f*ceiling%loss_factor)
-            call connect(flow, 1, at_cavity, radiated(1)*rest*(1 - transmission**2))
+            call connect(flow, 1, at_cavity, radiated(1)*free*(1 - transmission**2))
             call connect(flow, at_room, at_cavity, &
                air%sound_speed*area*transmission*(1 - transmission)/(4*room%volume))
-            call connect(flow, 1, at_room, radiated(1)*(share + rest*transmission**2))
+            call connect(flow, 1, at_room, radiated(1)*(forced + free*transmission**2))
          else
             call connect(flow, 1, at_room, radiated(1))
          end if

@@ -87,14 +87,13 @@ contains
    contains
 
       !> The component after part of the step.
-      pure function component_after(part) result(component_value)
-         !> Length of the part.
-         real(wp), intent(in) :: part
+      pure function component_after(length) result(component_value)
+         real(wp), intent(in) :: length
          real(wp) :: component_value
          real(wp) :: new_state(size(state))
          logical :: valid
 
-         call rk4_step(ode, time, state, part, new_state, valid)
+         call rk4_step(ode, time, state, length, new_state, valid)
          component_value = new_state(component)
       end function component_after
 

@@ -101,7 +101,7 @@ contains
       if (.not. are_alike(wanted, sweep%projections)) sweep%projections = wanted
    end subroutine new_sweep
 
-   !> Takes what an earlier call has left, or an empty one.
+   !> Takes the sweep that an earlier call has kept, or an empty one.
    subroutine acquire_sweep(sweep)
       !> The results of an earlier call, or none.
       type(sweep_type), allocatable, intent(out) :: sweep
@@ -169,21 +169,21 @@ contains
 
       !> The samples of one thread, one after the other.
       subroutine solve_remaining()
-         type(case_type), target :: own
+         type(case_type), target :: thread_case
          type(blocked_type) :: blocked
          type(field_type), allocatable :: fields(:)
          integer :: i
 
-         own = case
-         allocate (fields, source=get_active_fields(own))
+         thread_case = case
+         allocate (fields, source=get_active_fields(thread_case))
          ! Free modes and compression are no results of samples.
-         own%has_modes = .false.
-         own%has_compression = .false.
+         thread_case%has_modes = .false.
+         thread_case%has_compression = .false.
          blocked = sweep%blocked
          !$omp do schedule(dynamic)
          do i = 1, size(remaining)
-            if (.not. is_interrupted()) call solve_sample(own, fields, columns, values(:, remaining(i)), remaining(i), &
-               blocked, sweep)
+            if (.not. is_interrupted()) call solve_sample(thread_case, fields, columns, values(:, remaining(i)), &
+               remaining(i), blocked, sweep)
          end do
          !$omp end do
          !$omp single

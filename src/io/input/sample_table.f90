@@ -171,12 +171,12 @@ contains
       character(len=cell_length), allocatable, intent(out) :: cells(:)
       !> There are too many, one is too long, or a quote is not closed.
       type(error_type), allocatable, intent(out) :: error
-      character(len=len(line)) :: rest, structure
+      character(len=len(line)) :: text, structure
       integer :: i, n, at, length, last
 
-      rest = adjustl(line)
-      structure = get_structure(rest)
-      last = len_trim(rest)
+      text = adjustl(line)
+      structure = get_structure(text)
+      last = len_trim(text)
       associate (separator => table%separator)
          ! Spreadsheets may end lines with their separator.
          if (separator == ';') last = verify(structure(:last), '; ', back=.true.)
@@ -185,13 +185,13 @@ contains
          at = 1
          do while (at <= last + merge(1, 0, separator /= ' '))
             length = index(structure(at:last)//separator, separator) - 1
-            if (n == max_columns .or. len_trim(adjustl(rest(at:at + length - 1))) > cell_length) then
+            if (n == max_columns .or. len_trim(adjustl(text(at:at + length - 1))) > cell_length) then
                error = line_error(table, 'it has too many values or one that is too long; allowed: up to ' &
                   //to_text(max_columns)//' values of up to '//to_text(cell_length)//' characters')
                return
             end if
             n = n + 1
-            cells(n) = adjustl(rest(at:at + length - 1))
+            cells(n) = adjustl(text(at:at + length - 1))
             at = at + length + 1
             if (separator == ' ') at = at + max(0, verify(structure(at:)//'x', ' ') - 1)
          end do

@@ -41,7 +41,7 @@ module thud_impact_batch
       !> The ball was released: [batch_size].
       logical(c_bool) :: released(batch_size)
       !> A stage has left the domain of the equation: [batch_size].
-      logical(c_bool) :: left(batch_size)
+      logical(c_bool) :: out_of_domain(batch_size)
       !> The last step led beyond the reach of the series: [batch_size].
       logical(c_bool) :: out_of_range(batch_size)
    end type impact_batch_type

@@ -236,7 +236,7 @@ contains
       type(error_type), allocatable :: error
       real(wp) :: change, energy
 
-      computed = impacts%released(i) .and. .not. impacts%left(i)
+      computed = impacts%released(i) .and. .not. impacts%out_of_domain(i)
       if (computed) computed = impacts%contact(i) >= min_contact_samples*sampling%substeps
       if (.not. computed) return
       associate (state => impacts%states(impacts%now), v0 => impacts%impact_velocity(i))
