@@ -42,7 +42,7 @@ contains
       call end_call()
    end subroutine ask
 
-   !> The same while no other Python thread runs: for what keeps its state in static memory, as ARPACK does, and functions
+   !> The same while no other Python thread runs: for code that keeps state in static memory, as ARPACK does, and functions
    !> that return texts of deferred length.
    subroutine ask_alone(question, header, text, values, n, status, handle, n_byte, n_value)
       !f2py integer, intent(hide), depend(values) :: n = len(values)

@@ -106,7 +106,7 @@ contains
    !> Adds a line to the header.
    subroutine add_line(self, name, form)
       type(bundle_type), intent(inout) :: self
-      !> Name of the item; what it is.
+      !> Name of the item; its form.
       character(len=*), intent(in) :: name, form
 
       if (.not. allocated(self%header)) self%header = ''
@@ -185,7 +185,7 @@ contains
    !> Stores a bundle to be collected, or the message of an error alone.
    subroutine store(bundle, error, status, handle, n_byte, n_value)
       type(bundle_type), pointer, intent(inout) :: bundle
-      !> What went wrong.
+      !> An error whose message replaces the bundle.
       type(error_type), allocatable, intent(in) :: error
       !> Code of the error, or 0.
       integer, intent(out) :: status

@@ -54,7 +54,7 @@ contains
       character(len=*), intent(in) :: text
       !> Its value where it is a number.
       real(wp), intent(inout) :: number
-      !> What it is otherwise.
+      !> The text where it is an expression, else blank.
       character(len=expression_length), intent(out) :: expression
 
       expression = ''

@@ -1,4 +1,4 @@
-!> Warnings on what is possible but not plausible: input of no rubber, moduli of another model, forces of no source.
+!> Warnings on implausible cases: input of no rubber, moduli of another model, forces of no source.
 module thud_warnings
    use thud_ball, only: get_density
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
@@ -36,7 +36,7 @@ module thud_warnings
    !> a half sine of 20 ms, above the sums of their nominal octaves: [2].
    real(wp), parameter :: source_level(2) = [44.0_wp, 52.0_wp]
 
-   !> Distance from them of a force that is probably given in other units, dB.
+   !> Distance from them of a force that is probably in other units, dB.
    real(wp), parameter :: max_distance = 40.0_wp
 
    !> Outer edges of the octaves 31.5 and 500 Hz, Hz: [2].

@@ -1,4 +1,4 @@
-!> A source of a few masses of which the first touches the floor: what the marches on rigid and mobile floors need of it.
+!> A source of a few masses of which the first touches the floor: its interface to the marches on rigid and mobile floors.
 !>
 !> Its equations of motion are laid out in pairs, displacement towards the floor (m) and velocity (m/s) of each mass, then
 !> impulse given to the floor (N s) and energy lost (J); further components are its own. On a mobile floor they hold for
@@ -150,7 +150,7 @@ contains
 
    !> Error of steps that are too long for the source.
    pure function coarse_error(finding) result(error)
-      !> What shows it.
+      !> The symptom.
       character(len=*), intent(in) :: finding
       type(error_type) :: error
       character(len=:), allocatable :: shown

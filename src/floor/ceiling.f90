@@ -38,7 +38,7 @@ contains
    end function get_ceiling_fields
 
    !> Mean in a band of the square of the ceiling's velocity over the floor's, which drives it through the air's stiffness
-   !> against its mass and what it radiates, rho0 c0 sigma:
+   !> against its mass and its radiation resistance, rho0 c0 sigma:
    !> abs((1 + i eta)/(1 + i eta + i k d sigma - (f/f0)**2))**2, f0 = sqrt(rho0 c0**2/(depth mass))/(2 pi).
    elemental function get_forced_fraction(ceiling, air, radiation_factor, lower, upper) result(fraction)
       type(ceiling_type), intent(in) :: ceiling

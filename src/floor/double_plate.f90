@@ -37,7 +37,7 @@ contains
    !>
    !> Both plates have the same shapes, and each shape two modes: those of two masses on three springs. A mode takes the mean
    !> of the loss factors of plates and layer, by their shares of its elastic energy; with equal shapes this is off by the
-   !> square of what the loss factors differ. Residual modes are as those of one plate.
+   !> square of the difference of the loss factors. Residual modes are as those of one plate.
    subroutine new_double_receiver(floor, source, point, receiver, error)
       type(double_plate_type), intent(in) :: floor
       !> Positions of source and point, over length and width.
@@ -129,7 +129,7 @@ contains
    !>
    !> In wavenumbers u = k**2 the lower plate has h2 = s/(B1 B2 (u**2 - q1) (u**2 - q2)) with the roots q of the determinant,
    !> and dissipates omega Im B2/(4 pi) integral of u**2 |h2|**2 du, by partial fractions with
-   !> integral du/(u**2 - q) = pi/(2 sqrt(-q)). What it dissipates is what it gets.
+   !> integral du/(u**2 - q) = pi/(2 sqrt(-q)). It dissipates the power that it receives.
    elemental function get_lower_conductance(floor, frequency) result(conductance)
       type(double_plate_type), intent(in) :: floor
       !> Frequency, Hz.

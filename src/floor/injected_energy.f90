@@ -30,7 +30,7 @@ module thud_injected_energy
    !> Least rate of decay, 1/s: a pole on the axis has its peak on it.
    real(wp), parameter :: min_decay = 1.0e-6_wp
 
-   !> Nodes and weights on [-1, 1], and what makes Legendre coefficients of values at the nodes.
+   !> Nodes and weights on [-1, 1], and the matrix from values at the nodes to Legendre coefficients.
    type :: rule_type
       real(wp) :: node(n_node), weight(n_node), coefficient(0:n_node - 1, n_node)
    end type rule_type
@@ -124,7 +124,7 @@ contains
       end do
    end function new_rule
 
-   !> What a force and its floor do from first touch on.
+   !> Force and velocity of the floor from first touch on.
    pure function new_record(receiver, force, velocity, sample_rate) result(record)
       type(receiver_type), intent(in) :: receiver
       !> The force, N, and the velocity of the floor, m/s: [n_sample].

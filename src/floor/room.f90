@@ -80,11 +80,11 @@ module thud_room
       !> The same for octaves: bands, levels and times: [n_octave].
       type(band_type), allocatable :: octaves(:)
       real(wp), allocatable :: octave_level(:), octave_time(:)
-      !> Instants after the impact, s: [n_time], and what the Fast detector shows in each band then, dB: [n_time, n_band].
+      !> Instants after the impact, s: [n_time], and the output of the Fast detector in each band, dB: [n_time, n_band].
       real(wp), allocatable :: history_time(:), history(:, :)
    end type room_level_type
 
-   !> The energies of one band, dE/dt = -A E, and what the detector sees of them.
+   !> The energies of one band, dE/dt = -A E, and the weights of the detector.
    type :: band_energies_type
       !> A, 1/s: [n, n].
       real(wp), allocatable :: loss(:, :)
@@ -251,13 +251,13 @@ contains
       end do
    end subroutine add_history
 
-   !> Energies of a band: floor, walls, room and the air above a ceiling, with what flows between them.
+   !> Energies of a band: floor, walls, room and the air above a ceiling, with the flow between them.
    !>
    !> Plates lose omega eta in all; they radiate rho0 c0 sigma/m'' into the room and as much to the other side. The room
-   !> loses 6 ln 10/T besides what goes back into them. Of the sound below a floor with a ceiling the stiffness of the air
-   !> above this carries a share; that air takes the rest, which the ceiling lets through by its mass (Craik and Smith 2000).
-   !> For the part of the rest that passes the ceiling both ways there is no ceiling, and that air takes from the room what
-   !> passes the ceiling and is then reflected by it: a ceiling without mass is none.
+   !> loses 6 ln 10/T besides the return flow into them. Of the sound below a floor with a ceiling the stiffness of the air
+   !> above this carries a fraction; that air takes the rest, which the ceiling transmits by its mass (Craik and Smith 2000).
+   !> The fraction of the rest that the ceiling transmits twice goes straight into the room, and that air takes from the room
+   !> the sound that the ceiling transmits and then reflects: a ceiling without mass has no effect.
    pure function get_band_energies(plate, room, prediction, band) result(energies)
       type(plate_type), intent(in) :: plate
       type(room_type), intent(in) :: room

@@ -1,5 +1,5 @@
-!> Transient statistical energy analysis: energies of coupled subsystems after an impact, and what the Fast detector
-!> makes of them. The equations are linear with constant coefficients: each step is the exponential of their matrix.
+!> Transient statistical energy analysis: energies of coupled subsystems after an impact, and the output of a Fast detector.
+!> The equations are linear with constant coefficients: each step is the exponential of their matrix.
 module thud_transient_energy
    use thud_kinds, only: wp
    use thud_matrix_exponential, only: get_exponential

@@ -38,7 +38,7 @@ module thud_force_exposure
 
 contains
 
-   !> Levels of a record in the given bands.
+   !> Levels of a record in bands.
    subroutine get_force_exposure_levels(force, sample_rate, bands, method, levels, error)
       !> Force, N, zero before and after the record: [n_sample].
       real(wp), intent(in) :: force(:)

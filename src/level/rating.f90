@@ -159,7 +159,7 @@ contains
    end function get_log_gain
 
    !> Level without the background (ISO 16283-2): the energy of the background is subtracted where the level is 6 to
-   !> 15 dB above it; below, what 6 dB give is subtracted, and the result is an upper bound.
+   !> 15 dB above it; below, the correction of 6 dB is subtracted, and the result is an upper bound.
    elemental subroutine correct_for_background(level, background, corrected, is_upper_bound)
       !> Levels with and of the background, dB.
       real(wp), intent(in) :: level, background

@@ -32,7 +32,7 @@ contains
       type(force_history_type), intent(out) :: history
       !> The equation fails, the contact outlasts the record, or the steps are too coarse.
       type(error_type), allocatable, intent(out) :: error
-      !> What the source drops on (default: a rigid floor).
+      !> The floor under the source (default: rigid).
       type(receiver_type), intent(in), optional :: receiver
       !> Steps in each sampling interval (default: the substeps).
       integer, intent(in), optional :: n_step

@@ -106,7 +106,7 @@ contains
          residue = residue + get_residues(pole, x(:n - 1))
          direct = direct + x(n)
       end do
-      ! What is left is within rounding of the corrections; a larger constant part ends it.
+      ! The remaining violation is within rounding of the corrections; a larger constant part removes it.
       do i = 1, n_round
          direct = max(direct, minimum)
          call find_violations(pole, residue, direct, omega, failed)
@@ -151,12 +151,12 @@ contains
       x = matmul(solved, force)/length
    end function get_correction
 
-   !> The forces of constraints, each not negative, that raise every constraint by at least what it lacks, and by
-   !> just that where its force is positive: Hildreth's method.
+   !> The forces of constraints, each not negative, that raise every constraint by at least its deficit, and by
+   !> exactly that where its force is positive: Hildreth's method.
    subroutine solve_dual(gram, missing, force, n_sweep)
       !> Lift of each constraint by the unit force of each, symmetric: [n, n].
       real(wp), intent(in), contiguous :: gram(:, :)
-      !> What the constraints miss: [n].
+      !> Deficits of the constraints: [n].
       real(wp), intent(in) :: missing(:)
       !> The forces: [n].
       real(wp), intent(out) :: force(:)

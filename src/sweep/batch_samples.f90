@@ -35,7 +35,7 @@ contains
 
    !> Samples of the shell model: ball, drop and flux term of each.
    subroutine fill_samples(case, columns, values, samples)
-      !> The case, which gives what is not in the columns.
+      !> The case, which has the values of all other keys.
       type(case_type), intent(in), target :: case
       !> Keys in which the samples differ: [n_column].
       type(column_type), intent(in) :: columns(:)

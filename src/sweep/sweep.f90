@@ -65,7 +65,7 @@ module thud_sweep
       real(wp), allocatable :: margin(:)
       !> The source conforms by the assessed force: [n_sample].
       logical, allocatable :: verdict(:)
-      !> Names, with units, of what cases with a floor have in addition: [n_column].
+      !> Names, with units, of the additional quantities of cases with a floor: [n_column].
       character(len=column_name_length), allocatable :: floor_column(:)
       !> Their values: [n_column, n_sample].
       real(wp), allocatable :: floor_value(:, :)
@@ -75,7 +75,7 @@ module thud_sweep
       real(wp), allocatable :: force(:, :, :)
    end type sweep_type
 
-   !> What an earlier call has prepared for the next one; one thread at a time owns it.
+   !> Arrays that an earlier call has prepared for the next one; one thread at a time owns them.
    type(sweep_type), allocatable :: kept
 
 contains
@@ -87,7 +87,7 @@ contains
       type(column_type), intent(in) :: columns(:)
       !> Levels and verdicts are wanted.
       logical, intent(in) :: levels
-      !> What is kept from an earlier call is used again where it fits.
+      !> The sweep; arrays of an earlier call are used again where they fit.
       type(sweep_type), intent(inout) :: sweep
       type(projections_type) :: wanted
 
@@ -112,7 +112,7 @@ contains
       if (.not. allocated(sweep)) allocate (sweep)
    end subroutine acquire_sweep
 
-   !> Keeps what the next call can use.
+   !> Keeps the arrays that the next call can use.
    subroutine release_sweep(sweep)
       !> The results, which are released.
       type(sweep_type), allocatable, intent(inout) :: sweep
@@ -134,7 +134,7 @@ contains
 
    !> Computes samples.
    subroutine solve_sweep(case, columns, values, threads, forces, sweep, error)
-      !> The case; values of the samples may make valid what is not in it.
+      !> The case; values of the samples may replace invalid ones.
       type(case_type), intent(in), target :: case
       !> Keys in which the samples differ: [n_column].
       type(column_type), intent(in) :: columns(:)

@@ -26,7 +26,7 @@ module thud_room_report
 
 contains
 
-   !> The files: levels and what they are made of per third, levels of octaves, what the detector shows against time.
+   !> The files: levels and their terms per one-third-octave band, levels of octaves, the detector against time.
    subroutine get_room_files(prediction, files)
       type(room_level_type), intent(in) :: prediction
       !> The files: [size(room_file_names)].

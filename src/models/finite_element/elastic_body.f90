@@ -32,7 +32,7 @@ module thud_elastic_body
       real(wp), allocatable :: viscous(:, :, :, :, :)
    end type elastic_body_type
 
-   !> What the forces come with.
+   !> Energies, power and failure that belong to the internal forces.
    type :: body_state_type
       !> Strain energy, that of Maxwell branches included, J.
       real(wp) :: strain_energy = 0.0_wp

@@ -1,9 +1,9 @@
 !> Contact of the ball's surface with the floor at height 0, at every node of the surface, the pole
-!> included: what holds the ball up, and Coulomb's friction.
+!> included: normal forces and Coulomb's friction.
 !>
 !> Hard floor: nodes that would pass it in a step are stopped (forward increments of Lagrange
 !> multipliers, Carpenter, Taylor and Katona 1991, Int. J. Numer. Methods Eng. 32, 103-128); nothing
-!> sinks in, and the energy of what is stopped is lost. With a layer: linear springs of the floor
+!> sinks in, and the energy of stopped nodes is lost. With a layer: linear springs of the floor
 !> (Winkler), lossless and without mass, that push normal to the surface of the ball.
 !>
 !> The edge of the contact lies between two nodes, and the one outside takes its share of the pressure
@@ -91,7 +91,7 @@ contains
       end associate
    end function new_floor_contact
 
-   !> Forces of the floor that depend on where the nodes are: those of its layer and at the edge of the contact.
+   !> Forces of the floor that depend on the positions of the nodes: by its layer and at the edge of the contact.
    pure subroutine get_contact_forces(contact, position, force, energy, stiffness)
       type(floor_contact_type), intent(in) :: contact
       !> Positions of the nodes of the outer surface over the floor, m: [0:n_polar, 2].
@@ -100,7 +100,7 @@ contains
       real(wp), intent(out) :: force(0:, :)
       !> Energy that they hold, J.
       real(wp), intent(out) :: energy
-      !> What the forces upwards gain as the floor rises, N/m: [0:n_polar].
+      !> Derivatives of the upward forces by the height of the floor, N/m: [0:n_polar].
       real(wp), intent(out), optional :: stiffness(0:)
       real(wp) :: relative_depth
       integer :: j, n
@@ -129,8 +129,8 @@ contains
          max(-position(:, 2), 0.0_wp), force(:, 1), force(:, 2), energy)
    end subroutine get_contact_forces
 
-   !> Adds what the layer does: the derivatives of its energy, half of the stiffness times area and squared penetration. The
-   !> areas are those of the rings that the nodes stand for on the floor.
+   !> Adds the forces of the layer: the derivatives of its energy, half of the stiffness times area and squared penetration.
+   !> The areas are those of the rings around the nodes on the floor.
    pure subroutine add_layer_forces(stiffness, r, penetration, outwards, upwards, energy)
       !> Stiffness per area, N/m3.
       real(wp), intent(in) :: stiffness

@@ -1,4 +1,4 @@
-!> Material of the ball in the transient model: what the group `&material` asks for, and the moduli
+!> Material of the ball in the transient model: the options of the group `&material`, and the moduli
 !> that follow from it.
 module thud_material
    use thud_ball, only: ball_type, get_density
@@ -130,7 +130,7 @@ contains
       omega = 2*pi*options%loss_frequency
       material%density = get_density(ball)
       if (options%law == 'mooney_rivlin') material%mooney_share = options%mooney_share
-      ! The modulus of elasticity is kept, which is what is measured.
+      ! The modulus of elasticity, which is measured, is kept.
       poisson_ratio = min(ball%poisson_ratio, (3*options%bulk_ratio - 2)/(2*(3*options%bulk_ratio + 1)))
       storage_modulus = ball%youngs_modulus/(2*(1 + poisson_ratio))
       material%bulk_modulus = ball%youngs_modulus/(3*(1 - 2*poisson_ratio))

@@ -51,7 +51,7 @@ contains
 
    !> A floor at rest.
    pure function new_moving_floor(receiver) result(floor)
-      !> What the ball drops on; rigid where it is absent.
+      !> The floor under the ball; rigid where absent.
       type(receiver_type), intent(in), optional :: receiver
       type(moving_floor_type) :: floor
 

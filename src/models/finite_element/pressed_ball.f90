@@ -112,7 +112,7 @@ contains
       type(pressed_ball_type), intent(inout) :: pressed
       !> The approach, not less than before, m.
       real(wp), intent(in) :: deflection
-      !> There is no state of rest, or none that was found.
+      !> No state of rest exists, or the iteration does not converge to it.
       type(error_type), allocatable, intent(out) :: error
       type(pressed_ball_type) :: next
       real(wp) :: step
@@ -253,7 +253,7 @@ contains
       type(pressed_ball_type), intent(inout) :: pressed
       !> Forces where it is, N.
       real(wp), intent(in) :: force(0:, 0:, :)
-      !> Coordinates that are given, and their changes, m.
+      !> Prescribed coordinates, and their changes, m.
       logical, intent(in) :: fixed(0:, 0:, :)
       real(wp), intent(in) :: shift(0:, 0:, :)
       !> Changes of all coordinates, m.
@@ -308,7 +308,7 @@ contains
    !> Derivatives of the forces, negative, with the gas at its pressure.
    subroutine get_tangent(pressed, fixed, width, band, failed)
       type(pressed_ball_type), intent(in) :: pressed
-      !> Coordinates that are given; their rows become those of the unit matrix.
+      !> Prescribed coordinates; their rows become those of the unit matrix.
       logical, intent(in) :: fixed(0:, 0:, :)
       !> Diagonals on each side.
       integer, intent(in) :: width

@@ -180,7 +180,7 @@ contains
       logical, intent(in) :: active(batch_size)
       !> The part: [batch_size].
       real(wp), intent(in) :: length(batch_size)
-      !> What the end of the phase brings to zero: [batch_size].
+      !> Quantity that is zero at the end of the phase: [batch_size].
       real(wp), intent(out) :: value(batch_size)
       real(wp), dimension(batch_size) :: elastic_force, floor_force
       logical :: missed
@@ -189,7 +189,7 @@ contains
       value = get_watched(impacts%states(3 - impacts%now), compressing)
    end subroutine try_length
 
-   !> What the end of the phase brings to zero: velocity or deflection.
+   !> Quantity that is zero at the end of the phase: velocity or deflection.
    pure function get_watched(state, compressing) result(watched)
       type(state_batch_type), intent(in) :: state
       !> The phase ends with the velocity.

@@ -57,7 +57,7 @@ module thud_shell_samples
 
    !> Residual of the balances of impulse and energy above which the single solver decides: the sums that
    !> are taken here have up to some twenty times the error of the single solver's.
-   real(wp), parameter :: doubtful = 0.1_wp*max_residual
+   real(wp), parameter :: max_batch_residual = 0.1_wp*max_residual
 
 contains
 
@@ -243,7 +243,7 @@ contains
          change = abs(state%impulse(i) - (v0 - state%velocity(i)))/(v0 - state%velocity(i))
          energy = abs(state%velocity(i)**2 + 2*state%loss(i) - v0**2)/v0**2
       end associate
-      if (max(change, energy) <= doubtful) return
+      if (max(change, energy) <= max_batch_residual) return
       ! The sums of the single solver, which include the stages of each step, decide.
       call solve_hollow_sphere(sample%ball, sample%drop, hollow_sphere_type(momentum_flux=flux_choices(sample%flux)), &
          sampling, history, error)

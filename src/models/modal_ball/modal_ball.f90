@@ -84,8 +84,8 @@ contains
       modulus = 1.6e6_wp
    end function get_paper_modulus
 
-   !> Limits of linear modes, and of what rings and harmonics resolve: beyond them the octave of 500 Hz is off by more than
-   !> about 0.5 dB (docs/modal_ball.md).
+   !> Limits of linear modes, and of the resolution by rings and harmonics: beyond them the octave of 500 Hz is off by
+   !> more than about 0.5 dB (docs/modal_ball.md).
    function get_validity_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
@@ -169,7 +169,7 @@ contains
       !> Modes and damping.
       class(modal_ball_options_type), intent(in) :: options
       type(surface_rings_type), intent(in) :: rings
-      !> What the ball drops on.
+      !> The floor under the ball.
       type(receiver_type), intent(in) :: floor
       !> Length of a step, s.
       real(wp), intent(in) :: interval
@@ -196,7 +196,7 @@ contains
          //' cannot be distinguished; allowed: fewer rings, more static_harmonics, or more substeps')
    end subroutine prepare
 
-   !> Modes of all harmonics, and the static response of the rings to what these leave out.
+   !> Modes of all harmonics, and the static response of the rings to the truncated ones.
    subroutine add_modes(ball, options, rings, interval, step, response, error)
       type(ball_type), intent(in) :: ball
       !> Modes.
