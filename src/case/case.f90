@@ -102,7 +102,7 @@ contains
       integer :: i
 
       fields = [ &
-         in_group('case', [text_field('name', case%name, 'name of the case, also of its output directory')]), &
+         in_group('case', [text_field('name', case%name, 'name of the case and of its output directory')]), &
          in_group('ball', get_ball_fields(case%ball)), &
          owned_by('modes', get_modes_fields(case%modes)), &
          owned_by('compression', in_group('compression', get_compression_fields(case%compression))), &
@@ -114,9 +114,9 @@ contains
       fields = [fields, &
          in_group('sampling', get_sampling_fields(case%sampling)), &
          in_group('levels', [ &
-         choice_field('method', case%level_method, 'method of the levels', level_methods), &
+         choice_field('method', case%level_method, 'method of computing the levels', level_methods), &
          choice_field('bands', case%bands, 'bands of levels.csv', band_choices), &
-         choice_field('force', case%level_force, 'assessed force: levels, peak force and verdict are of it', &
+         choice_field('force', case%level_force, 'assessed force, for which levels, peak force and verdict are reported', &
          [character(len=8) :: 'floor', 'elastic'])]), &
          in_group('limits', [choice_field('source', case%source, 'source whose limits apply', source_names)]), &
          owned_by('floor', in_group('floor', [choice_field('name', case%floor, 'floor under the source', floor_names)]))]
