@@ -24,7 +24,7 @@ contains
       character(len=*), intent(in) :: question
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      !> Set if the question is unknown, the case is invalid, or a computation fails.
+      !> Set if the case is invalid or a computation fails.
       type(error_type), allocatable, intent(out) :: error
       type(case_type), target :: case
       character(len=:), allocatable :: text

@@ -1,5 +1,5 @@
-!> The flat API for Python, the only procedures that f2py wraps: a caller asks a question by name, with a request of texts,
-!> numbers and arrays; the answer is a bundle of texts, numbers and arrays.
+!> The flat API for Python, the only procedures that f2py wraps: the request for a question and the bundle with its answer
+!> hold named texts, numbers and arrays.
 !>
 !> `ask` stores the bundle in the library and returns its handle and sizes; `collect` hands it over and deallocates it.
 !> `status` is 0, or the error code; the bundle then holds only the text `message`.

@@ -49,9 +49,9 @@ contains
       call bundle%add_text('case', text)
    end subroutine answer_effective_case
 
-   !> Runs the namelist file `path` like the executable, with results in the directory `output`. The numbers `replace`, `all`
-   !> and `progress`, if not 0, ask to replace files that thud has not written, to write additional quantities of the model,
-   !> and to show progress on a terminal.
+   !> Runs the namelist file `path` like the executable, with results in the directory `output`. Numbers other than 0 ask to
+   !> replace files that thud has not written (`replace`), to write additional quantities of the model (`all`), and to show
+   !> progress on a terminal (`progress`).
    subroutine answer_run(request, bundle, error)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
@@ -85,7 +85,6 @@ contains
    subroutine answer_solve(case, bundle, error)
       type(case_type), intent(in) :: case
       type(bundle_type), intent(inout) :: bundle
-      !> Set if a computation fails.
       type(error_type), allocatable, intent(out) :: error
       type(results_type) :: results
 
@@ -97,7 +96,6 @@ contains
    subroutine answer_modes(case, bundle, error)
       type(case_type), intent(inout) :: case
       type(bundle_type), intent(inout) :: bundle
-      !> Set if a computation fails.
       type(error_type), allocatable, intent(out) :: error
 
       case%has_impact = .false.
@@ -133,10 +131,9 @@ contains
       if (.not. allocated(error)) call bundle%add_array('loss_factors', shape(frequency), loss_factor)
    end subroutine answer_loss_factors
 
-   !> Computes samples of a case that differ in the values of the keys `keys`, a comma-separated list of `key_count` names,
-   !> with `threads` threads. `values` are the values of the keys, for a choice its index from 1: [n_key, n_sample]. The
-   !> numbers `levels` and `forces`, if not 0, ask for levels and forces. Without `values` the answer has only the cost of a
-   !> sample, s, and the length of its forces.
+   !> Computes samples of a case that differ in the `key_count` comma-separated `keys`, with `threads` threads. `values`
+   !> holds the values of the keys, for a choice its index from 1: [n_key, n_sample]. Numbers `levels` and `forces` other
+   !> than 0 ask for those. Without `values` the answer is only the cost of a sample, s, and the length of its forces.
    subroutine answer_samples(case, request, bundle, error)
       type(case_type), intent(in), target :: case
       type(request_type), intent(in) :: request

@@ -24,8 +24,8 @@ module thud_floor_answers
 
 contains
 
-   !> Mobility of a case's floor, m/(N s), at the frequencies `frequency`, Hz: under the source or, if the request has the
-   !> array `point`, m, from the source to this point.
+   !> Mobility of a case's floor, m/(N s), at the frequencies `frequency`, Hz: under the source or, with `point`, m, from
+   !> the source to this point.
    subroutine answer_mobility(case, request, bundle, error)
       type(case_type), intent(in) :: case
       type(request_type), intent(in) :: request
@@ -50,8 +50,8 @@ contains
       call bundle%add_array('imaginary', shape(mobility), aimag(mobility))
    end subroutine answer_mobility
 
-   !> Energy that the force history `force`, N, injects into a case's floor with the velocity history `velocity`, m/s, both
-   !> at `sample_rate`, Hz, in the band set `bands`.
+   !> Energy that the record `force`, N, injects into a case's floor with `velocity`, m/s, at `sample_rate`, Hz, in the band
+   !> set `bands`.
    subroutine answer_floor_energy(case, request, bundle, error)
       type(case_type), intent(in) :: case
       type(request_type), intent(in) :: request
@@ -77,7 +77,7 @@ contains
       call bundle%add_array('conductance', shape(bands), get_mean_conductances(receiver, bands))
    end subroutine answer_floor_energy
 
-   !> Velocity, m/s, of the point `point`, m, of a case's floor under the force history `force`, N, at `sample_rate`, Hz.
+   !> Velocity, m/s, of the point `point`, m, of a case's floor under the record `force`, N, at `sample_rate`, Hz.
    subroutine answer_point_velocity(case, request, bundle, error)
       type(case_type), intent(in) :: case
       type(request_type), intent(in) :: request
@@ -95,11 +95,10 @@ contains
       if (.not. allocated(error)) call bundle%add_array('velocity', shape(velocity), velocity)
    end subroutine answer_point_velocity
 
-   !> The impact of a case on its mobile floor; empty if the floor is rigid or the model does not couple with it.
+   !> The impact on a case's mobile floor; empty if the floor is rigid or the model does not couple with it.
    subroutine answer_floor_impact(case, bundle, error)
       type(case_type), intent(in) :: case
       type(bundle_type), intent(inout) :: bundle
-      !> Set if the computation fails.
       type(error_type), allocatable, intent(out) :: error
       type(force_history_type), allocatable :: on_floor
 

@@ -59,8 +59,8 @@ contains
       call bundle%add_array('force', shape(low), low)
    end subroutine answer_low_pass
 
-   !> Single-number ratings of the levels `levels` in a room, dB, in the rated bands of the set `bands`: A-weighted level,
-   !> the same rounded as reported, class (0 for none) and, for octaves, inverse-A curve rating.
+   !> Single-number ratings of `levels` in a room, dB, in the rated bands of the set `bands`: A-weighted level, the same
+   !> rounded, class (0 for none) and, for octaves, inverse-A curve rating.
    subroutine answer_rating(request, bundle)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
@@ -77,7 +77,7 @@ contains
       if (set == octave_set) call bundle%add_number('curve', real(get_inverse_a_rating(levels), wp))
    end subroutine answer_rating
 
-   !> The levels `levels`, dB, of a room with `reverberation_time`, s, and `volume`, m3, standardized to the reference room.
+   !> `levels`, dB, of a room with `reverberation_time`, s, and `volume`, m3, standardized to the reference room.
    subroutine answer_standardization(request, bundle)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
@@ -88,8 +88,7 @@ contains
       call bundle%add_array('levels', shape(levels), levels)
    end subroutine answer_standardization
 
-   !> The levels `levels`, dB, corrected for the background levels `background`, dB, and whether a corrected level is only an
-   !> upper bound.
+   !> `levels`, dB, corrected for the levels `background`, dB, and whether a corrected level is only an upper bound.
    subroutine answer_background(request, bundle)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle

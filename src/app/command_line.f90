@@ -194,10 +194,10 @@ contains
 
    !> Reads the value of an option.
    subroutine take_value(i, option, allowed, value, error)
-      !> Index of the argument: of the option before the call, of its value after it.
+      !> Index of the option; afterwards that of its value.
       integer, intent(inout) :: i
       character(len=*), intent(in) :: option
-      !> Allowed values, for the error message.
+      !> Allowed values.
       character(len=*), intent(in) :: allowed
       character(len=:), allocatable, intent(inout) :: value
       !> Set if there is no value.
@@ -213,7 +213,7 @@ contains
    subroutine take_threads(text, threads, error)
       character(len=*), intent(in) :: text
       integer, intent(out) :: threads
-      !> Set if the text is not an allowed number of threads.
+      !> Set if the number is not allowed.
       type(error_type), allocatable, intent(out) :: error
 
       threads = 0

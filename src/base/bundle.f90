@@ -1,4 +1,4 @@
-!> Named results: any number of texts, numbers and arrays, described by a header for callers in other languages.
+!> Named results: any number of texts, numbers and arrays, described by a header for callers.
 module thud_bundle
    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_intptr_t, c_loc, c_null_ptr, c_ptr
    use thud_error, only: error_type
@@ -20,8 +20,8 @@ module thud_bundle
    !> Texts and arrays, each with its name.
    type :: bundle_type
       private
-      !> One line per item: its name, a tab, and its form. The form of a text is `t` and its length; that of an array its
-      !> extents, each followed by a comma; that of a single number is empty.
+      !> One line per item: name, tab, and for a text `t` and its length, for an array its extents, each with a comma
+      !> behind it, for a single number nothing.
       character(len=:), allocatable, public :: header
       !> All texts, concatenated.
       character(len=:), allocatable, public :: text
@@ -181,7 +181,7 @@ contains
 
    end subroutine copy_values
 
-   !> Returns the handle of a bundle for the caller to collect; after an error it holds only the error message.
+   !> Stores a bundle for its caller to collect; after an error it holds only the message.
    subroutine leave(bundle, error, status, handle, n_byte, n_value)
       type(bundle_type), pointer, intent(inout) :: bundle
       !> Error of the computation, if any.
@@ -189,9 +189,9 @@ contains
       !> Code of the error, or 0.
       integer, intent(out) :: status
       integer(int64), intent(out) :: handle
-      !> Bytes of header and texts, and of the zero between them.
+      !> Bytes of header, zero and texts.
       integer, intent(out) :: n_byte
-      !> Count of the numbers, at least 1 because f2py has no empty arrays.
+      !> Count of the numbers, at least 1: f2py has no empty arrays.
       integer, intent(out) :: n_value
 
       status = 0

@@ -35,7 +35,7 @@ module thud_field
    character(len=*), parameter :: flags(*) = [character(len=7) :: '.true.', '.false.', 'true', 'false', '.t.', '.f.', &
       't', 'f']
 
-   !> Marks list entries that the input does not set; no entry can have this value.
+   !> Marks list entries that are not given.
    real(wp), parameter :: unset = -huge(1.0_wp)
 
    !> Description of one key and a pointer to its variable.
@@ -82,11 +82,10 @@ module thud_field
 
 contains
 
-   !> Returns an error for the first value outside its range; NaN is always outside.
+   !> Returns an error for the first value outside its range, NaN included.
    subroutine check_fields(fields, error)
       !> The fields: [n_field].
       type(field_type), intent(in) :: fields(:)
-      !> Set if a value is not allowed.
       type(error_type), allocatable, intent(out) :: error
       type(interval_type) :: interval
       character(len=:), allocatable :: text, suggestion
@@ -175,7 +174,7 @@ contains
          if (scan(text(1:1), '''"') == 1 .and. text(len(text):) == text(1:1)) then
             read (line, nml=text_group, iostat=status, iomsg=message)
          end if
-         ! `word` would hold only the beginning of a longer text.
+         ! A longer text would have been cut.
          if (status == 0) status = merge(0, 1, len_trim(text) <= len(word) + 2 .and. len_trim(word) <= name_length)
          if (status == 0) self%text_value = word(:name_length)
          if (status == 0 .and. self%n_choice > 0) self%text_value = lower_case(self%text_value)

@@ -52,7 +52,7 @@ contains
    !> Reads one end of an interval.
    pure subroutine read_end(text, number, expression)
       character(len=*), intent(in) :: text
-      !> Value of the end; unchanged if the end is an expression.
+      !> Value of the end; unchanged for an expression.
       real(wp), intent(inout) :: number
       !> The expression; blank for a number.
       character(len=expression_length), intent(out) :: expression

@@ -35,7 +35,7 @@ contains
    pure function get_distance(one, other) result(distance)
       character(len=*), intent(in) :: one, other
       integer :: distance
-      ! Distances between leading parts: element (j, i) compares the first i letters of `one` with the first j of `other`.
+      ! Element (j, i): distance between the first i letters of `one` and the first j of `other`.
       integer :: row(0:len(other), 0:len(one))
       integer :: i, j, p, q
       logical :: swapped

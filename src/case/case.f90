@@ -163,7 +163,6 @@ contains
    !> Returns an error if values of a case are out of range or contradict each other.
    subroutine check_case(case, error)
       type(case_type), intent(in), target :: case
-      !> Set if the case is invalid.
       type(error_type), allocatable, intent(out) :: error
 
       call check_fields(get_active_fields(case), error)
@@ -184,7 +183,6 @@ contains
    !> Returns an error if options of the floor contradict each other, or it cannot radiate into the room below.
    subroutine check_floor(case, error)
       type(case_type), intent(in) :: case
-      !> Set if the floor is invalid.
       type(error_type), allocatable, intent(out) :: error
       type(band_type), allocatable :: bands(:)
       type(plate_type) :: plate

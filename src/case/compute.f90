@@ -55,21 +55,20 @@ module thud_compute
       type(assessment_type) :: assessment
    end type impact_type
 
-   !> Results of a case.
+   !> Results of a case; only those that it asks for are set.
    type :: results_type
-      !> The drop on a rigid floor, if the case asks for an impact.
+      !> The drop on a rigid floor.
       type(impact_type) :: impact
-      !> The drop on a mobile floor, if the case asks for it and the model couples with a floor.
+      !> The drop on a mobile floor, if the model couples with it.
       type(force_history_type), allocatable :: on_floor
       !> Levels and energies of the drop on the mobile floor.
       type(floor_result_type) :: floor
-      !> Free modes, if the case asks for them.
       type(free_modes_type) :: modes
-      !> Level in the room below, if the case asks for it.
+      !> Level in the room below.
       type(room_level_type) :: room
-      !> Quasi-static compression, if the case asks for it.
+      !> Quasi-static compression.
       type(compression_type) :: compression
-      !> Warnings on possible but implausible input or results: [n_warning].
+      !> Warnings on implausible input or results: [n_warning].
       character(len=warning_length), allocatable :: warning(:)
    end type results_type
 
@@ -81,7 +80,6 @@ contains
       type(case_type), intent(in) :: case
       type(scope_type), intent(in) :: scope
       type(results_type), intent(out) :: results
-      !> Set if a computation fails.
       type(error_type), allocatable, intent(out) :: error
 
       if (case%has_impact) call require_memory(sample_memory*get_sample_count(case%sampling), &
@@ -101,7 +99,6 @@ contains
       type(case_type), intent(in) :: case
       type(scope_type), intent(in) :: scope
       type(impact_type), intent(out) :: impact
-      !> Set if a computation fails.
       type(error_type), allocatable, intent(out) :: error
 
       associate (model => case%models(get_model_number(case))%model)
@@ -121,7 +118,6 @@ contains
       type(force_history_type), allocatable, intent(out) :: on_floor
       type(floor_result_type), intent(out) :: floor
       type(room_level_type), intent(out) :: room
-      !> Set if a computation fails.
       type(error_type), allocatable, intent(out) :: error
 
       if (case%has_floor) call drop_on_floor(case, on_floor, error)
@@ -140,7 +136,6 @@ contains
       type(case_type), intent(in) :: case
       !> The drop on the floor; not allocated if the floor is rigid or the model does not couple with it.
       type(force_history_type), allocatable, intent(out) :: on_floor
-      !> Set if the computation fails.
       type(error_type), allocatable, intent(out) :: error
       type(receiver_type) :: receiver
 

@@ -15,16 +15,14 @@ module thud_floor_result
 
    public :: floor_result_type, get_floor_result, get_point_velocity
 
-   !> Results on a mobile floor, in all band sets that the case asks for, one set after the other.
+   !> Results on a mobile floor; bands of several sets follow each other.
    type :: floor_result_type
       !> The bands: [n_band].
       type(band_type), allocatable :: bands(:)
       !> Levels of the force on the floor, dB: [n_band].
       real(wp), allocatable :: contact_level(:)
-      !> Energy injected into the floor, computed from its velocity, J: [n_band].
-      real(wp), allocatable :: energy_by_motion(:)
-      !> The same energy, computed from the floor's mobility, J: [n_band].
-      real(wp), allocatable :: energy_by_mobility(:)
+      !> Energy injected into the floor, from its velocity and from its mobility, J: [n_band].
+      real(wp), allocatable :: energy_by_motion(:), energy_by_mobility(:)
       !> Mean real part of the mobility, m/(N s): [n_band].
       real(wp), allocatable :: conductance(:)
       !> Velocities of points of the floor, m/s: [n_sample, n_point].

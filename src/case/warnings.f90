@@ -1,5 +1,4 @@
-!> Warnings on possible but implausible cases: balls unlike rubber, moduli meant for another model, forces unlike those of
-!> any standard source.
+!> Warnings on possible but implausible cases: balls unlike rubber, moduli of another model, forces of no real source.
 module thud_warnings
    use thud_ball, only: get_density
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
@@ -40,7 +39,7 @@ module thud_warnings
    !> Distance from `source_level` beyond which the units of the input are probably wrong, dB.
    real(wp), parameter :: max_distance = 40.0_wp
 
-   !> Lower edge of the octave 31.5 Hz and upper edge of the octave 500 Hz, Hz: [2].
+   !> Edges of the octaves 31.5 Hz (lower) and 500 Hz (upper), Hz: [2].
    real(wp), parameter :: standard_band(2) = [22.4_wp, 707.0_wp]
 
    !> An octave level this far below the level over all frequencies is affected by rounding errors, dB.
@@ -99,7 +98,7 @@ contains
       end associate
       do i = 1, size(limits)
          if (.not. is_outside(limits(i))) cycle
-         ! Do not repeat a warning of the rigid floor for the mobile floor.
+         ! No repeated warning for the mobile floor.
          if (any(index(warnings, trim(limits(i)%quantity)//' is ') > 0)) cycle
          call add(warnings, get_limit_message(limits(i)))
       end do

@@ -35,7 +35,7 @@ module thud_run
    !> File of a quasi-static compression.
    character(len=*), parameter :: compression_file = 'compression.csv'
 
-   !> File of the full input; it identifies the case whose results the directory holds.
+   !> File of the full input; it identifies the case of the results.
    character(len=*), parameter :: input_file = 'effective.nml'
 
    !> Beginning of a note; the path of the directory follows.
@@ -88,7 +88,7 @@ contains
       character(len=*), intent(in) :: output
       !> Also replace files that thud has not written.
       logical, intent(in) :: replace
-      !> Also write additional quantities of the model against time.
+      !> Also write additional quantities of the model.
       logical, intent(in) :: write_all
       type(case_type), target, intent(out) :: case
       type(results_type), intent(out) :: results
@@ -112,7 +112,7 @@ contains
       character(len=*), intent(in) :: output
       !> Also replace files that thud has not written.
       logical, intent(in) :: replace
-      !> Also write additional quantities of the model against time.
+      !> Also write additional quantities of the model.
       logical, intent(in) :: write_all
       type(results_type), intent(out) :: results
       !> Table, verdict and directory of the results.
@@ -145,7 +145,6 @@ contains
    subroutine check_space(case, directory, error)
       type(case_type), intent(in) :: case
       character(len=*), intent(in) :: directory
-      !> Set if the disk has too little space.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: wanted, free
 
@@ -163,7 +162,7 @@ contains
    subroutine describe(case, results, write_all, files, outcome)
       type(case_type), intent(in) :: case
       type(results_type), intent(in) :: results
-      !> Also write additional quantities of the model against time.
+      !> Also write additional quantities of the model.
       logical, intent(in) :: write_all
       !> The files: [n_file].
       type(text_file_type), allocatable, intent(out) :: files(:)
@@ -218,7 +217,7 @@ contains
       type(force_history_type), intent(in) :: history
       !> Prefix of the file names.
       character(len=*), intent(in) :: prefix
-      !> Write additional quantities of the model against time.
+      !> Write additional quantities of the model.
       logical, intent(in) :: write_all
       !> The files: [n_file].
       type(text_file_type), allocatable, intent(inout) :: files(:)

@@ -1,5 +1,5 @@
-!> A run of many samples from end to end: reads a case and a table, and writes one row of results per sample. Samples are
-!> handled in chunks, so that the memory does not grow with the table.
+!> A run of many samples from end to end: reads a case and a table, and writes one row of results per sample, in chunks, so
+!> that the memory does not grow with the table.
 module thud_samples_run
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
    use thud_case, only: case_type

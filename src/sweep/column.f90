@@ -80,7 +80,7 @@ contains
       character(len=:), allocatable, intent(out) :: group, key
       !> Index of the entry; 0 if the name has none.
       integer, intent(out) :: entry
-      !> The name has the form of a key, perhaps with a number in brackets.
+      !> The name is a key, perhaps with a number in brackets.
       logical, intent(out) :: valid
       integer :: bracket, dot, last
 

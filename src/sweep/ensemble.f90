@@ -52,7 +52,7 @@ module thud_ensemble
 
 contains
 
-   !> Prepares for the matrices, but computes none yet.
+   !> The projections, still without matrices.
    pure function new_projections(sample_rate, bands, n_sample) result(projections)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
@@ -102,7 +102,7 @@ contains
       real(wp), intent(out) :: quantity(:, :)
       !> Force exposure levels, dB, NaN if not computed: [n_band, force_count, n_set].
       real(wp), intent(out) :: levels(:, :, :)
-      !> The source conforms, assessed by each force: [force_count, n_set].
+      !> The source conforms, by each force: [force_count, n_set].
       logical, intent(out) :: met(:, :)
       !> Forces, N, NaN if not computed; of size 0 if not wanted: [n_sample, force_count, n_set].
       real(wp), intent(out) :: forces(:, :, :)
@@ -172,9 +172,9 @@ contains
 
    end subroutine solve_ensemble
 
-   !> Allocates the workspace of a thread. Its memory beyond the longest contact is never written to.
+   !> Allocates a workspace. Its memory beyond the longest contact is never touched.
    subroutine set_workspace(workspace, sampling, limits, n_row)
-      !> The workspace; its `error` is set if there is not enough memory.
+      !> The workspace, with `error` set if memory is lacking.
       type(workspace_type), intent(out) :: workspace
       !> The sampling, for the error message.
       type(sampling_type), intent(in) :: sampling
@@ -205,7 +205,7 @@ contains
       type(set_outcome_type), intent(out) :: outcomes(:)
       !> Levels, dB: [n_band, force_count, n_set].
       real(wp), intent(out) :: levels(:, :, :)
-      !> The source conforms, assessed by each force: [force_count, n_set].
+      !> The source conforms, by each force: [force_count, n_set].
       logical, intent(out) :: met(:, :)
       real(wp), pointer, contiguous :: force(:, :)
       integer :: class(size(sets))
@@ -269,7 +269,7 @@ contains
       end do
    end subroutine project
 
-   !> Levels of all sets with the same window, record by record as for single drops; fails only after an interrupt.
+   !> The same levels, record by record as for single drops; fails only after an interrupt.
    subroutine take_single_levels(workspace, force, window, chosen, projections, levels)
       type(workspace_type), intent(inout) :: workspace
       !> As in `project`.
@@ -319,7 +319,7 @@ contains
          //to_text(get_class_window(window))//' samples cannot be made; allowed: other rates')
    end subroutine require_window
 
-   !> Whether a set meets all criteria. Peaks are counted last, because counting takes longer than all other criteria.
+   !> Whether a set meets all criteria. Peaks are counted last, as this takes longer than all other criteria.
    function is_conforming(criteria, set, outcome, levels, force, row, sampling) result(met)
       !> The criteria; their values are overwritten: [criterion_count].
       type(criterion_type), intent(inout) :: criteria(:)
@@ -327,7 +327,7 @@ contains
       type(set_outcome_type), intent(in) :: outcome
       !> Levels, dB, octaves first: [n_band].
       real(wp), intent(in) :: levels(:)
-      !> Forces, N, up to the last sample that is not zero: [force_count block_size, n_sample].
+      !> Forces, N, without the zeros at the end: [force_count block_size, n_sample].
       real(wp), intent(in) :: force(:, :)
       !> Row of the force of this set.
       integer, intent(in) :: row

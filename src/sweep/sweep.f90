@@ -30,7 +30,7 @@ module thud_sweep
 
    public :: acquire_sweep, new_sweep, release_sweep, solve_sweep, sweep_type
 
-   !> Approximate computing time of one time step of a sample in a batch, s.
+   !> Approximate computing time of one step of a sample in a batch, s.
    real(wp), parameter :: batch_cost = 1.5e-8_wp
 
    !> The reason why a sample has no results.
@@ -59,11 +59,11 @@ module thud_sweep
       real(wp), allocatable :: quantity(:, :)
       !> Levels, dB: [n_band, force_count, n_sample].
       real(wp), allocatable :: level(:, :, :)
-      !> The source conforms, assessed by each force: [force_count, n_sample].
+      !> The source conforms, by each force: [force_count, n_sample].
       logical, allocatable :: conforms(:, :)
       !> Minimum distance of the octave levels of the assessed force to their limits, dB, > 0 inside: [n_sample].
       real(wp), allocatable :: margin(:)
-      !> The source conforms, assessed by the force that the case chooses: [n_sample].
+      !> The source conforms, by the assessed force: [n_sample].
       logical, allocatable :: verdict(:)
       !> Names, with units, of the additional columns of cases with a floor: [n_column].
       character(len=column_name_length), allocatable :: floor_column(:)
@@ -157,7 +157,7 @@ contains
       if (suits_batch(case, columns)) then
          call solve_batch(case, columns, values, threads, sweep, error)
          if (allocated(error)) return
-         ! The single solver repeats the samples that failed, to get their error messages.
+         ! The single solver repeats failed samples, for their error messages.
          remaining = pack(remaining, sweep%status /= 0)
       end if
       !$omp parallel num_threads(threads) if (size(remaining) > 1)
@@ -263,7 +263,7 @@ contains
       real(wp), intent(in) :: values(:)
       !> Index of the sample.
       integer, intent(in) :: sample
-      !> The drop on a rigid floor: of an earlier sample before the call, of this sample after it.
+      !> The drop on a rigid floor of an earlier sample; afterwards of this one.
       type(blocked_type), intent(inout) :: blocked
       type(sweep_type), intent(inout) :: sweep
       type(scope_type) :: scope

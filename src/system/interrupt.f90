@@ -21,7 +21,7 @@ contains
 
    !> Returns an error after an interrupt.
    subroutine check_interrupt(error)
-      !> Set if the work is interrupted; an earlier error stays.
+      !> An earlier error stays.
       type(error_type), allocatable, intent(inout) :: error
 
       if (is_interrupted() .and. .not. allocated(error)) error = error_type(signal_base + latest_signal, &

@@ -23,13 +23,12 @@ contains
 
    !> Returns an error if work needs more memory than is available.
    subroutine require_memory(bytes, purpose, allowed, error, mostly_unused)
-      !> Memory needed at the same time, bytes.
+      !> Memory needed at a time, bytes.
       real(wp), intent(in) :: bytes
       !> What needs the memory, in the plural; what would need less.
       character(len=*), intent(in) :: purpose, allowed
-      !> Set if there is not enough memory.
       type(error_type), allocatable, intent(out) :: error
-      !> Only a little of the memory is written to, so that addresses are enough (default: false).
+      !> Little of the memory is written to, so that addresses are enough (default: false).
       logical, intent(in), optional :: mostly_unused
       integer(c_int) :: behind
 

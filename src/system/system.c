@@ -37,7 +37,7 @@ static void interrupt(int number)
       first = now.tv_sec;
       return;
    }
-   // Some callers send a signal both to the process and to its group; the second one follows shortly.
+   // Some callers send a signal both to the process and to its group.
    if (deferred && now.tv_sec <= first + 1) return;
 
    // On a terminal, begin a new line after ^C and a progress line.
@@ -47,8 +47,8 @@ static void interrupt(int number)
    _exit(128 + number);
 }
 
-// Prepares the process of the executable: writing to a full file or a closed pipe becomes an error instead of a
-// signal, no file gets the descriptor of a closed standard stream, SIGINT and SIGTERM end the process with a message.
+// Prepares the process of the executable: writing to a full file or a closed pipe is an error and not a signal, no
+// file gets the descriptor of a closed standard stream, SIGINT and SIGTERM end the process with a message.
 void thud_prepare_process(void)
 {
    struct sigaction action = {.sa_handler = SIG_IGN}, before;
@@ -153,7 +153,7 @@ static void register_fork_handlers(void)
    pthread_atfork(wait_for_calls, resume_calls, reset_after_fork);
 }
 
-// Marks a call as running; from now on a signal that the process handles also interrupts the running calls.
+// Marks a call as running; signals that the process handles then also interrupt it.
 void thud_begin_call(void)
 {
    static pthread_once_t once = PTHREAD_ONCE_INIT;
@@ -188,7 +188,7 @@ void thud_end_call(void)
    pthread_mutex_unlock(&calls);
 }
 
-// From now on an interrupt is deferred: it does not end the process but stops `thud_write`.
+// From now on an interrupt is deferred: it only stops `thud_write`.
 void thud_keep_interrupts(void)
 {
    deferred = 1;
@@ -322,9 +322,9 @@ int thud_flush(const char *path)
    return error;
 }
 
-// Waits for the lock on a directory and returns the descriptor that holds it; with `make` creates a missing directory.
-// Returns minus the number of the error if this user cannot write there, -EINTR after a signal that ends the work.
-// On file systems without locks the directory stays unlocked.
+// Waits for the lock on a directory and returns the descriptor that holds it; `make` creates a missing directory.
+// Minus the number of the error if this user cannot write there, -EINTR after a signal that ends the work.
+// File systems without locks are used without a lock.
 int thud_lock_directory(const char *path, int make)
 {
    for (;;) {
@@ -389,7 +389,7 @@ int thud_can_exchange(const char *path, const char *target)
    if (stat(".", &here) == 0 && here.st_dev == there.st_dev && here.st_ino == there.st_ino) return 0;
    snprintf(from, sizeof from, "%s/..missing", path);
    snprintf(to, sizeof to, "%s/..missing", target);
-   // The file does not exist, so that rename always fails; on different mounts the error is EXDEV.
+   // The file does not exist: rename always fails, on different mounts with EXDEV.
    return rename(from, to) != 0 && errno != EXDEV;
 }
 

@@ -71,7 +71,7 @@ module thud_system
    procedure(number_call), bind(c, name='isatty') :: c_isatty
    procedure(number_call), bind(c, name='thud_is_closed') :: c_is_closed
 
-   !> Makes writing to a full or closed output an error instead of a signal, and SIGINT and SIGTERM end with a message.
+   !> Turns signals of full and closed outputs into errors; SIGINT and SIGTERM then end the process with a message.
    procedure(plain_call), bind(c, name='thud_prepare_process') :: prepare_process
    !> From now on an interrupt does not end the process; it stops `write_text`.
    procedure(plain_call), bind(c, name='thud_keep_interrupts') :: keep_interrupts
@@ -262,7 +262,7 @@ contains
    !> Adds a text to a checksum, CRC-32 as in zlib.
    subroutine add_to_checksum(text, checksum)
       character(len=*), intent(in) :: text
-      !> The checksum: before the call without the text, 0 for nothing; after it with the text.
+      !> Checksum of the preceding text, 0 at the beginning; afterwards with the text.
       integer(int32), intent(inout) :: checksum
 
       checksum = int(c_checksum(int(checksum, c_int32_t), text, len(text, c_size_t)), int32)
@@ -299,7 +299,7 @@ contains
    !> Whether a directory exists.
    function directory_exists(path) result(there)
       character(len=*), intent(in) :: path
-      !> True if the directory exists and can be read.
+      !> It exists and can be read.
       logical :: there
       type(c_ptr) :: directory
 
@@ -327,7 +327,7 @@ contains
             if (n == size(names)) names = [names, names]
             n = n + 1
             names(n) = name(:length)
-            ! A zero byte ends a name whose last character is a blank, so that the blank is kept.
+            ! A zero byte keeps a blank at the end of the name.
             if (name(length:length) == ' ') names(n)(min(length + 1, name_length):) = c_null_char
          end do
          if (c_closedir(directory) /= 0) n = 0

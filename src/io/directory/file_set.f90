@@ -41,7 +41,7 @@ module thud_file_set
 
 contains
 
-   !> Whether a directory can be a workspace: it is empty, or a name in it begins with that of the manifest.
+   !> Whether a directory is a workspace: empty, or with a name that begins with that of the manifest.
    pure function is_workspace(names) result(yes)
       !> Names in the directory: [n_name].
       character(len=*), intent(in) :: names(:)
@@ -74,7 +74,7 @@ contains
       yes = name == temporary .or. index(name, temporary//'.') == 1
    end function is_temporary
 
-   !> Whether the manifest of a directory lists a file, with the checksum of its present content.
+   !> Whether a manifest lists a file, with the checksum of its content.
    function is_listed(place, name, entries) result(yes)
       character(len=*), intent(in) :: place
       character(len=*), intent(in) :: name
@@ -91,14 +91,13 @@ contains
       yes = checksum >= 0 .and. any(entries%name == name .and. entries%sum == digits)
    end function is_listed
 
-   !> Sorts unchanged files of the old set by whether they stay beside the new one: results of other commands, and
-   !> figures of the same input.
+   !> Finds unchanged old files that stay beside the new set: results of other commands, figures of the same input.
    subroutine get_kept(place, names, same, kept, gone)
       !> The directory, under its lock.
       character(len=*), intent(in) :: place
       !> Names in the new set: [n_file].
       character(len=*), intent(in) :: names(:)
-      !> The new set has the same input as the old one.
+      !> The old set has the same input.
       logical, intent(in) :: same
       !> Manifest entries of the files that stay: [n_kept].
       type(entry_type), allocatable, intent(out) :: kept(:)
@@ -216,8 +215,7 @@ contains
       end block
    end subroutine move_files
 
-   !> Empties a workspace. Files that its manifest does not list are the user's, left there when a process was killed; they
-   !> go back to the directory.
+   !> Empties a workspace. Files that its manifest does not list are the user's, left by a killed process, and go back.
    subroutine clear_workspace(workspace, place)
       !> The workspace, under its lock; the directory.
       character(len=*), intent(in) :: workspace, place
@@ -235,7 +233,7 @@ contains
          end if
          call remove_file(workspace//'/'//trim(found(i)))
       end do
-      ! The manifest is removed last, because the next process reads in it which files it may remove.
+      ! Remove the manifest last: it lists the files that the next process may remove.
       call list_directory(workspace, found)
       if (all(found == manifest)) call remove_file(workspace//'/'//manifest)
    end subroutine clear_workspace

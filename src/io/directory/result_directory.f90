@@ -1,9 +1,9 @@
 !> Directories of results: a new set of files replaces the old one as a whole, or not at all.
 !>
-!> A writing process works in a workspace `.<name>.part` beside the directory `<name>`, or inside the directory if the
-!> two cannot be exchanged, as with the working directory or a mount. The lock on the workspace makes processes wait for
-!> each other; files that a killed process has left there are removed. The directory is locked only while it is checked
-!> and replaced. The first line of the marker, a file of the set, identifies the case whose results the directory holds.
+!> A process writes into a workspace `.<name>.part` beside the directory `<name>`, or inside the directory if the two
+!> cannot be exchanged, as with the working directory or a mount. The lock on the workspace makes processes wait for each
+!> other; files left there by a killed process are removed. The directory is locked only while it is checked and replaced.
+!> The first line of the marker, a file of the set, identifies the case of the results.
 module thud_result_directory
    use, intrinsic :: iso_fortran_env, only: int32
    use thud_error, only: error_type, input_error
@@ -62,7 +62,6 @@ contains
       logical, intent(in) :: replace
       !> The directory holds results of the same case with another input.
       logical, intent(out) :: differs
-      !> Set if the directory belongs to something else, or is not a directory.
       type(error_type), allocatable, intent(out) :: error
       integer :: owner
 
@@ -108,7 +107,7 @@ contains
       character(len=*), intent(in) :: inputs(:)
       !> Also replace files that thud has not written.
       logical, intent(in) :: replace
-      !> The open directory; the caller must call `close_results` even after an error.
+      !> The directory; to be closed even after an error.
       type(result_directory_type), intent(out) :: directory
       !> Set if the directory belongs to something else, or cannot be written.
       type(error_type), allocatable, intent(out) :: error
@@ -274,10 +273,9 @@ contains
          //'results of the same case, or --replace')
    end subroutine find_owner
 
-   !> Returns an error if the set would replace an input, a directory, or a file that thud has not written.
+   !> Returns an error if the set would replace inputs, directories, or files that thud has not written.
    subroutine check_files(directory, error)
       type(result_directory_type), intent(in) :: directory
-      !> Set if such a file is in the way.
       type(error_type), allocatable, intent(out) :: error
       type(entry_type), allocatable :: entries(:)
       character(len=:), allocatable :: path
@@ -305,7 +303,6 @@ contains
       type(result_directory_type), intent(in) :: directory
       !> Name of a file to write.
       character(len=*), intent(in) :: name
-      !> Set if the name leads to an input.
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: path, text
       integer :: i
@@ -324,9 +321,9 @@ contains
       end do
    end subroutine check_input
 
-   !> Error for a file or directory that thud has not written.
+   !> Error for a file that thud has not written.
    function foreign_error(path, name) result(error)
-      !> Path of the directory that holds it.
+      !> Path of its directory.
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: name
       type(error_type) :: error
@@ -339,7 +336,7 @@ contains
       end if
    end function foreign_error
 
-   !> Creates and locks the workspace of a directory. From then on interrupts are deferred.
+   !> Creates and locks the workspace of a directory, and defers interrupts.
    subroutine take_workspace(directory, error)
       type(result_directory_type), intent(inout) :: directory
       !> Set if the workspace cannot be created.

@@ -53,7 +53,7 @@ contains
          call assign_group(groups(i), fields, error)
       end do
       if (allocated(error)) return
-      ! These names determine which keys are used, so that they are checked even in an unchecked case.
+      ! The use of other keys depends on these, even in an unchecked case.
       call check_fields(pack(fields, fields%group == 'model' .or. fields%group == 'floor' .and. fields%key == 'name'), error)
       if (.not. allocated(error)) call check_name(case%name, error)
       if (.not. allocated(error)) call check_use(groups, case, error)
@@ -63,12 +63,11 @@ contains
       if (.not. allocated(error)) call check_case(case, error)
    end subroutine read_case
 
-   !> Returns an error for a group that the case does not use.
+   !> Returns an error if the case does not use a group.
    subroutine check_use(groups, case, error)
       !> Groups of the file: [n_group].
       type(group_type), intent(in) :: groups(:)
       type(case_type), intent(in), target :: case
-      !> Set if the case does not use a group.
       type(error_type), allocatable, intent(out) :: error
       type(field_type), allocatable :: fields(:)
       character(len=:), allocatable :: where
@@ -182,7 +181,7 @@ contains
       fields = pack(fields, first)
    end subroutine drop_repeated
 
-   !> The complete input of a case as the text of a namelist file, from which the same case is read.
+   !> The complete input as the text of a namelist file; reading it gives the same case.
    subroutine get_case_text(case, text)
       type(case_type), intent(in), target :: case
       character(len=:), allocatable, intent(out) :: text

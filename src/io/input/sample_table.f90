@@ -323,7 +323,7 @@ contains
       if (status /= 0) error = line_error(table, trim(table%names(column))//' = '//quoted(word)//' is not '//wanted)
    end subroutine read_value
 
-   !> Error that names the file and the latest line.
+   !> Error for the latest line.
    function line_error(table, message) result(error)
       type(sample_table_type), intent(in) :: table
       !> The fault in the line.

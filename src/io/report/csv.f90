@@ -35,7 +35,7 @@ contains
       at = len(header) + 1
       at_rest = .false.
       do i = 1, size(time)
-         ! Formatting takes most of a run's time. Most rows follow the release and hold only zeros, formatted once.
+         ! Formatting takes most of a run's time; the zeros after the release are formatted once.
          if (.not. at_rest .or. any(abs(columns(i, :)) > 0.0_wp)) write (rest, row_form) columns(i, :)
          at_rest = .not. any(abs(columns(i, :)) > 0.0_wp)
          write (row, row_form) time(i)

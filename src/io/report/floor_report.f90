@@ -28,7 +28,7 @@ contains
 
    !> Forces and motion of the floor against time.
    subroutine get_floor_force_csv(blocked, contact, found, text)
-      !> The drop on a rigid floor, and the drop on the mobile floor.
+      !> The drops on rigid and mobile floor.
       type(force_history_type), intent(in) :: blocked, contact
       type(floor_result_type), intent(in) :: found
       !> Text of `floor_force.csv`.
@@ -84,7 +84,7 @@ contains
       if (size(contact%model_quantity) > 0) text = text//newline//get_model_quantities('floor_model_quantities', contact)
    end subroutine get_floor_summary
 
-   !> Table that compares the drop on the mobile floor with the drop on a rigid floor.
+   !> Table that compares the drops on mobile and rigid floor.
    subroutine get_floor_table(case, impact, contact, found, text)
       type(case_type), intent(in) :: case
       !> The drop on a rigid floor.
@@ -129,7 +129,7 @@ contains
       !> Adds a quantity of both drops.
       subroutine add_quantity(quantity, rigid, moving)
          type(quantity_type), intent(in) :: quantity
-         !> Values on a rigid floor and on the mobile floor, SI units.
+         !> Values on rigid and mobile floor, SI units.
          real(wp), intent(in) :: rigid, moving
 
          call add_row(trim(quantity%title), quantity%display_scale*rigid, quantity%display_scale*moving, &
@@ -139,7 +139,7 @@ contains
       !> Adds a number of both drops.
       subroutine add_row(title, rigid, moving, decimals, unit)
          character(len=*), intent(in) :: title
-         !> Values on a rigid floor and on the mobile floor, in the shown unit.
+         !> Values on rigid and mobile floor, in the shown unit.
          real(wp), intent(in) :: rigid, moving
          integer, intent(in) :: decimals
          character(len=*), intent(in) :: unit

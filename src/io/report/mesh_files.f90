@@ -49,7 +49,7 @@ contains
 
    !> Approximate size of the snapshots of an impact, bytes.
    pure function estimate_motion_bytes(extents) result(bytes)
-      !> Numbers of nodes from pole to pole, of nodes through the wall, and of snapshots.
+      !> Numbers of nodes from pole to pole, nodes through the wall, and snapshots.
       integer, intent(in) :: extents(3)
       real(wp) :: bytes
 
@@ -111,22 +111,20 @@ contains
       text = buffer%get_text()
    end subroutine get_pressure_csv
 
-   !> Vectors at all nodes, one after the other, with the first index of the node changing fastest.
+   !> Vectors at all nodes, one after the other.
    pure function get_points(r, z) result(point)
-      !> Components r of the vectors: [n_line, n_ring].
-      real(wp), intent(in) :: r(:, :)
-      !> Components z of the vectors: [n_line, n_ring].
-      real(wp), intent(in) :: z(:, :)
-      !> The vectors: [2, n_line*n_ring].
+      !> Components of the vectors: [n_line, n_ring].
+      real(wp), intent(in) :: r(:, :), z(:, :)
+      !> The vectors, in array order: [2, n_line*n_ring].
       real(wp) :: point(2, size(r))
 
       point(1, :) = reshape(r, [size(r)])
       point(2, :) = reshape(z, [size(z)])
    end function get_points
 
-   !> Node numbers of the elements, in the order of VTK within an element.
+   !> Node numbers of the elements, in VTK's order.
    pure function get_cells(n_polar, n_radial, order) result(cell)
-      !> Number of elements from pole to pole; number of elements through the wall.
+      !> Numbers of elements from pole to pole and through the wall.
       integer, intent(in) :: n_polar, n_radial
       integer, intent(in) :: order
       !> Node numbers, from 1: [4 or 9, n_element].

@@ -101,7 +101,7 @@ contains
             limits(i) = to_text(criterion%lower)//','//to_text(criterion%upper)//','//get_word(criterion)
          end associate
       end do
-      ! Octave levels are always computed, because the verdict needs them; the file has only the bands asked for.
+      ! The verdict needs the octaves even if the case asks only for other bands.
       associate (bands => assessment%bands(assessment%first_band:), first => assessment%first_band)
          text = get_table_csv(header//',lower_limit_dB,upper_limit_dB,verdict_'//trim(case%level_force), &
             reshape([bands%nominal, bands%lower, bands%upper, assessment%level(first:, :)], &

@@ -50,7 +50,7 @@ contains
          if (size(assessment%bands) > octave_count) text = text//newline
          values = get_quantities(history)
          do i = 1, sample_quantity_count
-            ! Quantities with limits are in the upper part of the table.
+            ! Quantities with limits are listed above.
             if (any(criteria%name == quantities(i)%name)) cycle
             if (is_peak_of_other(quantities(i), case)) cycle
             text = text//quantity_row(quantities(i), values(i))
@@ -92,7 +92,7 @@ contains
    !> Line that names the main groups missing from the file.
    function get_defaults_line(case) result(line)
       type(case_type), intent(in) :: case
-      !> The line; empty if no main group is missing.
+      !> The line; empty if none is missing.
       character(len=:), allocatable :: line
 
       line = ''
@@ -124,8 +124,7 @@ contains
       end do
    end function get_modes_table
 
-   !> Table of the quasi-static compression for the screen: its last point, and the secant stiffness at the last and the
-   !> first point.
+   !> Table of the quasi-static compression for the screen: last point, and secant stiffness at the last and first point.
    function get_compression_table(compression) result(text)
       type(compression_type), intent(in) :: compression
       character(len=:), allocatable :: text
@@ -139,7 +138,7 @@ contains
       end associate
    end function get_compression_table
 
-   !> Row of the table for a quantity, with its limits if there are any.
+   !> Row for a quantity, with its limits if there are any.
    function quantity_row(quantity, value, criterion) result(text)
       type(quantity_type), intent(in) :: quantity
       !> Value, in SI units.
@@ -152,7 +151,7 @@ contains
          quantity%display_scale)
    end function quantity_row
 
-   !> Row of the table for a number, with its limits if there are any.
+   !> Row for a number, with its limits if there are any.
    function row(name, value, decimals, unit, criterion, scale) result(text)
       character(len=*), intent(in) :: name
       !> Value in the shown unit.
