@@ -28,7 +28,7 @@ module thud_case
       character(len=32) :: left_out = ''
       !> Name of the case and of its output directory.
       character(len=name_length) :: name = ''
-      !> The case asks for an impact: it has the group `&model`.
+      !> The case asks for an impact: it has the group `&model`, or no `&modes`.
       logical :: has_impact = .true.
       !> The case asks for free modes: it has the group `&modes`.
       logical :: has_modes = .false.

@@ -269,7 +269,7 @@ contains
       end do
    end subroutine project
 
-   !> The same levels, record by record as for single drops; fails only after an interrupt.
+   !> The levels of `project`, record by record as for single drops; fails only after an interrupt.
    subroutine take_single_levels(workspace, force, window, chosen, projections, levels)
       type(workspace_type), intent(inout) :: workspace
       !> As in `project`.

@@ -21,7 +21,7 @@ contains
 
    !> Returns an error after an interrupt.
    subroutine check_interrupt(error)
-      !> An earlier error stays.
+      !> Set after an interrupt, unless it is set already.
       type(error_type), allocatable, intent(inout) :: error
 
       if (is_interrupted() .and. .not. allocated(error)) error = error_type(signal_base + latest_signal, &

@@ -215,7 +215,8 @@ contains
       end block
    end subroutine move_files
 
-   !> Empties a workspace. Files that its manifest does not list are the user's, left by a killed process, and go back.
+   !> Empties a workspace. Files that its manifest does not list are the user's and return to the directory; a killed
+   !> process has left them.
    subroutine clear_workspace(workspace, place)
       !> The workspace, under its lock; the directory.
       character(len=*), intent(in) :: workspace, place
