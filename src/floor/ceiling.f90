@@ -31,9 +31,9 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('ceiling_mass', ceiling%mass, 'kg/m2', 'mass of a suspended ceiling over its area; 0: none', &
+         real_field('ceiling_mass', ceiling%mass, 'kg/m2', 'mass per unit area of a suspended ceiling; 0: none', &
          '[0, 200]'), &
-         real_field('ceiling_depth', ceiling%depth, 'm', 'depth of the air above the ceiling', '[0.01, 2]'), &
+         real_field('ceiling_depth', ceiling%depth, 'm', 'depth of the air cavity above the ceiling', '[0.01, 2]'), &
          real_field('ceiling_loss_factor', ceiling%loss_factor, '', 'loss factor of the ceiling cavity', '[0.001, 1]')]
    end function get_ceiling_fields
 

@@ -54,9 +54,9 @@ contains
          '[100, 10000]'), &
          real_field('wall_loss_factor', walls%loss_factor, '', 'internal loss factor of the walls', '[0, 1]'), &
          choice_field('wall_junction', walls%junction, &
-         'junction of floor and walls: rigid cross or t, or one of a given index', junctions), &
+         'junction of floor and walls: rigid cross or T, or described by junction_index', junctions), &
          real_field('junction_index', walls%index, 'dB', &
-         'vibration reduction index from floor to wall, of the junction index', '[-10, 80]')]
+         'vibration reduction index from floor to wall, for wall_junction index', '[-10, 80]')]
    end function get_wall_fields
 
    !> The walls as plates: [n_wall].

@@ -43,7 +43,7 @@ contains
          'speed of longitudinal waves in the floating plate', '[100, 10000]'), &
          real_field('screed_loss_factor', options%screed_loss_factor, '', 'loss factor of the floating plate', '[0, 1]'), &
          real_field('layer_stiffness', options%layer_stiffness, 'N/m3', &
-         'dynamic stiffness of the resilient layer over area (ISO 9052-1)', '[1e4, 1e12]'), &
+         'dynamic stiffness of the resilient layer per unit area (ISO 9052-1)', '[1e4, 1e12]'), &
          real_field('layer_loss_factor', options%layer_loss_factor, '', 'loss factor of the resilient layer', '[0, 1]'), &
          options%get_source_fields(), options%get_point_fields()]
    end function get_fields

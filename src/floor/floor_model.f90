@@ -67,8 +67,9 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         list_field('point_x', options%point_x, 'm', 'positions of further points along the length', '[0, 1000]'), &
-         list_field('point_y', options%point_y, 'm', 'their positions along the width', '[0, 1000]')]
+         list_field('point_x', options%point_x, 'm', &
+         'positions along the length of points whose velocity is computed', '[0, 1000]'), &
+         list_field('point_y', options%point_y, 'm', 'positions of these points along the width', '[0, 1000]')]
    end function get_point_fields
 
    !> Refuses points that are not there.

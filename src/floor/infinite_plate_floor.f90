@@ -28,7 +28,7 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [real_field('resistance', options%resistance, 'N s/m', &
-         'force over velocity', '[1, 1e15]')]
+         'driving-point resistance: force divided by velocity', '[1, 1e15]')]
    end function get_fields
 
    !> The mobility is the direct part alone.

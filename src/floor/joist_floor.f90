@@ -61,15 +61,16 @@ contains
          real_field('sheathing_density', options%sheathing_density, 'kg/m3', 'density of the sheathing', '[10, 20000]'), &
          real_field('sheathing_modulus', options%sheathing_modulus, 'Pa', &
          'modulus of elasticity of the sheathing in bending', '[1e7, 1e12]'), &
-         real_field('spacing', options%spacing, 'm', 'distance between the axes of two joists', '(joist_width, width)'), &
+         real_field('spacing', options%spacing, 'm', &
+         'distance between the axes of adjacent joists', '(joist_width, width)'), &
          real_field('joist_width', options%joist_width, 'm', 'width of a joist', '[0.005, 1]'), &
          real_field('joist_height', options%joist_height, 'm', 'height of a joist', '[0.01, 2]'), &
          real_field('joist_density', options%joist_density, 'kg/m3', 'density of the joists', '[10, 20000]'), &
          real_field('joist_modulus', options%joist_modulus, 'Pa', 'modulus of elasticity of the joists', '[1e7, 1e12]'), &
          real_field('connection', options%connection, '', &
-         'composite action of sheathing and joists, from 0, loose, to 1, glued (EN 1995-1-1 annex B)', '[0, 1]'), &
+         'composite action of sheathing and joists, 0 (loose) to 1 (glued), EN 1995-1-1 annex B', '[0, 1]'), &
          real_field('loss_factor', options%loss_factor, '', &
-         'loss factor of the floor and its edges, without radiation', '(0, 1]'), &
+         'loss factor of the floor including its edges, without radiation', '(0, 1]'), &
          options%get_source_fields(), &
          choice_field('source_on', options%source_on, &
          'impact location: sheathing between joists, or a joist', [character(len=9) :: 'sheathing', 'joist']), &

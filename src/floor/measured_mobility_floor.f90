@@ -39,17 +39,19 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('direct', options%direct, 'm/(N s)', 'mobility at high frequencies', '[0, 1000]'), &
-         list_field('pole_frequency', options%pole_frequency, 'Hz', 'magnitudes of the poles over 2 pi', '[1e-6, 1e7]'), &
-         list_field('damping_ratio', options%damping_ratio, '', 'damping ratios of the poles, 1 of a real pole', &
+         real_field('direct', options%direct, 'm/(N s)', 'limit of the mobility at high frequencies', '[0, 1000]'), &
+         list_field('pole_frequency', options%pole_frequency, 'Hz', &
+         'magnitudes of the poles divided by 2 pi', '[1e-6, 1e7]'), &
+         list_field('damping_ratio', options%damping_ratio, '', 'damping ratios of the poles; 1 for a real pole', &
          '[1e-12, 1]'), &
          list_field('residue_real', options%residue_real, 'm/(N s2)', &
-         'real parts of the residues, of a pair of poles doubled', '[-1e12, 1e12]'), &
-         list_field('residue_imaginary', options%residue_imaginary, 'm/(N s2)', 'imaginary parts of the residues', &
-         '[-1e12, 1e12]'), &
-         real_field('lowest_frequency', options%lowest_frequency, 'Hz', 'first frequency of the measurement', &
+         'real parts of the residues, doubled for a pair of poles', '[-1e12, 1e12]'), &
+         list_field('residue_imaginary', options%residue_imaginary, 'm/(N s2)', &
+         'imaginary parts of the residues, doubled for a pair of poles', '[-1e12, 1e12]'), &
+         real_field('lowest_frequency', options%lowest_frequency, 'Hz', 'lowest frequency of the measurement', &
          '(0, highest_frequency)'), &
-         real_field('highest_frequency', options%highest_frequency, 'Hz', 'last frequency of the measurement', '(0, 1e7]')]
+         real_field('highest_frequency', options%highest_frequency, 'Hz', &
+         'highest frequency of the measurement', '(0, 1e7]')]
    end function get_fields
 
    !> Refuses lists that do not fit each other, and a mobility that is not passive.

@@ -36,9 +36,9 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('mass', options%mass, 'kg', 'mass that moves under the source', '[1e-3, 1e12]'), &
-         real_field('stiffness', options%stiffness, 'N/m', 'stiffness of its support', '[0, 1e15]'), &
-         real_field('damping', options%damping, 'N s/m', 'damping of its support', '[0, 1e12]')]
+         real_field('mass', options%mass, 'kg', 'moving mass under the source', '[1e-3, 1e12]'), &
+         real_field('stiffness', options%stiffness, 'N/m', 'stiffness of the support', '[0, 1e15]'), &
+         real_field('damping', options%damping, 'N s/m', 'damping coefficient of the support', '[0, 1e12]')]
    end function get_fields
 
    !> Y = s/(m s**2 + c s + k) with the poles -c/(2 m) +- sqrt(c**2/(4 m**2) - k/m).

@@ -62,14 +62,14 @@ contains
          real_field('density', plate%density, 'kg/m3', 'density of the floor', '[10, 20000]'), &
          real_field('wave_speed', plate%wave_speed, 'm/s', 'speed of longitudinal waves in the floor', '[100, 10000]'), &
          real_field('stiffness_ratio', plate%stiffness_ratio, '', &
-         'bending stiffness along the width over that along the length', '[0.0001, 10000]'), &
+         'ratio of the bending stiffness along the width to that along the length', '[0.0001, 10000]'), &
          real_field('torsion_ratio', plate%torsion_ratio, '', &
-         'twisting stiffness over the geometric mean of both bending stiffnesses', '[0, 1]'), &
+         'ratio of the twisting stiffness to the geometric mean of both bending stiffnesses', '[0, 1]'), &
          real_field('loss_factor', plate%loss_factor, '', 'internal loss factor of the floor', '[0, 1]'), &
          choice_field('edges', plate%edges, 'losses at the edges of the floor', &
          [character(len=10) :: 'laboratory', 'absorption']), &
          real_field('edge_absorption', plate%edge_absorption, 'm', &
-         'sum of lengths times absorption coefficients of the edges, of absorption', '[0, 1000]')]
+         'sum of edge lengths times absorption coefficients, for absorption', '[0, 1000]')]
    end function get_plate_fields
 
    !> Mass per area.

@@ -105,7 +105,7 @@ contains
          real_field('volume', room%volume, 'm3', 'volume of the room', '[1, 100000]'), &
          real_field('reverberation_time', room%reverberation_time, 's', 'reverberation time of the room', '[0.05, 20]'), &
          list_field('reverberation_times', room%reverberation_times, 's', &
-         'the same for each one-third-octave band from 50 to 630 Hz', '[0.05, 20]'), &
+         'reverberation time in each one-third-octave band from 50 to 630 Hz', '[0.05, 20]'), &
          real_field('air_density', room%air%density, 'kg/m3', 'density of the air', '[0.5, 2]'), &
          real_field('sound_speed', room%air%sound_speed, 'm/s', 'speed of sound in the air', '[200, 500]'), &
          get_wall_fields(room%walls), get_ceiling_fields(room%ceiling)]

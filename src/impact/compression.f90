@@ -41,8 +41,9 @@ contains
 
       fields = [ &
          real_field('max_deflection', options%max_deflection, 'm', 'maximum approach of the plates', '[1e-15, 10]'), &
-         integer_field('points', options%points, 'points of the curve, the undeformed ball included', '[2, 10000]'), &
-         choice_field('gas', options%gas, 'gas in the ball: leaves by the hole, or is sealed in', &
+         integer_field('points', options%points, &
+         'number of points of the curve, including the undeformed ball', '[2, 10000]'), &
+         choice_field('gas', options%gas, 'gas in the ball: leaves through the hole (vented), or is sealed in', &
          [character(len=10) :: 'vented', 'isothermal', 'adiabatic'])]
    end function get_compression_fields
 

@@ -45,7 +45,7 @@ contains
 
       fields = [ &
          real_field('sample_rate', sampling%sample_rate, 'Hz', 'samples per second', '[2000, 1e7]'), &
-         real_field('duration', sampling%duration, 's', 'length of the record from first touch', &
+         real_field('duration', sampling%duration, 's', 'duration of the record from first touch', &
          '[0.001, 10]'), &
          integer_field('substeps', sampling%substeps, 'integration steps per sampling interval', '[1, 10000]')]
    end function get_sampling_fields

@@ -54,11 +54,11 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         integer_field('bounces', options%bounces, 'contacts to be followed', '[1, 100]'), &
-         real_field('flight_before', options%flight_before, 's', 'free flight before first touch', '[0, 1]'), &
-         real_field('flight_after', options%flight_after, 's', 'free flight after the last contact', &
+         integer_field('bounces', options%bounces, 'number of contacts to compute', '[1, 100]'), &
+         real_field('flight_before', options%flight_before, 's', 'duration of free flight before first touch', '[0, 1]'), &
+         real_field('flight_after', options%flight_after, 's', 'duration of free flight after the last contact', &
          '[0, 10]'), &
-         real_field('step_safety', options%step_safety, '', 'time step over stability limit', &
+         real_field('step_safety', options%step_safety, '', 'time step divided by the stability limit', &
          '[0.01, 0.98]'), &
          in_group('mesh', get_mesh_fields(options%mesh)), &
          in_group('material', get_material_fields(options%material)), &

@@ -70,20 +70,20 @@ contains
          choice_field('law', options%law, 'law of elasticity', &
          [character(len=16) :: 'neo_hookean', 'mooney_rivlin']), &
          real_field('mooney_share', options%mooney_share, '', &
-         'second-invariant fraction of the shear modulus, of mooney_rivlin', '[0, 1]'), &
+         'second-invariant fraction of the shear modulus, for mooney_rivlin', '[0, 1]'), &
          real_field('bulk_ratio', options%bulk_ratio, '', &
-         "maximum bulk modulus over shear modulus; less where Poisson's ratio says so", '[2, 100000]'), &
+         "maximum ratio of bulk to shear modulus; lower if Poisson's ratio implies a lower one", '[2, 100000]'), &
          choice_field('viscosity', options%viscosity, 'law of viscosity', &
          [character(len=16) :: 'none', 'kelvin_voigt', 'fractional', 'constant_loss', 'prony']), &
-         real_field('loss_factor', options%loss_factor, '', 'loss factor at loss_frequency, of kelvin_voigt, ' &
-         //'fractional; over 10 to 1000 Hz, of constant_loss', '(0, 1]'), &
+         real_field('loss_factor', options%loss_factor, '', 'loss factor: at loss_frequency (kelvin_voigt, ' &
+         //'fractional), or from 10 to 1000 Hz (constant_loss)', '(0, 1]'), &
          real_field('loss_frequency', options%loss_frequency, 'Hz', &
-         "where the ball's modulus is the storage modulus", '[1, 10000]'), &
+         "frequency at which the ball's modulus is the storage modulus", '[1, 10000]'), &
          real_field('fractional_order', options%fractional_order, '', &
-         'order of the derivative, of fractional; 1: kelvin_voigt', '(0, 1]'), &
-         list_field('prony_share', options%prony_share, '', 'moduli over the long-term modulus, of prony', &
-         '[0, 1000]'), &
-         list_field('prony_time', options%prony_time, 's', 'relaxation times, of prony', &
+         'order of the derivative, for fractional; 1: as kelvin_voigt', '(0, 1]'), &
+         list_field('prony_share', options%prony_share, '', &
+         'moduli of the branches divided by the long-term modulus, for prony', '[0, 1000]'), &
+         list_field('prony_time', options%prony_time, 's', 'relaxation times of the branches, for prony', &
          '(0, 1000]')]
    end function get_material_fields
 

@@ -48,8 +48,8 @@ contains
       type(field_type) :: fields(2)
 
       fields = [ &
-         integer_field('radial_elements', options%radial_elements, 'elements through the wall', '[1, 64]'), &
-         integer_field('polar_elements', options%polar_elements, 'elements from pole to pole', '[8, 1024]')]
+         integer_field('radial_elements', options%radial_elements, 'number of elements through the wall', '[1, 64]'), &
+         integer_field('polar_elements', options%polar_elements, 'number of elements from pole to pole', '[8, 1024]')]
    end function get_mesh_fields
 
    !> Mesh of the undeformed ball around the origin. Elements of order 1 are graded, for the contact; those of order 2,

@@ -74,7 +74,7 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [choice_field('momentum_flux', options%momentum_flux, &
-         'momentum of wall that enters or leaves the flat cap', flux_choices)]
+         'term for the momentum of wall that enters or leaves the flat cap', flux_choices)]
    end function get_fields
 
    !> Modulus of elasticity of the paper's ball, Pa (section 2.3).

@@ -53,22 +53,22 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         integer_field('harmonics', options%harmonics, 'highest harmonic whose modes oscillate', '[2, 200]'), &
-         integer_field('radial_modes', options%radial_modes, 'modes of each harmonic that oscillate', '[1, 20]'), &
+         integer_field('harmonics', options%harmonics, 'highest harmonic with oscillating modes', '[2, 200]'), &
+         integer_field('radial_modes', options%radial_modes, 'number of oscillating modes per harmonic', '[1, 20]'), &
          integer_field('static_harmonics', options%static_harmonics, &
-         'highest harmonic whose static flexibility counts', '[4, 400]'), &
-         integer_field('rings', options%rings, 'rings of the surface, from the lowest point to 60 degrees', &
+         'highest harmonic whose static flexibility is included', '[4, 400]'), &
+         integer_field('rings', options%rings, 'number of rings on the surface, from the lowest point to 60 degrees', &
          '[2, static_harmonics/3]'), &
-         choice_field('damping_law', options%damping_law, 'loss factor against frequency', &
+         choice_field('damping_law', options%damping_law, 'damping law: loss factor as a function of frequency', &
          [character(len=10) :: 'constant', 'rising', 'fractional']), &
          real_field('loss_factor', options%loss_factor, '', 'loss factor, twice the damping ratio', &
          '[0, 1.9]'), &
          real_field('loss_frequency', options%loss_frequency, 'Hz', &
-         'frequency of a loss factor that is not constant; of fractional also of the modulus', '[0.1, 100000]'), &
+         'frequency at which loss_factor (rising, fractional) and the modulus (fractional) apply', '[0.1, 100000]'), &
          real_field('fractional_order', options%fractional_order, '', &
-         'order of the derivative, of fractional; 1: rising', '(0, 1]'), &
-         logical_field('cavity_gas', options%cavity_gas, 'the gas in the cavity resists changes of its volume'), &
-         logical_field('contact_gravity', options%contact_gravity, 'gravity acts during the contact too'), &
+         'order of the derivative, for fractional; 1: as rising', '(0, 1]'), &
+         logical_field('cavity_gas', options%cavity_gas, 'the gas in the cavity resists volume changes'), &
+         logical_field('contact_gravity', options%contact_gravity, 'gravity acts also during the contact'), &
          choice_field('floor_friction', options%floor_friction, 'friction of the floor: none or infinite (sticking)', &
          [character(len=5) :: 'none', 'stick']), &
          list_field('static_families', options%static_families, '', 'harmonics treated as quasi-static', &
