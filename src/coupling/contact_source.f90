@@ -31,7 +31,7 @@ module thud_contact_source
       procedure(record_peaks_interface), deferred :: record_peaks
       procedure :: get_event
       procedure :: pass_event
-      procedure :: has_left
+      procedure :: has_separated
       procedure :: get_center
       procedure :: get_inner_energy
       procedure :: get_failure
@@ -95,14 +95,14 @@ contains
    end subroutine pass_event
 
    !> Whether the source has left a rigid floor for good; a single mass has at release.
-   pure function has_left(self, state) result(left)
+   pure function has_separated(self, state) result(separated)
       class(contact_source_type), intent(in) :: self
       !> State: [n_state].
       real(wp), intent(in) :: state(:)
-      logical :: left
+      logical :: separated
 
-      left = .not. self%touching
-   end function has_left
+      separated = .not. self%touching
+   end function has_separated
 
    !> Displacement, m, and velocity, m/s, of the center of mass: [2].
    pure function get_center(self, state) result(center)

@@ -37,7 +37,7 @@ contains
    !>
    !> Both plates have the same shapes, and each shape two modes: those of two masses on three springs. A mode takes the mean
    !> of the loss factors of plates and layer, by their shares of its elastic energy; with equal shapes this is off by the
-   !> square of what the loss factors differ. Residual modes are as those of one plate.
+   !> square of the difference of the loss factors. Residual modes are as those of one plate.
    subroutine new_double_receiver(floor, source, point, receiver, error)
       type(double_plate_type), intent(in) :: floor
       !> Positions of source and point, over length and width.
@@ -46,16 +46,17 @@ contains
       !> The losses are too high.
       type(error_type), allocatable, intent(out) :: error
       integer, allocatable :: m(:), n(:)
-      real(wp), allocatable :: omega(:, :), share(:, :), loss_factor(:, :), gain(:, :)
+      real(wp), allocatable :: omega(:, :), modal_square(:, :), loss_factor(:, :), gain(:, :)
       logical, allocatable :: single(:, :)
       real(wp) :: compliance
 
       call get_all_half_waves(floor, m, n)
-      allocate (omega(size(m), 2), share(size(m), 2), loss_factor(size(m), 2))
+      allocate (omega(size(m), 2), modal_square(size(m), 2), loss_factor(size(m), 2))
       call get_pair(floor, get_modal_stiffness(floor%upper, m, n), get_modal_stiffness(floor%lower, m, n), omega(:, 1), &
-         omega(:, 2), share(:, 1), share(:, 2), loss_factor(:, 1), loss_factor(:, 2))
+         omega(:, 2), modal_square(:, 1), modal_square(:, 2), loss_factor(:, 1), loss_factor(:, 2))
       single = omega < 2*pi*mode_limit
-      gain = 4/(floor%upper%length*floor%upper%width)*share*spread(get_shape(m, n, source)*get_shape(m, n, point), 2, 2)
+      gain = 4/(floor%upper%length*floor%upper%width)*modal_square &
+         *spread(get_shape(m, n, source)*get_shape(m, n, point), 2, 2)
       compliance = sum(gain/omega**2, mask=.not. single)
       if (all(abs(source - point) < epsilon(1.0_wp))) compliance = compliance + get_far_compliance(floor%upper)
       call new_modal_receiver('floating_floor', pack(gain, single), pack(omega, single), pack(loss_factor, single), &
@@ -79,14 +80,14 @@ contains
    end subroutine get_all_half_waves
 
    !> The two modes of each shape.
-   elemental subroutine get_pair(floor, upper, lower, omega_1, omega_2, share_1, share_2, loss_1, loss_2)
+   elemental subroutine get_pair(floor, upper, lower, omega_1, omega_2, square_1, square_2, loss_1, loss_2)
       type(double_plate_type), intent(in) :: floor
       !> Bending stiffness of the shape in both plates over area, N/m3.
       real(wp), intent(in) :: upper, lower
       !> Angular frequencies, rad/s, the lower first.
       real(wp), intent(out) :: omega_1, omega_2
       !> Squared displacements of the upper plate of modes with modal mass 1 over area, m2/kg.
-      real(wp), intent(out) :: share_1, share_2
+      real(wp), intent(out) :: square_1, square_2
       !> Loss factors.
       real(wp), intent(out) :: loss_1, loss_2
       real(wp) :: first, second, coupling, angle, top, bottom
@@ -101,11 +102,11 @@ contains
          angle = atan2(2*coupling, first - second)/2
          top = cos(angle)/sqrt(m1)
          bottom = sin(angle)/sqrt(m2)
-         share_2 = top**2
+         square_2 = top**2
          loss_2 = get_loss(floor, omega_2, upper*top**2, lower*bottom**2, s*(top - bottom)**2)
          top = -sin(angle)/sqrt(m1)
          bottom = cos(angle)/sqrt(m2)
-         share_1 = top**2
+         square_1 = top**2
          loss_1 = get_loss(floor, omega_1, upper*top**2, lower*bottom**2, s*(top - bottom)**2)
       end associate
    end subroutine get_pair
@@ -128,7 +129,7 @@ contains
    !>
    !> In wavenumbers u = k**2 the lower plate has h2 = s/(B1 B2 (u**2 - q1) (u**2 - q2)) with the roots q of the determinant,
    !> and dissipates omega Im B2/(4 pi) integral of u**2 |h2|**2 du, by partial fractions with
-   !> integral du/(u**2 - q) = pi/(2 sqrt(-q)). What it dissipates is what it gets.
+   !> integral du/(u**2 - q) = pi/(2 sqrt(-q)). It dissipates the power that it receives.
    elemental function get_lower_conductance(floor, frequency) result(conductance)
       type(double_plate_type), intent(in) :: floor
       !> Frequency, Hz.

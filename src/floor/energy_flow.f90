@@ -1,4 +1,4 @@
-!> Coupled subsystems of a statistical energy analysis in one band: what each loses, and what flows between them.
+!> Coupled subsystems of a statistical energy analysis in one band: their losses, and the flow between them.
 module thud_energy_flow
    use thud_kinds, only: wp
    implicit none (type, external)
@@ -10,7 +10,7 @@ module thud_energy_flow
    type :: energy_flow_type
       !> Modes per hertz of the subsystems, s: [n].
       real(wp), allocatable :: mode_density(:)
-      !> Rate at which the first subsystems lose energy, 1/s, what flows to others included: [at most n].
+      !> Rate at which the first subsystems lose energy, 1/s, the flow to others included: [at most n].
       real(wp), allocatable :: total(:)
       !> Minimum rate of losses that go to no other subsystem, 1/s: [n].
       real(wp), allocatable :: internal_loss(:)

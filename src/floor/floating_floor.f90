@@ -82,7 +82,7 @@ contains
       call new_double_receiver(get_double_plate(options), source, point, receiver, error)
    end subroutine get_mobility_at
 
-   !> The plate over the room, and what reaches it of infinite plates.
+   !> The plate over the room, and the power that reaches it, as of infinite plates.
    subroutine get_radiator(options, frequency, plate, conductance, error)
       class(floating_floor_type), intent(in) :: options
       real(wp), intent(in) :: frequency(:)

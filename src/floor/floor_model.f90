@@ -1,9 +1,9 @@
-!> The abstract floor: options from a namelist group, what a source feels of it, and the plate that radiates into the
+!> The abstract floor: options from a namelist group, its driving-point mobility, and the plate that radiates into the
 !> room below.
 !>
 !> A floor `<name>` is a module `thud_<name>_floor` with a type `<name>_floor_type` that extends this one (a name that
 !> ends with `_floor` gets no second one); the list `floor_models` in src/CMakeLists.txt makes it known. Its options belong
-!> to the group of its name. What is said here of the arguments of a procedure holds for those of every floor.
+!> to the group of its name. The arguments of a procedure mean the same in every floor.
 module thud_floor_model
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type
@@ -46,7 +46,7 @@ module thud_floor_model
          type(field_type), allocatable :: fields(:)
       end function get_fields
 
-      !> What a source feels of the floor.
+      !> The floor as a receiver, at the point under the source.
       subroutine get_receiver(options, receiver, error)
          import :: error_type, floor_model_type, receiver_type
          implicit none (type, external)
@@ -96,7 +96,7 @@ contains
    subroutine check(options, error)
       !> The options, each inside its own range.
       class(floor_model_type), intent(in) :: options
-      !> Names group, key, value and what is allowed.
+      !> Names group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
 
    end subroutine check
@@ -129,12 +129,12 @@ contains
       error = input_error('&floor: name: this floor has no plate that radiates into a room; allowed: one that has')
    end subroutine get_radiator
 
-   !> Band in which the floor is what it claims to be; by default at all frequencies.
+   !> Band in which the model of the floor is valid; by default all frequencies.
    subroutine get_validity(options, lowest, highest, reason)
       class(floor_model_type), intent(in) :: options
       !> Ends of the band, Hz.
       real(wp), intent(out) :: lowest, highest
-      !> What ends it, as the end of a message.
+      !> Reason for the limits, as the end of a message.
       character(len=reason_length), intent(out) :: reason
 
       lowest = 0.0_wp

@@ -30,7 +30,7 @@ module thud_injected_energy
    !> Least rate of decay, 1/s: a pole on the axis has its peak on it.
    real(wp), parameter :: min_decay = 1.0e-6_wp
 
-   !> Nodes and weights on [-1, 1], and what makes Legendre coefficients of values at the nodes.
+   !> Nodes and weights on [-1, 1], and the matrix from values at the nodes to Legendre coefficients.
    type :: rule_type
       real(wp) :: node(n_node), weight(n_node), coefficient(0:n_node - 1, n_node)
    end type rule_type
@@ -124,7 +124,7 @@ contains
       end do
    end function new_rule
 
-   !> What a force and its floor do from first touch on.
+   !> Force and velocity of the floor from first touch on.
    pure function new_record(receiver, force, velocity, sample_rate) result(record)
       type(receiver_type), intent(in) :: receiver
       !> The force, N, and the velocity of the floor, m/s: [n_sample].
@@ -166,18 +166,18 @@ contains
       real(wp), intent(in) :: middle, half
       !> By the motion and by the mobility, J: [2].
       real(wp) :: energy(2)
-      complex(wp), dimension(n_node) :: s, turn, last, force, velocity, mobility
+      complex(wp), dimension(n_node) :: s, phase_factor, last, force, velocity, mobility
       complex(wp), dimension(0:n_node - 1) :: by_force, by_square, second
       complex(wp) :: z, started
       integer :: k
 
       s = cmplx(0.0_wp, 2*pi*(middle + half*rule%node), wp)
-      turn = exp(-s/record%sample_rate)
+      phase_factor = exp(-s/record%sample_rate)
       associate (duration => (size(record%force) - 1)/record%sample_rate, &
                  record_time => (size(record%velocity) - 1)/record%sample_rate)
          last = exp(-s*record_time)
-         force = get_sums(record%force, turn)/record%sample_rate
-         velocity = get_recorded_velocity(record, s, turn, last)
+         force = get_sums(record%force, phase_factor)/record%sample_rate
+         velocity = get_recorded_velocity(record, s, phase_factor, last)
          mobility = record%direct
          by_force = matmul(rule%coefficient, conjg(force))
          by_square = matmul(rule%coefficient, abs(force)**2)
@@ -189,7 +189,8 @@ contains
                   mobility = mobility + residue/(s - pole)
                   velocity = velocity + record%end_of_record(k)*last/(s - pole)
                else
-                  ! As if the motion after the force had begun with the record; its pole is left, and what is too much.
+                  ! As if the motion after the force had begun with the record: its transform over the record is
+                  ! subtracted, and its pole integrated in closed form.
                   started = record%end_of_force(k)*exp(-pole*duration)
                   velocity = velocity - started*record_time*get_phi_1((pole - s)*record_time)
                   call get_second_legendre(z, second)
@@ -203,17 +204,18 @@ contains
    end function get_step_energies
 
    !> Transform of the velocity up to the end of the record: the trapezoidal rule with the correction of its end.
-   pure function get_recorded_velocity(record, s, turn, last) result(velocity)
+   pure function get_recorded_velocity(record, s, phase_factor, last) result(velocity)
       type(record_type), intent(in) :: record
-      !> Frequencies i w, 1/s; exp(-s t) for a sample and for the record: [n_node].
-      complex(wp), intent(in) :: s(n_node), turn(n_node), last(n_node)
+      !> Frequencies i w, 1/s; phase factor exp(-s t) of a sample and for the record: [n_node].
+      complex(wp), intent(in) :: s(n_node), phase_factor(n_node), last(n_node)
       !> The transform, m: [n_node].
       complex(wp) :: velocity(n_node)
       real(wp) :: acceleration
 
       acceleration = real(sum(record%pole*record%end_of_record), wp)
       associate (final => record%velocity(size(record%velocity)), rate => record%sample_rate)
-         velocity = (get_sums(record%velocity, turn) - last*final/2)/rate - last*(acceleration - s*final)/(12*rate**2)
+         velocity = (get_sums(record%velocity, phase_factor) - last*final/2)/rate &
+            - last*(acceleration - s*final)/(12*rate**2)
       end associate
    end function get_recorded_velocity
 
@@ -229,23 +231,23 @@ contains
    end function get_phi_1
 
    !> Sums of samples times powers of some numbers, by Horner's scheme.
-   pure function get_sums(sample, turn) result(total)
+   pure function get_sums(sample, phase_factor) result(total)
       !> The samples: [n_sample].
       real(wp), intent(in) :: sample(:)
       !> The numbers: [n_node].
-      complex(wp), intent(in) :: turn(n_node)
+      complex(wp), intent(in) :: phase_factor(n_node)
       !> The sums: [n_node].
       complex(wp) :: total(n_node)
-      real(wp), dimension(n_node) :: turn_re, turn_im, re, im, next
+      real(wp), dimension(n_node) :: factor_re, factor_im, re, im, next
       integer :: i
 
-      turn_re = turn%re
-      turn_im = turn%im
+      factor_re = phase_factor%re
+      factor_im = phase_factor%im
       re = 0.0_wp
       im = 0.0_wp
       do i = size(sample), 1, -1
-         next = re*turn_re - im*turn_im + sample(i)
-         im = re*turn_im + im*turn_re
+         next = re*factor_re - im*factor_im + sample(i)
+         im = re*factor_im + im*factor_re
          re = next
       end do
       total = cmplx(re, im, wp)

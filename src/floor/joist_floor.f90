@@ -37,7 +37,7 @@ module thud_joist_floor
       real(wp) :: connection = 0.1_wp
       !> Loss factor with that of the edges, without radiation.
       real(wp) :: loss_factor = 0.05_wp
-      !> What the source drops on: `sheathing` between two joists, or a `joist`.
+      !> Impact location: `sheathing` between two joists, or a `joist`.
       character(len=name_length) :: source_on = 'sheathing'
    contains
       procedure, pass(options) :: get_fields

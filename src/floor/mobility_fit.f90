@@ -34,7 +34,7 @@ contains
       type(measured_mobility_floor_type), intent(out), target :: floor
       !> Relative error before the fit was made passive, root of the mean square.
       real(wp), intent(out) :: free_error
-      !> There are too few frequency points or too many poles, a point is not allowed, or no passive floor was found.
+      !> There are too few frequency points or too many poles, a point is not allowed, or the fit has no passive solution.
       type(error_type), allocatable, intent(out) :: error
       complex(wp), allocatable :: pole(:), residue(:)
       real(wp) :: weight(size(mobility))
@@ -80,7 +80,7 @@ contains
       integer, intent(in) :: order
       !> Length of a list.
       integer, intent(in) :: max_poles
-      !> Names the point, or what is allowed.
+      !> Names the point, or the allowed range.
       type(error_type), allocatable, intent(out) :: error
       integer :: i
 

@@ -149,7 +149,7 @@ contains
       integer, allocatable :: m(:), n(:)
       real(wp), allocatable :: omega(:), gain(:)
       logical, allocatable :: single(:)
-      real(wp) :: rest(2)
+      real(wp) :: residual_terms(2)
 
       call get_half_waves(plate, far*mode_limit, m, n)
       if (present(max_across)) then
@@ -159,14 +159,14 @@ contains
       omega = sqrt(get_modal_stiffness(plate, m, n)/get_surface_mass(plate))
       single = omega < 2*pi*mode_limit
       gain = 4/(get_surface_mass(plate)*plate%length*plate%width)*get_shape(m, n, source)*get_shape(m, n, point)
-      rest = [sum(gain/omega**2, mask=.not. single), residual_corner]
+      residual_terms = [sum(gain/omega**2, mask=.not. single), residual_corner]
       ! Modes farther off cancel but under the source.
-      if (.not. present(max_across) .and. all(abs(source - point) < epsilon(1.0_wp))) rest(1) = rest(1) &
+      if (.not. present(max_across) .and. all(abs(source - point) < epsilon(1.0_wp))) residual_terms(1) = residual_terms(1) &
          + get_far_compliance(plate)
-      if (present(residual)) rest = residual
+      if (present(residual)) residual_terms = residual
       associate (omega => pack(omega, single))
-         call new_modal_receiver(group, pack(gain, single), omega, get_total_loss(plate, air_type(), omega/(2*pi)), rest, &
-            receiver, error)
+         call new_modal_receiver(group, pack(gain, single), omega, get_total_loss(plate, air_type(), omega/(2*pi)), &
+            residual_terms, receiver, error)
       end associate
    end subroutine new_plate_receiver
 

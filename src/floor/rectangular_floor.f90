@@ -80,7 +80,7 @@ contains
       end do
    end subroutine check
 
-   !> What a source feels.
+   !> Mobility at the point under the source.
    subroutine get_receiver(options, receiver, error)
       class(rectangular_floor_type), intent(in) :: options
       type(receiver_type), intent(out) :: receiver

@@ -3,7 +3,7 @@
 !> maximum.
 module thud_room
    use thud_band, only: band_type
-   use thud_ceiling, only: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_share, get_mass_law
+   use thud_ceiling, only: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_fraction, get_mass_law
    use thud_constants, only: pi
    use thud_energy_flow, only: add_subsystem, connect, energy_flow_type, get_loss, new_energy_flow
    use thud_error, only: error_type, input_error
@@ -80,11 +80,11 @@ module thud_room
       !> The same for octaves: bands, levels and times: [n_octave].
       type(band_type), allocatable :: octaves(:)
       real(wp), allocatable :: octave_level(:), octave_time(:)
-      !> Instants after the impact, s: [n_time], and what the Fast detector shows in each band then, dB: [n_time, n_band].
+      !> Instants after the impact, s: [n_time], and the output of the Fast detector in each band, dB: [n_time, n_band].
       real(wp), allocatable :: history_time(:), history(:, :)
    end type room_level_type
 
-   !> The energies of one band, dE/dt = -A E, and what the detector sees of them.
+   !> The energies of one band, dE/dt = -A E, and the weights of the detector.
    type :: band_energies_type
       !> A, 1/s: [n, n].
       real(wp), allocatable :: loss(:, :)
@@ -251,13 +251,13 @@ contains
       end do
    end subroutine add_history
 
-   !> Energies of a band: floor, walls, room and the air above a ceiling, with what flows between them.
+   !> Energies of a band: floor, walls, room and the air above a ceiling, with the flow between them.
    !>
    !> Plates lose omega eta in all; they radiate rho0 c0 sigma/m'' into the room and as much to the other side. The room
-   !> loses 6 ln 10/T besides what goes back into them. Of the sound below a floor with a ceiling the stiffness of the air
-   !> above this carries a share; that air takes the rest, which the ceiling lets through by its mass (Craik and Smith 2000).
-   !> For the part of the rest that passes the ceiling both ways there is no ceiling, and that air takes from the room what
-   !> passes the ceiling and is then reflected by it: a ceiling without mass is none.
+   !> loses 6 ln 10/T besides the return flow into them. Of the sound below a floor with a ceiling the stiffness of the air
+   !> above this carries a fraction; that air takes the rest, which the ceiling transmits by its mass (Craik and Smith 2000).
+   !> The fraction of the rest that the ceiling transmits twice goes straight into the room, and that air takes from the room
+   !> the sound that the ceiling transmits and then reflects: a ceiling without mass has no effect.
    pure function get_band_energies(plate, room, prediction, band) result(energies)
       type(plate_type), intent(in) :: plate
       type(room_type), intent(in) :: room
@@ -269,7 +269,7 @@ contains
       type(energy_flow_type) :: flow
       type(plate_type) :: plates(1 + room%walls%lengths%count)
       real(wp), dimension(size(plates)) :: radiated
-      real(wp) :: transmission, share, rest
+      real(wp) :: transmission, forced, free
       integer :: i, at_room, at_cavity
 
       plates = [plate, get_walls(room%walls)]
@@ -283,13 +283,13 @@ contains
             [2*pi*f*plates%loss_factor + radiated, decay_of_60_db/prediction%reverberation_time(band)])
          if (ceiling%mass > 0.0_wp) then
             transmission = get_mass_law(ceiling, air, f)
-            share = get_forced_share(ceiling, air, prediction%radiation_factor(band), third%lower, third%upper)
-            rest = max(1 - share, 0.0_wp)
+            forced = get_forced_fraction(ceiling, air, prediction%radiation_factor(band), third%lower, third%upper)
+            free = max(1 - forced, 0.0_wp)
             call add_subsystem(flow, get_cavity_mode_density(ceiling, air, area, f), 2*pi*f*ceiling%loss_factor)
-            call connect(flow, 1, at_cavity, radiated(1)*rest*(1 - transmission**2))
+            call connect(flow, 1, at_cavity, radiated(1)*free*(1 - transmission**2))
             call connect(flow, at_room, at_cavity, &
                air%sound_speed*area*transmission*(1 - transmission)/(4*room%volume))
-            call connect(flow, 1, at_room, radiated(1)*(share + rest*transmission**2))
+            call connect(flow, 1, at_room, radiated(1)*(forced + free*transmission**2))
          else
             call connect(flow, 1, at_room, radiated(1))
          end if

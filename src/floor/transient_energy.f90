@@ -1,5 +1,5 @@
-!> Transient statistical energy analysis: energies of coupled subsystems after an impact, and what the Fast detector
-!> makes of them. The equations are linear with constant coefficients: each step is the exponential of their matrix.
+!> Transient statistical energy analysis: energies of coupled subsystems after an impact, and the output of a Fast detector.
+!> The equations are linear with constant coefficients: each step is the exponential of their matrix.
 module thud_transient_energy
    use thud_kinds, only: wp
    use thud_matrix_exponential, only: get_exponential
@@ -43,10 +43,10 @@ contains
       time = 0.0_wp
       do i = 1, nint(search_time/search_step)
          next = matmul(step, state)
-         ! At the start the detector is at rest, and may turn within the first step.
+         ! At the start the detector is at rest, and may reach its maximum within the first step.
          if ((i == 1 .or. get_rise(weight, state) > 0.0_wp) .and. get_rise(weight, next) <= 0.0_wp) then
             call refine(loss, weight, state, (i - 1)*search_step, maximum, time)
-            ! What is left can raise the detector no more.
+            ! The remaining energy cannot raise the detector above the maximum.
             if (maxval(abs(weight))*sum(next(:size(start))) < maximum) return
          end if
          state = next
@@ -100,7 +100,7 @@ contains
       rise = dot_product(weight, state(:size(weight))) - state(size(state))
    end function get_rise
 
-   !> The maximum inside a step in which the detector turns.
+   !> The maximum inside a step in which the detector stops rising.
    pure subroutine refine(loss, weight, state, begin, maximum, time)
       !> As in `get_fast_maximum`: [n, n], [n].
       real(wp), intent(in) :: loss(:, :), weight(:)

@@ -18,7 +18,7 @@ module thud_compression
       real(wp) :: max_deflection = 0.04_wp
       !> Points of the curve, the undeformed ball included.
       integer :: points = 41
-      !> What the gas in the ball does: `vented`, `isothermal` or `adiabatic`.
+      !> Gas in the ball: `vented`, `isothermal` or `adiabatic`.
       character(len=name_length) :: gas = 'vented'
    end type compression_options_type
 

@@ -1,4 +1,4 @@
-!> The drop: from what height, in what gravity.
+!> The drop: height and gravity.
 module thud_drop
    use thud_field, only: field_type
    use thud_kinds, only: wp

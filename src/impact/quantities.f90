@@ -22,7 +22,7 @@ module thud_quantities
       real(wp) :: display_scale = 1.0_wp
       !> Decimals on the screen.
       integer :: decimals = 3
-      !> What it is.
+      !> Its meaning.
       character(len=72) :: meaning = ''
       !> Results that have it: `of_sample`, `of_impact` or `of_others`.
       integer :: results = 0

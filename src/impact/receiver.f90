@@ -1,4 +1,4 @@
-!> What a source drops on: a linear passive structure, by the mobility Y of the point under the source.
+!> A receiver: a linear passive structure under a source, described by the mobility Y of the point under the source.
 !>
 !> Y(s) = d + sum of r_k/(s - p_k), a direct part and poles with residues. Of a pair of conjugate poles one is kept, with
 !> twice its residue: the velocity is d F + Re sum r_k x_k with x_k' = p_k x_k + F. Time steps are exact for forces that

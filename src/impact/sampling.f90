@@ -83,7 +83,7 @@ contains
          //to_text(contact_time)//' s too few samples; allowed: from '//to_text(min_contact_samples/contact_time)//' Hz')
    end subroutine check_contact_samples
 
-   !> Limit of levels by the sampling rate: what the samples of a force that sets in with a jump or a corner fold into the
+   !> Limit of levels by the sampling rate: the aliasing of a force that sets in with a jump or a corner into the
    !> octave of 500 Hz changes its level by up to 0.2 dB at the limit, 2 dB at 2000 Hz.
    pure function get_rate_limit(sampling) result(limit)
       type(sampling_type), intent(in) :: sampling

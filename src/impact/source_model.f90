@@ -60,7 +60,7 @@ module thud_source_model
          type(force_history_type), intent(out) :: history
          !> The drop leads out of the model, the contact outlasts the record, or the steps are too coarse.
          type(error_type), allocatable, intent(out) :: error
-         !> What the ball drops on (default: a rigid floor); given to models only that `couples`.
+         !> The floor under the ball (default: rigid); present only for models that `couples`.
          type(receiver_type), intent(in), optional :: receiver
       end subroutine solve
    end interface
@@ -73,7 +73,7 @@ contains
       !> The options, each inside its own range.
       class(source_model_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> Names group, key, value and what is allowed.
+      !> Names group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
 
    end subroutine check
@@ -94,7 +94,7 @@ contains
       !> The options, checked.
       class(source_model_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> What the source drops on (default: a rigid floor).
+      !> The floor under the source (default: rigid).
       type(receiver_type), intent(in), optional :: receiver
       !> The time, s.
       real(wp) :: cost

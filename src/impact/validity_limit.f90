@@ -18,7 +18,7 @@ module thud_validity_limit
    type :: validity_limit_type
       !> Group of the keys that decide.
       character(len=24) :: group = ''
-      !> What is limited, a pure number or with its unit.
+      !> Name of the limited quantity, a pure number or with its unit.
       character(len=72) :: quantity = ''
       !> Its value, and the range in which the theory holds.
       real(wp) :: value = 0.0_wp, lowest = -huge(1.0_wp), highest = huge(1.0_wp)

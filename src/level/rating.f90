@@ -35,7 +35,7 @@ module thud_rating
    character(len=24), parameter :: rated_set_names(*) = rated_sets%name
 
    !> Reference volume, m3, and reverberation time, s (ISO 16283-2).
-   real(wp), parameter :: reference_volume = 50.0_wp, reference_time = 0.5_wp
+   real(wp), parameter :: reference_volume = 50.0_wp, reference_reverberation = 0.5_wp
 
    !> Reverberation time, s, of the decay that the Fast detector's time constant, 0.125 s, has: 0.125 s * 6 ln 10.
    real(wp), parameter :: fast_reverberation = 1.7275_wp
@@ -140,7 +140,7 @@ contains
       real(wp) :: difference
 
       difference = 10*log10(volume/reference_volume) &
-         - 10/log(10.0_wp)*(get_log_gain(reverberation_time) - get_log_gain(reference_time))
+         - 10/log(10.0_wp)*(get_log_gain(reverberation_time) - get_log_gain(reference_reverberation))
    end function get_standardization
 
    !> ln g = -ln C/(C - 1).
@@ -159,7 +159,7 @@ contains
    end function get_log_gain
 
    !> Level without the background (ISO 16283-2): the energy of the background is subtracted where the level is 6 to
-   !> 15 dB above it; below, what 6 dB give is subtracted, and the result is an upper bound.
+   !> 15 dB above it; below, the correction of 6 dB is subtracted, and the result is an upper bound.
    elemental subroutine correct_for_background(level, background, corrected, is_upper_bound)
       !> Levels with and of the background, dB.
       real(wp), intent(in) :: level, background

@@ -1,4 +1,4 @@
-!> What the standards ask of heavy/soft impact sources, and the verdict on a force history
+!> Requirements of the standards on heavy/soft impact sources, and the verdict on a force history
 !> (JIS A 1418-2:2019 tables A.1 and A.2, ISO 10140-5:2021 table F.1, ISO 16283-2:2020 table A.1).
 module thud_source_limits
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count

@@ -7,7 +7,7 @@
 !>    t = exponent log2(base) = n + r,                              |r| <= 1/2
 !>    base**exponent = 2**n (1 + r ln 2 + ... + (r ln 2)**13/13!)
 !>
-!> Bound of the relative error, with u = 2**(-53). Both series are Taylor's; what they leave out is
+!> Bound of the relative error, with u = 2**(-53). Both series are Taylor's; their remainders are
 !> less than s**20/(21 (1 - s**2)) = 2.3e-17 < 0.3 u of the logarithm and
 !> (ln(2)/2)**14/14! exp(ln(2)/2) = 6e-18 < 0.1 u of the power. m - 1 is exact, so s is wrong by 2 u
 !> (sum, quotient), the series in s**2 by 2.2 u (rounded coefficients, the last sum; the rest is

@@ -302,19 +302,19 @@ contains
    end subroutine check_step
 
    !> Adds the impulse of the floor in one step to the means around two samples.
-   pure subroutine add_impulse(impulse, interval, i, share, history)
+   pure subroutine add_impulse(impulse, interval, i, fraction, history)
       !> The impulse, N s; sampling interval, s.
       real(wp), intent(in) :: impulse, interval
       !> Index of the sample before the step.
       integer, intent(in) :: i
       !> Fraction of the step that lies nearer to the next sample.
-      real(wp), intent(in) :: share
+      real(wp), intent(in) :: fraction
       !> Gets the impulse.
       type(force_history_type), intent(inout) :: history
 
       associate (force => history%floor_force)
-         force(i) = force(i) + (1 - share)*impulse/interval
-         if (i < size(force)) force(i + 1) = force(i + 1) + share*impulse/interval
+         force(i) = force(i) + (1 - fraction)*impulse/interval
+         if (i < size(force)) force(i + 1) = force(i + 1) + fraction*impulse/interval
       end associate
       history%impulse = history%impulse + impulse
    end subroutine add_impulse

@@ -101,7 +101,7 @@ contains
       real(wp), intent(out) :: energy
       !> Derivatives of the upward forces with respect to the height of the floor, N/m: [0:n_polar].
       real(wp), intent(out), optional :: stiffness(0:)
-      real(wp) :: part
+      real(wp) :: relative_depth
       integer :: j, n
 
       force = 0.0_wp
@@ -112,11 +112,11 @@ contains
       do j = 0, n - 1
          associate (z => position(j, 2), begin => contact%edge_height(j), edge_force => contact%edge_force(j))
             if (z >= begin) cycle
-            part = 1.0_wp
-            if (z > 0.0_wp) part = 1 - z/begin
-            force(j, 2) = edge_force*part**2
-            energy = energy + edge_force*(begin*part**3/3 + max(-z, 0.0_wp))
-            if (present(stiffness) .and. z > 0.0_wp) stiffness(j) = 2*edge_force*part/begin
+            relative_depth = 1.0_wp
+            if (z > 0.0_wp) relative_depth = 1 - z/begin
+            force(j, 2) = edge_force*relative_depth**2
+            energy = energy + edge_force*(begin*relative_depth**3/3 + max(-z, 0.0_wp))
+            if (present(stiffness) .and. z > 0.0_wp) stiffness(j) = 2*edge_force*relative_depth/begin
          end associate
       end do
       if (.not. contact%layer_stiffness > 0.0_wp) return
@@ -130,13 +130,13 @@ contains
 
    !> Adds the forces of the layer: derivatives of its energy, half of stiffness times area times squared penetration. The
    !> areas are those of the rings on the floor that belong to the nodes.
-   pure subroutine add_layer_forces(stiffness, r, sink, outwards, upwards, energy)
+   pure subroutine add_layer_forces(stiffness, r, penetration, outwards, upwards, energy)
       !> Stiffness per area, N/m3.
       real(wp), intent(in) :: stiffness
       !> Distances of the nodes from the axis, m: [0:n_polar].
       real(wp), intent(in) :: r(0:)
       !> Depths of the nodes in the layer, 0 above it, m: [0:n_polar].
-      real(wp), intent(in) :: sink(0:)
+      real(wp), intent(in) :: penetration(0:)
       !> Forces, N: [0:n_polar].
       real(wp), intent(inout) :: outwards(0:), upwards(0:)
       !> Energy, J.
@@ -146,11 +146,11 @@ contains
 
       n = ubound(r, 1)
       area = get_nodal_areas(r, 0*r)
-      upwards = upwards + stiffness*area*sink
-      energy = energy + stiffness*dot_product(area, sink**2)/2
+      upwards = upwards + stiffness*area*penetration
+      energy = energy + stiffness*dot_product(area, penetration**2)/2
       associate (inner => r(:n - 2), here => r(1:n - 1), outer => r(2:))
-         outwards(1:n - 1) = outwards(1:n - 1) - stiffness*pi/6*(sink(1:n - 1)**2*(outer - inner) &
-            + sink(:n - 2)**2*(2*here + inner) - sink(2:)**2*(2*here + outer))
+         outwards(1:n - 1) = outwards(1:n - 1) - stiffness*pi/6*(penetration(1:n - 1)**2*(outer - inner) &
+            + penetration(:n - 2)**2*(2*here + inner) - penetration(2:)**2*(2*here + outer))
       end associate
    end subroutine add_layer_forces
 

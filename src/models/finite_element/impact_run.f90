@@ -73,7 +73,7 @@ contains
       type(material_type), intent(in) :: material
       !> Gravity, m/s2; height of the lowest point, m; velocity downwards, m/s.
       real(wp), intent(in) :: gravity, gap, speed
-      !> What the ball drops on (default: a rigid floor).
+      !> The floor under the ball (default: rigid).
       type(receiver_type), intent(in), optional :: receiver
       type(impact_run_type) :: run
 

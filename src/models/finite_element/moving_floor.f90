@@ -42,7 +42,7 @@ module thud_moving_floor
       !> Displacements at the instants without force, m; compliances, m/N: [3].
       real(wp) :: free(3) = 0.0_wp, compliance(3) = 0.0_wp
       !> Displacement up to the instants per amplitude, m/(N s): [n_pole, 3].
-      complex(wp), allocatable :: part(:, :)
+      complex(wp), allocatable :: displacement_factor(:, :)
       !> The step from midpoint to midpoint.
       type(receiver_step_type) :: step
    end type moving_floor_type
@@ -72,7 +72,7 @@ contains
       same = .not. (abs(last_interval - floor%last_interval) > 0.0_wp .or. abs(interval - floor%interval) > 0.0_wp)
       if (.not. same) call set_factors(floor, last_interval, interval)
       do i = 1, 3
-         floor%free(i) = floor%motion%displacement + get_real_sum(floor%part(:, i), floor%motion%amplitude)
+         floor%free(i) = floor%motion%displacement + get_real_sum(floor%displacement_factor(:, i), floor%motion%amplitude)
       end do
    end subroutine predict
 
@@ -102,13 +102,13 @@ contains
       floor%last_interval = last_interval
       floor%interval = interval
       length([here, after, next]) = last_interval/2 + [0.0_wp, interval/2, interval]
-      if (allocated(floor%part)) deallocate (floor%part)
-      allocate (floor%part(size(floor%motion%amplitude), 3))
+      if (allocated(floor%displacement_factor)) deallocate (floor%displacement_factor)
+      allocate (floor%displacement_factor(size(floor%motion%amplitude), 3))
       do i = 1, 3
          step = new_receiver_step(floor%receiver, length(i))
          floor%compliance(i) = length(i)*floor%receiver%direct
-         if (size(floor%part, 1) > 0) then
-            floor%part(:, i) = floor%receiver%residue*step%gain
+         if (size(floor%displacement_factor, 1) > 0) then
+            floor%displacement_factor(:, i) = floor%receiver%residue*step%gain
             floor%compliance(i) = floor%compliance(i) + sum(real(floor%receiver%residue*step%travel, wp))
          end if
          if (i == after) floor%step = step

@@ -166,7 +166,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp), dimension(0:pressed%body%mesh%n_polar, 0:pressed%body%mesh%n_radial, 2) :: force, target, change
       logical :: fixed(0:pressed%body%mesh%n_polar, 0:pressed%body%mesh%n_radial, 2)
-      logical :: found(0:pressed%body%mesh%n_polar, 2)
+      logical :: touching(0:pressed%body%mesh%n_polar, 2)
       integer :: iteration, last, plate
       logical :: failed, same
 
@@ -188,14 +188,14 @@ contains
          call get_forces(pressed, pressed%position, force, failed)
          if (failed) return
          do plate = 1, 2
-            associate (height => get_heights(pressed, plate), push => merge(-1, 1, plate == 1)*force(:, last, 2))
-               found(:, plate) = merge(push > -pressed%tolerance, height < 0.0_wp, pressed%touches(:, plate))
+            associate (height => get_heights(pressed, plate), contact_force => merge(-1, 1, plate == 1)*force(:, last, 2))
+               touching(:, plate) = merge(contact_force > -pressed%tolerance, height < 0.0_wp, pressed%touches(:, plate))
             end associate
          end do
-         same = all(found .eqv. pressed%touches)
-         pressed%touches = found
+         same = all(touching .eqv. pressed%touches)
+         pressed%touches = touching
          converged = same .and. maxval(abs(force), mask=.not. fixed) < pressed%tolerance
-         if (.not. any(found(:, 1)) .or. .not. any(found(:, 2))) return
+         if (.not. any(touching(:, 1)) .or. .not. any(touching(:, 2))) return
          if (converged) exit
       end do
       pressed%force = -sum(force(:, last, 2), mask=pressed%touches(:, 1))

@@ -40,7 +40,7 @@ module thud_impact_batch
       !> Whether the ball was released: [batch_size].
       logical(c_bool) :: released(batch_size)
       !> Whether a stage has left the domain of the equation: [batch_size].
-      logical(c_bool) :: left(batch_size)
+      logical(c_bool) :: out_of_domain(batch_size)
       !> Whether the last step left the reach of the series: [batch_size].
       logical(c_bool) :: out_of_range(batch_size)
    end type impact_batch_type

@@ -49,7 +49,7 @@ contains
       !> Length of a step, s.
       real(wp), intent(in) :: interval
       type(surface_rings_type), intent(in) :: rings
-      !> What the ball drops on.
+      !> The floor under the ball.
       type(receiver_type), intent(in) :: floor
       !> Outer radius, m; velocity at first touch, m/s; gravity during the contact, m/s2.
       real(wp), intent(in) :: outer_radius, impact_velocity, gravity

@@ -168,7 +168,7 @@ contains
       !> Modes and damping.
       class(modal_ball_options_type), intent(in) :: options
       type(surface_rings_type), intent(in) :: rings
-      !> What the ball drops on.
+      !> The floor under the ball.
       type(receiver_type), intent(in) :: floor
       !> Length of a step, s.
       real(wp), intent(in) :: interval
@@ -263,13 +263,13 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: impulse, settling_time
       integer :: i, j, n_step, last
-      logical :: has_left
+      logical :: has_separated
 
       ! The surface may touch again while the slowest mode swings back, half a period later.
       settling_time = 0.0_wp
       if (size(step%omega) > 0) settling_time = pi/(sqrt(step%equilibrium_ratio)*minval(step%omega))
       last = 0
-      has_left = .false.
+      has_separated = .false.
       samples: do i = 1, size(history%floor_force)
          call record_motion(ball, step, state, i, history)
          do j = 1, sampling%substeps
@@ -285,12 +285,12 @@ contains
             end if
             if (contact%last == size(rings%radius)) then
                error = numerical_error('&drop: '//to_text(1.0e3_wp*n_step*interval)//' ms after first touch the ball lies ' &
-                  //'on its outermost ring, its center sunk by '//to_text(1.0e3_wp*(ball%outer_radius - state%height)) &
+                  //'on its outermost ring, its center lowered by '//to_text(1.0e3_wp*(ball%outer_radius - state%height)) &
                   //' mm; allowed: a lower height, or a stiffer ball')
                return
             end if
-            has_left = state%speed > 0.0_wp .and. (n_step - last)*interval > settling_time
-            if (has_left .and. .not. state%floor_moves) exit samples
+            has_separated = state%speed > 0.0_wp .and. (n_step - last)*interval > settling_time
+            if (has_separated .and. .not. state%floor_moves) exit samples
          end do
          if (state%floor_moves) then
             ! The mean over the interval, as for the force.
@@ -299,7 +299,7 @@ contains
             history%velocity(i) = history%velocity(i) - history%floor_velocity(i)
          end if
       end do samples
-      call check_end(sampling, settling_time, has_left, contact, state, error)
+      call check_end(sampling, settling_time, has_separated, contact, state, error)
       if (allocated(error)) return
       history%contact_time = last*interval
       call check_contact_samples(sampling, history%contact_time, error)
@@ -307,12 +307,12 @@ contains
    end subroutine march
 
    !> Returns an error if the record ends too early.
-   subroutine check_end(sampling, settling_time, has_left, contact, state, error)
+   subroutine check_end(sampling, settling_time, has_separated, contact, state, error)
       type(sampling_type), intent(in) :: sampling
       !> Time without contact after which the surface no longer touches, s.
       real(wp), intent(in) :: settling_time
       !> Whether this time has passed and the ball rises.
-      logical, intent(in) :: has_left
+      logical, intent(in) :: has_separated
       type(ring_contact_type), intent(in) :: contact
       !> Motion of ball and floor.
       type(ball_motion_type), intent(in) :: state
@@ -320,7 +320,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       character(len=64) :: allowed
 
-      if (.not. has_left) then
+      if (.not. has_separated) then
          allowed = 'longer than that'
          if (state%floor_moves) allowed = 'longer than that, and a floor from which the ball rebounds'
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
