@@ -1,6 +1,6 @@
 !> A tyre as two masses, rim and belt. The belt stands on the contact patch, whose force is inflation pressure times contact
-!> area plus the force of the carcass, F = (p w d + c d (d/d0)^(n - 1))(1 + a d'), never tensile. A sidewall, a linear spring
-!> with viscous damping, joins rim and belt (in tyre dynamics: rigid ring and residual stiffness).
+!> area plus the force of the carcass, both damped and never tensile: F = (p w d + c d (d/d0)^(n - 1))(1 + a d'). A sidewall,
+!> a linear spring with viscous damping, joins rim and belt (in tyre dynamics: residual stiffness and rigid ring).
 module thud_two_mass
    use thud_ball, only: ball_type
    use thud_constants, only: pi

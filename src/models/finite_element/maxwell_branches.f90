@@ -74,8 +74,8 @@ contains
       end do
    end subroutine add_branch_stress
 
-   !> Value of exp(t/time) - 1 at the instant t of a step at which a decaying stress equals its mean over the step: x/(1 -
-   !> exp(-x)) - 1.
+   !> Value of exp(t/time) - 1 at the instant t of a step at which a decaying stress equals its mean over the step, which is
+   !> x/(1 - exp(-x)) - 1.
    pure elemental function get_mean_weight(ratio) result(mean_weight)
       !> Length of the step divided by the relaxation time, x.
       real(wp), intent(in) :: ratio
