@@ -1,5 +1,4 @@
-!> A source of a few masses, the first of which touches the floor: interface for the time integration on rigid and mobile
-!> floors.
+!> A source of a few masses, the first of which touches the floor: interface for rigid and mobile floors.
 !>
 !> The state holds displacement towards the floor (m) and velocity (m/s) of each mass in turn, then impulse on the floor
 !> (N s) and energy lost (J); a source may append components. On a mobile floor displacements and velocities are relative to

@@ -30,7 +30,7 @@ contains
       class(contact_source_type), intent(inout) :: source
       type(drop_type), intent(in) :: drop
       type(sampling_type), intent(in) :: sampling
-      !> Number of steps in each sampling interval.
+      !> Steps per sampling interval.
       integer, intent(in) :: n_step
       !> The floor under the source.
       type(receiver_type), intent(in) :: receiver
@@ -174,7 +174,7 @@ contains
          history%floor_displacement(i) = motion%motion%displacement
          history%floor_velocity(i) = motion%floor_velocity
          call source%record_sample(get_relative_state(source, motion), i, history)
-         ! Force and floor velocity may jump at first touch: the first sample is the mean of both sides of the jump.
+         ! Force and floor velocity may jump at first touch: the first sample is the mean of both sides.
          if (i > 1) history%floor_force(i) = motion%force
          if (i == 1) history%floor_velocity(i) = motion%floor_velocity/2
       end associate

@@ -13,8 +13,8 @@ module thud_coupled_phases
 
    public :: begin_contact, get_distance, get_event, impact_type, pass_event, update_maxima
 
-   !> Fraction of the initial energy below which a light floor counts as having captured the source, which ends the contact;
-   !> kinetic energy and force times deflection are compared.
+   !> Fraction of the initial energy at which a light floor captures the source and the contact ends, of kinetic energy and
+   !> of force times deflection.
    real(wp), parameter :: capture_tolerance = 1.0e-12_wp
 
    !> Maximum number of Newton iterations for the first force, and the relative change that ends them.
@@ -34,7 +34,7 @@ module thud_coupled_phases
       type(receiver_stages_type) :: stages
       !> Motion of source and floor.
       type(coupled_state_type) :: motion
-      !> Time since first touch, s; velocity at first touch, m/s.
+      !> Time since first touch, s; velocity at first touch as a scale, m/s.
       real(wp) :: time = 0.0_wp, scale = 0.0_wp
       !> Maximum force on the floor so far, N.
       real(wp) :: peak_force = 0.0_wp

@@ -29,7 +29,7 @@ module thud_hunt_crossley
       real(wp) :: stiffness = 0.0_wp
       !> Target contact time, s.
       real(wp) :: contact_time = 0.0_wp
-      !> Exponent n of the deflection; 3/2 is Hertz's.
+      !> Exponent n of the deflection; 3/2 for Hertz contact.
       real(wp) :: exponent = 1.5_wp
       !> Damping alpha, s/m.
       real(wp) :: damping = 0.0_wp
@@ -162,7 +162,7 @@ contains
          if (abs(x) > 0.03_wp) then
             value = x - log(1 + x)
          else
-            ! Ten terms of the series leave 0.03**12.
+            ! The remainder after ten terms of the series is of order 0.03**12.
             value = sum([((-x)**k/k, k=2, 11)])
          end if
       end function excess

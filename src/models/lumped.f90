@@ -34,7 +34,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> The floor under the source (default: rigid).
       type(receiver_type), intent(in), optional :: receiver
-      !> Number of steps in each sampling interval (default: the substeps).
+      !> Steps per sampling interval (default: the substeps).
       integer, intent(in), optional :: n_step
       !> Names, with units, of additional quantities against time: [n_model_history].
       character(len=*), intent(in), optional :: model_history_name(:)
@@ -62,7 +62,7 @@ contains
       class(contact_source_type), intent(inout) :: source
       type(drop_type), intent(in) :: drop
       type(sampling_type), intent(in) :: sampling
-      !> Number of steps in each sampling interval.
+      !> Steps per sampling interval.
       integer, intent(in) :: n_step
       !> Gets samples, maxima and contact time.
       type(force_history_type), intent(inout) :: history

@@ -21,10 +21,10 @@ module thud_measured_modes
 
    public :: measured_modes_type
 
-   !> Relative error of the sum of effective masses that rounding of printed values explains.
+   !> Relative error of the sum of effective masses that printed digits explain.
    real(wp), parameter :: mass_tolerance = 1.0e-3_wp
 
-   !> Number of force values per shortest period in the search for the first zero of the force.
+   !> Evaluations per shortest period in the search for the first zero of the force.
    integer, parameter :: checks_per_period = 16
 
    !> Options of the model: one entry per mode in each list.
@@ -34,7 +34,7 @@ module thud_measured_modes
       type(list_type) :: damping_ratio
       !> Effective masses, kg.
       type(list_type) :: effective_mass
-      !> Whether the masses may differ from that of the ball in sum.
+      !> Whether the sum of the masses may differ from the mass of the ball.
       logical :: allow_mass_mismatch = .false.
    contains
       procedure, pass(options) :: get_fields
@@ -134,7 +134,7 @@ contains
             //fixed(1.0e3_wp*time, 1)//' ms of contact; allowed: longer than the contact')
          return
       end if
-      ! Dashpots make the force jump at first touch: the first sample is the mean of both sides of the jump.
+      ! Dashpots make the force jump at first touch: the first sample is the mean of both sides.
       history%component(1, 1) = history%component(1, 1)/2
       history%elastic_force = history%component(:, 1)
       history%floor_force = history%component(:, 1)

@@ -49,7 +49,7 @@ contains
       call self%get_components(state, history%component(i, :), history%elastic_force(i))
       history%peak_elastic_force = max(history%peak_elastic_force, history%elastic_force(i))
       history%peak_force = max(history%peak_force, history%peak_elastic_force, sum(history%component(i, :)))
-      ! A component may jump at first touch: the first sample is the mean of both sides of the jump.
+      ! A component may jump at first touch: the first sample is the mean of both sides.
       if (i == 1) history%component(i, :) = history%component(i, :)/2
       history%floor_force(i) = sum(history%component(i, :))
    end subroutine record_sample

@@ -23,8 +23,7 @@ module thud_two_mass
    public :: two_mass_type
 
    !> Indices in the state: displacement (m) and velocity (m/s) of belt and rim towards the floor, relative to a mobile
-   !> floor; impulse on the floor (N s); energy lost (J); gap between belt and floor (m), kept because touch is located as a
-   !> component that falls to zero.
+   !> floor; impulse on the floor (N s); energy lost (J); gap between belt and floor (m), which falls to zero at touch.
    integer, parameter :: at_belt = 1, at_belt_velocity = 2, at_rim = 3, at_rim_velocity = 4, at_impulse = 5, at_loss = 6, &
       at_gap = 7, n_state = 7
 
@@ -162,7 +161,7 @@ contains
          sidewall_damping=2*options%belt_damping*options%belt_mass*omega)
    end function new_tyre
 
-   !> Chooses the number of steps in each sampling interval from the fastest rate of motion.
+   !> Chooses the steps per sampling interval from the fastest rate of the motion.
    subroutine choose_steps(tyre, impact_velocity, angle, sampling, n_step, error)
       type(tyre_type), intent(in) :: tyre
       !> Velocity at first touch, m/s.
@@ -170,7 +169,7 @@ contains
       !> Angle by which the fastest motion advances in a step, rad.
       real(wp), intent(in) :: angle
       type(sampling_type), intent(in) :: sampling
-      !> Number of steps in each sampling interval.
+      !> Steps per sampling interval.
       integer, intent(out) :: n_step
       !> Set if the record would take too many steps.
       type(error_type), allocatable, intent(out) :: error

@@ -62,7 +62,7 @@ contains
       pressure = cavity%pressure*(cavity%volume/volume)**cavity%exponent - cavity%ambient
    end function get_gas_pressure
 
-   !> Work that brings the gas from its initial volume to another, including that on the air around the ball.
+   !> Work that changes the volume of the gas, including that on the air around the ball.
    pure function get_gas_energy(cavity, volume) result(energy)
       type(cavity_type), intent(in) :: cavity
       !> Volume, above 0, m3.

@@ -113,8 +113,7 @@ contains
       modulus = 2.08e6_wp
    end function get_paper_modulus
 
-   !> Limits of what the mesh resolves: beyond them octave levels are off by more than about 0.5 dB
-   !> (docs/finite_elements.md).
+   !> Limits of the mesh: beyond them octave levels are off by more than about 0.5 dB (docs/finite_elements.md).
    function get_validity_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
@@ -274,7 +273,7 @@ contains
       if (.not. allocated(error)) call continue_flight(run, latest, start, history)
    end subroutine march
 
-   !> Chooses the number of steps in the next sampling intervals; returns an error if the run would take too long.
+   !> Chooses the steps of the next sampling intervals; returns an error if the run would take too long.
    subroutine check_step(run, time, options, sampling, n_sample, n_step, error)
       type(impact_run_type), intent(inout) :: run
       !> Time since the record began, s.
@@ -282,7 +281,7 @@ contains
       !> Fraction of the stability limit to use.
       class(finite_element_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> Samples of the record.
+      !> Number of samples of the record.
       integer, intent(in) :: n_sample
       !> Number of steps in each interval.
       integer, intent(inout) :: n_step

@@ -42,8 +42,8 @@ module thud_free_modes
       real(wp), allocatable :: frequency(:)
       !> Order of the Legendre polynomial that dominates at the outer surface: [n_mode].
       integer, allocatable :: harmonic(:)
-      !> Participation of the lowest point, which states how strongly a contact there drives the mode: mass of the ball times
-      !> squared vertical amplitude at unit modal mass, 1 for the rigid motion: [n_mode].
+      !> Mass of the ball times squared vertical amplitude of the lowest point at unit modal mass, 1 for the rigid motion,
+      !> which states how strongly a contact there drives the mode: [n_mode].
       real(wp), allocatable :: participation(:)
       !> Displacements in r and z, of maximum length 1, the lowest point moving upwards: [2, 0:n_line, 0:n_ring, n_mode].
       real(wp), allocatable :: shape(:, :, :, :)

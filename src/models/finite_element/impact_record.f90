@@ -129,7 +129,7 @@ contains
       end if
       history%component(:, 1) = history%floor_force
       history%elastic_force = history%floor_force
-      ! Nodes that touch one after another cause spikes, which are higher if the steps are shorter.
+      ! Nodes that touch one by one cause spikes, the higher the shorter the steps.
       call get_low_pass(history%floor_force, history%sample_rate, recorded_band, recorded)
       history%peak_force = maxval(recorded)
       history%peak_elastic_force = history%peak_force

@@ -93,13 +93,13 @@ contains
       end associate
    end function new_impact_run
 
-   !> Chooses the number of steps in a sampling interval that keeps the run stable; it never decreases during a run.
+   !> Chooses a stable number of steps per sampling interval, which never decreases during a run.
    subroutine choose_step(run, interval, safety, min_steps, n_step)
       type(impact_run_type), intent(inout) :: run
       !> Sampling interval, s; fraction of the stability limit to use.
       real(wp), intent(in) :: interval, safety
       integer, intent(in) :: min_steps
-      !> The number so far, 0 at the start; gets the new number, above `max_steps` if too many would be needed.
+      !> The number so far, 0 at the start; gets the new one, above `max_steps` if too many are needed.
       integer, intent(inout) :: n_step
       real(wp) :: stability_ratio, ratio, wave, width
       integer :: n_iteration, iteration
@@ -124,9 +124,9 @@ contains
          ! If there are no forces, the next step reports the reason.
          if (stability_ratio >= huge(stability_ratio)) exit
          ratio = stability_ratio/(safety*max_stability_ratio)
-         ! The ratio grows with the first to second power of the step: of the two, the higher number of steps is taken.
+         ! The ratio grows with the first to second power of the step: the higher number of steps is taken.
          if (ratio <= 1.0_wp) then
-            ! Later the number never decreases, since the estimated shape lags behind the deforming ball.
+            ! Later the number never decreases, since the estimated mode lags behind the deforming ball.
             if (starts) n_step = max(min_steps, 1, ceiling(n_step*sqrt(max(ratio, 0.0_wp))))
             exit
          end if
@@ -188,8 +188,8 @@ contains
          -minval(surface(:, 2)))
    end subroutine update_velocity
 
-   !> Adds the work that impulses of the floor take from nodes: the half with the velocities before now, the half with the
-   !> velocities after in the next step; in the first step, both in the next.
+   !> Adds the work that impulses of the floor take from nodes. The half with the velocities before counts now, the half with
+   !> the velocities after in the next step; in the first step, both count in the next.
    pure subroutine add_lost_work(impulse, before, after, starts, lost, waiting)
       !> Impulses, N s; velocities before and after, m/s: [0:n_polar].
       real(wp), intent(in) :: impulse(0:), before(0:), after(0:)

@@ -31,7 +31,7 @@ module thud_mode_matrices
    type :: mode_matrices_type
       !> Number of unknowns and of diagonals below the main one.
       integer :: n = 0, n_band = 0
-      !> Poisson's ratio is 1/2.
+      !> Whether Poisson's ratio is 1/2.
       logical :: incompressible = .false.
       !> Bulk modulus, real or augmented, Pa.
       real(wp) :: bulk_modulus = 0.0_wp

@@ -2,8 +2,8 @@
 !>
 !> The force of a step is that at its instant, constant from half a step before to half a step after; so the displacement of
 !> the floor is known at the midpoints between instants, as velocities are. Contact forces depend on the displacement at the
-!> instant; nodes stop at the displacement of the next instant, if the force went on. Both displacements depend on the force.
-!> Since the force does not increase when the floor yields, there is one solution.
+!> instant, stopped nodes on that at the next instant under the same force, and both displacements on the force. Since the
+!> force does not increase when the floor yields, there is one solution.
 module thud_moving_floor
    use thud_floor_contact, only: floor_contact_type, get_contact_forces
    use thud_kinds, only: wp
@@ -33,7 +33,7 @@ module thud_moving_floor
       !> Displacement at the instant, and at the next, where nodes stop, m.
       real(wp) :: displacement = 0.0_wp, stop = 0.0_wp
       !> Twice the travel from the midpoint before to the instant, and from the instant to the midpoint after, divided by the
-      !> time between the midpoints, m/s; velocity at the instant except that of the direct mobility, m/s.
+      !> time between the midpoints, m/s; velocity at the instant without that of the direct mobility, m/s.
       real(wp) :: velocity_before = 0.0_wp, velocity_after = 0.0_wp, velocity = 0.0_wp
       !> Energy given to the floor up to the instant, and up to the midpoint after it, J.
       real(wp) :: work = 0.0_wp, work_after = 0.0_wp
@@ -51,7 +51,7 @@ contains
 
    !> A floor at rest.
    pure function new_moving_floor(receiver) result(floor)
-      !> What the ball drops on (default: a rigid floor).
+      !> The floor under the ball (default: rigid).
       type(receiver_type), intent(in), optional :: receiver
       type(moving_floor_type) :: floor
 

@@ -2,7 +2,7 @@
 !>
 !> With velocities half a step behind, the step dt is stable while dt**2 K + 2 dt C <= 4 M for the tangents K and C of
 !> elasticity and viscosity. The stability ratio is the maximum eigenvalue of the left side relative to M; it may reach 4.
-!> Power iteration finds it, with one evaluation of the forces per iteration. The estimated shape of the fastest mode is kept
+!> Power iteration finds it, with one evaluation of the forces per iteration. The estimate of the fastest mode is kept
 !> between calls, so that a few iterations follow the deforming ball.
 module thud_stable_step
    use thud_elastic_body, only: body_state_type, elastic_body_type, get_internal_forces, no_failure
@@ -22,10 +22,10 @@ module thud_stable_step
 
 contains
 
-   !> Start of the power iteration: a shape that contains every mode, the fastest ones most.
+   !> First estimate of the fastest mode: contains every mode, the fastest ones most.
    pure function get_first_direction(body) result(direction)
       type(elastic_body_type), intent(in) :: body
-      !> The shape: [0:n_polar, 0:n_radial, 2].
+      !> The estimate: [0:n_polar, 0:n_radial, 2].
       real(wp), allocatable :: direction(:, :, :)
       integer :: i, j, k
 
@@ -53,7 +53,7 @@ contains
       !> Length of the step, s.
       real(wp), intent(in) :: interval
       integer, intent(in) :: n_iteration
-      !> Estimated shape of the fastest mode, improved by each call: the same shape as the positions.
+      !> Estimate of the fastest mode, improved by each call: the same shape.
       real(wp), intent(inout), contiguous :: direction(0:, 0:, :)
       !> The ratio. The part of the body is a lower bound, close after tens of iterations; the part of the floor is an upper
       !> bound. Huge if there are no forces, or after an interrupt.
@@ -72,7 +72,7 @@ contains
       if (state%failure /= no_failure) return
       do iteration = 1, n_iteration
          direction = direction/sqrt(sum(mass*direction**2))
-         ! Amplitude of the shape.
+         ! Amplitude of the trial displacements.
          step = trial*thickness/maxval(abs(direction))
          call get_internal_forces(body, position + step*direction, velocity + 2*step/interval*direction, interval, .false., &
             there, state)

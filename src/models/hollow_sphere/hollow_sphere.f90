@@ -26,7 +26,7 @@ module thud_hollow_sphere
 
    !> Options of the model.
    type, extends(source_model_type) :: hollow_sphere_type
-      !> Treatment of the momentum of wall that enters or leaves the flat cap.
+      !> Treatment of the momentum of wall that enters or leaves the flat cap, one of `flux_choices`.
       character(len=name_length) :: momentum_flux = 'momentum_balance'
    contains
       procedure, pass(options) :: get_fields
@@ -246,7 +246,7 @@ contains
       weight = merge(shell%compression_weight, shell%restitution_weight, shell%compressing)
    end function get_flux_weight
 
-   !> Whether a state lies so far outside the domain that too long a step, and not the shell, caused it.
+   !> Whether a state lies so far outside the domain that it results from a step that is too long.
    pure function is_diverged(shell, state) result(diverged)
       class(shell_type), intent(in) :: shell
       !> State: [4].

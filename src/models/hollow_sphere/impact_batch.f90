@@ -125,7 +125,7 @@ contains
    subroutine locate(impacts, compressing, ends, length)
       !> The impacts, at the beginning of the step.
       type(impact_batch_type), intent(inout) :: impacts
-      !> Whether the phase is compression, which ends at zero velocity, not at zero deflection.
+      !> Whether the phase is compression, which ends at zero velocity.
       logical, intent(in) :: compressing
       !> Whether the phase of the ball ends in this step: [batch_size].
       logical, intent(in) :: ends(batch_size)

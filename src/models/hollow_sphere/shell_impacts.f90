@@ -56,14 +56,14 @@ contains
       impacts%contact = last + length
       n_written = last_step/substeps + 1
       call get_peaks(force(:, :n_written), impacts%peak_elastic_force, impacts%peak_force)
-      ! A component may jump at first touch: the first sample is the mean of both sides of the jump.
+      ! A component may jump at first touch: the first sample is the mean of both sides.
       force(:, 1) = force(:, 1)/2
    end subroutine solve_impacts
 
    !> Integrates in time until every ball has reached the end of the phase or of the record.
    subroutine march(impacts, compressing, start, last, n_step, substeps, n_sample, force, last_step)
       type(impact_batch_type), intent(inout) :: impacts
-      !> Whether the phase is compression, which ends at zero velocity, not at zero deflection.
+      !> Whether the phase is compression, which ends at zero velocity.
       logical, intent(in) :: compressing
       !> First step of each ball: [batch_size].
       real(wp), intent(in) :: start(batch_size)
@@ -111,8 +111,8 @@ contains
       where (.not. start < never) last = never
    end subroutine march
 
-   !> Expands a new series for each ball that begins, that went out of range or, checked at fixed times, whose series will
-   !> not last: nothing that depends on other balls.
+   !> Expands a new series for balls that begin or went out of range and, at fixed steps, for balls whose series will not
+   !> last: no condition depends on other balls.
    pure subroutine renew_series(impacts, start, n)
       type(impact_batch_type), intent(inout) :: impacts
       real(wp), intent(in) :: start(batch_size)

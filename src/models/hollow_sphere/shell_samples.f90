@@ -56,7 +56,7 @@ module thud_shell_samples
    end type sample_outcome_type
 
    !> Residual of the balances of impulse and energy above which the single solver decides: the sums of the batch have up to
-   !> about twenty times the error of its sums.
+   !> about twenty times the error.
    real(wp), parameter :: max_batch_residual = 0.1_wp*max_residual
 
 contains

@@ -76,7 +76,7 @@ contains
       !> Harmonics and rings.
       class(modal_ball_options_type), intent(in) :: options
       type(surface_rings_type), intent(in) :: rings
-      !> Its response is the gap due to unit force, m/N.
+      !> The contact; its response is the gap due to unit force, m/N.
       type(ring_contact_type), intent(out) :: contact
       !> Set if the rings cannot be distinguished.
       type(error_type), allocatable, intent(out) :: error

@@ -3,7 +3,7 @@
 !>
 !> Sticking rings have a second gap, to the position of first touch, and a second impulse of any sign. The second impulse
 !> closes the second gap of the rings that touched in the previous step: this set does not depend on the unknowns, so the
-!> solution is unique, and the error of holding a ring too long or too late is proportional to the step.
+!> solution is unique, and the error of a ring that sticks too long or too late is proportional to the step.
 module thud_ring_contact
    use thud_error, only: error_type, numerical_error
    use thud_kinds, only: wp

@@ -1,10 +1,10 @@
 !> Axisymmetric modes of a free hollow sphere without twist: displacements U(r) P_n(cos t) along
 !> the radius and V(r) dP_n/dt along the meridian, t the angle from the pole.
 !>
-!> Galerkin's method with Legendre polynomials in r; all integrals over the sphere are exact. With
-!> W = r div u the meridional displacement is V = (r U' + 2 U - W)/(n (n + 1)): the unknowns are U
-!> and W, incompressible material (nu = 1/2) is W = 0, and nearly incompressible material does not
-!> lock. Strain energy and kinetic energy become sums of Gram matrices that do not depend on n.
+!> Galerkin's method with Legendre polynomials in r; all integrals over the sphere are exact. With W = r div u the meridional
+!> displacement is V = (r U' + 2 U - W)/(n (n + 1)): the unknowns are U and W, W = 0 is incompressible material (nu = 1/2),
+!> and nearly incompressible material does not lock. Strain energy and kinetic energy become sums of Gram matrices that do
+!> not depend on n.
 module thud_sphere_modes
    use thud_ball, only: ball_type, get_density
    use thud_constants, only: pi
@@ -16,8 +16,8 @@ module thud_sphere_modes
 
    public :: basis_type, family_type, get_family, get_static_family, new_basis
 
-   !> Distance of Poisson's ratio from 1/2 below which the material counts as incompressible: closer to 1/2 rounding of the
-   !> compressible energy would swamp the other energies, and modes differ by as little.
+   !> Distance of Poisson's ratio from 1/2 below which the material counts as incompressible: at less distance the
+   !> compressible energy would drown the others in rounding, and modes differ by as little.
    real(wp), parameter :: incompressible_distance = 1.0e-7_wp
 
    !> Gram matrices of the basis, the same for every harmonic.
@@ -168,7 +168,7 @@ contains
    end subroutine set_gram
 
    !> Degree of the polynomials that resolves a harmonic. Its modes fall off like r^n, which needs a degree proportional to
-   !> the root of the exponent; the tests compare this degree with higher ones.
+   !> sqrt(n ln(outer/inner radius)); the tests compare this degree with higher ones.
    pure function get_degree(basis, harmonic) result(degree)
       !> The basis; its radii are set.
       type(basis_type), intent(in) :: basis

@@ -63,12 +63,12 @@ contains
                area_fraction = weight(k)*merge(1 + node(k), 1 - node(k), j == 1)*sin(angle)
                area(i + j) = area(i + j) + area_fraction
                rings%height(i + j) = rings%height(i + j) + area_fraction*cos(angle)
-               ! P_n cos t and -dP_n/dt sin t.
+               ! Downwards: P_n cos t for U and -dP_n/dt sin t for V.
                row = rings%n_dof*(i + j - 1) + 1
                rings%shape_at_ring(row, 1, :) = rings%shape_at_ring(row, 1, :) + area_fraction*cos(angle)*value
                rings%shape_at_ring(row, 2, :) = rings%shape_at_ring(row, 2, :) + area_fraction*sin(angle)**2*first
                if (.not. sticks) cycle
-               ! -P_n sin t and -dP_n/dt cos t.
+               ! Inwards: -P_n sin t for U and -dP_n/dt cos t for V.
                rings%shape_at_ring(row + 1, 1, :) = rings%shape_at_ring(row + 1, 1, :) - area_fraction*sin(angle)*value
                rings%shape_at_ring(row + 1, 2, :) = rings%shape_at_ring(row + 1, 2, :) + &
                   area_fraction*sin(angle)*cos(angle)*first
