@@ -92,12 +92,13 @@ contains
          real_field('belt_mass', options%belt_mass, 'kg', 'mass of belt and tread, less than the mass of the source', &
          '(0, 1000000)'), &
          real_field('inflation_pressure', options%inflation_pressure, 'Pa', 'inflation pressure', '[0, 1e8]'), &
-         real_field('contact_width', options%contact_width, 'm', 'contact area over deflection of the patch', '[0, 100]'), &
+         real_field('contact_width', options%contact_width, 'm', 'contact area divided by deflection of the patch', &
+         '[0, 100]'), &
          real_field('carcass_stiffness', options%carcass_stiffness, 'N/m', &
-         'force of the carcass over its deflection at 20 mm', '[0, 1e12]'), &
+         'force of the carcass divided by its deflection, at 20 mm', '[0, 1e12]'), &
          real_field('carcass_exponent', options%carcass_exponent, '', 'exponent of the deflection of the carcass', &
          '[1.5, 5]'), real_field('contact_damping', options%contact_damping, 's/m', &
-         'damping of the contact over its elastic force and velocity', '[0, 100]'), &
+         'damping force of the contact divided by elastic force and velocity', '[0, 100]'), &
          real_field('belt_frequency', options%belt_frequency, 'Hz', &
          'natural frequency of the belt on the sidewall, the rim held', '(0, 1000000]'), &
          real_field('belt_damping', options%belt_damping, '', 'damping ratio of the same motion', '[0, 10]')]
