@@ -105,7 +105,7 @@ contains
       else if (state(1) <= 0.0_wp) then
          event = release
       else if (state(2) > 0.0_wp) then
-         ! The floor moves back towards the source.
+         ! The floor approaches again.
          event = turning_point
       end if
    end function get_event
@@ -116,7 +116,7 @@ contains
       !> The event.
       integer, intent(in) :: event
       type(coupled_state_type), intent(in) :: motion
-      !> The quantity, positive before the event, m or m/s.
+      !> Positive before the event, m or m/s.
       real(wp) :: distance
       real(wp) :: state(source%n_state)
 

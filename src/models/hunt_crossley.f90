@@ -162,7 +162,7 @@ contains
          if (abs(x) > 0.03_wp) then
             value = x - log(1 + x)
          else
-            ! The remainder after ten terms of the series is of order 0.03**12.
+            ! Ten terms of the series leave an error of 0.03**12.
             value = sum([((-x)**k/k, k=2, 11)])
          end if
       end function excess

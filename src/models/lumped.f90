@@ -51,7 +51,7 @@ contains
          call solve_coupled(source, drop, sampling, steps, receiver, history, state, error)
       end if
       if (allocated(error)) return
-      ! Contact time and advice on the sampling rate mean nothing if the balances fail: these are checked first.
+      ! Contact time and advice on the sampling rate mean nothing if a balance fails.
       call finish(source, state, history, error)
       if (.not. allocated(error)) call check_contact_samples(sampling, history%contact_time, error)
       if (.not. allocated(error)) call check_samples(history, error)

@@ -22,8 +22,9 @@ module thud_two_mass
 
    public :: two_mass_type
 
-   !> Indices in the state: displacement (m) and velocity (m/s) of belt and rim towards the floor, relative to a mobile
-   !> floor; impulse on the floor (N s); energy lost (J); gap between belt and floor (m), which falls to zero at touch.
+   !> Indices in the state: displacement since first touch (m) and velocity (m/s) of belt and rim towards the floor, relative
+   !> to a mobile one; impulse on the floor (N s); energy lost (J); gap between belt and floor (m), which falls to zero at
+   !> touch.
    integer, parameter :: at_belt = 1, at_belt_velocity = 2, at_rim = 3, at_rim_velocity = 4, at_impulse = 5, at_loss = 6, &
       at_gap = 7, n_state = 7
 
@@ -65,7 +66,7 @@ module thud_two_mass
    type, extends(contact_source_type) :: tyre_type
       !> Masses of belt and rim, kg.
       real(wp) :: belt_mass, rim_mass
-      !> Contact: power law of the carcass, and stiffness p w of the inflated patch.
+      !> Contact: the inflated patch, of stiffness p w, and the carcass.
       type(contact_law_type) :: law
       !> Stiffness, N/m, and damping, N s/m, of the sidewall.
       real(wp) :: sidewall_stiffness, sidewall_damping
@@ -194,7 +195,7 @@ contains
       real(wp) :: energy, deflection, power
 
       associate (n => tyre%law%exponent, factor => tyre%law%factor, k => tyre%law%stiffness)
-         ! The deflection is largest if the patch stores all of the energy.
+         ! Largest deflection: the patch stores all of the energy.
          energy = tyre%mass/2*impact_velocity**2
          deflection = huge(1.0_wp)
          if (k > 0.0_wp) deflection = sqrt(2*energy/k)

@@ -10,9 +10,9 @@
 !> pressure p = C sqrt(s) at the distance s inside and the gap 4/3 C/E* s**(3/2) at the distance s outside (Johnson 1985,
 !> Contact Mechanics, section 5.1), with C = 2 E* sqrt(2 a)/(pi R) by Hertz. With the edge at the distance e from the inner
 !> node, a linear shape function of width h gives the outer node the force per area 4/15 C e**(5/2)/h**2 at the gap 4/3 C/E*
-!> (h - e)**(3/2). A parabola replaces this relation, with a in the middle of the element: it has the same force at the
-!> floor, 4/15 C sqrt(h), and the same work, 0.1840 times the product of this force and the gap at e = 0. Force and gap
-!> vanish as the mesh is refined.
+!> (h - e)**(3/2). A parabola replaces this relation, with a in the middle of the element: of the same force at the floor,
+!> 4/15 C sqrt(h), and the same work, 0.1840 times this force times the gap at e = 0. Force and gap vanish as the mesh is
+!> refined.
 module thud_floor_contact
    use thud_ball, only: ball_type
    use thud_constants, only: pi
@@ -37,7 +37,7 @@ module thud_floor_contact
 
    !> The contact; arrays over the nodes of the outer surface are [0:n_polar].
    type, extends(contact_options_type) :: floor_contact_type
-      !> Force on a node at the edge of the contact when the node reaches the floor, N.
+      !> Force on a node at the edge when it reaches the floor, N.
       real(wp), allocatable :: edge_force(:)
       !> Height at which that force begins, m.
       real(wp), allocatable :: edge_height(:)
@@ -76,7 +76,7 @@ contains
       modulus = ball%youngs_modulus/(1 - ball%poisson_ratio**2)
       associate (last => mesh%n_radial)
          area = get_nodal_areas(mesh%r(:, last), mesh%z(:, last))
-         ! The relation holds for a straight edge, far from the axis: not in the first element.
+         ! Valid for a straight edge far from the axis: not in the first element.
          do j = 2, mesh%n_polar - 1
             width = hypot(mesh%r(j, last) - mesh%r(j - 1, last), mesh%z(j, last) - mesh%z(j - 1, last))
             strength = 2*modulus*sqrt(mesh%r(j, last) + mesh%r(j - 1, last))/(pi*ball%outer_radius)

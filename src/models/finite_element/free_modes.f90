@@ -64,7 +64,7 @@ contains
          in_group('mesh', get_mesh_fields(options%mesh))]
    end function get_modes_fields
 
-   !> Returns an error if there are more modes than the mesh resolves.
+   !> Returns an error if the mesh does not resolve as many modes.
    subroutine check_modes(options, error)
       !> Number of modes, and the mesh.
       type(modes_options_type), intent(in) :: options
@@ -163,7 +163,7 @@ contains
       call check_eigenpairs(failed, info, error)
    end subroutine find_eigenpairs
 
-   !> Returns an error if an interrupt, the operator or ARPACK ended the iteration.
+   !> Returns an error if interrupt, operator or ARPACK ended the iteration.
    subroutine check_eigenpairs(failed, info, error)
       !> Whether the volume could not be kept.
       logical, intent(in) :: failed

@@ -37,7 +37,7 @@ module thud_impact_run
       real(wp), allocatable :: velocity(:, :, :)
       !> Masses of the nodes, kg.
       real(wp), allocatable :: mass(:, :, :)
-      !> Estimated shape of the fastest mode, over all degrees of freedom.
+      !> Estimated shape of the fastest mode, over all nodes.
       real(wp), allocatable :: direction(:, :, :)
       !> Forces of the floor on the nodes of the outer surface in the latest step, N: [0:n_polar, 2].
       real(wp), allocatable :: floor_force(:, :)
@@ -157,7 +157,7 @@ contains
          call find_floor(run%floor, run%contact, run%mass(:, last, 2), surface, &
             before(:, last, 2) + span*(force(:, last, 2)/run%mass(:, last, 2) - run%gravity), sum(run%floor_force(:, 2)))
       end if
-      ! Displacements of the floor are downwards: `displacement` at this instant, `stop` at the next.
+      ! Floor displacements are downwards; `stop` is that of the next instant.
       surface(:, 2) = surface(:, 2) + run%floor%displacement
       call get_contact_forces(run%contact, surface, run%floor_force, run%contact_energy)
       force(:, last, :) = force(:, last, :) + run%floor_force
@@ -183,13 +183,13 @@ contains
       if (starts) run%kinetic = sum(run%mass*before**2)/2
       run%potential = run%gravity*sum(run%mass(:, :, 2)*run%position(:, :, 2))
       run%dissipated = run%dissipated + span*run%state%dissipation
-      ! Stopped nodes lie exactly on a rigid floor, but a mobile floor moves on with each new force.
+      ! Stopped nodes lie exactly on a rigid floor; a mobile floor moves on with each force.
       if (run%floor%moves .or. run%contact%layer_stiffness > 0.0_wp) run%penetration = max(run%penetration, &
          -minval(surface(:, 2)))
    end subroutine update_velocity
 
-   !> Adds the work that impulses of the floor take from nodes. The half with the velocities before counts now, the half with
-   !> the velocities after in the next step; in the first step, both count in the next.
+   !> Adds the work that impulses of the floor take from nodes: half by the velocities before, half by the velocities after.
+   !> The second half is added in the next step; in the first step, both halves are.
    pure subroutine add_lost_work(impulse, before, after, starts, lost, waiting)
       !> Impulses, N s; velocities before and after, m/s: [0:n_polar].
       real(wp), intent(in) :: impulse(0:), before(0:), after(0:)

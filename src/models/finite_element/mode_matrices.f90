@@ -57,7 +57,7 @@ contains
       !> Mesh of order 2.
       type(mesh_type), intent(in) :: mesh
       type(mode_matrices_type), intent(out) :: matrices
-      !> Set if the matrices need too much memory or are not positive definite.
+      !> Set if the matrices are too large or not positive definite.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: shear_modulus, density
       integer :: info
@@ -70,7 +70,7 @@ contains
       else
          matrices%bulk_modulus = ball%youngs_modulus/(3*(1 - 2*ball%poisson_ratio))
       end if
-      ! Below zero, the eigenvalue of the rigid motion, and of much smaller size than the first elastic one.
+      ! Below zero, the rigid eigenvalue, and of much smaller size than the first elastic one.
       matrices%shift = -0.1_wp*ball%youngs_modulus/density/ball%outer_radius**2
       call number_unknowns(mesh, matrices)
       call require_memory(16.0_wp*matrices%n*(matrices%n_band + 1.0_wp), '&mesh: the matrices of so many elements', &

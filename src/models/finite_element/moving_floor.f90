@@ -148,7 +148,7 @@ contains
       end do
    end subroutine find_floor
 
-   !> Reaction of the contact at the displacements that a trial force gives the floor.
+   !> Contact reaction at the floor displacements of a trial force.
    pure subroutine get_contact_reaction(floor, contact, mass, position, velocity, reaction, slope)
       type(moving_floor_type), intent(in) :: floor
       type(floor_contact_type), intent(in) :: contact

@@ -148,7 +148,7 @@ contains
    !> Whether the cavity has closed somewhere between the plates.
    pure function has_met(pressed) result(met)
       type(pressed_ball_type), intent(in) :: pressed
-      !> Whether a node of the lower half of the cavity has reached half the height between the plates.
+      !> Whether a node of its lower half has reached mid-height.
       logical :: met
 
       associate (middle => (pressed%diameter - pressed%deflection)/2)
@@ -314,7 +314,7 @@ contains
       integer, intent(in) :: width
       !> The matrix as LAPACK stores bands: [3 width + 1, n].
       real(wp), intent(out) :: band(:, :)
-      !> Whether the forces at a displaced position could not be computed.
+      !> Whether a trial position has no forces.
       logical, intent(out) :: failed
       real(wp), dimension(0:ubound(fixed, 1), 0:ubound(fixed, 2), 2) :: here, there, moved
       type(pressed_ball_type) :: held
@@ -349,7 +349,7 @@ contains
 
       !> Enters the derivatives with respect to one coordinate.
       subroutine add_column(line, ring, component)
-         !> Line, ring and component of this coordinate.
+         !> Its line, ring and component.
          integer, intent(in) :: line, ring, component
          integer :: a, b, c, row, column
 

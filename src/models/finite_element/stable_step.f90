@@ -84,7 +84,7 @@ contains
          stability_ratio = sum(direction*product)
          direction = product/mass
       end do
-      ! The maximum over all nodes, since any node may touch the floor at any time.
+      ! The maximum over the nodes: any of them may touch the floor at any time.
       stability_ratio = stability_ratio + interval**2*maxval(get_contact_stiffness(contact, position(:, last, &
          1))/body%mass(:, last))
    end subroutine find_stability_ratio

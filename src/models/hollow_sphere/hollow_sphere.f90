@@ -208,7 +208,7 @@ contains
       real(wp) :: elastic_force, flux, moving_mass, weight
 
       associate (deflection => state(at_deflection), velocity => state(at_velocity))
-         ! Below the closing deflection the volume of the gas and the moving mass of the ball are positive.
+         ! Below the closing deflection gas volume and moving mass are positive.
          valid = time >= 0.0_wp .and. deflection < self%closing_deflection
          rate = 0.0_wp
          if (.not. valid) return

@@ -150,7 +150,7 @@ contains
          length = right - right_value*(right - left)/(right_value - left_value)
          where (mod(iteration, 8) == 0 .or. .not. (length > left .and. length < right)) length = (left + right)/2
          call try_length(impacts, compressing, ends, length, value)
-         ! The value at an end that is kept twice is halved (Illinois), since regula falsi would converge slowly.
+         ! Halve the value at an end kept twice (Illinois): regula falsi would converge slowly.
          where (open .and. value > 0.0_wp)
             left = length
             left_value = value
@@ -233,7 +233,7 @@ contains
    pure subroutine add_end(impacts, active, value_factor, rate_factor)
       !> The impacts, within reach of their series.
       type(impact_batch_type), intent(inout) :: impacts
-      !> Whether the end is added for the ball: [batch_size].
+      !> Whether to add for the ball: [batch_size].
       logical, intent(in) :: active(batch_size)
       !> Factor of the values at the end: [batch_size].
       real(wp), intent(in) :: value_factor(batch_size)

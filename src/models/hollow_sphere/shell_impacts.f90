@@ -1,9 +1,9 @@
 !> Impacts of a batch of balls: the time integration of `thud_lumped`, with the same steps and the same change of phase at
 !> the turning point and at release, located within the step.
 !>
-!> All balls take their steps together, so that sample i of all forces is written at the same time. A ball that has reached
-!> its turning point waits until all others have reached theirs or collapsed; then the turning points are located together,
-!> and each ball continues at its own time.
+!> All balls take their steps together, so that sample i of all forces is written together. A ball that has reached its
+!> turning point waits until all others have reached theirs or collapsed; then the turning points are located together, and
+!> each ball continues at its own time.
 module thud_shell_impacts
    use thud_impact_batch, only: add_end, advance, finish_step, get_watched, impact_batch_type, is_finite, locate
    use thud_interrupt, only: is_interrupted

@@ -22,14 +22,13 @@ module thud_shell_series
    !> Highest power of the series.
    integer, parameter :: degree = 7
 
-   !> Maximum distance at which a series is used, divided by the distance to the nearest root of x.
+   !> Maximum distance at which a series is used, as a fraction of that to the nearest root of x.
    real(wp), parameter :: near = 1.0_wp/64
 
    !> Fraction of the reach that is used as long as steps are short.
    real(wp), parameter :: inner = 0.6_wp
 
-   !> Number of steps between two checks of the series; at the default step a ball dropped from 2.7 m stays in reach of its
-   !> series for as many steps.
+   !> Steps between two checks of the series; at the default step a ball from 2.7 m stays in reach of its series for as many.
    integer, parameter :: series_steps = 16
 
    !> The series.

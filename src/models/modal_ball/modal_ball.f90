@@ -204,7 +204,7 @@ contains
       real(wp), intent(in) :: interval
       !> Gets frequencies, harmonics and shapes of the modes.
       type(mode_step_type), intent(inout) :: step
-      !> Sum to which the displacement of each ring due to unit impulse on each is added, m/(N s): [n_gap, n_gap].
+      !> Displacement of each ring due to unit impulse on each, m/(N s), to be added to: [n_gap, n_gap].
       real(wp), intent(inout) :: response(:, :)
       !> Set if the modes cannot be computed.
       type(error_type), allocatable, intent(out) :: error

@@ -46,7 +46,7 @@ contains
       n = size(rates, 1)
       allocate (step%factor(size(step%omega), n, n))
       do i = 1, size(step%omega)
-         ! The rate is divided by the frequency, which makes the elements of similar size.
+         ! The rate divided by the frequency makes the elements similar.
          associate (omega => step%omega(i))
             rates = 0.0_wp
             rates(place_q, place_v) = omega

@@ -17,7 +17,7 @@ module thud_ring_contact
    !> Gap that counts as closed, m: rounding of heights.
    real(wp), parameter :: closed = 1.0e-12_wp
 
-   !> Maximum number of iterations of the search for the touching rings.
+   !> Maximum number of rounds in the search for the touching rings.
    integer, parameter :: max_rounds = 200
 
    !> Rings, ordered from the lowest point outwards.
