@@ -24,8 +24,7 @@ module thud_receiver_stages
       real(wp) :: velocity(n_stage, n_stage), displacement(n_stage, n_stage)
       !> The same due to unit x_k at the beginning, m/(N s2) and m/(N s): [n_pole, n_stage].
       complex(wp), allocatable :: free_velocity(:, :), free_displacement(:, :)
-      !> The x_k at the end due to unit x_k at the beginning: [n_pole]; due to unit force at each stage, s: [n_pole,
-      !> n_stage].
+      !> The x_k at the end per unit x_k at the beginning: [n_pole]; per unit force at each stage, s: [n_pole, n_stage].
       complex(wp), allocatable :: decay(:), gain(:, :)
    end type receiver_stages_type
 

@@ -1,5 +1,5 @@
-!> Contact law: a linear and a power-law spring in parallel, damped in proportion to their force (Hunt and Crossley 1975), F
-!> = (k d + c d^n)(1 + a d'), never tensile.
+!> Contact law: a linear and a power-law spring in parallel, damped in proportion to their force (Hunt and Crossley 1975),
+!> F = (k d + c d^n)(1 + a d'), never tensile.
 module thud_contact_law
    use thud_kinds, only: wp
    implicit none (type, external)

@@ -23,8 +23,8 @@ module thud_element_row
 
    !> The elements between two rings of nodes, undeformed.
    type :: element_row_type
-      !> Derivatives of the shape functions with respect to r and z, and their values divided by r, 1/m: [n_element, 3, node
-      !> 1 to 4, point].
+      !> Derivatives of the shape functions with respect to r and z, and their values divided by r, 1/m:
+      !> [n_element, 3, node 1 to 4, point].
       real(wp), allocatable :: gradient(:, :, :, :)
       !> Volume of each Gauss point, m3: [n_element, point].
       real(wp), allocatable :: weight(:, :)

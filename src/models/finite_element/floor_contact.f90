@@ -9,10 +9,10 @@
 !> otherwise the force would jump from ring to ring. Near the edge, at the radius a, a smooth frictionless contact has the
 !> pressure p = C sqrt(s) at the distance s inside and the gap 4/3 C/E* s**(3/2) at the distance s outside (Johnson 1985,
 !> Contact Mechanics, section 5.1), with C = 2 E* sqrt(2 a)/(pi R) by Hertz. With the edge at the distance e from the inner
-!> node, a linear shape function of width h gives the outer node the force per area 4/15 C e**(5/2)/h**2 at the gap 4/3 C/E*
-!> (h - e)**(3/2). A parabola replaces this relation, with a in the middle of the element: of the same force at the floor,
-!> 4/15 C sqrt(h), and the same work, 0.1840 times this force times the gap at e = 0. Force and gap vanish as the mesh is
-!> refined.
+!> node, a linear shape function of width h gives the outer node the force per area 4/15 C e**(5/2)/h**2 at the
+!> gap 4/3 C/E* (h - e)**(3/2). A parabola replaces this relation, with a in the middle of the element: of the same force at
+!> the floor, 4/15 C sqrt(h), and the same work, 0.1840 times this force times the gap at e = 0. Force and gap vanish as the
+!> mesh is refined.
 module thud_floor_contact
    use thud_ball, only: ball_type
    use thud_constants, only: pi

@@ -1,7 +1,7 @@
 !> Impacts of a batch of balls: the time integration of `thud_lumped`, with the same steps and the same change of phase at
 !> the turning point and at release, located within the step.
 !>
-!> All balls take their steps together, so that sample i of all forces is written together. A ball that has reached its
+!> All balls take their steps in parallel, so that sample i of all forces is written together. A ball that has reached its
 !> turning point waits until all others have reached theirs or collapsed; then the turning points are located together, and
 !> each ball continues at its own time.
 module thud_shell_impacts

@@ -4,12 +4,12 @@
 !> expansion point of the ball, and only multiplications and additions are needed while the ball stays near this point.
 !>
 !> The terms: x is a cubic with a double root at 1 and a single root at -1/2, so A x**(-gamma) = sum p_n d**n follows from
-!> its three Taylor coefficients by J. C. P. Miller's recurrence; 1/(1 - y) is a geometric series. The remainder: let rho =
-!> min(1 - y, 1/2 + y) be the distance of the nearest root. The coefficients of x**(-gamma)/x_0**(-gamma) are at most those
-!> of (1 - d/rho)**(-3 gamma), hence for gamma <= 2 those of (1 - d/rho)**(-6), which are binomial(n + 5, 5)/rho**n. The
-!> first term left out, n = 8, is at most 1287 near**8, and the ratio of successive later terms is below 14/9 near: in total
-!> at most 4.7e-12 of the pressure. For gamma = 1.4 this bound is 7.6e-13, and 1.3e-14 in the inner part of the reach, where
-!> balls from 1 m stay at the default step.
+!> its three Taylor coefficients by J. C. P. Miller's recurrence; 1/(1 - y) is a geometric series. The remainder: the nearest
+!> root has the distance rho = min(1 - y, 1/2 + y). The coefficients of x**(-gamma)/x_0**(-gamma) are at most those of (1 -
+!> d/rho)**(-3 gamma), hence for gamma <= 2 those of (1 - d/rho)**(-6), which are binomial(n + 5, 5)/rho**n. The first term
+!> left out, n = 8, is at most 1287 near**8, and the ratio of successive later terms is below 14/9 near: in total at most
+!> 4.7e-12 of the pressure. For gamma = 1.4 this bound is 7.6e-13, and 1.3e-14 in the inner part of the reach, where balls
+!> from 1 m stay at the default step.
 module thud_shell_series
    use thud_kinds, only: wp
    use thud_power, only: not_a_number, vector_power

@@ -1,7 +1,7 @@
 !> Exact time steps of damped modes of unit modal mass.
 !>
-!> For a linear viscoelastic material, with a spring g, Maxwell branches g_k and a viscosity: q'' + 2 zeta omega q' +
-!> omega**2 [g q + sum of g_k (q - x_k)] = 0 and x_k' = (q - x_k)/tau_k.
+!> For a linear viscoelastic material, with a spring g, Maxwell branches g_k and a viscosity:
+!> q'' + 2 zeta omega q' + omega**2 [g q + sum of g_k (q - x_k)] = 0 and x_k' = (q - x_k)/tau_k.
 module thud_mode_step
    use thud_kinds, only: wp
    use thud_matrix_exponential, only: get_exponential
