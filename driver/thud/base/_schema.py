@@ -489,14 +489,15 @@ class TwoMass(Group):
     inflation_pressure : float
         Inflation pressure, Pa; 0 <= inflation_pressure <= 1e+08.
     contact_width : float
-        Contact area over deflection of the patch, m; 0 <= contact_width <= 100.
+        Contact area divided by deflection of the patch, m; 0 <= contact_width <= 100.
     carcass_stiffness : float
-        Force of the carcass over its deflection at 20 mm, N/m; 0 <= carcass_stiffness <= 1e+12.
+        Force of the carcass divided by its deflection, at 20 mm, N/m; 0 <= carcass_stiffness <=
+        1e+12.
     carcass_exponent : float
         Exponent of the deflection of the carcass; 1.5 <= carcass_exponent <= 5.
     contact_damping : float
-        Damping of the contact over its elastic force and velocity, s/m; 0 <= contact_damping <=
-        100.
+        Damping force of the contact divided by elastic force and velocity, s/m; 0 <=
+        contact_damping <= 100.
     belt_frequency : float
         Natural frequency of the belt on the sidewall, the rim held, Hz; 0 < belt_frequency <=
         1e+06.
@@ -1009,10 +1010,10 @@ KEYS = (
     Key("hunt_crossley", "hunt_crossley", "restitution", "real", "", "wanted coefficient of restitution; 0: from damping", (), 0.0, 1.0),
     Key("two_mass", "two_mass", "belt_mass", "real", "kg", "mass of belt and tread, less than the mass of the source", (), 0.0, 1000000.0),
     Key("two_mass", "two_mass", "inflation_pressure", "real", "Pa", "inflation pressure", (), 0.0, 100000000.0),
-    Key("two_mass", "two_mass", "contact_width", "real", "m", "contact area over deflection of the patch", (), 0.0, 100.0),
-    Key("two_mass", "two_mass", "carcass_stiffness", "real", "N/m", "force of the carcass over its deflection at 20 mm", (), 0.0, 1000000000000.0),
+    Key("two_mass", "two_mass", "contact_width", "real", "m", "contact area divided by deflection of the patch", (), 0.0, 100.0),
+    Key("two_mass", "two_mass", "carcass_stiffness", "real", "N/m", "force of the carcass divided by its deflection, at 20 mm", (), 0.0, 1000000000000.0),
     Key("two_mass", "two_mass", "carcass_exponent", "real", "", "exponent of the deflection of the carcass", (), 1.5, 5.0),
-    Key("two_mass", "two_mass", "contact_damping", "real", "s/m", "damping of the contact over its elastic force and velocity", (), 0.0, 100.0),
+    Key("two_mass", "two_mass", "contact_damping", "real", "s/m", "damping force of the contact divided by elastic force and velocity", (), 0.0, 100.0),
     Key("two_mass", "two_mass", "belt_frequency", "real", "Hz", "natural frequency of the belt on the sidewall, the rim held", (), 0.0, 1000000.0),
     Key("two_mass", "two_mass", "belt_damping", "real", "", "damping ratio of the same motion", (), 0.0, 10.0),
     Key("", "sampling", "sample_rate", "real", "Hz", "samples per second", (), 2000.0, 10000000.0),

@@ -1,4 +1,4 @@
-!> Options of the modal ball; `thud_modal_ball` adds how it is solved.
+!> Options of the modal ball; `thud_modal_ball` adds the solution.
 module thud_modal_ball_options
    use thud_ball, only: ball_type
    use thud_error, only: error_type, input_error
@@ -18,25 +18,25 @@ module thud_modal_ball_options
    type, abstract, extends(source_model_type) :: modal_ball_options_type
       !> Highest harmonic n whose modes oscillate.
       integer :: harmonics = 48
-      !> Modes of each harmonic that oscillate.
+      !> Number of modes of each harmonic that oscillate.
       integer :: radial_modes = 5
-      !> Highest harmonic whose static flexibility counts.
+      !> Highest harmonic whose static flexibility is included.
       integer :: static_harmonics = 180
-      !> Rings of the surface that take the pressure.
+      !> Number of rings of the surface that carry the pressure.
       integer :: rings = 60
       !> Loss factor: `constant`, `rising` in proportion to frequency, or of a `fractional` law.
       character(len=name_length) :: damping_law = 'constant'
       !> Loss factor, twice the damping ratio.
       real(wp) :: loss_factor = 0.1_wp
-      !> Frequency of this loss factor where it is not constant, Hz; there the ball's modulus is the storage modulus.
+      !> Frequency of a loss factor that is not constant, Hz; there the storage modulus is the ball's modulus.
       real(wp) :: loss_frequency = 74.0_wp
-      !> Order of the derivative of a fractional law.
+      !> Order of the fractional derivative.
       real(wp) :: fractional_order = 0.3_wp
-      !> The gas in the cavity resists changes of its volume.
+      !> Whether the gas in the cavity resists changes of its volume.
       logical :: cavity_gas = .true.
-      !> Gravity acts during the contact too.
+      !> Whether gravity acts during the contact too.
       logical :: contact_gravity = .false.
-      !> Friction of the floor: `none`, or `stick`, by which touching rings do not slide.
+      !> Friction of the floor: `none`, or `stick` (touching rings do not slide).
       character(len=name_length) :: floor_friction = 'none'
       !> Harmonics treated as quasi-static instead of oscillating.
       type(list_type) :: static_families
@@ -75,7 +75,7 @@ contains
          '[0, harmonics]', whole=.true.)]
    end function get_fields
 
-   !> Refuses rings that are too few for the harmonics, and losses that no fractional law has.
+   !> Returns an error if the rings are too few for the harmonics, or if no fractional law has the loss.
    subroutine check(ball, options, sampling, error)
       type(ball_type), intent(in) :: ball
       class(modal_ball_options_type), intent(in) :: options
