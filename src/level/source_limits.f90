@@ -36,7 +36,7 @@ module thud_source_limits
       real(wp) :: drop_height(2)
    end type source_limits_type
 
-   !> Heavy/soft impact sources that the standards limit.
+   !> Heavy/soft impact sources with limits in the standards.
    type(source_limits_type), parameter :: sources(*) = [ &
       ! Impact force characteristic (2): 39 +- 1, 31 +- 1.5, 23 +- 1.5, 17 +- 2, 12.5 +- 2 dB.
       source_limits_type('rubber_ball', &
