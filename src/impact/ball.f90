@@ -59,7 +59,7 @@ contains
    !> Density of the wall, kg/m3.
    pure function get_density(ball) result(density)
       type(ball_type), intent(in) :: ball
-      !> Mass over the volume of the wall, kg/m3.
+      !> Mass divided by the volume of the wall, kg/m3.
       real(wp) :: density
 
       density = ball%mass/(4.0_wp/3.0_wp*pi*(ball%outer_radius**3 - (ball%outer_radius - ball%wall_thickness)**3))

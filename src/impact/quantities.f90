@@ -1,5 +1,5 @@
-!> The table of quantities: every number that a result has, with symbol, unit, meaning and how it is shown.
-!> Summary, tables, schema, and with it all of the Python package, take them from here.
+!> The table of quantities: every number that a result can have, with symbol, unit, meaning and display format. Summary,
+!> tables and schema, and through the schema the Python package, use this table.
 module thud_quantities
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
@@ -8,30 +8,31 @@ module thud_quantities
 
    public :: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, sample_quantity_count
 
-   !> A number that a result has.
+   !> A number that a result can have.
    type :: quantity_type
-      !> Name in files and programs, and in tables for readers.
+      !> Name in files and programs.
       character(len=24) :: name = ''
+      !> Name in tables for readers.
       character(len=24) :: title = ''
       !> Symbol in formulas and figures, in the mathematical notation of matplotlib.
       character(len=20) :: symbol = ''
       !> SI unit, blank for pure numbers.
       character(len=8) :: unit = ''
-      !> Unit on the screen, and how many of them are one SI unit.
+      !> Unit on the screen, and number of these units in one SI unit.
       character(len=8) :: display_unit = ''
       real(wp) :: display_scale = 1.0_wp
       !> Decimals on the screen.
       integer :: decimals = 3
-      !> What it is.
+      !> Meaning.
       character(len=72) :: meaning = ''
       !> Results that have it: `of_sample`, `of_impact` or `of_others`.
       integer :: results = 0
    end type quantity_type
 
-   !> Every sample of a sweep and every impact has the quantity, every impact, or some other result.
+   !> Results with the quantity: every sample of a sweep and every impact, every impact, or another result.
    integer, parameter :: of_sample = 1, of_impact = 2, of_others = 3
 
-   !> The quantities: those of samples, of impacts, in the order of `get_quantities`, and of other results.
+   !> The quantities: first those of samples, then those of impacts, in the order of `get_quantities`, then all others.
    type(quantity_type), parameter :: quantities(*) = [ &
       quantity_type('contact_time', 'contact time', 'T', 's', 'ms', 1.0e3_wp, 3, 'contact time', of_sample), &
       quantity_type('peak_force', 'peak force', 'F_{max}', 'N', 'N', 1.0_wp, 1, 'maximum force on the floor', of_sample), &
@@ -68,13 +69,13 @@ module thud_quantities
       quantity_type('standardized_rating', 'standardized level', "L'_{iA,Fmax,V,T}", 'dB', 'dB', 1.0_wp, 1, &
       'A-weighted maximum Fast level, standardized, re 20 uPa', of_others)]
 
-   !> Numbers of quantities that samples have, and that impacts have.
+   !> Numbers of quantities of every sample, and of every impact.
    integer, parameter :: sample_quantity_count = count(quantities%results == of_sample)
    integer, parameter :: history_quantity_count = count(quantities%results <= of_impact)
 
 contains
 
-   !> The values of the quantities.
+   !> Values of the quantities of an impact.
    function get_quantities(history) result(values)
       type(force_history_type), intent(in) :: history
       !> Values, SI units: [history_quantity_count].
@@ -88,7 +89,7 @@ contains
 
    !> A quantity of the table.
    pure function get_quantity(name) result(quantity)
-      !> Its name, which the table has.
+      !> Name of a quantity in the table.
       character(len=*), intent(in) :: name
       type(quantity_type) :: quantity
 
