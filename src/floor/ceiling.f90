@@ -1,5 +1,4 @@
-!> A light ceiling below a floor, without rigid connection: its mass on the stiffness of the air in the cavity between them,
-!> and the sound that spreads in the cavity.
+!> A light ceiling without rigid connection to the floor: its mass on the stiffness of the cavity, and the sound in there.
 module thud_ceiling
    use thud_constants, only: pi
    use thud_field, only: field_type
@@ -51,7 +50,7 @@ contains
       complex(wp) :: b
       real(wp) :: period, damping
 
-      ! If the product of depth and mass underflows to 0, the smallest number replaces it.
+      ! The smallest number replaces a product of depth and mass that underflows.
       period = 2*pi*sqrt(max(ceiling%depth*ceiling%mass/(air%density*air%sound_speed**2), tiny(1.0_wp)))
       damping = ceiling%loss_factor + 2*pi*sqrt(lower*upper)*ceiling%depth*radiation_factor/air%sound_speed
       associate (low => lower*period, high => upper*period)

@@ -35,8 +35,8 @@ contains
    !> Transfer mobility from a source to a point of the upper plate.
    !>
    !> Both plates have the same mode shapes. Each shape has two modes, those of two masses on three springs. The loss factor
-   !> of a mode is the mean of those of plates and layer, weighted by their shares of its elastic energy; the error is the
-   !> square of the differences between the loss factors. Residual modes are treated as for one plate.
+   !> of a mode is the mean of those of plates and layer, weighted by their shares of its elastic energy; the error is of
+   !> second order in the differences of the loss factors. Residual modes are treated as for one plate.
    subroutine new_double_receiver(floor, source, point, receiver, error)
       type(double_plate_type), intent(in) :: floor
       !> Positions of source and point, as fractions of length and width.
@@ -61,10 +61,10 @@ contains
          pack(loss_factor, individual), [compliance, residual_corner], receiver, error)
    end subroutine new_double_receiver
 
-   !> Half waves of the upper plate's modes up to sum_limit_factor*mode_limit, and of the lower's further ones to mode_limit.
+   !> Half waves of the modes of the upper plate up to sum_limit_factor*mode_limit, and of the lower plate up to mode_limit.
    pure subroutine get_all_half_waves(floor, m, n)
       type(double_plate_type), intent(in) :: floor
-      !> Numbers of half waves along length and width: [n_shape].
+      !> Half waves along length and width: [n_shape].
       integer, allocatable, intent(out) :: m(:), n(:)
       integer, allocatable :: m_lower(:), n_lower(:)
       logical, allocatable :: new(:)

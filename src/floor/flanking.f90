@@ -96,8 +96,8 @@ contains
 
    !> Rate at which energy flows from the floor into a wall.
    !>
-   !> The index is K = D + 10 lg(l/sqrt(a1 a2)) with the mean D of the velocity level differences in both directions and a =
-   !> pi**2 S eta sqrt(1000 Hz f)/c0 (ISO 12354-1). With D = 5 lg(eta1 eta2/(eta12 eta21)) and n1 eta12 = n2 eta21, the
+   !> The index is K = D + 10 lg(l/sqrt(a1 a2)) with the mean D of the velocity level differences in both directions and
+   !> a = pi**2 S eta sqrt(1000 Hz f)/c0 (ISO 12354-1). With D = 5 lg(eta1 eta2/(eta12 eta21)) and n1 eta12 = n2 eta21, the
    !> total loss factors eta1 and eta2 cancel: eta12 = l c0/(pi**2 S1 sqrt(1000 Hz f)) sqrt(fc2/fc1) 10**(-K/10)
    !> (Nightingale and Bosmans 2003).
    elemental function get_junction_rate(floor, wall, air, index, frequency) result(rate)

@@ -1,5 +1,4 @@
-!> The abstract floor: options from a namelist group, the mobility at the source, and the plate that radiates into the room
-!> below.
+!> The abstract floor: options from a namelist group, mobility at the source, and the plate that radiates into the room.
 !>
 !> A floor `<name>` is a type `<name>_floor_type` that extends this one, in the module `thud_<name>_floor` (a name that ends
 !> with `_floor` gets no second suffix). The list `floor_models` in src/CMakeLists.txt registers it. The namelist group of
@@ -40,7 +39,7 @@ module thud_floor_model
       function get_fields(options) result(fields)
          import :: field_type, floor_model_type
          implicit none (type, external)
-         !> The options to which the fields belong.
+         !> The options that the fields read and set.
          class(floor_model_type), intent(in), target :: options
          !> The fields: [n_field].
          type(field_type), allocatable :: fields(:)
@@ -71,12 +70,12 @@ contains
          list_field('point_y', options%point_y, 'm', 'their positions along the width', '[0, 1000]')]
    end function get_point_fields
 
-   !> Returns an error if a point does not lie on the floor.
+   !> Checks that the points lie on the floor.
    subroutine check_points(options, group, error)
       class(floor_model_type), intent(in) :: options
-      !> Namelist group of the options, for messages.
+      !> Namelist group, for messages.
       character(len=*), intent(in) :: group
-      !> Set if the numbers of coordinates differ or a point does not lie on the floor.
+      !> Set if a point lacks a coordinate or does not lie on the floor.
       type(error_type), allocatable, intent(out) :: error
       type(receiver_type) :: transfer
       integer :: i
@@ -92,11 +91,11 @@ contains
       end do
    end subroutine check_points
 
-   !> Returns an error if options contradict each other; by default they never do.
+   !> Checks options that depend on each other; by default, none do.
    subroutine check(options, error)
       !> The options, each inside its own range.
       class(floor_model_type), intent(in) :: options
-      !> Set if options contradict each other; names group, key, value and allowed range.
+      !> Set if they contradict each other; names group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
 
    end subroutine check

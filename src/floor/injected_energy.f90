@@ -4,8 +4,7 @@
 !> Over a step of 1/(2 D), D being the duration of the force, the spectrum of the force is a polynomial of degree 15, to
 !> 2e-15. The mobility is a sum of poles. Poles near the step are integrated with the polynomial in closed form, by Legendre
 !> functions of the second kind, all others by Gauss-Legendre quadrature, so that narrow resonances cost no more than wide
-!> ones. The floor keeps moving after the record: its velocity is then that of the receiver, whose transform is known in
-!> closed form.
+!> ones. After the record, the floor moves freely; the transform of this motion is known in closed form.
 module thud_injected_energy
    use thud_band, only: band_type
    use thud_constants, only: pi

@@ -52,7 +52,7 @@ contains
          real_field('highest_frequency', options%highest_frequency, 'Hz', 'last frequency of the measurement', '(0, 1e7]')]
    end function get_fields
 
-   !> Returns an error if the lists differ in length or the mobility is not passive.
+   !> Checks that the lists are equally long and the mobility is passive.
    subroutine check(options, error)
       class(measured_mobility_floor_type), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error

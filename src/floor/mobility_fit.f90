@@ -72,7 +72,7 @@ contains
       end if
    end subroutine fit_mobility
 
-   !> Returns an error if a table cannot be fitted.
+   !> Checks that a table can be fitted.
    subroutine check_table(frequency, mobility, order, max_poles, error)
       !> As in `fit_mobility`: [n_point].
       real(wp), intent(in) :: frequency(:)

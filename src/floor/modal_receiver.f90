@@ -14,10 +14,10 @@ contains
 
    !> Sum of modes, gain s/(s**2 + eta omega s + omega**2), and residual modes.
    !>
-   !> The damping of a mode is viscous and has the given loss factor at its frequency. Residual modes have a compliance C at
-   !> low frequencies and, above a corner frequency w, the conductance G = sqrt(2) C w: G (s**2 + w s/sqrt(2))/(s**2 +
-   !> sqrt(2) w s + w**2). This is passive and absorbs hardly any power below the corner: with x = omega/w its real part is
-   !> G x**4/(1 + x**4), its imaginary part omega C (1 + x**2)/(1 + x**4).
+   !> Modes have viscous damping, with the given loss factor at their frequency. Residual modes have a compliance C at low
+   !> frequencies and, above a corner frequency w, the conductance G = sqrt(2) C w:
+   !> G (s**2 + w s/sqrt(2))/(s**2 + sqrt(2) w s + w**2). This is passive and absorbs hardly any power below the corner: with
+   !> x = omega/w its real part is G x**4/(1 + x**4), its imaginary part omega C (1 + x**2)/(1 + x**4).
    subroutine new_modal_receiver(group, gain, omega, loss_factor, residual, receiver, error)
       !> Namelist group, for messages.
       character(len=*), intent(in) :: group
@@ -48,8 +48,8 @@ contains
          receiver%pole(i) = pole
          receiver%residue(i) = gain(i)*cmplx(1.0_wp, -pole%re/pole%im, wp)
       end do
-      ! Minus the direct part G, the quotient is -G (w s/sqrt(2) + w**2)/(s**2 + ...). Its doubled residue at the pole w (i
-      ! - 1)/sqrt(2) is -G w (1 - i)/sqrt(2).
+      ! Minus the direct part G, the quotient is -G (w s/sqrt(2) + w**2)/(s**2 + ...). Its doubled residue at the pole
+      ! w (i - 1)/sqrt(2) is -G w (1 - i)/sqrt(2).
       associate (compliance => residual(1), corner => residual(2))
          receiver%direct = sqrt(2.0_wp)*compliance*corner
          receiver%pole(n + 1) = corner*cmplx(-1.0_wp, 1.0_wp, wp)/sqrt(2.0_wp)

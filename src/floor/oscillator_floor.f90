@@ -12,7 +12,7 @@ module thud_oscillator_floor
    public :: oscillator_floor_type
 
    !> Minimum half distance of the poles, divided by their mean: near critical damping they are set this far apart. The
-   !> mobility changes by the square of this, about as much as cancellation in the sum of both poles loses.
+   !> mobility changes by the square of this; cancellation in the sum of both poles has an error of the same size.
    real(wp), parameter :: apart = 6.0e-6_wp
 
    !> The floor; the default resonates at 25 Hz with a loss factor of 0.05.

@@ -89,7 +89,7 @@ contains
       stiffness = get_surface_mass(plate)*(plate%wave_speed*plate%thickness)**2/12
    end function get_bending_stiffness
 
-   !> Resistance of the infinite plate, 8 sqrt(B' m''); for an orthotropic plate, times a mean over its directions.
+   !> Resistance of the infinite plate, 8 sqrt(B' m'') M with a mean M over the directions.
    elemental function get_resistance(plate) result(resistance)
       type(plate_type), intent(in) :: plate
       !> The resistance, N s/m.
@@ -98,7 +98,7 @@ contains
       resistance = 8*sqrt(get_bending_stiffness(plate)*get_surface_mass(plate))*get_directional_mean(plate%torsion_ratio)
    end function get_resistance
 
-   !> Mean M over the directions of an orthotropic plate: Z = 8 sqrt(B' m'') M, and the mode density is divided by M.
+   !> Mean M over the directions of an orthotropic plate: Z = 8 sqrt(B' m'') M, mode density S/2 sqrt(m''/B')/M.
    !>
    !> 1/Z = 1/(4 pi sqrt(m'')) integral over 0 to pi/2 of (Bx cos**4 + 2 H cos**2 sin**2 + By sin**4)**(-1/2), a complete
    !> elliptic integral: M = agm(1, sqrt((1 + H/sqrt(Bx By))/2)).
@@ -141,7 +141,7 @@ contains
       frequency = (2*pi/(6*plate%thickness))**2*sqrt(stiffness/get_surface_mass(plate))/(2*pi)
    end function get_thin_limit
 
-   !> Bending modes per hertz, S/2 sqrt(m''/B').
+   !> Bending modes per hertz, S/2 sqrt(m''/B')/M.
    elemental function get_mode_density(plate) result(density)
       type(plate_type), intent(in) :: plate
       !> Modes per hertz, s.

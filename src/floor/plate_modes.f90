@@ -13,7 +13,7 @@ module thud_plate_modes
 
    public :: check_mode_count, get_far_compliance, get_half_waves, get_modal_stiffness, get_shape, new_plate_receiver
 
-   !> Modes up to this frequency are treated individually, Hz; modes above it add their static compliance. On average, this
+   !> Modes up to this frequency are treated individually, Hz; higher modes add their static compliance. On average, this
    !> omits 0.3 (f/mode_limit)**3 of the mobility of the infinite plate at a frequency f: 0.4 % at 707 Hz.
    real(wp), parameter, public :: mode_limit = 3000.0_wp
 
@@ -25,17 +25,17 @@ module thud_plate_modes
    !> infinite plate). With this corner, their conductance at high frequencies is 1/Z.
    real(wp), parameter, public :: residual_corner = pi/(2*sqrt(2.0_wp))*2*pi*mode_limit
 
-   !> Maximum number of modes below `mode_limit`: the computing time of a drop is proportional to it.
+   !> Maximum number of modes below `mode_limit`: the time for a drop is proportional to it.
    real(wp), parameter :: max_modes = 20000.0_wp
 
 contains
 
-   !> Returns an error if a plate has too many modes.
+   !> Checks the number of modes of a plate.
    subroutine check_mode_count(group, plate, error)
-      !> Namelist group of the plate, for messages.
+      !> Namelist group, for messages.
       character(len=*), intent(in) :: group
       type(plate_type), intent(in) :: plate
-      !> Set if there are too many modes; names length and width.
+      !> Set if there are too many; names length and width.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: count
 
@@ -45,12 +45,12 @@ contains
          //' Hz; allowed: up to '//fixed(max_modes, 0))
    end subroutine check_mode_count
 
-   !> Numbers of half waves of the modes below a frequency.
+   !> Half waves of the modes below a frequency.
    pure subroutine get_half_waves(plate, frequency, m, n)
       type(plate_type), intent(in) :: plate
       !> The frequency, Hz.
       real(wp), intent(in) :: frequency
-      !> Numbers of half waves along length and width: [n_mode].
+      !> Half waves along length and width: [n_mode].
       integer, allocatable, intent(out) :: m(:), n(:)
       real(wp) :: max_stiffness
       integer :: pass, j, last, count
@@ -109,7 +109,7 @@ contains
    !> Modal stiffness per unit area, Bx kx**4 + 2 H kx**2 ky**2 + By ky**4: omega**2 = stiffness/m''.
    elemental function get_modal_stiffness(plate, m, n) result(stiffness)
       type(plate_type), intent(in) :: plate
-      !> Numbers of half waves along length and width.
+      !> Half waves along length and width.
       integer, intent(in) :: m, n
       !> The stiffness, N/m3.
       real(wp) :: stiffness
@@ -121,7 +121,7 @@ contains
 
    !> Mode shapes at a point.
    pure function get_shape(m, n, point) result(shape)
-      !> Numbers of half waves along length and width: [n_mode].
+      !> Half waves along length and width: [n_mode].
       integer, intent(in) :: m(:), n(:)
       !> Position of the point, as fractions of length and width.
       real(wp), intent(in) :: point(2)
@@ -136,7 +136,7 @@ contains
 
    !> Transfer mobility from a source to a point of a plate. Modes above `mode_limit` are residual modes.
    subroutine new_plate_receiver(group, plate, source, point, receiver, error, max_across, residual)
-      !> Namelist group of the plate, for messages.
+      !> Namelist group, for messages.
       character(len=*), intent(in) :: group
       type(plate_type), intent(in) :: plate
       !> Positions of source and point, as fractions of length and width: [2].

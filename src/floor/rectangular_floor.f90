@@ -66,7 +66,7 @@ contains
          real_field('source_y', options%source_y, '', 'relative source position along the width', '(0, 1)')]
    end function get_source_fields
 
-   !> Returns an error if a plate has too many modes.
+   !> Checks the number of modes of the plates.
    subroutine check(options, error)
       class(rectangular_floor_type), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error

@@ -14,10 +14,10 @@ contains
 
    !> Relative variance of the band-averaged energy of the excitation or response at one point.
    !>
-   !> (alpha - 1)/(pi m B**2) (2 B arctan B - ln(1 + B**2)) + ln(1 + B**2)/(pi m B**2) with the modal overlap m = a n/(2
-   !> pi), the decay rate a, the modes per hertz n and B = 2 pi bandwidth/a, for mode spacings of the Gaussian orthogonal
-   !> ensemble (Langley and Cotoni 2004); alpha = 1.5**d for sinusoidal modes in d dimensions. With many modes in the band
-   !> and little damping, the variance is (alpha - 1)/(number of modes).
+   !> (alpha - 1)/(pi m B**2) (2 B arctan B - ln(1 + B**2)) + ln(1 + B**2)/(pi m B**2) with the modal overlap
+   !> m = a n/(2 pi), the decay rate a, the modes per hertz n and B = 2 pi bandwidth/a, for mode spacings of the Gaussian
+   !> orthogonal ensemble (Langley and Cotoni 2004); alpha = 1.5**d for sinusoidal modes in d dimensions. With many modes in
+   !> the band and little damping, the variance is (alpha - 1)/(number of modes).
    elemental function get_band_variance(dimensions, mode_density, decay, bandwidth) result(variance)
       !> Dimensions of the subsystem: 2 for a plate, 3 for a room.
       integer, intent(in) :: dimensions

@@ -1,6 +1,5 @@
 !> Level of an impact in the room below a floor, by transient statistical energy analysis in one-third-octave bands: the
-!> force injects energy into the floor, the floor radiates into the room, all energies decay, and the level is the maximum
-!> of the Fast detector.
+!> force injects energy into the floor, the floor radiates into the room, and the Fast detector shows the level.
 module thud_room
    use thud_band, only: band_type
    use thud_ceiling, only: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_share, get_mass_law
@@ -30,7 +29,7 @@ module thud_room
    !> Reference sound pressure, Pa.
    real(wp), parameter :: reference_pressure = 2.0e-5_wp
 
-   !> Decay of an energy by 60 dB, as a natural logarithm.
+   !> Natural logarithm of an energy decay of 60 dB.
    real(wp), parameter :: decay_of_60_db = 6*log(10.0_wp)
 
    !> Number of modes in a band below which the statistical result is unreliable.
@@ -111,10 +110,10 @@ contains
          get_wall_fields(room%walls), get_ceiling_fields(room%ceiling)]
    end function get_room_fields
 
-   !> Returns an error if the reverberation times do not fit the bands.
+   !> Checks the number of reverberation times.
    subroutine check_room(room, error)
       type(room_type), intent(in) :: room
-      !> Set if their number is neither 0 nor that of the bands.
+      !> Set if it is neither 0 nor that of the bands.
       type(error_type), allocatable, intent(out) :: error
       type(band_type), allocatable :: bands(:)
 
@@ -124,7 +123,7 @@ contains
          //' values; allowed: '//to_text(size(bands))//', one for each one-third-octave band from 50 to 630 Hz')
    end subroutine check_room
 
-   !> Returns an error if walls or ceiling do not fit below a floor.
+   !> Checks that walls and ceiling fit below a floor.
    subroutine check_below(plate, room, error)
       !> The plate that radiates.
       type(plate_type), intent(in) :: plate
@@ -261,7 +260,7 @@ contains
    pure function get_band_energies(plate, room, prediction, band) result(energies)
       type(plate_type), intent(in) :: plate
       type(room_type), intent(in) :: room
-      !> Prediction with reverberation times, energies and radiation factors: [n_band].
+      !> Prediction with reverberation times, energies and radiation factors.
       type(room_level_type), intent(in) :: prediction
       !> Index of the band.
       integer, intent(in) :: band

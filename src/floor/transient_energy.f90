@@ -1,5 +1,5 @@
 !> Transient statistical energy analysis: energies of coupled subsystems after an impact, and the response of the Fast
-!> detector. The equations are linear with constant coefficients: a step is exact with the exponential of their matrix.
+!> detector. The equations are linear with constant coefficients: the exponential of their matrix gives exact steps.
 module thud_transient_energy
    use thud_kinds, only: wp
    use thud_matrix_exponential, only: get_exponential
@@ -74,7 +74,7 @@ contains
       end do
    end function get_fast_history
 
-   !> Matrix M of the energies and the detector together, [E, y]' = M [E, y].
+   !> Matrix M of energies and detector: [E, y]' = M [E, y].
    pure function get_detector(loss, weight) result(matrix)
       !> A: [n, n].
       real(wp), intent(in) :: loss(:, :)
@@ -91,7 +91,7 @@ contains
       end associate
    end function get_detector
 
-   !> Slope of the detector's response, divided by its rate: w.E - y.
+   !> Slope of the response, divided by `fast_rate`: w.E - y.
    pure function get_rise(weight, state) result(rise)
       real(wp), intent(in) :: weight(:)
       !> Energies and response: [n + 1].

@@ -56,7 +56,7 @@ contains
          'ratio of specific heats of the enclosed gas', '[1, 2]')]
    end function get_ball_fields
 
-   !> Density of the wall, kg/m3.
+   !> Density of the wall.
    pure function get_density(ball) result(density)
       type(ball_type), intent(in) :: ball
       !> Mass divided by the volume of the wall, kg/m3.

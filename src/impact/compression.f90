@@ -46,7 +46,7 @@ contains
          [character(len=10) :: 'vented', 'isothermal', 'adiabatic'])]
    end function get_compression_fields
 
-   !> Returns an error if the ball does not allow a compression.
+   !> Checks that the ball allows a compression.
    subroutine check_compression(options, ball, error)
       !> The options, each inside its own range.
       type(compression_options_type), intent(in) :: options

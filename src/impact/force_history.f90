@@ -94,7 +94,7 @@ contains
       yes = abs(sampled - impulse) <= max_missing*impulse
    end function holds_impulse
 
-   !> Returns an error if samples miss part of the force, such as a spike between two of them.
+   !> Checks that samples do not miss part of the force, such as a spike between two of them.
    subroutine check_samples(history, error)
       !> The history, complete.
       type(force_history_type), intent(in) :: history

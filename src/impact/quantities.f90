@@ -1,5 +1,5 @@
 !> The table of quantities: every number that a result can have, with symbol, unit, meaning and display format. Summary,
-!> tables and schema, and through the schema the Python package, use this table.
+!> tables and schema use this table, and so does the Python package through the schema.
 module thud_quantities
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
@@ -18,8 +18,9 @@ module thud_quantities
       character(len=20) :: symbol = ''
       !> SI unit, blank for pure numbers.
       character(len=8) :: unit = ''
-      !> Unit on the screen, and number of these units in one SI unit.
+      !> Unit on the screen.
       character(len=8) :: display_unit = ''
+      !> Number of display units in one SI unit.
       real(wp) :: display_scale = 1.0_wp
       !> Decimals on the screen.
       integer :: decimals = 3

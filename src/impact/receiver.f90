@@ -1,4 +1,4 @@
-!> The structure that a source drops on: linear and passive, described by the mobility Y of the point under the source.
+!> The structure under a source: linear and passive, described by the mobility Y of the point under the source.
 !>
 !> Y(s) = d + sum of r_k/(s - p_k), a direct part and poles with residues. Of a pair of conjugate poles only one is stored,
 !> with twice its residue: the velocity is d F + Re sum r_k x_k with x_k' = p_k x_k + F. Time steps are exact for forces
@@ -31,7 +31,7 @@ module thud_receiver
    type :: receiver_step_type
       !> Length of the step, s.
       real(wp) :: interval = 0.0_wp
-      !> exp(p h) with the step h, its integral over the step (s), and the integral of that integral (s2): [n_pole].
+      !> exp(p h), its integral over the step h (s), and the integral of this integral (s2): [n_pole].
       complex(wp), allocatable :: decay(:), gain(:), travel(:)
    end type receiver_step_type
 

@@ -50,7 +50,7 @@ contains
          integer_field('substeps', sampling%substeps, 'integration steps per sampling interval', '[1, 10000]')]
    end function get_sampling_fields
 
-   !> Returns an error if a record has too many samples or steps.
+   !> Checks the numbers of samples and steps of a record.
    subroutine check_sampling(sampling, error)
       !> The sampling, each value inside its own range.
       type(sampling_type), intent(in) :: sampling
@@ -70,7 +70,7 @@ contains
       end if
    end subroutine check_sampling
 
-   !> Returns an error if a contact has too few samples.
+   !> Checks the number of samples of a contact.
    subroutine check_contact_samples(sampling, contact_time, error)
       type(sampling_type), intent(in) :: sampling
       !> Contact time, s.
@@ -83,8 +83,8 @@ contains
          //to_text(contact_time)//' s too few samples; allowed: from '//to_text(min_contact_samples/contact_time)//' Hz')
    end subroutine check_contact_samples
 
-   !> Validity limit of levels by the sampling rate. If a force begins with a jump or a corner, aliasing changes the level
-   !> of the 500 Hz octave by up to 0.2 dB at the limit, 2 dB at 2000 Hz.
+   !> Validity limit of levels due to the sampling rate. If a force begins with a jump or a corner, aliasing changes the
+   !> level of the 500 Hz octave by up to 0.2 dB at the limit, 2 dB at 2000 Hz.
    pure function get_rate_limit(sampling) result(limit)
       type(sampling_type), intent(in) :: sampling
       type(validity_limit_type) :: limit
@@ -111,7 +111,7 @@ contains
       n_sample = aint(sampling%duration*sampling%sample_rate*(1 + rounding))
    end function count_samples
 
-   !> Number of integration steps of a record, or of its beginning, for estimates of costs; the sampling may be unchecked.
+   !> Number of integration steps of a record, or of its beginning, for cost estimates; the sampling may be unchecked.
    pure function get_step_count(sampling, time) result(n_step)
       type(sampling_type), intent(in) :: sampling
       !> Length of the beginning, s (default: the whole record).

@@ -41,7 +41,7 @@ module thud_source_model
       function get_fields(options) result(fields)
          import :: field_type, source_model_type
          implicit none (type, external)
-         !> The options to which the fields belong.
+         !> The options that the fields read and set.
          class(source_model_type), intent(in), target :: options
          !> The fields: [n_field].
          type(field_type), allocatable :: fields(:)
@@ -60,14 +60,14 @@ module thud_source_model
          type(force_history_type), intent(out) :: history
          !> Set if the drop leaves the range of the model, the contact outlasts the record, or the steps are too coarse.
          type(error_type), allocatable, intent(out) :: error
-         !> The structure that the ball drops on (default: a rigid floor); only for models for which `couples` is true.
+         !> The structure under the source (default: a rigid floor); only for models for which `couples` is true.
          type(receiver_type), intent(in), optional :: receiver
       end subroutine solve
    end interface
 
 contains
 
-   !> Returns an error if options, ball and sampling do not fit each other; by default they always fit.
+   !> Checks that options, ball and sampling fit each other; by default, they do.
    subroutine check(ball, options, sampling, error)
       type(ball_type), intent(in) :: ball
       !> The options, each inside its own range.
@@ -94,7 +94,7 @@ contains
       !> The options, checked.
       class(source_model_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> The structure that the source drops on (default: a rigid floor).
+      !> The structure under the source (default: a rigid floor).
       type(receiver_type), intent(in), optional :: receiver
       !> The time, s.
       real(wp) :: cost
@@ -116,7 +116,7 @@ contains
       modulus = 0.0_wp
    end function get_paper_modulus
 
-   !> Validity limits of the model for a result; by default that of gravity, which models neglect.
+   !> Validity limits of the model for a result; by default that of neglected gravity.
    function get_validity_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
@@ -145,7 +145,7 @@ contains
       error = input_error('&model: name: this model has no material with a loss factor; allowed: one that has')
    end subroutine get_loss_factors
 
-   !> Whether the model can drop on a mobile floor (default). For others, the blocked force is used.
+   !> Whether the model can drop on a mobile floor (default); if not, its force on a rigid floor is used.
    function couples(options) result(yes)
       class(source_model_type), intent(in) :: options
       logical :: yes

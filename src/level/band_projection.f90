@@ -1,8 +1,8 @@
 !> Band energies of many records at once, by two matrix products.
 !>
 !> The energy of a record f in a band is f'Qf with the sinc kernel Q of the band (see `thud_force_exposure`). All bands lie
-!> below one frequency W. The kernel of all frequencies below W has few eigenvectors with significant eigenvalues: about 2 W
-!> T for records of length T, the discrete prolate spheroidal sequences (Slepian 1978). The kernel commutes with a
+!> below one frequency W. The kernel of all frequencies below W has few eigenvectors with significant eigenvalues: about
+!> 2 W T for records of length T, the discrete prolate spheroidal sequences (Slepian 1978). The kernel commutes with a
 !> tridiagonal matrix, which gives them quickly and without cancellation. A record is projected on them once for all bands;
 !> the spectrum of the projection at Gauss-Legendre nodes gives the energies. The sequences are symmetric or antisymmetric,
 !> so records are folded first, which halves the work.

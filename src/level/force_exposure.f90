@@ -82,7 +82,7 @@ contains
       levels = 10*log10(max(energy, resolution)/(reference_force**2*reference_time))
    end subroutine get_force_exposure_levels
 
-   !> Returns an error if a record has no levels.
+   !> Checks that a record has levels.
    subroutine check_record(force, sample_rate, bands, error)
       !> Force, N: [n_sample].
       real(wp), intent(in) :: force(:)

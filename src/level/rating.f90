@@ -18,8 +18,9 @@ module thud_rating
    type :: rated_set_type
       !> Name of the set of bands.
       character(len=24) :: name
-      !> Nominal mid frequency of the lowest band, Hz, and number of bands.
+      !> Nominal mid frequency of the lowest band, Hz.
       real(wp) :: lowest
+      !> Number of bands.
       integer :: n_band
       !> A-weighting as ISO 717-2 annex D rounds it, dB; only the first n_band values are used.
       real(wp) :: a_weighting(max_rated)

@@ -11,8 +11,8 @@
 !> s**20/(21 (1 - s**2)) = 2.3e-17 < 0.3 u of the logarithm and (ln(2)/2)**14/14! exp(ln(2)/2) = 6e-18 < 0.1 u of the power.
 !> m - 1 is exact, so s errs by 2 u (sum, quotient), the series in s**2 by 2.2 u (rounded coefficients, the last sum; the
 !> rest is scaled down by s**2), their product by one more: 5.5 u. Adding k and multiplying by the exponent add u each: t
-!> errs by 7.5 u |t|, the power by ln 2 times that. n and r are exact. The last series has positive terms for r > 0 and errs by 3 u
-!> for either sign; its scaling is exact. The sum is (5.2 |t| + 3) u, stated as `power_error`.
+!> errs by 7.5 u |t|, the power by ln 2 times that. n and r are exact. The last series has positive terms for r > 0 and errs
+!> by 3 u for either sign; its scaling is exact. The sum is (5.2 |t| + 3) u, stated as `power_error`.
 module thud_power
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_kinds, only: wp

@@ -1,5 +1,5 @@
-!> Prony series: a long-term modulus of 1 in parallel with Maxwell branches, each with its modulus, divided by the long-term
-!> modulus, and its relaxation time.
+!> Prony series: a long-term modulus of 1 in parallel with Maxwell branches, each with its relative modulus (divided by the
+!> long-term modulus) and its relaxation time.
 module thud_prony
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
@@ -35,7 +35,7 @@ contains
 
    !> Storage modulus divided by the long-term modulus.
    pure function get_storage_ratio(share, time, omega) result(ratio)
-      !> Moduli of the branches, divided by the long-term modulus: [n_branch].
+      !> Relative moduli of the branches: [n_branch].
       real(wp), intent(in) :: share(:)
       !> Their relaxation times, s: [n_branch].
       real(wp), intent(in) :: time(:)
@@ -48,7 +48,7 @@ contains
 
    !> Loss modulus divided by the long-term modulus.
    pure function get_loss_ratio(share, time, omega) result(ratio)
-      !> Moduli of the branches, divided by the long-term modulus: [n_branch].
+      !> Relative moduli of the branches: [n_branch].
       real(wp), intent(in) :: share(:)
       !> Their relaxation times, s: [n_branch].
       real(wp), intent(in) :: time(:)
@@ -65,7 +65,7 @@ contains
    !> over frequencies that are spaced evenly in their logarithm.
    subroutine fit_constant_loss(loss_factor, share, time, failed)
       real(wp), intent(in) :: loss_factor
-      !> Moduli of the branches, divided by the long-term modulus: [n_branch].
+      !> Relative moduli of the branches: [n_branch].
       real(wp), allocatable, intent(out) :: share(:)
       !> Their relaxation times, s: [n_branch].
       real(wp), allocatable, intent(out) :: time(:)
@@ -91,8 +91,8 @@ contains
       failed = info /= 0 .or. minval(share) < 0.0_wp
    end subroutine fit_constant_loss
 
-   !> Returns an error if a fractional law has no series: its loss factor is not below that of the spring-pot alone (the
-   !> spring would be negative), or the frequency of the loss factor lies outside the band.
+   !> Checks that a fractional law has a series. It has none if its loss factor is not below that of the spring-pot alone
+   !> (the spring would be negative), or if the frequency of the loss factor lies outside the band.
    subroutine check_fractional_loss(group, order, loss_factor, frequency, error)
       !> Group of the keys, for the message.
       character(len=*), intent(in) :: group
@@ -117,7 +117,7 @@ contains
    !> magnitude. The spring of the law only reduces the relative error of the whole.
    subroutine fit_fractional_loss(law, share, time, viscosity)
       type(fractional_loss_type), intent(in) :: law
-      !> Moduli of the branches, divided by the long-term modulus: [n_branch].
+      !> Relative moduli of the branches: [n_branch].
       real(wp), allocatable, intent(out) :: share(:)
       !> Their relaxation times, s: [n_branch].
       real(wp), allocatable, intent(out) :: time(:)

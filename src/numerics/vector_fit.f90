@@ -49,7 +49,7 @@ contains
       complex(wp), allocatable, intent(out) :: pole(:), residue(:)
       !> Constant part.
       real(wp), intent(out) :: direct
-      !> Weighted root-mean-square error, divided by that of the weighted values.
+      !> Root-mean-square weighted error, relative to the weighted values.
       real(wp), intent(out) :: misfit
       !> True if LAPACK finds no solution or an interrupt ended the search.
       logical, intent(out) :: failed
@@ -166,7 +166,7 @@ contains
       complex(wp), intent(in) :: pole(:)
       !> The coefficients, the constant part last: [order + 1].
       real(wp), allocatable, intent(out) :: coefficient(:)
-      !> Weighted root-mean-square error, divided by that of the weighted values; huge if there is no solution.
+      !> Root-mean-square weighted error, relative to the weighted values; huge if there is no solution.
       real(wp), intent(out) :: misfit
       complex(wp), allocatable :: basis(:, :)
       real(wp), allocatable :: matrix(:, :), right(:)
