@@ -31,7 +31,7 @@ contains
 
       if (request%has('case')) then
          call request%get_text('case', text)
-         ! Samples may make valid what is not in the case.
+         ! Values of samples may replace invalid ones of the case.
          call read_case(text, 'python', case, error, unchecked=question == 'samples')
          if (allocated(error)) return
       end if

@@ -1,12 +1,12 @@
 !> The flat API for Python, the only procedures that f2py wraps: a question by name, with a request of texts, numbers and
 !> arrays, is answered by a bundle of the same.
 !>
-!> The answer is left in the library; its handle and sizes are returned, and `collect` hands it over and frees it.
+!> The answer is stored in the library; its handle and sizes are returned, and `collect` hands it over and frees it.
 !> `status` is 0, or the code of the error whose message is the text `message` of the bundle.
 !> Procedures marked `threadsafe` let other Python threads run meanwhile.
 module thud_api
    use thud_answer, only: get_answer
-   use thud_bundle, only: bundle_type, leave, take
+   use thud_bundle, only: bundle_type, retrieve, store
    use thud_error, only: error_type
    use thud_kinds, only: int64, int8, wp
    use thud_progress, only: latest_progress
@@ -29,7 +29,7 @@ contains
       integer, intent(in) :: n
       !> Values of the request: [n].
       real(wp), intent(in), target :: values(n)
-      !> Code of the error, or 0; sizes as in `leave`.
+      !> Code of the error, or 0; sizes as in `store`.
       integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
       type(bundle_type), pointer :: bundle
@@ -38,11 +38,11 @@ contains
       call begin_call()
       allocate (bundle)
       call get_answer(question, request_type(header, text, values), bundle, error)
-      call leave(bundle, error, status, handle, n_byte, n_value)
+      call store(bundle, error, status, handle, n_byte, n_value)
       call end_call()
    end subroutine ask
 
-   !> The same while no other Python thread runs: for what keeps its state in static memory, as ARPACK does, and functions
+   !> The same while no other Python thread runs: for code that keeps state in static memory, as ARPACK does, and functions
    !> that return texts of deferred length.
    subroutine ask_alone(question, header, text, values, n, status, handle, n_byte, n_value)
       !f2py integer, intent(hide), depend(values) :: n = len(values)
@@ -69,7 +69,7 @@ contains
       real(wp), intent(out) :: values(n_value)
       type(bundle_type), pointer :: bundle
 
-      call take(handle, bundle)
+      call retrieve(handle, bundle)
       bytes = transfer(bundle%header//achar(0)//bundle%text, bytes)
       call bundle%copy_values(values)
       deallocate (bundle)

@@ -81,7 +81,7 @@ contains
       call add_results(bundle, case, results)
    end subroutine answer_run
 
-   !> What a case asks for, without levels and energies: callers ask for those in the bands that they need.
+   !> Results of a case without levels and energies, which callers request in the bands that they need.
    subroutine answer_solve(case, bundle, error)
       type(case_type), intent(in) :: case
       type(bundle_type), intent(inout) :: bundle

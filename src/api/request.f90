@@ -1,4 +1,4 @@
-!> What a caller in another language asks: texts, numbers and arrays by name, the counterpart of `thud_bundle`.
+!> A request of a caller in another language: texts, numbers and arrays by name, the counterpart of `thud_bundle`.
 module thud_request
    use thud_kinds, only: wp
    implicit none (type, external)
@@ -27,12 +27,12 @@ module thud_request
 contains
 
    !> Whether there is an item of a name.
-   pure function has(self, name) result(found)
+   pure function has(self, name) result(exists)
       class(request_type), intent(in) :: self
       character(len=*), intent(in) :: name
-      logical :: found
+      logical :: exists
 
-      found = index(line_feed//self%header, line_feed//name//tab) > 0
+      exists = index(line_feed//self%header, line_feed//name//tab) > 0
    end function has
 
    !> A text, empty where there is none of the name.
@@ -70,7 +70,7 @@ contains
       values => self%values(first:first + length - 1)
    end function get_array
 
-   !> Where an item is among those of its kind.
+   !> Position of an item among the items of its kind.
    pure subroutine find(self, name, kind, first, length)
       type(request_type), intent(in) :: self
       character(len=*), intent(in) :: name
@@ -96,7 +96,7 @@ contains
       end do
    end subroutine find
 
-   !> The number that digits stand for.
+   !> The value of a string of digits.
    pure function get_count(digits) result(count)
       character(len=*), intent(in) :: digits
       integer :: count

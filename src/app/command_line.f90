@@ -33,17 +33,17 @@ module thud_command_line
    character(len=*), parameter :: known_options(*) = [character(len=9) :: '--output', '--replace', '--all', &
       '--samples', '--threads', '--check', '--quiet', '--keys', '--schema', '--help', '--version']
 
-   !> What the command line asks for.
+   !> Options of the command line.
    type :: request_type
       !> Path of the case file.
       character(len=:), allocatable :: case_file
-      !> Output directory, empty where not given.
+      !> Output directory, empty by default.
       character(len=:), allocatable :: output
       !> Replace also files that thud has not written.
       logical :: replace = .false.
       !> Write also further quantities of the model against time.
       logical :: all = .false.
-      !> Path of a table of samples, empty where not given.
+      !> Path of a table of samples, empty by default.
       character(len=:), allocatable :: samples
       !> Threads for them.
       integer :: threads = 1
@@ -57,7 +57,7 @@ module thud_command_line
 
 contains
 
-   !> Does what the command line asks for.
+   !> Runs the action of the command line.
    subroutine execute(exit_code)
       !> 0 done, 1 bad input or usage, 2 numerical failure, 3 checked and not conforming, 130 interrupted, 143 terminated.
       integer, intent(out) :: exit_code

@@ -7,7 +7,7 @@ module thud_bundle
    implicit none (type, external)
    private
 
-   public :: bundle_type, leave, take
+   public :: bundle_type, retrieve, store
 
    !> Numbers of one item, in `values` or in `cube`.
    type :: item_type
@@ -106,7 +106,7 @@ contains
    !> Adds a line to the header.
    subroutine add_line(self, name, form)
       type(bundle_type), intent(inout) :: self
-      !> Name of the item; what it is.
+      !> Name of the item; its form.
       character(len=*), intent(in) :: name, form
 
       if (.not. allocated(self%header)) self%header = ''
@@ -183,9 +183,9 @@ contains
    end subroutine copy_values
 
    !> Stores a bundle to be collected, or the message of an error alone.
-   subroutine leave(bundle, error, status, handle, n_byte, n_value)
+   subroutine store(bundle, error, status, handle, n_byte, n_value)
       type(bundle_type), pointer, intent(inout) :: bundle
-      !> What went wrong.
+      !> An error whose message replaces the bundle.
       type(error_type), allocatable, intent(in) :: error
       !> Code of the error, or 0.
       integer, intent(out) :: status
@@ -207,17 +207,17 @@ contains
       handle = transfer(c_loc(bundle), handle)
       n_byte = len(bundle%header) + 1 + len(bundle%text)
       n_value = max(1, bundle%count_values())
-   end subroutine leave
+   end subroutine store
 
    !> The bundle of a handle; the caller frees it.
-   subroutine take(handle, bundle)
-      !> Handle of a bundle that was stored and not yet taken.
+   subroutine retrieve(handle, bundle)
+      !> Handle of a stored bundle that was not retrieved before.
       integer(int64), intent(in) :: handle
       type(bundle_type), pointer, intent(out) :: bundle
       type(c_ptr) :: address
 
       address = transfer(int(handle, c_intptr_t), c_null_ptr)
       call c_f_pointer(address, bundle)
-   end subroutine take
+   end subroutine retrieve
 
 end module thud_bundle

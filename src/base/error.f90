@@ -20,7 +20,7 @@ module thud_error
    type :: error_type
       !> `bad_input`, `numerical_failure`, or `signal_base` plus the number of the signal.
       integer :: code = numerical_failure
-      !> One sentence that names key or position, value and allowed range.
+      !> Message that names key or position, value and allowed range.
       character(len=:), allocatable :: message
    end type error_type
 

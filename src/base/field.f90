@@ -31,7 +31,7 @@ module thud_field
    !> Maximum number of allowed texts of one key.
    integer, parameter :: max_choices = 12
 
-   !> What a flag may be.
+   !> Texts of a flag.
    character(len=*), parameter :: flags(*) = [character(len=7) :: '.true.', '.false.', 'true', 'false', '.t.', '.f.', &
       't', 'f']
 
@@ -44,11 +44,11 @@ module thud_field
       character(len=key_length) :: group = ''
       !> Key within the group.
       character(len=key_length) :: key = ''
-      !> What uses it: a source model, `modes` for the free modes, `compression`, blank for every impact.
+      !> Its user: a source model, `modes` for the free modes, `compression`, blank for every impact.
       character(len=key_length) :: owner = ''
       !> SI unit, empty for pure numbers and text.
       character(len=8) :: unit = ''
-      !> What the value is, in a few words.
+      !> Meaning of the value, in a few words.
       character(len=96) :: meaning = ''
       !> The real variable that is described, else null.
       real(wp), pointer :: real_value => null()
@@ -138,7 +138,7 @@ contains
       class(field_type), intent(in) :: self
       !> Text after the equals sign.
       character(len=*), intent(in) :: text
-      !> The text is not a value of the wanted type.
+      !> The text is not a value of the type of the key.
       type(error_type), allocatable, intent(out) :: error
       character(len=2*name_length) :: word
       character(len=128) :: message
@@ -188,32 +188,32 @@ contains
    pure function are_numbers(text) result(yes)
       character(len=*), intent(in) :: text
       logical :: yes
-      character(len=len(text) + 1) :: rest
+      character(len=len(text) + 1) :: remaining
       integer :: last
 
       yes = .true.
-      rest = adjustl(replaced(text, ',', ' '))
-      do while (yes .and. rest /= '')
-         last = index(rest, ' ') - 1
-         yes = is_number(rest(index(rest(:last), '*') + 1:last))
-         rest = adjustl(rest(last + 1:))
+      remaining = adjustl(replaced(text, ',', ' '))
+      do while (yes .and. remaining /= '')
+         last = index(remaining, ' ') - 1
+         yes = is_number(remaining(index(remaining(:last), '*') + 1:last))
+         remaining = adjustl(remaining(last + 1:))
       end do
    end function are_numbers
 
    !> Takes over the entries that were read.
    subroutine set_list(entries, list, status)
-      !> The entries, those that were not given hold `unset`: [list_length + 1].
+      !> The entries; `unset` where the list has ended: [list_length + 1].
       real(wp), intent(in) :: entries(:)
       type(list_type), intent(inout) :: list
       !> Not 0 where there are too many entries or gaps between them.
       integer, intent(out) :: status
-      logical :: given(size(entries))
+      logical :: is_set(size(entries))
 
-      ! Written so that a NaN counts as given; the check of the range refuses it later.
-      given = .not. entries <= unset
-      status = merge(0, 1, all(given(:count(given))) .and. count(given) <= list_length)
+      ! Written so that a NaN counts as set; the check of the range refuses it later.
+      is_set = .not. entries <= unset
+      status = merge(0, 1, all(is_set(:count(is_set))) .and. count(is_set) <= list_length)
       if (status /= 0) return
-      list%count = count(given)
+      list%count = count(is_set)
       list%values(:list%count) = entries(:list%count)
    end subroutine set_list
 
@@ -273,20 +273,20 @@ contains
    end function get_kind
 
    !> Error that names group, key, value and allowed range.
-   function get_error(self, value, what, interval) result(error)
+   function get_error(self, value, problem, interval) result(error)
       class(field_type), intent(in) :: self
-      !> The value as text; what is wrong with it.
-      character(len=*), intent(in) :: value, what
+      !> The value as text; the problem with it.
+      character(len=*), intent(in) :: value, problem
       type(interval_type), intent(in) :: interval
       type(error_type) :: error
       character(len=:), allocatable :: allowed
 
       call self%get_allowed(allowed, interval)
-      error = input_error('&'//trim(self%group)//': '//trim(self%key)//' = '//shortened(value)//' '//what &
+      error = input_error('&'//trim(self%group)//': '//trim(self%key)//' = '//shortened(value)//' '//problem &
          //'; allowed: '//allowed)
    end function get_error
 
-   !> The value as it stands in a namelist.
+   !> The value in the form of a namelist.
    subroutine get_text(self, text)
       class(field_type), intent(in) :: self
       !> The value; text is in quotes.

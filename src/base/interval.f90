@@ -22,13 +22,13 @@ module thud_interval
       character(len=expression_length) :: lower_expression = '', upper_expression = ''
    contains
       procedure :: contains => contains_value
-      procedure :: contains_sets
+      procedure :: contains_rows
       procedure :: resolve
    end type interval_type
 
-   !> Value of an expression: for one set of values, or for many.
+   !> Value of an expression for the values of all keys, or for each row of a table of them.
    interface evaluate
-      module procedure evaluate_one, evaluate_sets
+      module procedure evaluate_row, evaluate_rows
    end interface evaluate
 
 contains
@@ -54,7 +54,7 @@ contains
       character(len=*), intent(in) :: text
       !> Its value where it is a number.
       real(wp), intent(inout) :: number
-      !> What it is otherwise.
+      !> The text where it is an expression, else blank.
       character(len=expression_length), intent(out) :: expression
 
       expression = ''
@@ -86,17 +86,17 @@ contains
       if (self%upper_expression /= '') self%upper = evaluate(self%upper_expression, keys, values)
    end subroutine resolve
 
-   !> Whether values of one key, in many sets of the values of all keys, lie in the interval.
-   pure function contains_sets(self, key, keys, values) result(inside)
+   !> Whether the values of one key lie in the interval; each row has the values of all keys.
+   pure function contains_rows(self, key, keys, values) result(inside)
       class(interval_type), intent(in) :: self
       !> Index of the key.
       integer, intent(in) :: key
       character(len=*), intent(in) :: keys(:)
-      !> Their values: [n_set, n_key].
+      !> Their values: [n_row, n_key].
       real(wp), intent(in) :: values(:, :)
-      !> Whether they lie in it: [n_set].
+      !> Whether they lie in it: [n_row].
       logical :: inside(size(values, 1))
-      type(interval_type) :: one
+      type(interval_type) :: resolved
       real(wp), allocatable :: lower(:), upper(:)
       integer :: i
 
@@ -105,16 +105,16 @@ contains
       upper = self%upper
       if (self%lower_expression /= '') lower = evaluate(self%lower_expression, keys, values)
       if (self%upper_expression /= '') upper = evaluate(self%upper_expression, keys, values)
-      one = self
+      resolved = self
       do i = 1, size(inside)
-         one%lower = lower(i)
-         one%upper = upper(i)
-         inside(i) = one%contains(values(i, key))
+         resolved%lower = lower(i)
+         resolved%upper = upper(i)
+         inside(i) = resolved%contains(values(i, key))
       end do
-   end function contains_sets
+   end function contains_rows
 
-   !> Value for one set of values.
-   pure function evaluate_one(expression, keys, values) result(value)
+   !> Value for one value of each key.
+   pure function evaluate_row(expression, keys, values) result(value)
       !> Such as `static_harmonics/2`.
       character(len=*), intent(in) :: expression
       character(len=*), intent(in) :: keys(:)
@@ -122,20 +122,20 @@ contains
       real(wp) :: value
       real(wp) :: only(1)
 
-      only = evaluate_sets(expression, keys, reshape(values, [1, size(values)]))
+      only = evaluate_rows(expression, keys, reshape(values, [1, size(values)]))
       value = only(1)
-   end function evaluate_one
+   end function evaluate_row
 
    !> Value of a product or quotient of numbers and keys; not within any range where a key is unknown.
-   pure function evaluate_sets(expression, keys, values) result(value)
+   pure function evaluate_rows(expression, keys, values) result(value)
       character(len=*), intent(in) :: expression
       character(len=*), intent(in) :: keys(:)
       real(wp), intent(in) :: values(:, :)
-      !> The values: [n_set].
+      !> The values: [n_row].
       real(wp) :: value(size(values, 1))
       real(wp) :: operand(size(values, 1))
       real(wp) :: number
-      integer :: start, length, place, status
+      integer :: start, length, key, status
       character(len=len(expression)) :: word
       character(len=128) :: message
       character(len=1) :: operator
@@ -146,9 +146,9 @@ contains
       do
          length = scan(expression(start:)//'*', '*/') - 1
          word = adjustl(expression(start:start + length - 1))
-         place = findloc(keys == word, .true., dim=1)
-         if (place > 0) then
-            operand = values(:, place)
+         key = findloc(keys == word, .true., dim=1)
+         if (key > 0) then
+            operand = values(:, key)
          else
             read (word, *, iostat=status, iomsg=message) number
             if (status /= 0) number = ieee_value(number, ieee_quiet_nan)
@@ -160,7 +160,7 @@ contains
          if (start > len(expression)) exit
          operator = expression(start - 1:start - 1)
       end do
-   end function evaluate_sets
+   end function evaluate_rows
 
    !> Whether a value lies in the interval; NaN never does.
    elemental function contains_value(self, value) result(inside)

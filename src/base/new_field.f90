@@ -14,7 +14,7 @@ contains
    function real_field(key, variable, unit, meaning, range) result(field)
       character(len=*), intent(in) :: key
       real(wp), intent(in), target :: variable
-      !> SI unit, empty for a pure number; what the value is; allowed range.
+      !> SI unit, empty for a pure number; meaning; allowed range.
       character(len=*), intent(in) :: unit, meaning, range
       type(field_type) :: field
 
@@ -26,7 +26,7 @@ contains
    function integer_field(key, variable, meaning, range) result(field)
       character(len=*), intent(in) :: key
       integer, intent(in), target :: variable
-      !> What the value is; allowed range.
+      !> Meaning of the value; allowed range.
       character(len=*), intent(in) :: meaning, range
       type(field_type) :: field
 
@@ -49,7 +49,7 @@ contains
    function list_field(key, variable, unit, meaning, range, whole) result(field)
       character(len=*), intent(in) :: key
       type(list_type), intent(in), target :: variable
-      !> SI unit, empty for pure numbers; what the values are; allowed range of each.
+      !> SI unit, empty for pure numbers; meaning; allowed range of each.
       character(len=*), intent(in) :: unit, meaning, range
       !> They are whole numbers (default: not).
       logical, intent(in), optional :: whole

@@ -172,7 +172,7 @@ contains
          more = count(first >= [194, 224, 240])
          valid = valid .and. (first < 128 .or. more > 0) .and. first < 245
          if (more == 0 .or. i == len(text)) cycle
-         ! Longer forms than needed, halves of pairs, and what lies beyond the last character.
+         ! Longer forms than needed, halves of pairs, and codes beyond the last character.
          second = iachar(text(i + 1:i + 1))
          valid = valid .and. .not. any([first == 224 .and. second < 160, first == 237 .and. second > 159, &
             first == 240 .and. second < 144, first == 244 .and. second > 143])
@@ -185,7 +185,7 @@ contains
    pure function is_number(text) result(yes)
       !> The text, without blanks around it.
       character(len=*), intent(in) :: text
-      !> It is a number, or one of the names of what is none.
+      !> It is a number, an infinity or NaN.
       logical :: yes
       character(len=len(text)) :: word
       integer :: sign

@@ -27,7 +27,7 @@ module thud_compute
    !> Memory for one sample of a record, its transforms and text included, bytes; measured.
    real(wp), parameter :: sample_memory = 600.0_wp
 
-   !> What is computed of that which a case asks for.
+   !> Results to be computed, if the case requests them.
    type :: scope_type
       !> Levels and criteria.
       logical :: levels = .true.
@@ -69,7 +69,7 @@ module thud_compute
       type(room_level_type) :: room
       !> Quasi-static compression, where it is asked for.
       type(compression_type) :: compression
-      !> What is possible but not plausible: [n_warning].
+      !> Warnings on an implausible case: [n_warning].
       character(len=warning_length), allocatable :: warning(:)
    end type results_type
 

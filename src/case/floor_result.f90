@@ -32,36 +32,36 @@ module thud_floor_result
 contains
 
    !> Results on the floor of a case.
-   subroutine get_floor_result(case, contact, energies, found, error)
+   subroutine get_floor_result(case, contact, energies, floor_result, error)
       type(case_type), intent(in) :: case
       !> The drop on the floor.
       type(force_history_type), intent(in) :: contact
       !> Compute also energies and velocities of points.
       logical, intent(in) :: energies
-      type(floor_result_type), intent(out) :: found
+      type(floor_result_type), intent(out) :: floor_result
       !> A level cannot be computed, or the floor has no such point.
       type(error_type), allocatable, intent(out) :: error
       type(receiver_type) :: receiver
       integer :: first, n, i
 
-      call get_level_bands(case%bands, found%bands, first)
-      found%bands = found%bands(first:)
-      n = size(found%bands)
-      allocate (found%contact_level(n), found%energy_by_motion(n), found%energy_by_mobility(n))
-      call get_force_exposure_levels(contact%floor_force, contact%sample_rate, found%bands, trim(case%level_method), &
-         found%contact_level, error)
+      call get_level_bands(case%bands, floor_result%bands, first)
+      floor_result%bands = floor_result%bands(first:)
+      n = size(floor_result%bands)
+      allocate (floor_result%contact_level(n), floor_result%energy_by_motion(n), floor_result%energy_by_mobility(n))
+      call get_force_exposure_levels(contact%floor_force, contact%sample_rate, floor_result%bands, trim(case%level_method), &
+         floor_result%contact_level, error)
       if (allocated(error) .or. .not. energies) return
       associate (floor => case%floors(get_floor_number(case))%model)
          call floor%get_receiver(receiver, error)
          if (allocated(error)) return
          call get_injected_energies(receiver, contact%floor_force, contact%floor_velocity, contact%sample_rate, &
-            found%bands, found%energy_by_motion, found%energy_by_mobility, error)
+            floor_result%bands, floor_result%energy_by_motion, floor_result%energy_by_mobility, error)
          if (allocated(error)) return
-         found%conductance = get_mean_conductances(receiver, found%bands)
-         allocate (found%point_velocity(size(contact%floor_force), floor%point_x%count))
+         floor_result%conductance = get_mean_conductances(receiver, floor_result%bands)
+         allocate (floor_result%point_velocity(size(contact%floor_force), floor%point_x%count))
          do i = 1, floor%point_x%count
             call get_point_velocity(floor, contact%floor_force, contact%sample_rate, floor%point_x%values(i), &
-               floor%point_y%values(i), found%point_velocity(:, i), error)
+               floor%point_y%values(i), floor_result%point_velocity(:, i), error)
             if (allocated(error)) return
          end do
       end associate

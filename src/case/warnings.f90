@@ -1,4 +1,4 @@
-!> Warnings on what is possible but not plausible: input of no rubber, moduli of another model, forces of no source.
+!> Warnings on implausible cases: input of no rubber, moduli of another model, forces of no source.
 module thud_warnings
    use thud_ball, only: get_density
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
@@ -36,7 +36,7 @@ module thud_warnings
    !> a half sine of 20 ms, above the sums of their nominal octaves: [2].
    real(wp), parameter :: source_level(2) = [44.0_wp, 52.0_wp]
 
-   !> Distance from them of a force that is probably given in other units, dB.
+   !> Distance from them of a force that is probably in other units, dB.
    real(wp), parameter :: max_distance = 40.0_wp
 
    !> Outer edges of the octaves 31.5 and 500 Hz, Hz: [2].
@@ -152,12 +152,12 @@ contains
       character(len=*), intent(in) :: model
       !> Messages: [n].
       character(len=warning_length), allocatable, intent(inout) :: warnings(:)
-      real(wp) :: own, other, density
+      real(wp) :: paper_modulus, other, density
       integer :: i
 
       i = findloc(model_names == model, .true., dim=1)
-      own = case%models(i)%model%get_paper_modulus()
-      if (.not. own > 0.0_wp) return
+      paper_modulus = case%models(i)%model%get_paper_modulus()
+      if (.not. paper_modulus > 0.0_wp) return
       density = get_density(case%ball)
       associate (modulus => case%ball%youngs_modulus)
          if (density < rubber_density(1) .or. density > rubber_density(2)) call add(warnings, &
@@ -171,11 +171,11 @@ contains
             //fixed(rubber_ratio(2), 2))
          do i = 1, size(model_names)
             other = case%models(i)%model%get_paper_modulus()
-            if (.not. (other > 0.0_wp .and. abs(other - own) > same_modulus*own)) cycle
+            if (.not. (other > 0.0_wp .and. abs(other - paper_modulus) > same_modulus*paper_modulus)) cycle
             if (abs(modulus - other) > same_modulus*other) cycle
             call add(warnings, '&ball: youngs_modulus = '//fixed(modulus/1.0e6_wp, 2)//' MPa is the modulus of the ' &
                //"paper's ball in the model "//quoted(model_names(i))//'; '//quoted(model)//' needs ' &
-               //fixed(own/1.0e6_wp, 2)//' MPa')
+               //fixed(paper_modulus/1.0e6_wp, 2)//' MPa')
             exit
          end do
       end associate

@@ -1,4 +1,4 @@
-!> A source of a few masses of which the first touches the floor: what the marches on rigid and mobile floors need of it.
+!> A source of a few masses of which the first touches the floor: its interface to the marches on rigid and mobile floors.
 !>
 !> Its equations of motion are laid out in pairs, displacement towards the floor (m) and velocity (m/s) of each mass, then
 !> impulse given to the floor (N s) and energy lost (J); further components are its own. On a mobile floor they hold for
@@ -30,7 +30,7 @@ module thud_contact_source
       procedure(record_peaks_interface), deferred :: record_peaks
       procedure :: get_event
       procedure :: pass_event
-      procedure :: has_left
+      procedure :: has_separated
       procedure :: get_center
       procedure :: get_inner_energy
       procedure :: get_failure
@@ -94,14 +94,14 @@ contains
    end subroutine pass_event
 
    !> Whether the source has left a rigid floor for good; a single mass does at release.
-   pure function has_left(self, state) result(left)
+   pure function has_separated(self, state) result(separated)
       class(contact_source_type), intent(in) :: self
       !> State: [n_state].
       real(wp), intent(in) :: state(:)
-      logical :: left
+      logical :: separated
 
-      left = .not. self%touching
-   end function has_left
+      separated = .not. self%touching
+   end function has_separated
 
    !> Displacement, m, and velocity, m/s, of the center of mass: [2].
    pure function get_center(self, state) result(center)
@@ -150,7 +150,7 @@ contains
 
    !> Error of steps that are too long for the source.
    pure function coarse_error(finding) result(error)
-      !> What shows it.
+      !> The symptom.
       character(len=*), intent(in) :: finding
       type(error_type) :: error
       character(len=:), allocatable :: shown

@@ -13,7 +13,7 @@ module thud_coupled_impact
    use thud_receiver_stages, only: new_receiver_stages
    use thud_sampling, only: sampling_type
    use thud_text, only: to_text
-   use thud_zero_search, only: advance_search, is_found, new_zero_search, update_bracket, zero_search_type
+   use thud_zero_search, only: advance_search, is_converged, new_zero_search, update_bracket, zero_search_type
    implicit none (type, external)
    private
 
@@ -32,7 +32,7 @@ contains
       type(sampling_type), intent(in) :: sampling
       !> Steps in each sampling interval.
       integer, intent(in) :: n_step
-      !> What the source drops on.
+      !> The floor under the source.
       type(receiver_type), intent(in) :: receiver
       !> The history, prepared by the source; gets samples, maxima, contact time and the motion of the floor.
       type(force_history_type), intent(inout) :: history
@@ -124,7 +124,7 @@ contains
       type(zero_search_type) :: search
 
       search = new_zero_search(get_distance(source, event, impact%motion), remaining, get_distance(source, event, end))
-      do while (.not. is_found(search))
+      do while (.not. is_converged(search))
          call advance_search(search)
          call take_step(source, drop, search%trial, impact, end, error)
          if (allocated(error)) return
@@ -206,7 +206,7 @@ contains
       end associate
    end subroutine check_end
 
-   !> Clears the flight after the last contact, and writes what the march has summed up.
+   !> Clears the flight after the last contact, and writes the sums of the march.
    pure subroutine finish_record(source, impact, history)
       class(contact_source_type), intent(in) :: source
       type(impact_type), intent(in) :: impact

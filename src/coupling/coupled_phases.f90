@@ -110,7 +110,7 @@ contains
       end if
    end function get_event
 
-   !> What falls to zero at an event: gap, deflection, or velocity.
+   !> Quantity that falls to zero at an event: gap, deflection, or velocity.
    pure function get_distance(source, event, motion) result(distance)
       class(contact_source_type), intent(in) :: source
       !> The event.
@@ -160,7 +160,7 @@ contains
       end associate
    end subroutine pass_event
 
-   !> Raises the maxima, and ends the contact of a source that has given its energy to the floor.
+   !> Raises the maxima, and ends the contact of a source that has lost its energy to the floor.
    pure subroutine update_maxima(source, impact, history)
       class(contact_source_type), intent(inout) :: source
       type(impact_type), intent(inout) :: impact

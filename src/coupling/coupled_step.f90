@@ -200,7 +200,7 @@ contains
       end if
    end subroutine get_rate
 
-   !> What the forces on the floor and the accelerations miss.
+   !> Residual of the forces on the floor and the accelerations.
    pure function get_residual(source, trial) result(residual)
       class(contact_source_type), intent(in) :: source
       type(trial_type), intent(in) :: trial
@@ -243,7 +243,7 @@ contains
       cap_mass = get_cap_mass(source, trial)
       by_cap = matmul(radau_derivative, stages%velocity)/stages%interval
       do i = 1, n_stage
-         ! What displacements and velocities relative to the floor gain at this stage.
+         ! Derivatives of displacements and velocities relative to the floor at this stage.
          by_force = -reshape([stages%displacement(i, :), stages%velocity(i, :)], [n_stage, 2])
          by_acceleration = reshape([stages%interval**2*second_integral(i, :), stages%interval*radau_integral(i, :)], &
             [n_stage, 2])

@@ -8,7 +8,7 @@ module thud_ceiling
    implicit none (type, external)
    private
 
-   public :: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_share, get_mass_law
+   public :: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_fraction, get_mass_law
 
    !> A ceiling; a mass of 0 means no ceiling.
    type :: ceiling_type
@@ -39,14 +39,14 @@ contains
    !> Ratio of the squared velocity of the ceiling to that of the floor, averaged over a band. The floor drives the ceiling
    !> through the stiffness of the air; the ceiling's mass and radiation rho0 c0 sigma react:
    !> abs((1 + i eta)/(1 + i eta + i k d sigma - (f/f0)**2))**2, f0 = sqrt(rho0 c0**2/(depth mass))/(2 pi).
-   elemental function get_forced_share(ceiling, air, radiation_factor, lower, upper) result(share)
+   elemental function get_forced_fraction(ceiling, air, radiation_factor, lower, upper) result(fraction)
       type(ceiling_type), intent(in) :: ceiling
       type(air_type), intent(in) :: air
       !> Radiation factor of floor and ceiling.
       real(wp), intent(in) :: radiation_factor
       !> Edges of the band, Hz.
       real(wp), intent(in) :: lower, upper
-      real(wp) :: share
+      real(wp) :: fraction
       complex(wp) :: b
       real(wp) :: period, damping
 
@@ -57,9 +57,9 @@ contains
          ! 1/((1 - x**2)**2 + damping**2) = Im(1/(b**2 - x**2))/damping with b**2 = 1 - i damping. The difference of
          ! atanh(x/b) at both ends is written as one atanh: the imaginary parts lie between 0 and pi/2.
          b = sqrt(cmplx(1.0_wp, -damping, wp))
-         share = (1 + ceiling%loss_factor**2)/(damping*(high - low))*aimag(atanh((high - low)*b/(b**2 - low*high))/b)
+         fraction = (1 + ceiling%loss_factor**2)/(damping*(high - low))*aimag(atanh((high - low)*b/(b**2 - low*high))/b)
       end associate
-   end function get_forced_share
+   end function get_forced_fraction
 
    !> Modes per hertz of the cavity: lateral modes for each number of half waves that fits across its depth.
    elemental function get_cavity_mode_density(ceiling, air, area, frequency) result(density)

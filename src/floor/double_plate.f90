@@ -45,16 +45,17 @@ contains
       !> Set if the losses are too high.
       type(error_type), allocatable, intent(out) :: error
       integer, allocatable :: m(:), n(:)
-      real(wp), allocatable :: omega(:, :), share(:, :), loss_factor(:, :), gain(:, :)
+      real(wp), allocatable :: omega(:, :), modal_square(:, :), loss_factor(:, :), gain(:, :)
       logical, allocatable :: individual(:, :)
       real(wp) :: compliance
 
       call get_all_half_waves(floor, m, n)
-      allocate (omega(size(m), 2), share(size(m), 2), loss_factor(size(m), 2))
+      allocate (omega(size(m), 2), modal_square(size(m), 2), loss_factor(size(m), 2))
       call get_pair(floor, get_modal_stiffness(floor%upper, m, n), get_modal_stiffness(floor%lower, m, n), omega(:, 1), &
-         omega(:, 2), share(:, 1), share(:, 2), loss_factor(:, 1), loss_factor(:, 2))
+         omega(:, 2), modal_square(:, 1), modal_square(:, 2), loss_factor(:, 1), loss_factor(:, 2))
       individual = omega < 2*pi*mode_limit
-      gain = 4/(floor%upper%length*floor%upper%width)*share*spread(get_shape(m, n, source)*get_shape(m, n, point), 2, 2)
+      gain = 4/(floor%upper%length*floor%upper%width)*modal_square &
+         *spread(get_shape(m, n, source)*get_shape(m, n, point), 2, 2)
       compliance = sum(gain/omega**2, mask=.not. individual)
       if (all(abs(source - point) < epsilon(1.0_wp))) compliance = compliance + get_far_compliance(floor%upper)
       call new_modal_receiver('floating_floor', pack(gain, individual), pack(omega, individual), &
@@ -78,14 +79,14 @@ contains
    end subroutine get_all_half_waves
 
    !> The two modes of a shape.
-   elemental subroutine get_pair(floor, upper, lower, omega_1, omega_2, share_1, share_2, loss_1, loss_2)
+   elemental subroutine get_pair(floor, upper, lower, omega_1, omega_2, square_1, square_2, loss_1, loss_2)
       type(double_plate_type), intent(in) :: floor
       !> Modal stiffness per unit area of both plates, N/m3.
       real(wp), intent(in) :: upper, lower
       !> Angular frequencies, rad/s, the lower first.
       real(wp), intent(out) :: omega_1, omega_2
       !> Squared displacements of the upper plate, for a modal mass of 1 per unit area, m2/kg.
-      real(wp), intent(out) :: share_1, share_2
+      real(wp), intent(out) :: square_1, square_2
       !> Loss factors.
       real(wp), intent(out) :: loss_1, loss_2
       real(wp) :: first, second, coupling, angle, top, bottom
@@ -100,11 +101,11 @@ contains
          angle = atan2(2*coupling, first - second)/2
          top = cos(angle)/sqrt(m1)
          bottom = sin(angle)/sqrt(m2)
-         share_2 = top**2
+         square_2 = top**2
          loss_2 = get_loss(floor, omega_2, upper*top**2, lower*bottom**2, s*(top - bottom)**2)
          top = -sin(angle)/sqrt(m1)
          bottom = cos(angle)/sqrt(m2)
-         share_1 = top**2
+         square_1 = top**2
          loss_1 = get_loss(floor, omega_1, upper*top**2, lower*bottom**2, s*(top - bottom)**2)
       end associate
    end subroutine get_pair

@@ -166,18 +166,18 @@ contains
       real(wp), intent(in) :: middle, half
       !> By the motion and by the mobility, J: [2].
       real(wp) :: energy(2)
-      complex(wp), dimension(n_node) :: s, turn, last, force, velocity, mobility
+      complex(wp), dimension(n_node) :: s, phase_factor, last, force, velocity, mobility
       complex(wp), dimension(0:n_node - 1) :: by_force, by_square, second
       complex(wp) :: z, started
       integer :: k
 
       s = cmplx(0.0_wp, 2*pi*(middle + half*rule%node), wp)
-      turn = exp(-s/record%sample_rate)
+      phase_factor = exp(-s/record%sample_rate)
       associate (duration => (size(record%force) - 1)/record%sample_rate, &
                  record_time => (size(record%velocity) - 1)/record%sample_rate)
          last = exp(-s*record_time)
-         force = get_sums(record%force, turn)/record%sample_rate
-         velocity = get_recorded_velocity(record, s, turn, last)
+         force = get_sums(record%force, phase_factor)/record%sample_rate
+         velocity = get_recorded_velocity(record, s, phase_factor, last)
          mobility = record%direct
          by_force = matmul(rule%coefficient, conjg(force))
          by_square = matmul(rule%coefficient, abs(force)**2)
@@ -203,17 +203,18 @@ contains
    end function get_step_energies
 
    !> Transform of the velocity up to the end of the record, by the trapezoidal rule with end correction.
-   pure function get_recorded_velocity(record, s, turn, last) result(velocity)
+   pure function get_recorded_velocity(record, s, phase_factor, last) result(velocity)
       type(record_type), intent(in) :: record
       !> Frequencies i w, 1/s; exp(-s t) after one sample and after the record: [n_node].
-      complex(wp), intent(in) :: s(n_node), turn(n_node), last(n_node)
+      complex(wp), intent(in) :: s(n_node), phase_factor(n_node), last(n_node)
       !> The transform, m: [n_node].
       complex(wp) :: velocity(n_node)
       real(wp) :: acceleration
 
       acceleration = real(sum(record%pole*record%end_of_record), wp)
       associate (final => record%velocity(size(record%velocity)), rate => record%sample_rate)
-         velocity = (get_sums(record%velocity, turn) - last*final/2)/rate - last*(acceleration - s*final)/(12*rate**2)
+         velocity = (get_sums(record%velocity, phase_factor) - last*final/2)/rate &
+            - last*(acceleration - s*final)/(12*rate**2)
       end associate
    end function get_recorded_velocity
 
@@ -228,24 +229,24 @@ contains
       phi_1 = phi(1)
    end function get_phi_1
 
-   !> Sums of sample(i) turn**(i - 1), by Horner's scheme.
-   pure function get_sums(sample, turn) result(total)
+   !> Sums of sample(i) phase_factor**(i - 1), by Horner's scheme.
+   pure function get_sums(sample, phase_factor) result(total)
       !> The samples: [n_sample].
       real(wp), intent(in) :: sample(:)
-      !> Numbers whose powers are taken: [n_node].
-      complex(wp), intent(in) :: turn(n_node)
+      !> Phase factor of one sample: [n_node].
+      complex(wp), intent(in) :: phase_factor(n_node)
       !> The sums: [n_node].
       complex(wp) :: total(n_node)
-      real(wp), dimension(n_node) :: turn_re, turn_im, re, im, next
+      real(wp), dimension(n_node) :: factor_re, factor_im, re, im, next
       integer :: i
 
-      turn_re = turn%re
-      turn_im = turn%im
+      factor_re = phase_factor%re
+      factor_im = phase_factor%im
       re = 0.0_wp
       im = 0.0_wp
       do i = size(sample), 1, -1
-         next = re*turn_re - im*turn_im + sample(i)
-         im = re*turn_im + im*turn_re
+         next = re*factor_re - im*factor_im + sample(i)
+         im = re*factor_im + im*factor_re
          re = next
       end do
       total = cmplx(re, im, wp)

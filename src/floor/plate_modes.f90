@@ -151,7 +151,7 @@ contains
       integer, allocatable :: m(:), n(:)
       real(wp), allocatable :: omega(:), gain(:)
       logical, allocatable :: individual(:)
-      real(wp) :: residual_modes(2)
+      real(wp) :: residual_terms(2)
 
       call get_half_waves(plate, sum_limit_factor*mode_limit, m, n)
       if (present(max_across)) then
@@ -161,14 +161,14 @@ contains
       omega = sqrt(get_modal_stiffness(plate, m, n)/get_surface_mass(plate))
       individual = omega < 2*pi*mode_limit
       gain = 4/(get_surface_mass(plate)*plate%length*plate%width)*get_shape(m, n, source)*get_shape(m, n, point)
-      residual_modes = [sum(gain/omega**2, mask=.not. individual), residual_corner]
+      residual_terms = [sum(gain/omega**2, mask=.not. individual), residual_corner]
       ! The modes that are not summed cancel on average, except at the source.
       if (.not. present(max_across) .and. all(abs(source - point) < epsilon(1.0_wp))) &
-         residual_modes(1) = residual_modes(1) + get_far_compliance(plate)
-      if (present(residual)) residual_modes = residual
+         residual_terms(1) = residual_terms(1) + get_far_compliance(plate)
+      if (present(residual)) residual_terms = residual
       associate (omega => pack(omega, individual))
          call new_modal_receiver(group, pack(gain, individual), omega, get_total_loss(plate, air_type(), omega/(2*pi)), &
-            residual_modes, receiver, error)
+            residual_terms, receiver, error)
       end associate
    end subroutine new_plate_receiver
 

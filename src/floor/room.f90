@@ -2,7 +2,7 @@
 !> force injects energy into the floor, the floor radiates into the room, and the Fast detector shows the level.
 module thud_room
    use thud_band, only: band_type
-   use thud_ceiling, only: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_share, get_mass_law
+   use thud_ceiling, only: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_fraction, get_mass_law
    use thud_constants, only: pi
    use thud_energy_flow, only: add_subsystem, connect, energy_flow_type, get_loss, new_energy_flow
    use thud_error, only: error_type, input_error
@@ -253,7 +253,7 @@ contains
    !> Energies of a band: floor, walls, room and ceiling cavity, with the flows between them.
    !>
    !> A plate loses omega eta in total; it radiates rho0 c0 sigma/m'' into the room and as much to the other side. The room
-   !> loses 6 ln 10/T plus the flow back into the plates. With a ceiling of transmission t, a share of the floor's radiation
+   !> loses 6 ln 10/T plus the flow back into the plates. With a ceiling of transmission t, a fraction of the floor's radiation
    !> reaches the room through the stiffness of the air. Of the rest, t**2 reaches the room directly and 1 - t**2 the
    !> cavity, from which sound leaves through the ceiling (Craik and Smith 2000). The cavity receives t (1 - t) of the sound
    !> that the room sends to the ceiling. A ceiling without mass, t = 1, has no effect.
@@ -268,7 +268,7 @@ contains
       type(energy_flow_type) :: flow
       type(plate_type) :: plates(1 + room%walls%lengths%count)
       real(wp), dimension(size(plates)) :: radiated
-      real(wp) :: transmission, share, rest
+      real(wp) :: transmission, forced, free
       integer :: i, at_room, at_cavity
 
       plates = [plate, get_walls(room%walls)]
@@ -282,13 +282,13 @@ contains
             [2*pi*f*plates%loss_factor + radiated, decay_of_60_db/prediction%reverberation_time(band)])
          if (ceiling%mass > 0.0_wp) then
             transmission = get_mass_law(ceiling, air, f)
-            share = get_forced_share(ceiling, air, prediction%radiation_factor(band), third%lower, third%upper)
-            rest = max(1 - share, 0.0_wp)
+            forced = get_forced_fraction(ceiling, air, prediction%radiation_factor(band), third%lower, third%upper)
+            free = max(1 - forced, 0.0_wp)
             call add_subsystem(flow, get_cavity_mode_density(ceiling, air, area, f), 2*pi*f*ceiling%loss_factor)
-            call connect(flow, 1, at_cavity, radiated(1)*rest*(1 - transmission**2))
+            call connect(flow, 1, at_cavity, radiated(1)*free*(1 - transmission**2))
             call connect(flow, at_room, at_cavity, &
                air%sound_speed*area*transmission*(1 - transmission)/(4*room%volume))
-            call connect(flow, 1, at_room, radiated(1)*(share + rest*transmission**2))
+            call connect(flow, 1, at_room, radiated(1)*(forced + free*transmission**2))
          else
             call connect(flow, 1, at_room, radiated(1))
          end if

@@ -125,17 +125,17 @@ contains
    pure subroutine continue_to_zero(history)
       !> The history, with its contact time; `exact_contact_time` is set.
       type(force_history_type), intent(inout) :: history
-      real(wp) :: part
+      real(wp) :: fraction
       integer :: last
 
       last = min(size(history%floor_force), ceiling((history%touch_time + history%contact_time)*history%sample_rate) + 2)
       last = findloc(abs(history%floor_force(:last)) > 0.0_wp, .true., dim=1, back=.true.)
       if (last < 2) return
       associate (before => history%floor_force(last - 1), end => history%floor_force(last))
-         part = 1.0_wp
-         if (before > end) part = min(1.0_wp, end/(before - end))
+         fraction = 1.0_wp
+         if (before > end) fraction = min(1.0_wp, end/(before - end))
       end associate
-      history%exact_contact_time = (last - 1 + part)/history%sample_rate - history%touch_time
+      history%exact_contact_time = (last - 1 + fraction)/history%sample_rate - history%touch_time
    end subroutine continue_to_zero
 
    !> A history of zero force.

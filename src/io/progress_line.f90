@@ -11,7 +11,7 @@ module thud_progress_line
    public :: begin_progress, end_progress
 
    !> Time without a line, at the beginning and between two lines, s.
-   real(wp), parameter :: patience = 0.5_wp
+   real(wp), parameter :: min_interval = 0.5_wp
 
    !> Clock at the beginning and at the latest line, and its ticks in a second.
    integer(int64) :: first = 0, latest = 0, rate = 1
@@ -51,16 +51,16 @@ contains
       character(len=*), intent(in) :: unit
       character(len=line_length) :: line
       integer(int64) :: now
-      real(wp) :: left
+      real(wp) :: remaining
       integer :: status
 
       call system_clock(now)
-      if (real(now - latest, wp) < patience*real(rate, wp)) return
+      if (real(now - latest, wp) < min_interval*real(rate, wp)) return
       latest = now
       if (whole > 0.0_wp .and. done > 0.0_wp) then
-         left = real(now - first, wp)/real(rate, wp)*(whole - done)/done
-         line = 'thud: '//fixed(done, 1)//' of at most '//fixed(whole, 1)//' '//unit//' computed, at most '//fixed(left, 0) &
-            //' s left'
+         remaining = real(now - first, wp)/real(rate, wp)*(whole - done)/done
+         line = 'thud: '//fixed(done, 1)//' of at most '//fixed(whole, 1)//' '//unit//' computed, at most ' &
+            //fixed(remaining, 0)//' s left'
          call write_text(standard_error, achar(13)//line, status)
       else
          call write_text(standard_error, achar(13)//'thud: '//fixed(done, 0)//' '//unit//' computed', status)

@@ -141,7 +141,7 @@ contains
    subroutine check_space(case, directory, error)
       type(case_type), intent(in) :: case
       character(len=*), intent(in) :: directory
-      !> Names the bytes that are wanted and those that are free.
+      !> Names the required and the free bytes.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: wanted, free
 

@@ -30,7 +30,7 @@ module thud_samples_run
    type :: tally_type
       !> Samples, those that were computed, and those that conform.
       integer :: samples = 0, computed = 0, conforming = 0
-      !> Why the first of those failed that did.
+      !> Error of the first failed sample.
       character(len=1024) :: failure = ''
       !> Minimum and maximum contact time, s, and octave levels of the force of the case, dB: [octave_count + 1, 2].
       real(wp) :: span(octave_count + 1, 2) = spread([huge(1.0_wp), -huge(1.0_wp)], 1, octave_count + 1)
@@ -40,7 +40,7 @@ contains
 
    !> Computes all samples of a table and writes their results.
    subroutine run_samples(path, table_path, threads, output, replace, outcome, error)
-      !> Path of the namelist file, which gives what the table does not.
+      !> Path of the namelist file, which has the values of all other keys.
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: table_path
       integer, intent(in) :: threads
@@ -98,7 +98,7 @@ contains
       integer, intent(in) :: threads
       type(result_directory_type), intent(inout) :: results
       type(tally_type), intent(out) :: tally
-      !> What went wrong before; or a value is not a number, the sampling cannot be used, the file cannot be written.
+      !> An earlier error; or a value is not a number, the sampling cannot be used, the file cannot be written.
       type(error_type), allocatable, intent(inout) :: error
       type(sweep_type) :: sweep
       type(text_file_type) :: parts(threads)
@@ -168,7 +168,7 @@ contains
       end do
    end subroutine add
 
-   !> What the screen shows.
+   !> Text for the screen.
    subroutine describe(case, table, tally, text)
       type(case_type), intent(in) :: case
       type(sample_table_type), intent(in) :: table

@@ -147,16 +147,16 @@ contains
       real(wp) :: work(20*projection%n_sample)
       real(wp), allocatable :: vectors(:, :)
       integer :: support(2*projection%n_sample), whole_work(10*projection%n_sample)
-      integer :: i, n, rank, found, status
+      integer :: i, n, rank, n_value, status
 
       n = projection%n_sample
       rank = get_rank(n, half_width)
       diagonal = [(((n - 1 - 2*i)/2.0_wp)**2*cos(2*pi*half_width), i=0, n - 1)]
       beside = [(real(i, wp)*(n - i)/2, i=1, n)]
       allocate (vectors(n, rank))
-      call dstevr('V', 'I', n, diagonal, beside, 0.0_wp, 0.0_wp, n - rank + 1, n, 0.0_wp, found, values, vectors, n, &
+      call dstevr('V', 'I', n, diagonal, beside, 0.0_wp, 0.0_wp, n - rank + 1, n, 0.0_wp, n_value, values, vectors, n, &
          support, work, size(work), whole_work, size(whole_work), status)
-      failed = status /= 0 .or. found /= rank
+      failed = status /= 0 .or. n_value /= rank
       if (failed) return
       ! The largest eigenvalue belongs to the first sequence, which is symmetric; then the symmetry alternates.
       vectors = vectors(:, rank:1:-1)

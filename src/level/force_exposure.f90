@@ -185,21 +185,21 @@ contains
       !> Angles per sample of cosine and sine.
       real(wp), intent(in) :: m, h
       real(wp) :: total
-      real(wp) :: part(block, 4), start_wave(4), angle(2)
+      real(wp) :: partial_sum(block, 4), start_wave(4), angle(2)
       integer :: start, i
 
-      part = 0.0_wp
+      partial_sum = 0.0_wp
       do start = 0, size(x) - 1, block
          angle = get_angle([m, h], start)
          start_wave = [cos(angle(1))*[sin(angle(2)), cos(angle(2))], -sin(angle(1))*[sin(angle(2)), cos(angle(2))]]
          do i = 1, 4
-            part(:, i) = part(:, i) + start_wave(i)*x(start + 1:start + block)
+            partial_sum(:, i) = partial_sum(:, i) + start_wave(i)*x(start + 1:start + block)
          end do
       end do
       total = 0.0_wp
       do i = 1, block
-         total = total + cos(m*i)*(part(i, 1)*cos(h*i) + part(i, 2)*sin(h*i)) &
-            + sin(m*i)*(part(i, 3)*cos(h*i) + part(i, 4)*sin(h*i))
+         total = total + cos(m*i)*(partial_sum(i, 1)*cos(h*i) + partial_sum(i, 2)*sin(h*i)) &
+            + sin(m*i)*(partial_sum(i, 3)*cos(h*i) + partial_sum(i, 4)*sin(h*i))
       end do
    end function get_wave_sum
 
@@ -212,12 +212,12 @@ contains
       integer, intent(in) :: count
       real(wp) :: angle
       real(wp), parameter :: scale = 2.0_wp**24
-      real(wp) :: turns, high
+      real(wp) :: revolutions, high
 
-      turns = per_sample/(2*pi)
+      revolutions = per_sample/(2*pi)
       ! Rounded to so few digits that the product is exact.
-      high = anint(turns*scale)/scale
-      angle = 2*pi*((high*count - anint(high*count)) + (turns - high)*count)
+      high = anint(revolutions*scale)/scale
+      angle = 2*pi*((high*count - anint(high*count)) + (revolutions - high)*count)
    end function get_angle
 
 end module thud_force_exposure

@@ -36,7 +36,7 @@ module thud_rating
    character(len=24), parameter :: rated_set_names(*) = rated_sets%name
 
    !> Reference volume, m3, and reverberation time, s (ISO 16283-2).
-   real(wp), parameter :: reference_volume = 50.0_wp, reference_time = 0.5_wp
+   real(wp), parameter :: reference_volume = 50.0_wp, reference_reverberation = 0.5_wp
 
    !> Reverberation time of a decay with the time constant of the Fast detector, s: 0.125 s * 6 ln 10.
    real(wp), parameter :: fast_reverberation = 1.7275_wp
@@ -140,7 +140,7 @@ contains
       real(wp) :: difference
 
       difference = 10*log10(volume/reference_volume) &
-         - 10/log(10.0_wp)*(get_log_gain(reverberation_time) - get_log_gain(reference_time))
+         - 10/log(10.0_wp)*(get_log_gain(reverberation_time) - get_log_gain(reference_reverberation))
    end function get_standardization
 
    !> ln g = -ln C/(C - 1).

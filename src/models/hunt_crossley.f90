@@ -22,18 +22,18 @@ module thud_hunt_crossley
 
    public :: get_damping, hunt_crossley_type
 
-   !> Options of the model. Of stiffness and contact time one is given, of damping and
-   !> restitution at most one; 0 means not given.
+   !> Options of the model. Exactly one of stiffness and contact time is set, at most one of damping
+   !> and restitution; 0 means not set.
    type, extends(source_model_type) :: hunt_crossley_type
       !> Stiffness k, N/m^exponent.
       real(wp) :: stiffness = 0.0_wp
-      !> Wanted contact time, s.
+      !> Target contact time, s.
       real(wp) :: contact_time = 0.0_wp
       !> Exponent n of the deflection; 3/2 is Hertz's.
       real(wp) :: exponent = 1.5_wp
       !> Damping alpha, s/m.
       real(wp) :: damping = 0.0_wp
-      !> Wanted coefficient of restitution.
+      !> Target coefficient of restitution.
       real(wp) :: restitution = 0.0_wp
    contains
       procedure, pass(options) :: get_fields
@@ -174,7 +174,7 @@ contains
    !> In units of v0 and of the length D = (M v0^2/k)^(1/(n + 1)) the equation does not contain k:
    !> one contact in these units gives the ratio of contact time to D/v0.
    pure function get_stiffness(contact_time, exponent, damping, mass, impact_velocity) result(stiffness)
-      !> Wanted contact time, s; exponent n of the deflection; damping alpha, s/m; mass, kg.
+      !> Target contact time, s; exponent n of the deflection; damping alpha, s/m; mass, kg.
       real(wp), intent(in) :: contact_time, exponent, damping, mass
       !> Velocity at first touch, m/s.
       real(wp), intent(in) :: impact_velocity

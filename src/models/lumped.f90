@@ -32,7 +32,7 @@ contains
       type(force_history_type), intent(out) :: history
       !> The equation fails, the contact outlasts the record, or the steps are too coarse.
       type(error_type), allocatable, intent(out) :: error
-      !> What the source drops on (default: a rigid floor).
+      !> The floor under the source (default: rigid).
       type(receiver_type), intent(in), optional :: receiver
       !> Steps in each sampling interval (default: the substeps).
       integer, intent(in), optional :: n_step
@@ -81,7 +81,7 @@ contains
          do j = 0, n_step - 1
             call advance(source, drop, ((i - 1)*real(n_step, wp) + j)*step, step, state, history, error)
             if (allocated(error)) return
-            if (.not. source%has_left(state)) cycle
+            if (.not. source%has_separated(state)) cycle
             call clear_flight(history)
             return
          end do
@@ -126,7 +126,7 @@ contains
          time = time + length
          state = new_state
          call source%pass_event(time, state, history)
-         if (source%has_left(state)) return
+         if (source%has_separated(state)) return
       end do
       state = new_state
       ! A single mass has its maxima at the turning point and at samples.

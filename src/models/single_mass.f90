@@ -1,4 +1,4 @@
-!> A source of a single mass: its state, and what it records.
+!> A source of a single mass: its state and its record.
 module thud_single_mass
    use thud_contact_source, only: contact_source_type
    use thud_force_history, only: force_history_type

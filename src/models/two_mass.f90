@@ -75,7 +75,7 @@ module thud_two_mass
       procedure :: record_peaks
       procedure :: get_event
       procedure :: pass_event
-      procedure :: has_left
+      procedure :: has_separated
       procedure :: get_center
       procedure :: get_inner_energy
       procedure :: get_amplitude
@@ -301,13 +301,13 @@ contains
    end function get_amplitude
 
    !> Whether no motion of the belt brings it back to a rigid floor.
-   pure function has_left(self, state) result(left)
+   pure function has_separated(self, state) result(separated)
       class(tyre_type), intent(in) :: self
       real(wp), intent(in) :: state(:)
-      logical :: left
+      logical :: separated
 
-      left = .not. self%touching .and. all(self%get_center(state) + [self%get_amplitude(state), 0.0_wp] < 0.0_wp)
-   end function has_left
+      separated = .not. self%touching .and. all(self%get_center(state) + [self%get_amplitude(state), 0.0_wp] < 0.0_wp)
+   end function has_separated
 
    !> Writes motion and forces of one instant into the history.
    pure subroutine record_sample(self, state, i, history)

@@ -16,7 +16,7 @@ module thud_fractional_loss
       !> Modulus of the spring, G0.
       real(wp) :: spring
       !> Magnitude of the modulus of the spring-pot at `omega`.
-      real(wp) :: pot
+      real(wp) :: springpot
       !> Angular frequency of the loss factor, rad/s.
       real(wp) :: omega
    end type fractional_loss_type
@@ -31,8 +31,8 @@ contains
       type(fractional_loss_type) :: law
 
       law%order = order
-      law%pot = loss_factor/sin(pi/2*order)
-      law%spring = 1 - law%pot*cos(pi/2*order)
+      law%springpot = loss_factor/sin(pi/2*order)
+      law%spring = 1 - law%springpot*cos(pi/2*order)
       law%omega = 2*pi*frequency
    end function new_fractional_loss
 
@@ -43,7 +43,7 @@ contains
       real(wp), intent(in) :: omega
       complex(wp) :: modulus
 
-      modulus = law%spring + law%pot*(omega/law%omega)**law%order*exp(cmplx(0.0_wp, pi/2*law%order, wp))
+      modulus = law%spring + law%springpot*(omega/law%omega)**law%order*exp(cmplx(0.0_wp, pi/2*law%order, wp))
    end function get_modulus
 
 end module thud_fractional_loss

@@ -183,31 +183,31 @@ contains
       real(wp), intent(in) :: direct, lower, upper
       real(wp) :: omega
       real(wp), parameter :: golden = (sqrt(5.0_wp) - 1)/2
-      real(wp) :: low, high, left, right
+      real(wp) :: low, high, lower_trial, upper_trial
       integer :: i
 
       low = lower
       high = upper
       do i = 1, n_section
-         left = high - golden*(high - low)
-         right = low + golden*(high - low)
-         if (get_real_part(pole, residue, direct, left) < get_real_part(pole, residue, direct, right)) then
-            high = right
+         lower_trial = high - golden*(high - low)
+         upper_trial = low + golden*(high - low)
+         if (get_real_part(pole, residue, direct, lower_trial) < get_real_part(pole, residue, direct, upper_trial)) then
+            high = upper_trial
          else
-            low = left
+            low = lower_trial
          end if
       end do
       omega = (low + high)/2
    end function get_minimum
 
    !> Real part at a frequency.
-   pure function get_real_part(pole, residue, direct, omega) result(part)
+   pure function get_real_part(pole, residue, direct, omega) result(real_part)
       complex(wp), intent(in) :: pole(:), residue(:)
       !> Constant part; angular frequency, rad/s.
       real(wp), intent(in) :: direct, omega
-      real(wp) :: part
+      real(wp) :: real_part
 
-      part = real(get_response(pole, residue, direct, omega))
+      real_part = real(get_response(pole, residue, direct, omega))
    end function get_real_part
 
    !> Value at a frequency.

@@ -34,61 +34,61 @@ module thud_prony
 contains
 
    !> Storage modulus divided by the long-term modulus.
-   pure function get_storage_ratio(share, time, omega) result(ratio)
+   pure function get_storage_ratio(relative_modulus, time, omega) result(ratio)
       !> Relative moduli of the branches: [n_branch].
-      real(wp), intent(in) :: share(:)
+      real(wp), intent(in) :: relative_modulus(:)
       !> Their relaxation times, s: [n_branch].
       real(wp), intent(in) :: time(:)
       !> Angular frequency, rad/s.
       real(wp), intent(in) :: omega
       real(wp) :: ratio
 
-      ratio = 1 + sum(share*(omega*time)**2/(1 + (omega*time)**2))
+      ratio = 1 + sum(relative_modulus*(omega*time)**2/(1 + (omega*time)**2))
    end function get_storage_ratio
 
    !> Loss modulus divided by the long-term modulus.
-   pure function get_loss_ratio(share, time, omega) result(ratio)
+   pure function get_loss_ratio(relative_modulus, time, omega) result(ratio)
       !> Relative moduli of the branches: [n_branch].
-      real(wp), intent(in) :: share(:)
+      real(wp), intent(in) :: relative_modulus(:)
       !> Their relaxation times, s: [n_branch].
       real(wp), intent(in) :: time(:)
       !> Angular frequency, rad/s.
       real(wp), intent(in) :: omega
       real(wp) :: ratio
 
-      ratio = sum(share*omega*time/(1 + (omega*time)**2))
+      ratio = sum(relative_modulus*omega*time/(1 + (omega*time)**2))
    end function get_loss_ratio
 
    !> Series whose loss factor is constant from 10 to 1000 Hz.
    !>
    !> The condition loss modulus = loss factor times storage modulus is linear in the moduli of the branches: least squares
    !> over frequencies that are spaced evenly in their logarithm.
-   subroutine fit_constant_loss(loss_factor, share, time, failed)
+   subroutine fit_constant_loss(loss_factor, relative_modulus, time, failed)
       real(wp), intent(in) :: loss_factor
       !> Relative moduli of the branches: [n_branch].
-      real(wp), allocatable, intent(out) :: share(:)
+      real(wp), allocatable, intent(out) :: relative_modulus(:)
       !> Their relaxation times, s: [n_branch].
       real(wp), allocatable, intent(out) :: time(:)
       !> True if a modulus would be negative: the loss factor is above about 0.9.
       logical, intent(out) :: failed
       real(wp) :: omega
-      real(wp) :: matrix(n_frequency, n_branch), right(n_frequency), work(64*n_branch), turn(n_branch)
+      real(wp) :: matrix(n_frequency, n_branch), right(n_frequency), work(64*n_branch), omega_tau(n_branch)
       integer :: i, info
 
-      allocate (share(n_branch))
+      allocate (relative_modulus(n_branch))
       allocate (time, source=[(1/(2*pi*lowest*(highest/lowest)**((i - 2)/real(n_branch - 3, wp))), i=1, n_branch)])
       do i = 1, n_frequency
          omega = 2*pi*lowest*(highest/lowest)**((i - 1)/real(n_frequency - 1, wp))
-         turn = omega*time
+         omega_tau = omega*time
          ! Division by the storage modulus at constant loss factor gives all equations the same weight.
-         matrix(i, :) = (turn - loss_factor*turn**2)/(1 + turn**2)
+         matrix(i, :) = (omega_tau - loss_factor*omega_tau**2)/(1 + omega_tau**2)
          right(i) = loss_factor
          matrix(i, :) = matrix(i, :)*omega**(-2/pi*atan(loss_factor))
          right(i) = right(i)*omega**(-2/pi*atan(loss_factor))
       end do
       call dgels('N', n_frequency, n_branch, 1, matrix, n_frequency, right, n_frequency, work, size(work), info)
-      share = right(:n_branch)
-      failed = info /= 0 .or. minval(share) < 0.0_wp
+      relative_modulus = right(:n_branch)
+      failed = info /= 0 .or. minval(relative_modulus) < 0.0_wp
    end subroutine fit_constant_loss
 
    !> Checks that a fractional law has a series. It has none if its loss factor is not below that of the spring-pot alone
@@ -115,10 +115,10 @@ contains
    !>
    !> Least squares of the complex power law over frequencies that are spaced evenly in their logarithm, relative to its
    !> magnitude. The spring of the law only reduces the relative error of the whole.
-   subroutine fit_fractional_loss(law, share, time, viscosity)
+   subroutine fit_fractional_loss(law, relative_modulus, time, viscosity)
       type(fractional_loss_type), intent(in) :: law
       !> Relative moduli of the branches: [n_branch].
-      real(wp), allocatable, intent(out) :: share(:)
+      real(wp), allocatable, intent(out) :: relative_modulus(:)
       !> Their relaxation times, s: [n_branch].
       real(wp), allocatable, intent(out) :: time(:)
       !> Viscosity divided by the long-term modulus, s.
@@ -146,11 +146,11 @@ contains
       end do
       ! The columns are independent, and the moduli are positive for any order (see the tests).
       call dgels('N', size(right), n_term, 1, matrix, size(right), right, size(right), work, size(work), info)
-      right = max(right, 0.0_wp)*law%pot*(last/law%omega)**law%order
+      right = max(right, 0.0_wp)*law%springpot*(last/law%omega)**law%order
       spring = law%spring + right(1)
       ! The spring-pot of order 1 is a viscosity: its branches are rounding errors.
       time = pack(time, right(2:n_term - 1) > rounding*sum(right(:n_term)))
-      share = pack(right(2:n_term - 1), right(2:n_term - 1) > rounding*sum(right(:n_term)))/spring
+      relative_modulus = pack(right(2:n_term - 1), right(2:n_term - 1) > rounding*sum(right(:n_term)))/spring
       viscosity = right(n_term)/(last*spring)
    end subroutine fit_fractional_loss
 

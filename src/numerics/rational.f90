@@ -135,14 +135,14 @@ contains
       !> True if the matrix is not finite or LAPACK does not find the eigenvalues.
       logical, intent(out) :: failed
       real(wp) :: copy(size(matrix, 1), size(matrix, 1)), wr(size(matrix, 1)), wi(size(matrix, 1))
-      real(wp) :: left(1, 1), right(1, 1), work(16*size(matrix, 1))
+      real(wp) :: left_vector(1, 1), right_vector(1, 1), work(16*size(matrix, 1))
       integer :: info
 
       eigenvalue = 0.0_wp
       failed = .not. all(ieee_is_finite(matrix))
       if (failed) return
       copy = matrix
-      call dgeev('N', 'N', size(wr), copy, size(wr), wr, wi, left, 1, right, 1, work, size(work), info)
+      call dgeev('N', 'N', size(wr), copy, size(wr), wr, wi, left_vector, 1, right_vector, 1, work, size(work), info)
       eigenvalue = cmplx(wr, wi, wp)
       failed = info /= 0
    end subroutine get_eigenvalues

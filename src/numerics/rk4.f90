@@ -2,7 +2,8 @@
 !> and the location of events inside a step.
 module thud_rk4
    use thud_kinds, only: wp
-   use thud_zero_search, only: advance_search, bisection_type, is_found, new_zero_search, update_bracket, zero_search_type
+   use thud_zero_search, only: advance_search, bisection_type, is_converged, new_zero_search, update_bracket, &
+      zero_search_type
    implicit none (type, external)
    private
 
@@ -77,7 +78,7 @@ contains
       type(zero_search_type) :: search
 
       search = new_zero_search(state(component), step, component_after(step))
-      do while (.not. is_found(search))
+      do while (.not. is_converged(search))
          call advance_search(search)
          call update_bracket(search, component_after(search%trial))
       end do
@@ -86,14 +87,14 @@ contains
    contains
 
       !> The component after a shorter step.
-      pure function component_after(part) result(component_value)
+      pure function component_after(length) result(component_value)
          !> Length of the shorter step.
-         real(wp), intent(in) :: part
+         real(wp), intent(in) :: length
          real(wp) :: component_value
          real(wp) :: new_state(size(state))
          logical :: valid
 
-         call rk4_step(ode, time, state, part, new_state, valid)
+         call rk4_step(ode, time, state, length, new_state, valid)
          component_value = new_state(component)
       end function component_after
 

@@ -5,7 +5,7 @@ module thud_zero_search
    implicit none (type, external)
    private
 
-   public :: advance_search, bisection_type, is_found, new_zero_search, update_bracket, zero_search_type
+   public :: advance_search, bisection_type, is_converged, new_zero_search, update_bracket, zero_search_type
 
    !> Maximum number of trials of a search.
    integer, parameter :: max_trials = 200
@@ -52,12 +52,12 @@ contains
    end function new_zero_search
 
    !> Whether the zero is located to rounding; it lies at `right`.
-   pure function is_found(search) result(found)
+   pure function is_converged(search) result(converged)
       type(zero_search_type), intent(in) :: search
-      logical :: found
+      logical :: converged
 
-      found = search%n_trial == max_trials .or. search%right - search%left <= 2*spacing(search%right)
-   end function is_found
+      converged = search%n_trial == max_trials .or. search%right - search%left <= 2*spacing(search%right)
+   end function is_converged
 
    !> Proposes the next trial point.
    pure subroutine advance_search(search)

@@ -4,7 +4,7 @@
 !> them. No number of a sample depends on the threads, on the other samples or on its index among them.
 module thud_sweep
    use thud_band, only: band_type, get_level_bands, octave_count
-   use thud_batch_sets, only: fill_sets, suits_batch
+   use thud_batch_samples, only: fill_samples, suits_batch
    use thud_blocked_drop, only: blocked_type, solve_blocked
    use thud_case, only: case_type, check_case, get_active_fields
    use thud_column, only: column_type
@@ -21,7 +21,7 @@ module thud_sweep
    use thud_quantities, only: get_quantities, sample_quantity_count
    use thud_room, only: room_level_type
    use thud_sampling, only: check_sampling, get_sample_count, get_step_count
-   use thud_shell_sets, only: set_type
+   use thud_shell_samples, only: sample_type
    use thud_source_limits, only: conforms, get_source_limits, source_limits_type
    use thud_source_model, only: typical_contact
    use thud_text, only: to_text
@@ -65,7 +65,7 @@ module thud_sweep
       real(wp), allocatable :: margin(:)
       !> The source conforms by the assessed force: [n_sample].
       logical, allocatable :: verdict(:)
-      !> Names, with units, of what cases with a floor have in addition: [n_column].
+      !> Names, with units, of the additional quantities of cases with a floor: [n_column].
       character(len=column_name_length), allocatable :: floor_column(:)
       !> Their values: [n_column, n_sample].
       real(wp), allocatable :: floor_value(:, :)
@@ -75,7 +75,7 @@ module thud_sweep
       real(wp), allocatable :: force(:, :, :)
    end type sweep_type
 
-   !> What an earlier call has prepared for the next one; one thread at a time owns it.
+   !> Arrays that an earlier call has prepared for the next one; one thread at a time owns them.
    type(sweep_type), allocatable :: kept
 
 contains
@@ -87,7 +87,7 @@ contains
       type(column_type), intent(in) :: columns(:)
       !> Levels and verdicts are wanted.
       logical, intent(in) :: levels
-      !> What is kept from an earlier call is used again where it fits.
+      !> The sweep; arrays of an earlier call are used again where they fit.
       type(sweep_type), intent(inout) :: sweep
       type(projections_type) :: wanted
 
@@ -101,7 +101,7 @@ contains
       if (.not. are_alike(wanted, sweep%projections)) sweep%projections = wanted
    end subroutine new_sweep
 
-   !> Takes what an earlier call has left, or an empty one.
+   !> Takes the sweep that an earlier call has kept, or an empty one.
    subroutine acquire_sweep(sweep)
       !> The results of an earlier call, or none.
       type(sweep_type), allocatable, intent(out) :: sweep
@@ -112,7 +112,7 @@ contains
       if (.not. allocated(sweep)) allocate (sweep)
    end subroutine acquire_sweep
 
-   !> Keeps what the next call can use.
+   !> Keeps the arrays that the next call can use.
    subroutine release_sweep(sweep)
       !> The results, which are released.
       type(sweep_type), allocatable, intent(inout) :: sweep
@@ -134,7 +134,7 @@ contains
 
    !> Computes samples.
    subroutine solve_sweep(case, columns, values, threads, forces, sweep, error)
-      !> The case; values of the samples may make valid what is not in it.
+      !> The case; values of the samples may replace invalid ones.
       type(case_type), intent(in), target :: case
       !> Keys in which the samples differ: [n_column].
       type(column_type), intent(in) :: columns(:)
@@ -169,21 +169,21 @@ contains
 
       !> The samples of one thread, one after the other.
       subroutine solve_remaining()
-         type(case_type), target :: own
+         type(case_type), target :: thread_case
          type(blocked_type) :: blocked
          type(field_type), allocatable :: fields(:)
          integer :: i
 
-         own = case
-         allocate (fields, source=get_active_fields(own))
+         thread_case = case
+         allocate (fields, source=get_active_fields(thread_case))
          ! Free modes and compression are no results of samples.
-         own%has_modes = .false.
-         own%has_compression = .false.
+         thread_case%has_modes = .false.
+         thread_case%has_compression = .false.
          blocked = sweep%blocked
          !$omp do schedule(dynamic)
          do i = 1, size(remaining)
-            if (.not. is_interrupted()) call solve_sample(own, fields, columns, values(:, remaining(i)), remaining(i), &
-               blocked, sweep)
+            if (.not. is_interrupted()) call solve_sample(thread_case, fields, columns, values(:, remaining(i)), &
+               remaining(i), blocked, sweep)
          end do
          !$omp end do
          !$omp single
@@ -336,17 +336,17 @@ contains
       type(sweep_type), intent(inout) :: sweep
       !> There is no space in memory.
       type(error_type), allocatable, intent(out) :: error
-      type(set_type), allocatable :: sets(:)
+      type(sample_type), allocatable :: samples(:)
       logical, allocatable :: computed(:)
       integer :: i
 
-      allocate (sets(size(values, 2)), computed(size(values, 2)))
-      call fill_sets(case, columns, values, sets)
-      call solve_ensemble(sets, case%sampling, trim(case%source), threads, sweep%levels, sweep%projections, computed, &
+      allocate (samples(size(values, 2)), computed(size(values, 2)))
+      call fill_samples(case, columns, values, samples)
+      call solve_ensemble(samples, case%sampling, trim(case%source), threads, sweep%levels, sweep%projections, computed, &
          sweep%quantity, sweep%level, sweep%conforms, sweep%force, error)
       if (allocated(error)) return
       sweep%status = merge(0, 1, computed)
-      do i = 1, size(sets)
+      do i = 1, size(samples)
          if (sweep%levels .and. computed(i)) call set_verdict(case, i, sweep)
       end do
    end subroutine solve_batch

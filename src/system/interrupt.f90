@@ -22,7 +22,7 @@ contains
 
    !> Refuses to go on after an interrupt.
    subroutine check_interrupt(error)
-      !> What went wrong before, or the interrupt.
+      !> An earlier error, or the interrupt.
       type(error_type), allocatable, intent(inout) :: error
 
       if (is_interrupted() .and. .not. allocated(error)) error = error_type(signal_base + latest_signal, &

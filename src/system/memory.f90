@@ -23,9 +23,9 @@ contains
 
    !> Refuses work that needs more memory than there is.
    subroutine require_memory(bytes, purpose, allowed, error, mostly_unused)
-      !> What is kept at a time, bytes.
+      !> Required memory, bytes.
       real(wp), intent(in) :: bytes
-      !> What keeps it, in the plural; what needs less.
+      !> Its use, in the plural; a remedy.
       character(len=*), intent(in) :: purpose, allowed
       !> Names the bytes.
       type(error_type), allocatable, intent(out) :: error

@@ -227,11 +227,11 @@ ssize_t thud_read(int descriptor, char *bytes, size_t length)
 // file of somebody else.
 static int open_regular(const char *path, int flags)
 {
-   struct stat found;
+   struct stat info;
    int descriptor = open(path, flags | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666);
 
    if (descriptor < 0) return -errno;
-   if (fstat(descriptor, &found) == 0 && S_ISREG(found.st_mode)) return descriptor;
+   if (fstat(descriptor, &info) == 0 && S_ISREG(info.st_mode)) return descriptor;
    close(descriptor);
    return -EEXIST;
 }
@@ -301,7 +301,7 @@ int thud_is_closed(int status)
    return status == EPIPE || status == EBADF;
 }
 
-// Closes a file; some disks are found to be full only then.
+// Closes a file; some disks report that they are full only then.
 int thud_close(int descriptor)
 {
    return close(descriptor) == 0 ? 0 : errno;
@@ -357,7 +357,7 @@ int thud_lock_directory(const char *path, int make)
 // The path without links, of `length` bytes at most; makes the directories above.
 int thud_resolve(const char *path, char *resolved, size_t length)
 {
-   char above[PATH_MAX], *found, *end;
+   char above[PATH_MAX], *real_path, *end;
    const char *name = strrchr(path, '/') ? strrchr(path, '/') + 1 : path;
    size_t used = (size_t)snprintf(above, sizeof above, "%s", path);
 
@@ -366,16 +366,16 @@ int thud_resolve(const char *path, char *resolved, size_t length)
       *end = 0;
       if (mkdir(above, 0777) != 0) continue;
    }
-   found = realpath(path, NULL);
-   if (found) {
-      used = (size_t)snprintf(resolved, length, "%s", found);
+   real_path = realpath(path, NULL);
+   if (real_path) {
+      used = (size_t)snprintf(resolved, length, "%s", real_path);
    } else {
       above[name - path] = 0;
-      found = errno == ENOENT ? realpath(*above ? above : ".", NULL) : NULL;
-      if (!found) return errno;
-      used = (size_t)snprintf(resolved, length, "%s/%s", found[1] ? found : "", name);
+      real_path = errno == ENOENT ? realpath(*above ? above : ".", NULL) : NULL;
+      if (!real_path) return errno;
+      used = (size_t)snprintf(resolved, length, "%s/%s", real_path[1] ? real_path : "", name);
    }
-   free(found);
+   free(real_path);
    return used < length ? 0 : ENAMETOOLONG;
 }
 
@@ -420,10 +420,10 @@ int thud_is_same_file(const char *path, const char *other)
 // 1 for a regular file and no link, 0 where there is nothing of a name, -1 for anything else.
 int thud_look_up(const char *path)
 {
-   struct stat found;
+   struct stat info;
 
-   if (lstat(path, &found) != 0) return errno == ENOENT || errno == ENOTDIR ? 0 : -1;
-   return S_ISREG(found.st_mode) ? 1 : -1;
+   if (lstat(path, &info) != 0) return errno == ENOENT || errno == ENOTDIR ? 0 : -1;
+   return S_ISREG(info.st_mode) ? 1 : -1;
 }
 
 // Length of the next name in an open directory, `.` and `..` left out; 0 at the end.
@@ -441,10 +441,10 @@ size_t thud_next_name(DIR *directory, char *name, size_t length)
 // Bytes of a file, 0 where it is not a regular one; negative where there is none.
 int64_t thud_get_file_size(const char *path)
 {
-   struct stat found;
+   struct stat info;
 
-   if (stat(path, &found) != 0) return -1;
-   return S_ISREG(found.st_mode) ? (int64_t)found.st_size : 0;
+   if (stat(path, &info) != 0) return -1;
+   return S_ISREG(info.st_mode) ? (int64_t)info.st_size : 0;
 }
 
 // Bytes that this user may write to the disk of a directory, or of the next one above that is there; negative where
@@ -452,14 +452,14 @@ int64_t thud_get_file_size(const char *path)
 double thud_get_free_bytes(const char *path)
 {
    struct statvfs disk;
-   char place[PATH_MAX], *end;
+   char directory[PATH_MAX], *end;
 
-   snprintf(place, sizeof place, "%s", path);
-   while (statvfs(place, &disk) != 0) {
-      if (strcmp(place, ".") == 0 || strcmp(place, "/") == 0) return -1.0;
-      end = strrchr(place, '/');
-      if (end) end[end == place] = 0;
-      else strcpy(place, ".");
+   snprintf(directory, sizeof directory, "%s", path);
+   while (statvfs(directory, &disk) != 0) {
+      if (strcmp(directory, ".") == 0 || strcmp(directory, "/") == 0) return -1.0;
+      end = strrchr(directory, '/');
+      if (end) end[end == directory] = 0;
+      else strcpy(directory, ".");
    }
    return (double)disk.f_frsize * (double)disk.f_bavail;
 }

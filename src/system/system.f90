@@ -78,7 +78,7 @@ module thud_system
    !> Lets signals that the process handles set `latest_signal`, too, and forks wait for the call. Every call of Python
    !> begins with it but those that compute nothing: `collect`, `get_progress` and `end_calls`.
    procedure(plain_call), bind(c, name='thud_begin_call') :: begin_call
-   !> Ends what `begin_call` has begun.
+   !> Ends the call that `begin_call` has begun.
    procedure(plain_call), bind(c, name='thud_end_call') :: end_call
    !> Ends all calls that are running.
    procedure(plain_call), bind(c, name='thud_end_calls') :: end_calls
@@ -231,12 +231,12 @@ contains
       integer, intent(inout) :: descriptor
       !> 0, or the number of the error.
       integer, intent(out), optional :: status
-      integer :: found
+      integer :: result_status
 
-      found = 0
-      if (descriptor >= 0) found = int(c_close(int(descriptor, c_int)))
+      result_status = 0
+      if (descriptor >= 0) result_status = int(c_close(int(descriptor, c_int)))
       descriptor = -1
-      if (present(status)) status = found
+      if (present(status)) status = result_status
    end subroutine close_descriptor
 
    !> Makes a file, or empties it.
@@ -264,7 +264,7 @@ contains
    !> Goes on with the checksum of a text, CRC-32 as in zlib.
    subroutine add_to_checksum(text, checksum)
       character(len=*), intent(in) :: text
-      !> That of what stands before the text, 0 at its beginning.
+      !> Checksum of the text before, 0 at the beginning; gets that of both.
       integer(int32), intent(inout) :: checksum
 
       checksum = int(c_checksum(int(checksum, c_int32_t), text, len(text, c_size_t)), int32)

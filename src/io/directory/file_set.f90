@@ -76,8 +76,8 @@ contains
    end function is_temporary
 
    !> Whether a file of a directory is as its manifest lists it.
-   function is_listed(place, name, entries) result(yes)
-      character(len=*), intent(in) :: place
+   function is_listed(target, name, entries) result(yes)
+      character(len=*), intent(in) :: target
       character(len=*), intent(in) :: name
       !> The manifest: [n_entry].
       type(entry_type), intent(in) :: entries(:)
@@ -87,15 +87,15 @@ contains
 
       yes = any(entries%name == name)
       if (.not. yes) return
-      call get_file_checksum(place//'/'//trim(name), checksum)
+      call get_file_checksum(target//'/'//trim(name), checksum)
       write (digits, '(z8.8)') checksum
       yes = checksum >= 0 .and. any(entries%name == name .and. entries%sum == digits)
    end function is_listed
 
    !> Which files of a directory stay beside the next set: figures of the same input, and results of other commands.
-   subroutine get_kept(place, names, same, kept, gone)
+   subroutine get_kept(target, names, same, kept, gone)
       !> The directory, under its lock.
-      character(len=*), intent(in) :: place
+      character(len=*), intent(in) :: target
       !> Names of the next set: [n_file].
       character(len=*), intent(in) :: names(:)
       !> It is of the same input.
@@ -109,23 +109,23 @@ contains
       logical :: is_manifest
       integer :: i
 
-      call read_manifest(place, entries, is_manifest)
-      entries = pack(entries, [(.not. any(names == entries(i)%name) .and. is_listed(place, entries(i)%name, entries), &
+      call read_manifest(target, entries, is_manifest)
+      entries = pack(entries, [(.not. any(names == entries(i)%name) .and. is_listed(target, entries(i)%name, entries), &
          i=1, size(entries))])
       stays = same .or. entries%command /= ''
       kept = pack(entries, stays)
       gone = pack(entries%name, .not. stays)
    end subroutine get_kept
 
-   !> Puts the set of a workspace in the place of the one before.
-   subroutine replace_set(workspace, place, entries, gone, exchangeable, error)
+   !> Replaces the files of a directory by those of a workspace.
+   subroutine replace_set(workspace, target, entries, gone, exchangeable, error)
       !> The workspace; its remaining files are to be cleared.
       character(len=*), intent(in) :: workspace
       !> The directory, under its lock.
-      character(len=*), intent(in) :: place
+      character(len=*), intent(in) :: target
       !> The files, the last of which says whose they are: [n_file].
       type(entry_type), intent(in) :: entries(:)
-      !> Names of files before that go with those: [n_gone].
+      !> Names of earlier files to be removed: [n_gone].
       character(len=*), intent(in) :: gone(:)
       !> The two directories may be exchanged.
       logical, intent(in) :: exchangeable
@@ -136,41 +136,41 @@ contains
 
       replaced = [character(len=name_length) :: entries%name, gone]
       done = exchangeable
-      if (done) call exchange(workspace, place, replaced, done)
-      if (.not. done) call move_files(workspace, place, replaced, entries, error)
+      if (done) call exchange(workspace, target, replaced, done)
+      if (.not. done) call move_files(workspace, target, replaced, entries, error)
    end subroutine replace_set
 
    !> Exchanges workspace and directory; nothing has changed where that is impossible.
-   subroutine exchange(workspace, place, replaced, done)
-      character(len=*), intent(in) :: workspace, place
+   subroutine exchange(workspace, target, replaced, done)
+      character(len=*), intent(in) :: workspace, target
       !> Names of files that are not carried over: [n_replaced].
       character(len=*), intent(in) :: replaced(:)
       !> They are exchanged.
       logical, intent(out) :: done
-      character(len=name_length), allocatable :: found(:), left(:)
+      character(len=name_length), allocatable :: names(:)
       logical :: changed
       integer :: i
 
       done = .true.
-      call list_directory(place, found)
-      do i = 1, size(found)
-         if (is_temporary(found(i)) .or. any(found(i) == [character(len=name_length) :: manifest, replaced])) cycle
-         call link_file(place//'/'//trim(found(i)), workspace//'/'//trim(found(i)), done)
+      call list_directory(target, names)
+      do i = 1, size(names)
+         if (is_temporary(names(i)) .or. any(names(i) == [character(len=name_length) :: manifest, replaced])) cycle
+         call link_file(target//'/'//trim(names(i)), workspace//'/'//trim(names(i)), done)
          if (.not. done) return
       end do
-      call exchange_directories(workspace, place, done)
+      call exchange_directories(workspace, target, done)
       if (.not. done) return
-      ! The user may have changed files meanwhile; those that are the same are left alone.
-      call list_directory(workspace, left)
-      do i = 1, size(left)
-         if (is_temporary(left(i)) .or. any(left(i) == [character(len=name_length) :: manifest, replaced])) cycle
-         call rename_file(workspace//'/'//trim(left(i)), place//'/'//trim(left(i)), changed)
+      ! Files that the user has changed meanwhile go back; equal ones stay.
+      call list_directory(workspace, names)
+      do i = 1, size(names)
+         if (is_temporary(names(i)) .or. any(names(i) == [character(len=name_length) :: manifest, replaced])) cycle
+         call rename_file(workspace//'/'//trim(names(i)), target//'/'//trim(names(i)), changed)
       end do
    end subroutine exchange
 
    !> Moves files one by one: those before are set aside in the workspace, so that two inputs are never mixed.
-   subroutine move_files(workspace, place, replaced, entries, error)
-      character(len=*), intent(in) :: workspace, place
+   subroutine move_files(workspace, target, replaced, entries, error)
+      character(len=*), intent(in) :: workspace, target
       !> Names that the files before may have: [n_replaced].
       character(len=*), intent(in) :: replaced(:)
       !> The new files, the last of which says whose they are: [n_file].
@@ -178,65 +178,65 @@ contains
       !> A file cannot be moved; the directory is as it was.
       type(error_type), allocatable, intent(out) :: error
       type(entry_type), allocatable :: listed(:)
-      character(len=name_length), allocatable :: found(:)
+      character(len=name_length), allocatable :: old_names(:)
       character(len=name_length) :: marker
       integer :: n, i
       logical :: done, is_manifest
 
       marker = entries(size(entries))%name
-      call list_directory(place, found)
-      call read_manifest(place, listed, is_manifest)
-      found = [pack(found, found == marker), pack(found, [(found(i) /= marker .and. any(replaced == found(i)), &
-         i=1, size(found))])]
+      call list_directory(target, old_names)
+      call read_manifest(target, listed, is_manifest)
+      old_names = [pack(old_names, old_names == marker), pack(old_names, [(old_names(i) /= marker &
+         .and. any(replaced == old_names(i)), i=1, size(old_names))])]
       ! A writer killed from here on leaves files that are listed, but no marker.
-      if (is_manifest) call add_entries(place, entries, error)
+      if (is_manifest) call add_entries(target, entries, error)
       if (allocated(error)) return
-      n = size(found)
+      n = size(old_names)
       block
          character(len=len(workspace) + name_length + 8), dimension(n + size(entries)) :: from, to
 
          do i = 1, n
-            from(i) = place//'/'//found(i)
-            to(i) = workspace//'/'//aside//found(i)
+            from(i) = target//'/'//old_names(i)
+            to(i) = workspace//'/'//aside//old_names(i)
          end do
          do i = 1, size(entries)
             from(n + i) = workspace//'/'//entries(i)%name
-            to(n + i) = place//'/'//entries(i)%name
+            to(n + i) = target//'/'//entries(i)%name
          end do
          do i = 1, size(from)
             call rename_file(trim(from(i)), trim(to(i)), done)
             if (.not. done) exit
          end do
-         if (done) call rename_file(workspace//'/'//manifest, place//'/'//manifest, done)
+         if (done) call rename_file(workspace//'/'//manifest, target//'/'//manifest, done)
          if (done) return
-         error = input_error('--output '//place//': files cannot be replaced; allowed: a directory that you may write to')
+         error = input_error('--output '//target//': files cannot be replaced; allowed: a directory that you may write to')
          do i = i - 1, 1, -1
             call rename_file(trim(to(i)), trim(from(i)), done)
          end do
       end block
    end subroutine move_files
 
-   !> Empties a workspace. Files that its manifest does not list are the user's, left by a writer that was killed.
-   subroutine clear_workspace(workspace, place)
+   !> Empties a workspace. Files of the user, which its manifest does not list, go back.
+   subroutine clear_workspace(workspace, target)
       !> The workspace, under its lock; the directory.
-      character(len=*), intent(in) :: workspace, place
-      character(len=name_length), allocatable :: found(:)
+      character(len=*), intent(in) :: workspace, target
+      character(len=name_length), allocatable :: names(:)
       type(entry_type), allocatable :: listed(:)
       logical :: done, is_manifest
       integer :: i
 
       call read_manifest(workspace, listed, is_manifest)
-      call list_directory(workspace, found)
-      do i = 1, size(found)
-         if (found(i) == manifest) cycle
-         if (.not. any([listed%name == found(i), index(found(i), aside) == 1, is_temporary(found(i))])) then
-            call link_file(workspace//'/'//trim(found(i)), place//'/'//trim(found(i)), done)
+      call list_directory(workspace, names)
+      do i = 1, size(names)
+         if (names(i) == manifest) cycle
+         if (.not. any([listed%name == names(i), index(names(i), aside) == 1, is_temporary(names(i))])) then
+            call link_file(workspace//'/'//trim(names(i)), target//'/'//trim(names(i)), done)
          end if
-         call remove_file(workspace//'/'//trim(found(i)))
+         call remove_file(workspace//'/'//trim(names(i)))
       end do
-      ! The manifest tells the next writer what it may remove.
-      call list_directory(workspace, found)
-      if (all(found == manifest)) call remove_file(workspace//'/'//manifest)
+      ! The manifest lists the files that the next writer may remove.
+      call list_directory(workspace, names)
+      if (all(names == manifest)) call remove_file(workspace//'/'//manifest)
    end subroutine clear_workspace
 
    !> The manifest of a directory.

@@ -2,7 +2,7 @@
 !>
 !> A writer works in a workspace `.<name>.part` beside the directory `<name>`, or in the directory itself where the two
 !> cannot be exchanged, as with the working directory or a mount. The lock on the workspace makes writers wait for each
-!> other; what a killed one has left there is removed. The lock on the directory is held for its check and for the
+!> other; the files of a killed one are removed. The lock on the directory is held for its check and for the
 !> replacement. The first line of the marker, a file of the set, says whose results a directory holds.
 module thud_result_directory
    use, intrinsic :: iso_fortran_env, only: int32
@@ -30,7 +30,7 @@ module thud_result_directory
    type :: result_directory_type
       private
       !> Its path as the user gives it, the same without links, and the path of the workspace.
-      character(len=:), allocatable :: path, place, workspace
+      character(len=:), allocatable :: path, target, workspace
       !> The file that says whose results these are.
       type(text_file_type) :: marker
       !> Paths of the files that the results depend on: [n_input].
@@ -43,7 +43,7 @@ module thud_result_directory
       integer(int32), allocatable :: sums(:)
       !> Name of the file that is being written.
       character(len=name_length) :: name = ''
-      !> Checksum of what was written to it.
+      !> Checksum of the bytes written to it.
       integer(int32) :: sum = 0_int32
       !> Descriptors of that file, and of the locks on workspace and directory; negative where there is none.
       integer :: file = -1, workspace_lock = -1, lock = -1
@@ -122,11 +122,11 @@ contains
       directory%replace = replace
       directory%names = [character(len=name_length) :: names, marker%name]
       allocate (directory%sums(size(directory%names)), source=0_int32)
-      call take_workspace(directory, error)
-      if (.not. allocated(error)) call lock_place(directory, owner, error)
+      call acquire_workspace(directory, error)
+      if (.not. allocated(error)) call lock_target(directory, owner, error)
       call close_descriptor(directory%lock)
       if (allocated(error)) return
-      call clear_workspace(directory%workspace, directory%place)
+      call clear_workspace(directory%workspace, directory%target)
       unwritten%name = directory%names
       call add_entries(directory%workspace, unwritten, error)
    end subroutine open_results
@@ -136,7 +136,7 @@ contains
       type(result_directory_type), intent(inout) :: directory
       !> The files replace results of the same case with another input.
       logical, intent(out) :: differs
-      !> What went wrong before, or now; then the directory is as it was.
+      !> An earlier error or a new one; then the directory is as it was.
       type(error_type), allocatable, intent(inout) :: error
       logical :: moved
 
@@ -147,10 +147,10 @@ contains
       if (.not. allocated(error)) call publish(directory, differs, moved, error)
       ! Where the workspace has moved, another one of its name belongs to another writer.
       if (directory%workspace_lock >= 0 .and. .not. moved) then
-         call clear_workspace(directory%workspace, directory%place)
+         call clear_workspace(directory%workspace, directory%target)
          call remove_file(directory%workspace)
       end if
-      if (directory%is_new .and. allocated(error)) call remove_file(directory%place)
+      if (directory%is_new .and. allocated(error)) call remove_file(directory%target)
       call close_descriptor(directory%lock)
       call close_descriptor(directory%workspace_lock)
       call pass_interrupts(merge(0, 1, allocated(error)))
@@ -159,9 +159,9 @@ contains
    !> Begins a file.
    subroutine begin_file(directory, name, error)
       type(result_directory_type), intent(inout) :: directory
-      !> Name of the file, one of those given before.
+      !> Name of the file, one of those stated in `open_results`.
       character(len=*), intent(in) :: name
-      !> What went wrong before, or now.
+      !> An earlier error, or a new one.
       type(error_type), allocatable, intent(inout) :: error
       integer :: status
 
@@ -177,7 +177,7 @@ contains
    subroutine add_text(directory, text, error)
       type(result_directory_type), intent(inout) :: directory
       character(len=*), intent(in) :: text
-      !> What went wrong before, or now.
+      !> An earlier error, or a new one.
       type(error_type), allocatable, intent(inout) :: error
       integer :: status
 
@@ -190,7 +190,7 @@ contains
    !> Ends the file that was begun last.
    subroutine end_file(directory, error)
       type(result_directory_type), intent(inout) :: directory
-      !> What went wrong before, or now.
+      !> An earlier error, or a new one.
       type(error_type), allocatable, intent(inout) :: error
       integer :: status
 
@@ -204,7 +204,7 @@ contains
    subroutine write_file(directory, file, error)
       type(result_directory_type), intent(inout) :: directory
       type(text_file_type), intent(in) :: file
-      !> What went wrong before, or now.
+      !> An earlier error, or a new one.
       type(error_type), allocatable, intent(inout) :: error
 
       if (allocated(error)) return
@@ -218,7 +218,7 @@ contains
       type(result_directory_type), intent(in) :: directory
       !> 0, the number of the system's error, or negative after an interrupt.
       integer, intent(in) :: status
-      !> What went wrong before, or now.
+      !> An earlier error, or a new one.
       type(error_type), allocatable, intent(inout) :: error
 
       if (status == 0 .or. allocated(error)) return
@@ -243,18 +243,18 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(error_type), allocatable :: unreadable
       type(entry_type), allocatable :: entries(:)
-      character(len=name_length), allocatable :: found(:)
+      character(len=name_length), allocatable :: names(:)
       character(len=:), allocatable :: text
-      logical :: there, is_manifest
+      logical :: exists, is_manifest
 
       owner = no_owner
       if (.not. directory_exists(path)) then
-         inquire (file=path, exist=there)
-         if (there) error = making_error(path)
+         inquire (file=path, exist=exists)
+         if (exists) error = making_error(path)
          return
       end if
-      call list_directory(path, found)
-      if (all(found == inner_workspace)) return
+      call list_directory(path, names)
+      if (all(names == inner_workspace)) return
       call read_manifest(path, entries, is_manifest)
       if (directory_exists(path//'/'//manifest) .or. .not. (is_manifest .or. replace)) then
          error = foreign_error(path, manifest)
@@ -263,10 +263,10 @@ contains
          if (allocated(unreadable)) text = ''
          if (index(text, marker%content(:index(marker%content, newline))) == 1) owner = merge(same_input, other_input, &
             text == marker%content)
-      else if (any(found == marker%name)) then
+      else if (any(names == marker%name)) then
          if (.not. replace) error = foreign_error(path, marker%name)
       else if (any(entries%name == marker%name)) then
-         ! A writer killed while it moved files one by one has left the manifest without the marker.
+         ! A writer killed while it moved files one by one leaves the manifest without the marker.
          return
       end if
       if (owner /= no_owner .or. allocated(error) .or. replace) return
@@ -286,14 +286,14 @@ contains
 
       call check_input(directory, manifest, error)
       if (allocated(error)) return
-      call read_manifest(directory%place, entries, is_manifest)
+      call read_manifest(directory%target, entries, is_manifest)
       do i = 1, size(directory%names)
-         path = directory%place//'/'//trim(directory%names(i))
+         path = directory%target//'/'//trim(directory%names(i))
          if (is_missing(path)) cycle
          call check_input(directory, directory%names(i), error)
          if (allocated(error)) return
          if (.not. directory_exists(path)) then
-            if (directory%replace .or. is_listed(directory%place, directory%names(i), entries)) cycle
+            if (directory%replace .or. is_listed(directory%target, directory%names(i), entries)) cycle
          end if
          error = foreign_error(directory%path, directory%names(i))
          return
@@ -310,7 +310,7 @@ contains
       character(len=:), allocatable :: path, text
       integer :: i
 
-      path = directory%place//'/'//trim(name)
+      path = directory%target//'/'//trim(name)
       do i = 1, size(directory%inputs)
          if (.not. is_same_file(path, trim(directory%inputs(i)))) cycle
          ! Results are repeated from their own input.
@@ -324,7 +324,7 @@ contains
       end do
    end subroutine check_input
 
-   !> Error of what thud has not written.
+   !> Error of a file that thud has not written.
    function foreign_error(path, name) result(error)
       !> Path of its directory.
       character(len=*), intent(in) :: path
@@ -339,63 +339,63 @@ contains
       end if
    end function foreign_error
 
-   !> Takes the workspace of a directory. Interrupts are kept from then on.
-   subroutine take_workspace(directory, error)
+   !> Makes and locks the workspace of a directory. Interrupts are kept from then on.
+   subroutine acquire_workspace(directory, error)
       type(result_directory_type), intent(inout) :: directory
       !> It cannot be made.
       type(error_type), allocatable, intent(out) :: error
-      character(len=name_length), allocatable :: found(:)
+      character(len=name_length), allocatable :: names(:)
       integer :: slash, made
       logical :: done
 
       call keep_interrupts()
-      call resolve_path(directory%path, directory%place, done)
+      call resolve_path(directory%path, directory%target, done)
       if (done) then
-         slash = index(directory%place, '/', back=.true.)
-         directory%workspace = directory%place(:slash)//'.'//directory%place(slash + 1:)//'.part'
+         slash = index(directory%target, '/', back=.true.)
+         directory%workspace = directory%target(:slash)//'.'//directory%target(slash + 1:)//'.part'
          call lock_directory(directory%workspace, .true., directory%workspace_lock)
          if (directory%workspace_lock >= 0) then
-            done = can_exchange(directory%workspace, directory%place)
+            done = can_exchange(directory%workspace, directory%target)
             if (.not. done) call remove_file(directory%workspace)
             if (.not. done) call close_descriptor(directory%workspace_lock)
          end if
          call check_interrupt(error)
          if (allocated(error)) return
          if (directory%workspace_lock < 0) then
-            directory%is_new = .not. directory_exists(directory%place)
-            call lock_directory(directory%place, .true., made)
+            directory%is_new = .not. directory_exists(directory%target)
+            call lock_directory(directory%target, .true., made)
             call close_descriptor(made)
-            directory%workspace = directory%place//'/'//inner_workspace
+            directory%workspace = directory%target//'/'//inner_workspace
             call lock_directory(directory%workspace, .true., directory%workspace_lock)
          end if
       end if
       call check_interrupt(error)
       if (directory%workspace_lock < 0 .and. .not. allocated(error)) error = making_error(directory%path)
       if (allocated(error)) return
-      call list_directory(directory%workspace, found)
-      if (is_workspace(found)) return
+      call list_directory(directory%workspace, names)
+      if (is_workspace(names)) return
       error = input_error('--output '//directory%path//': '//directory%workspace//' is in the way; allowed: another ' &
          //'directory, or remove it first')
       call close_descriptor(directory%workspace_lock)
-   end subroutine take_workspace
+   end subroutine acquire_workspace
 
    !> Locks a directory that is there, and finds whose results it holds.
-   subroutine lock_place(directory, owner, error)
+   subroutine lock_target(directory, owner, error)
       type(result_directory_type), intent(inout) :: directory
       !> `no_owner`, `same_input` or `other_input`.
       integer, intent(out) :: owner
       !> It belongs to something else, or cannot be written.
       type(error_type), allocatable, intent(out) :: error
 
-      call lock_directory(directory%place, .false., directory%lock)
+      call lock_directory(directory%target, .false., directory%lock)
       call find_owner(directory%path, directory%marker, directory%replace, owner, error)
       if (.not. allocated(error)) call check_files(directory, error)
       if (directory%lock < 0) call check_interrupt(error)
       if (allocated(error) .or. directory%lock >= 0) return
-      if (directory_exists(directory%place)) error = making_error(directory%path)
-   end subroutine lock_place
+      if (directory_exists(directory%target)) error = making_error(directory%path)
+   end subroutine lock_target
 
-   !> Puts the files of the workspace in the place of those before.
+   !> Replaces the files of the directory by those of the workspace.
    subroutine publish(directory, differs, moved, error)
       type(result_directory_type), intent(inout) :: directory
       !> The files replace results of the same case with another input.
@@ -410,22 +410,22 @@ contains
       integer :: owner, status
 
       moved = .false.
-      call lock_place(directory, owner, error)
+      call lock_target(directory, owner, error)
       differs = owner == other_input
       if (allocated(error)) return
       entries = new_entries(directory%names, directory%sums)
-      call get_kept(directory%place, directory%names, owner == same_input, kept, gone)
+      call get_kept(directory%target, directory%names, owner == same_input, kept, gone)
       call add_entries(directory%workspace, [entries, kept], error)
       if (allocated(error)) return
       call flush_directory(directory%workspace, status)
       call require_written(directory, status, error)
       if (allocated(error)) return
       if (directory%lock < 0) then
-         call rename_file(directory%workspace, directory%place, moved)
+         call rename_file(directory%workspace, directory%target, moved)
          if (.not. moved) error = making_error(directory%path)
       else
-         call replace_set(directory%workspace, directory%place, entries, gone, &
-            directory%workspace /= directory%place//'/'//inner_workspace, error)
+         call replace_set(directory%workspace, directory%target, entries, gone, &
+            directory%workspace /= directory%target//'/'//inner_workspace, error)
       end if
    end subroutine publish
 

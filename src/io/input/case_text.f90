@@ -23,7 +23,7 @@ contains
       !> Name of the case where the text gives none.
       character(len=*), intent(in) :: default_name
       type(case_type), target, intent(out) :: case
-      !> What is wrong, with group, key, value and allowed range.
+      !> Names group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
       !> Values may lie outside their ranges (default: they may not).
       logical, intent(in), optional :: unchecked
@@ -129,24 +129,24 @@ contains
       integer :: i, j
 
       do i = 1, size(group%assignments)
-         associate (given => group%assignments(i))
-            is_meant = fields%group == group%name .and. fields%key == given%key
+         associate (assignment => group%assignments(i))
+            is_meant = fields%group == group%name .and. fields%key == assignment%key
             if (.not. any(is_meant)) then
-               call get_suggestion(given%key, pack(fields%key, fields%group == group%name), suggestion)
-               error = input_error('&'//group%name//': '//shortened(given%key)//' in line '//to_text(given%line) &
+               call get_suggestion(assignment%key, pack(fields%key, fields%group == group%name), suggestion)
+               error = input_error('&'//group%name//': '//shortened(assignment%key)//' in line '//to_text(assignment%line) &
                   //' is not a known key'//suggestion//'; allowed: ' &
                   //join_quoted(distinct(pack(fields%key, fields%group == group%name))))
-            else if (any([(group%assignments(j)%key == given%key, j=1, i - 1)])) then
-               error = input_error('&'//group%name//': '//given%key//' is given a second time in line ' &
-                  //to_text(given%line)//'; allowed: once')
-            else if (given%value == '') then
+            else if (any([(group%assignments(j)%key == assignment%key, j=1, i - 1)])) then
+               error = input_error('&'//group%name//': '//assignment%key//' is given a second time in line ' &
+                  //to_text(assignment%line)//'; allowed: once')
+            else if (assignment%value == '') then
                call fields(findloc(is_meant, .true., dim=1))%get_allowed(allowed)
-               error = input_error('&'//group%name//': '//given%key//' in line '//to_text(given%line) &
+               error = input_error('&'//group%name//': '//assignment%key//' in line '//to_text(assignment%line) &
                   //' has no value; allowed: '//allowed)
             else
                ! A key of two owners sets both variables.
                do j = 1, size(fields)
-                  if (is_meant(j) .and. .not. allocated(error)) call fields(j)%set_from_text(given%value, error)
+                  if (is_meant(j) .and. .not. allocated(error)) call fields(j)%set_from_text(assignment%value, error)
                end do
             end if
          end associate

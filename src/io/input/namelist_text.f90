@@ -156,7 +156,7 @@ contains
       type(group_type), intent(inout) :: group
       !> Something is not `key = value`.
       type(error_type), allocatable, intent(out) :: error
-      type(assignment_type) :: given
+      type(assignment_type) :: assignment
       integer :: equals, key_start, key_end, next_key, position
 
       allocate (group%assignments(0))
@@ -164,23 +164,23 @@ contains
       call find_key(structure(:finish), position, key_start, key_end, equals)
       if (key_start > finish .and. verify(structure(start:finish), blanks//',') == 0) return
       if (key_start > finish .or. verify(structure(start:min(key_start, finish + 1) - 1), blanks//',') > 0) then
-         call get_value(clean(start:finish), given%value)
+         call get_value(clean(start:finish), assignment%value)
          error = input_error('&'//shortened(group%name)//' in line '//to_text(group%line)//": '" &
-            //shortened(given%value)//"' is not an assignment; allowed: 'key = value'")
+            //shortened(assignment%value)//"' is not an assignment; allowed: 'key = value'")
          return
       end if
       do while (key_start <= finish)
-         given%line = line_of(structure, key_start)
+         assignment%line = line_of(structure, key_start)
          if (key_end < key_start) then
-            error = input_error('&'//shortened(group%name)//': an equals sign in line '//to_text(given%line) &
+            error = input_error('&'//shortened(group%name)//': an equals sign in line '//to_text(assignment%line) &
                //" has no key; allowed: 'key = value'")
             return
          end if
-         given%key = structure(key_start:key_end)
+         assignment%key = structure(key_start:key_end)
          position = equals + 1
          call find_key(structure(:finish), position, next_key, key_end, equals)
-         call get_value(clean(position:min(next_key, finish + 1) - 1), given%value)
-         group%assignments = [group%assignments, given]
+         call get_value(clean(position:min(next_key, finish + 1) - 1), assignment%value)
+         group%assignments = [group%assignments, assignment]
          key_start = next_key
       end do
    end subroutine split_group

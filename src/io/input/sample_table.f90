@@ -1,7 +1,7 @@
 !> Tables of samples: text with the keys in its first line and one sample in each of the others. Tabs, semicolons,
 !> commas or blanks separate the values, as in the first line; they may stand in quotes. Decimal commas are allowed
 !> where commas do not separate, or in quotes; the first number with a decimal mark decides for the table. Empty lines
-!> and what follows a `#` are skipped.
+!> and comments after a `#` are skipped.
 module thud_sample_table
    use thud_case, only: case_type, get_active_fields
    use thud_column, only: column_type, find_columns
@@ -28,7 +28,7 @@ module thud_sample_table
       character(len=path_length) :: path = ''
       !> Its lines.
       type(line_reader_type) :: reader
-      !> What separates their cells.
+      !> Separator of their cells.
       character(len=1) :: separator = ' '
       !> Decimal mark of their numbers; a blank as long as none has one.
       character(len=1) :: decimal = ' '
@@ -36,7 +36,7 @@ module thud_sample_table
       type(column_type), allocatable :: columns(:)
       !> Their names: [n_column].
       character(len=cell_length), allocatable :: names(:)
-      !> What they are; pointers into the case: [n_column].
+      !> Their fields, pointers into the case: [n_column].
       type(field_type), allocatable :: fields(:)
    end type sample_table_type
 
@@ -52,7 +52,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       character(len=line_length) :: line
       type(field_type), allocatable :: fields(:)
-      logical :: done, there
+      logical :: done, has_line
 
       table%path = path
       if (directory_exists(path)) then
@@ -64,8 +64,8 @@ contains
          error = input_error(path//': the file cannot be read; allowed: a table of samples')
          return
       end if
-      call next_line(table, line, there, error)
-      if (.not. (there .or. allocated(error))) error = input_error(path//': the table is empty; allowed: keys in the ' &
+      call next_line(table, line, has_line, error)
+      if (.not. (has_line .or. allocated(error))) error = input_error(path//': the table is empty; allowed: keys in the ' &
          //'first line and one sample in each of the others')
       if (.not. allocated(error)) then
          table%separator = get_separator(line)
@@ -95,12 +95,12 @@ contains
       character(len=line_length) :: line
       character(len=cell_length), allocatable :: cells(:)
       integer :: i
-      logical :: there
+      logical :: has_line
 
       n_sample = 0
       do while (n_sample < size(values, 2))
-         call next_line(table, line, there, error)
-         if (allocated(error) .or. .not. there) return
+         call next_line(table, line, has_line, error)
+         if (allocated(error) .or. .not. has_line) return
          call split_line(table, line, cells, error)
          if (allocated(error)) return
          if (size(cells) /= size(table%names)) then
@@ -120,19 +120,19 @@ contains
    end subroutine read_samples
 
    !> The next line with something in it.
-   subroutine next_line(table, line, there, error)
+   subroutine next_line(table, line, has_line, error)
       !> The table; closed at its end.
       type(sample_table_type), intent(inout) :: table
       !> The line, without comment.
       character(len=line_length), intent(out) :: line
       !> There was one.
-      logical, intent(out) :: there
+      logical, intent(out) :: has_line
       !> The line is too long or cannot be read.
       type(error_type), allocatable, intent(out) :: error
       integer :: length, mark
 
-      there = .false.
-      do while (.not. there)
+      has_line = .false.
+      do while (.not. has_line)
          call read_line(table%reader, line, length)
          if (length == -1) exit
          if (length < 0) error = input_error(trim(table%path)//': the file cannot be read; allowed: a table of samples')
@@ -141,9 +141,9 @@ contains
          if (length > line_length .and. mark == 0) error = line_error(table, 'it is too long; allowed: up to ' &
             //to_text(line_length)//' characters')
          if (allocated(error)) exit
-         there = line /= ''
+         has_line = line /= ''
       end do
-      if (.not. there) call close_lines(table%reader)
+      if (.not. has_line) call close_lines(table%reader)
    end subroutine next_line
 
    !> Separator of a table: the first of tab, semicolon, comma and blank that its first line holds.
@@ -171,12 +171,12 @@ contains
       character(len=cell_length), allocatable, intent(out) :: cells(:)
       !> There are too many, one is too long, or a quote is not closed.
       type(error_type), allocatable, intent(out) :: error
-      character(len=len(line)) :: rest, structure
+      character(len=len(line)) :: text, structure
       integer :: i, n, at, length, last
 
-      rest = adjustl(line)
-      structure = get_structure(rest)
-      last = len_trim(rest)
+      text = adjustl(line)
+      structure = get_structure(text)
+      last = len_trim(text)
       associate (separator => table%separator)
          ! Spreadsheets may end lines with their separator.
          if (separator == ';') last = verify(structure(:last), '; ', back=.true.)
@@ -185,13 +185,13 @@ contains
          at = 1
          do while (at <= last + merge(1, 0, separator /= ' '))
             length = index(structure(at:last)//separator, separator) - 1
-            if (n == max_columns .or. len_trim(adjustl(rest(at:at + length - 1))) > cell_length) then
+            if (n == max_columns .or. len_trim(adjustl(text(at:at + length - 1))) > cell_length) then
                error = line_error(table, 'it has too many values or one that is too long; allowed: up to ' &
                   //to_text(max_columns)//' values of up to '//to_text(cell_length)//' characters')
                return
             end if
             n = n + 1
-            cells(n) = adjustl(rest(at:at + length - 1))
+            cells(n) = adjustl(text(at:at + length - 1))
             at = at + length + 1
             if (separator == ' ') at = at + max(0, verify(structure(at:)//'x', ' ') - 1)
          end do
@@ -210,9 +210,9 @@ contains
       character(len=cell_length), intent(in) :: cells(:)
       !> A number has the other mark than those before it, or may have a decimal comma or 1000 times the value.
       type(error_type), allocatable, intent(out) :: error
-      integer :: doubtful, i, at
+      integer :: ambiguous, i, at
 
-      doubtful = 0
+      ambiguous = 0
       do i = 1, size(cells)
          at = scan(cells(i), '.,')
          if (at == 0 .or. .not. is_number(trim(replaced(cells(i), ',', '.')))) cycle
@@ -222,12 +222,12 @@ contains
             return
          end if
          if (table%decimal == ' ' .and. may_be_group(cells(i))) then
-            doubtful = i
+            ambiguous = i
          else
             table%decimal = cells(i)(at:at)
          end if
       end do
-      if (doubtful > 0 .and. table%decimal == ' ') error = line_error(table, quoted(trim(cells(doubtful))) &
+      if (ambiguous > 0 .and. table%decimal == ' ') error = line_error(table, quoted(trim(cells(ambiguous))) &
          //' may have a decimal comma or be a thousand times as much; allowed: numbers such as 1575 and 1,5750')
    end subroutine find_decimal
 
@@ -288,7 +288,7 @@ contains
       character(len=*), intent(in) :: word
       !> The value; of a choice its number, of a flag 0 or 1.
       real(wp), intent(out) :: value
-      !> It is not what the key takes.
+      !> The key does not accept it.
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: suggestion, wanted
       character(len=128) :: message
@@ -326,7 +326,7 @@ contains
    !> Error of a line.
    function line_error(table, message) result(error)
       type(sample_table_type), intent(in) :: table
-      !> What is wrong with the line.
+      !> Problem of the line.
       character(len=*), intent(in) :: message
       !> The error, with file and line.
       type(error_type) :: error

@@ -1,5 +1,5 @@
-!> Keys, models and results as data for other programs, in JSON: what the Python package and the reference of
-!> all keys are made from.
+!> Keys, models and results as data for other programs, in JSON, from which the Python package and the reference of
+!> all keys are made.
 module thud_schema
    use thud_band, only: band_set_names, band_type, get_bands, octave_count
    use thud_case, only: case_type, get_fields, new_case

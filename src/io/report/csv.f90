@@ -25,7 +25,7 @@ contains
       !> The others: [n_row, n_column].
       real(wp), intent(in) :: columns(:, :)
       character(len=:), allocatable :: text
-      character(len=width*size(columns, 2)) :: rest
+      character(len=width*size(columns, 2)) :: cells
       character(len=width*(size(columns, 2) + 1)) :: row
       logical :: at_rest
       integer :: i, at
@@ -36,10 +36,10 @@ contains
       at_rest = .false.
       do i = 1, size(time)
          ! Formatting takes most of a run's time, and most rows are after the release.
-         if (.not. at_rest .or. any(abs(columns(i, :)) > 0.0_wp)) write (rest, row_form) columns(i, :)
+         if (.not. at_rest .or. any(abs(columns(i, :)) > 0.0_wp)) write (cells, row_form) columns(i, :)
          at_rest = .not. any(abs(columns(i, :)) > 0.0_wp)
          write (row, row_form) time(i)
-         row(width:) = ','//rest
+         row(width:) = ','//cells
          row(len(row):) = newline
          text(at + 1:at + len(row)) = row
          at = at + len(row)

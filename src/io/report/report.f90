@@ -151,7 +151,7 @@ contains
       end do
    end function get_quantity_lines
 
-   !> Numbers that the model chose or found as a namelist group.
+   !> Quantities of the model as a namelist group.
    function get_model_quantities(name, history) result(text)
       !> Name of the group.
       character(len=*), intent(in) :: name
@@ -182,7 +182,7 @@ contains
          //'/'//newline//newline
    end function warning_group
 
-   !> Where a value lies: `conforms`, `too low` or `too high`.
+   !> Position of a value in its range: `conforms`, `too low` or `too high`.
    function get_word(criterion) result(word)
       type(criterion_type), intent(in) :: criterion
       character(len=:), allocatable :: word

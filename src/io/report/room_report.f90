@@ -26,7 +26,7 @@ module thud_room_report
 
 contains
 
-   !> The files: levels and what they are made of per third, levels of octaves, what the detector shows against time.
+   !> The files: levels and their terms per one-third-octave band, levels of octaves, the detector against time.
    subroutine get_room_files(prediction, files)
       type(room_level_type), intent(in) :: prediction
       !> The files: [size(room_file_names)].
@@ -97,13 +97,13 @@ contains
       !> The table so far.
       character(len=:), allocatable, intent(inout) :: text
       real(wp) :: level
-      integer :: grade
+      integer :: class
 
       level = get_a_weighted_level(prediction%octaves(1)%set, prediction%octave_level)
-      grade = get_class(level)
+      class = get_class(level)
       text = text//': L_iA,Fmax '//fixed(level, 2)//' dB, '
-      if (grade > 0) then
-         text = text//'class '//to_text(grade)
+      if (class > 0) then
+         text = text//'class '//to_text(class)
       else
          text = text//'no class'
       end if

@@ -45,7 +45,7 @@ contains
       text = text//',margin_dB,conforms,status,reason'//newline
    end subroutine get_sample_header
 
-   !> Lines of the results, 17 digits; what could not be computed is left out.
+   !> Lines of the results, 17 digits; cells without a result are empty.
    subroutine get_sample_rows(table, before, values, first, last, sweep, text)
       type(sample_table_type), intent(in) :: table
       !> Number of samples before the first of `values`.

@@ -195,7 +195,7 @@ contains
          //flush_right(fixed(span(2), decimals), 8)//' '//unit//newline
    end function get_span_row
 
-   !> Numbers that the model chose or found, as rows.
+   !> Quantities of the model as rows.
    function model_quantity_rows(history) result(rows)
       type(force_history_type), intent(in) :: history
       character(len=:), allocatable :: rows

@@ -32,7 +32,7 @@ module thud_elastic_body
       real(wp), allocatable :: viscous(:, :, :, :, :)
    end type elastic_body_type
 
-   !> What the forces come with.
+   !> Energies, power and failure that belong to the internal forces.
    type :: body_state_type
       !> Strain energy, that of Maxwell branches included, J.
       real(wp) :: strain_energy = 0.0_wp
@@ -67,10 +67,10 @@ contains
       allocate (body%mass(0:n, 0:mesh%n_radial), source=0.0_wp)
       do i = 1, mesh%n_radial
          body%row(i) = new_element_row(mesh, i - 1)
-         body%mass(:n - 1, i - 1) = body%mass(:n - 1, i - 1) + body%row(i)%share(:, 1)
-         body%mass(:n - 1, i) = body%mass(:n - 1, i) + body%row(i)%share(:, 2)
-         body%mass(1:, i - 1) = body%mass(1:, i - 1) + body%row(i)%share(:, 3)
-         body%mass(1:, i) = body%mass(1:, i) + body%row(i)%share(:, 4)
+         body%mass(:n - 1, i - 1) = body%mass(:n - 1, i - 1) + body%row(i)%nodal_volume(:, 1)
+         body%mass(:n - 1, i) = body%mass(:n - 1, i) + body%row(i)%nodal_volume(:, 2)
+         body%mass(1:, i - 1) = body%mass(1:, i - 1) + body%row(i)%nodal_volume(:, 3)
+         body%mass(1:, i) = body%mass(1:, i) + body%row(i)%nodal_volume(:, 4)
       end do
       ! The mesh is a little smaller than the sphere; the mass is that of the ball.
       body%mass = body%mass*(ball%mass/sum(body%mass))

@@ -32,7 +32,7 @@ module thud_element_row
       !> Volume of each element, m3: [n_element].
       real(wp), allocatable :: volume(:)
       !> Volume that belongs to each node, m3: [n_element, node].
-      real(wp), allocatable :: share(:, :)
+      real(wp), allocatable :: nodal_volume(:, :)
    end type element_row_type
 
 contains
@@ -49,7 +49,7 @@ contains
       integer :: a, b, g, j
 
       allocate (row%gradient(mesh%n_polar, 3, 4, n_point), row%weight(mesh%n_polar, n_point))
-      allocate (row%volume(mesh%n_polar), row%share(mesh%n_polar, 4), source=0.0_wp)
+      allocate (row%volume(mesh%n_polar), row%nodal_volume(mesh%n_polar, 4), source=0.0_wp)
       call get_gauss_points(point, weight)
       do j = 1, mesh%n_polar
          r = reshape(transpose(mesh%r(j - 1:j, i:i + 1)), [4])
@@ -67,7 +67,7 @@ contains
                row%gradient(j, 3, :, g) = value/radius
                row%weight(j, g) = 2*pi*radius*abs(determinant)*weight(a)*weight(b)
                row%volume(j) = row%volume(j) + row%weight(j, g)
-               row%share(j, :) = row%share(j, :) + row%weight(j, g)*value
+               row%nodal_volume(j, :) = row%nodal_volume(j, :) + row%weight(j, g)*value
             end do
          end do
       end do

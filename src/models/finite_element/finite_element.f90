@@ -114,7 +114,7 @@ contains
       modulus = 2.08e6_wp
    end function get_paper_modulus
 
-   !> Limits of what the mesh resolves: beyond them octaves are off by more than about 0.5 dB (docs/finite_elements.md).
+   !> Limits of the resolution of the mesh: beyond them octaves are off by more than about 0.5 dB (docs/finite_elements.md).
    function get_validity_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
@@ -301,20 +301,20 @@ contains
       end associate
    end subroutine check_step
 
-   !> Adds the impulse of the floor in one step to the record, as part of the means around two samples.
-   pure subroutine add_impulse(impulse, interval, i, share, history)
+   !> Adds the impulse of the floor in one step to the record, shared by the means around two samples.
+   pure subroutine add_impulse(impulse, interval, i, fraction, history)
       !> The impulse, N s; sampling interval, s.
       real(wp), intent(in) :: impulse, interval
       !> Index of the sample before it.
       integer, intent(in) :: i
       !> Fraction of the step that lies nearer to the next sample.
-      real(wp), intent(in) :: share
+      real(wp), intent(in) :: fraction
       !> Gets the impulse.
       type(force_history_type), intent(inout) :: history
 
       associate (force => history%floor_force)
-         force(i) = force(i) + (1 - share)*impulse/interval
-         if (i < size(force)) force(i + 1) = force(i + 1) + share*impulse/interval
+         force(i) = force(i) + (1 - fraction)*impulse/interval
+         if (i < size(force)) force(i + 1) = force(i + 1) + fraction*impulse/interval
       end associate
       history%impulse = history%impulse + impulse
    end subroutine add_impulse
@@ -353,7 +353,7 @@ contains
       text = '&finite_element: '//to_text(1.0e3_wp*time)//' ms after the start'
    end function event_prefix
 
-   !> Follows the contacts: when they begin and end, and what they leave of the velocity.
+   !> Follows the contacts: when they begin and end, and the velocity at their end.
    subroutine follow_contact(run, contacts, time, step, history)
       type(impact_run_type), intent(in) :: run
       type(contacts_type), intent(inout) :: contacts
@@ -385,7 +385,7 @@ contains
       real(wp), intent(in) :: time, first_energy
       !> Gets the maximum residual of the energy, relative to the energy of motion at first touch.
       type(force_history_type), intent(inout) :: history
-      !> What happened, when and why.
+      !> Names event, time and cause.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: residual
 

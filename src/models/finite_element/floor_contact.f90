@@ -1,9 +1,9 @@
 !> Contact of the ball's surface with the floor at height 0, at every node of the surface, the pole
-!> included: what holds the ball up, and Coulomb's friction.
+!> included: normal forces and Coulomb's friction.
 !>
 !> Hard floor: nodes that would pass it in a step are stopped (forward increments of Lagrange
 !> multipliers, Carpenter, Taylor and Katona 1991, Int. J. Numer. Methods Eng. 32, 103-128); nothing
-!> sinks in, and the energy of what is stopped is lost. With a layer: linear springs of the floor
+!> sinks in, and the energy of stopped nodes is lost. With a layer: linear springs of the floor
 !> (Winkler), lossless and without mass, that push normal to the surface of the ball.
 !>
 !> The edge of the contact lies between two nodes, and the one outside takes its share of the pressure
@@ -91,7 +91,7 @@ contains
       end associate
    end function new_floor_contact
 
-   !> Forces of the floor that depend on where the nodes are: those of its layer and at the edge of the contact.
+   !> Forces of the floor that depend on the positions of the nodes: by its layer and at the edge of the contact.
    pure subroutine get_contact_forces(contact, position, force, energy, stiffness)
       type(floor_contact_type), intent(in) :: contact
       !> Positions of the nodes of the outer surface over the floor, m: [0:n_polar, 2].
@@ -100,9 +100,9 @@ contains
       real(wp), intent(out) :: force(0:, :)
       !> Energy that they hold, J.
       real(wp), intent(out) :: energy
-      !> What the forces upwards gain as the floor rises, N/m: [0:n_polar].
+      !> Derivatives of the upward forces by the height of the floor, N/m: [0:n_polar].
       real(wp), intent(out), optional :: stiffness(0:)
-      real(wp) :: part
+      real(wp) :: relative_depth
       integer :: j, n
 
       force = 0.0_wp
@@ -113,11 +113,11 @@ contains
       do j = 0, n - 1
          associate (z => position(j, 2), begin => contact%edge_height(j), edge_force => contact%edge_force(j))
             if (z >= begin) cycle
-            part = 1.0_wp
-            if (z > 0.0_wp) part = 1 - z/begin
-            force(j, 2) = edge_force*part**2
-            energy = energy + edge_force*(begin*part**3/3 + max(-z, 0.0_wp))
-            if (present(stiffness) .and. z > 0.0_wp) stiffness(j) = 2*edge_force*part/begin
+            relative_depth = 1.0_wp
+            if (z > 0.0_wp) relative_depth = 1 - z/begin
+            force(j, 2) = edge_force*relative_depth**2
+            energy = energy + edge_force*(begin*relative_depth**3/3 + max(-z, 0.0_wp))
+            if (present(stiffness) .and. z > 0.0_wp) stiffness(j) = 2*edge_force*relative_depth/begin
          end associate
       end do
       if (.not. contact%layer_stiffness > 0.0_wp) return
@@ -129,15 +129,15 @@ contains
          max(-position(:, 2), 0.0_wp), force(:, 1), force(:, 2), energy)
    end subroutine get_contact_forces
 
-   !> Adds what the layer does: the derivatives of its energy, half of the stiffness times area and squared sink. The
-   !> areas are those of the rings that the nodes stand for on the floor.
-   pure subroutine add_layer_forces(stiffness, r, sink, outwards, upwards, energy)
+   !> Adds the forces of the layer: the derivatives of its energy, half of the stiffness times area and squared penetration.
+   !> The areas are those of the rings around the nodes on the floor.
+   pure subroutine add_layer_forces(stiffness, r, penetration, outwards, upwards, energy)
       !> Stiffness per area, N/m3.
       real(wp), intent(in) :: stiffness
       !> Distances of the nodes from the axis, m: [0:n_polar].
       real(wp), intent(in) :: r(0:)
       !> Depths of the nodes in the layer, 0 above it, m: [0:n_polar].
-      real(wp), intent(in) :: sink(0:)
+      real(wp), intent(in) :: penetration(0:)
       !> Forces, N: [0:n_polar].
       real(wp), intent(inout) :: outwards(0:), upwards(0:)
       !> Energy, J.
@@ -147,11 +147,11 @@ contains
 
       n = ubound(r, 1)
       area = get_nodal_areas(r, 0*r)
-      upwards = upwards + stiffness*area*sink
-      energy = energy + stiffness*dot_product(area, sink**2)/2
+      upwards = upwards + stiffness*area*penetration
+      energy = energy + stiffness*dot_product(area, penetration**2)/2
       associate (inner => r(:n - 2), here => r(1:n - 1), outer => r(2:))
-         outwards(1:n - 1) = outwards(1:n - 1) - stiffness*pi/6*(sink(1:n - 1)**2*(outer - inner) &
-            + sink(:n - 2)**2*(2*here + inner) - sink(2:)**2*(2*here + outer))
+         outwards(1:n - 1) = outwards(1:n - 1) - stiffness*pi/6*(penetration(1:n - 1)**2*(outer - inner) &
+            + penetration(:n - 2)**2*(2*here + inner) - penetration(2:)**2*(2*here + outer))
       end associate
    end subroutine add_layer_forces
 

@@ -164,13 +164,13 @@ contains
       call check_eigenpairs(failed, info, error)
    end subroutine find_eigenpairs
 
-   !> Refuses what an interrupt, the operator or ARPACK has ended.
+   !> Refuses modes if an interrupt, the operator or ARPACK has ended the iteration.
    subroutine check_eigenpairs(failed, info, error)
       !> The volume could not be kept.
       logical, intent(in) :: failed
       !> Status of ARPACK, 0 where it succeeded.
       integer, intent(in) :: info
-      !> Names what has ended it.
+      !> Names the cause.
       type(error_type), allocatable, intent(out) :: error
 
       call check_interrupt(error)

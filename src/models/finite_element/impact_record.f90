@@ -33,7 +33,7 @@ contains
       type(sampling_type), intent(in) :: sampling
       !> Velocity towards the floor at first touch, m/s.
       real(wp), intent(in) :: impact_velocity
-      !> What the ball drops on (default: a rigid floor).
+      !> The floor under the ball (default: rigid).
       type(receiver_type), intent(in), optional :: receiver
       type(force_history_type) :: history
 

@@ -25,7 +25,7 @@ module thud_impact_run
    !> Maximum number of steps in a sampling interval.
    integer, parameter :: max_steps = 100000
 
-   !> What is known between steps; arrays over nodes are [0:n_polar, 0:n_radial, 2].
+   !> State between steps; arrays over nodes are [0:n_polar, 0:n_radial, 2].
    type :: impact_run_type
       type(elastic_body_type) :: body
       type(floor_contact_type) :: contact
@@ -74,7 +74,7 @@ contains
       type(material_type), intent(in) :: material
       !> Gravity, m/s2; height of the lowest point, m; velocity downwards, m/s.
       real(wp), intent(in) :: gravity, gap, speed
-      !> What the ball drops on (default: a rigid floor).
+      !> The floor under the ball (default: rigid).
       type(receiver_type), intent(in), optional :: receiver
       type(impact_run_type) :: run
 
@@ -174,7 +174,7 @@ contains
       run%node_impulse = run%node_impulse + span*run%floor_force
       if (run%floor%moves) call advance_floor(run%floor, sum(run%floor_force(:, 2)))
       starts = .not. run%last_interval > 0.0_wp
-      ! Of what a node loses, a mobile floor gets a part.
+      ! A mobile floor gets a fraction of the energy that a node loses.
       call add_lost_work(impulse(:, 2), before(:, last, 2) + run%floor%velocity_before, &
          run%velocity(:, last, 2) + run%floor%velocity_after, starts, run%contact_loss, run%pending_contact_loss)
       call add_lost_work(impulse(:, 1), before(:, last, 1), run%velocity(:, last, 1), starts, run%friction_loss, &

@@ -1,4 +1,4 @@
-!> Material of the ball in the transient model: what the group `&material` asks for, and the moduli
+!> Material of the ball in the transient model: the options of the group `&material`, and the moduli
 !> that follow from it.
 module thud_material
    use thud_ball, only: ball_type, get_density
@@ -124,40 +124,40 @@ contains
       !> No Prony series fits the loss factor.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: storage_modulus, poisson_ratio, omega, viscosity
-      real(wp), allocatable :: share(:)
+      real(wp), allocatable :: relative_modulus(:)
       logical :: failed
 
       omega = 2*pi*options%loss_frequency
       material%density = get_density(ball)
       if (options%law == 'mooney_rivlin') material%mooney_share = options%mooney_share
-      ! The modulus of elasticity is kept, which is what is measured.
+      ! The modulus of elasticity, which is measured, is kept.
       poisson_ratio = min(ball%poisson_ratio, (3*options%bulk_ratio - 2)/(2*(3*options%bulk_ratio + 1)))
       storage_modulus = ball%youngs_modulus/(2*(1 + poisson_ratio))
       material%bulk_modulus = ball%youngs_modulus/(3*(1 - 2*poisson_ratio))
-      allocate (share(0), material%branch_time(0))
+      allocate (relative_modulus(0), material%branch_time(0))
       viscosity = 0.0_wp
       select case (options%viscosity)
       case ('kelvin_voigt')
          viscosity = options%loss_factor/omega
       case ('fractional')
          call fit_fractional_loss(new_fractional_loss(options%fractional_order, options%loss_factor, &
-            options%loss_frequency), share, material%branch_time, viscosity)
+            options%loss_frequency), relative_modulus, material%branch_time, viscosity)
       case ('constant_loss')
-         call fit_constant_loss(options%loss_factor, share, material%branch_time, failed)
+         call fit_constant_loss(options%loss_factor, relative_modulus, material%branch_time, failed)
          if (failed) then
             error = input_error('&material: no Prony series has loss_factor = '//to_text(options%loss_factor) &
                //' from 10 to 1000 Hz; allowed: up to about 0.9')
             return
          end if
       case ('prony')
-         share = options%prony_share%values(:options%prony_share%count)
+         relative_modulus = options%prony_share%values(:options%prony_share%count)
          material%branch_time = options%prony_time%values(:options%prony_time%count)
       case default
          continue
       end select
-      material%shear_modulus = storage_modulus/get_storage_ratio(share, material%branch_time, omega)
+      material%shear_modulus = storage_modulus/get_storage_ratio(relative_modulus, material%branch_time, omega)
       material%viscosity = viscosity*material%shear_modulus
-      allocate (material%branch_modulus, source=share*material%shear_modulus)
+      allocate (material%branch_modulus, source=relative_modulus*material%shear_modulus)
    end subroutine new_material
 
    !> Loss factor of the material in shear.
@@ -170,9 +170,9 @@ contains
       real(wp) :: omega
 
       omega = 2*pi*frequency
-      associate (share => material%branch_modulus/material%shear_modulus, time => material%branch_time)
-         loss_factor = (get_loss_ratio(share, time, omega) + omega*material%viscosity/material%shear_modulus) &
-            /get_storage_ratio(share, time, omega)
+      associate (relative_modulus => material%branch_modulus/material%shear_modulus, time => material%branch_time)
+         loss_factor = (get_loss_ratio(relative_modulus, time, omega) + omega*material%viscosity/material%shear_modulus) &
+            /get_storage_ratio(relative_modulus, time, omega)
       end associate
    end function get_material_loss_factor
 

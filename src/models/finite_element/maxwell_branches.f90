@@ -51,12 +51,12 @@ contains
       real(wp), intent(inout) :: energy, power
       real(wp) :: isochoric_factor(n)
       real(wp), dimension(n, n_symmetric) :: c, branch_stress
-      real(wp), dimension(size(time)) :: ratio, part, effective
+      real(wp), dimension(size(time)) :: ratio, mean_weight, effective
       real(wp) :: stored
       integer :: b, g
 
       ratio = interval/time
-      part = get_part_to_mean(ratio)
+      mean_weight = get_mean_weight(ratio)
       effective = modulus
       if (.not. commit) effective = modulus*(1 + tanh(ratio/2))
       do g = 1, n_point
@@ -64,30 +64,30 @@ contains
          branch_stress = 0.0_wp
          do b = 1, size(time)
             stored = 0.0_wp
-            call take_branch_step(n, effective(b), time(b), ratio(b), part(b), commit, weight(:, g), c, viscous(:, :, g, &
-               b), branch_stress, stored, power)
+            call take_branch_step(n, effective(b), time(b), ratio(b), mean_weight(b), commit, weight(:, g), c, &
+               viscous(:, :, g, b), branch_stress, stored, power)
             ! Of the mean stress: so work, energy and loss of a linear branch add up over the steps.
-            energy = energy + stored*(1 + part(b))*(1 + exp(-ratio(b)))/2
+            energy = energy + stored*(1 + mean_weight(b))*(1 + exp(-ratio(b)))/2
          end do
          call add_branch_stresses(n, isochoric_factor, c, branch_stress, f(:, :, g), cofactor(:, :, g), jacobian(:, g), &
             stress(:, :, g))
       end do
    end subroutine add_branch_stress
 
-   !> Growth exp(t/time) - 1 at the instant t of a step at which a decaying stress equals its mean over
+   !> exp(t/time) - 1 at the instant t of a step at which a decaying stress equals its mean over
    !> the step: x/(1 - exp(-x)) - 1.
-   pure elemental function get_part_to_mean(ratio) result(part)
+   pure elemental function get_mean_weight(ratio) result(mean_weight)
       !> Length of the step over the relaxation time, x.
       real(wp), intent(in) :: ratio
-      real(wp) :: part
+      real(wp) :: mean_weight
 
       if (ratio < 1.0e-3_wp) then
          ! Series, where the difference would lose digits; off by x**4/720.
-         part = ratio/2 + ratio**2/12
+         mean_weight = ratio/2 + ratio**2/12
       else
-         part = ratio/(1 - exp(-ratio)) - 1
+         mean_weight = ratio/(1 - exp(-ratio)) - 1
       end if
-   end function get_part_to_mean
+   end function get_mean_weight
 
    !> Isochoric right Cauchy-Green tensors at one Gauss point.
    pure subroutine get_isochoric(n, f, jacobian, isochoric_factor, c)
@@ -115,12 +115,13 @@ contains
    end subroutine get_isochoric
 
    !> Adds the stress of one Maxwell branch at one Gauss point, its energy and its loss, and updates its viscous tensor.
-   pure subroutine take_branch_step(n, modulus, time, ratio, part, commit, weight, c, viscous, branch_stress, energy, power)
+   pure subroutine take_branch_step(n, modulus, time, ratio, mean_weight, commit, weight, c, viscous, branch_stress, &
+      energy, power)
       integer, intent(in) :: n
       !> Shear modulus, Pa; relaxation time, s; length of the step over it.
       real(wp), intent(in) :: modulus, time, ratio
       !> Weight of the deformation beside the viscous tensor, for that within the step.
-      real(wp), intent(in) :: part
+      real(wp), intent(in) :: mean_weight
       !> The viscous tensors are taken to the end of the step; otherwise they stay.
       logical, intent(in) :: commit
       !> Volumes of the points, undeformed, m3: [n].
@@ -137,8 +138,8 @@ contains
       real(wp) :: scale, square, i1, i2, i3, i4
       integer :: j
 
-      strain_weight = part
-      call mix(n, part, strain_weight, c, viscous, tensor, determinant)
+      strain_weight = mean_weight
+      call mix(n, mean_weight, strain_weight, c, viscous, tensor, determinant)
       call get_inverse_cube_root(n, determinant, root)
       !$omp simd private(scale, square, i1, i2, i3, i4) reduction(+:energy, power)
       do j = 1, n
@@ -171,13 +172,13 @@ contains
       real(wp), intent(in) :: trace(n)
       real(wp), intent(inout) :: viscous(n, n_symmetric)
       real(wp) :: determinant(n), root(n), strain_weight(n), mixed(n, n_symmetric)
-      real(wp) :: growth
+      real(wp) :: end_weight
       integer :: j
 
-      growth = exp(ratio) - 1
+      end_weight = exp(ratio) - 1
       ! At large strain the rate of the norm, tr(Cbar Cv^-1)/3 - 1, counts too, in the second order of the step.
-      strain_weight = growth + (trace/3 - 1)*ratio**2/2
-      call mix(n, growth, strain_weight, c, viscous, mixed, determinant)
+      strain_weight = end_weight + (trace/3 - 1)*ratio**2/2
+      call mix(n, end_weight, strain_weight, c, viscous, mixed, determinant)
       call get_inverse_cube_root(n, determinant, root)
       do j = 1, n_symmetric
          viscous(:, j) = mixed(:, j)*root
@@ -185,10 +186,10 @@ contains
    end subroutine update_internal_variables
 
    !> Mixtures of viscous tensor and deformation at one Gauss point, and their determinants, which are near 1.
-   pure subroutine mix(n, usual_share, strain_weight, c, viscous, tensor, determinant)
+   pure subroutine mix(n, usual_weight, strain_weight, c, viscous, tensor, determinant)
       integer, intent(in) :: n
       !> Weight of the deformation beside the viscous tensor by which the norm is taken off.
-      real(wp), intent(in) :: usual_share
+      real(wp), intent(in) :: usual_weight
       !> Weights of the deformation: [n].
       real(wp), intent(in) :: strain_weight(n)
       real(wp), intent(in) :: c(n, n_symmetric)
@@ -201,7 +202,7 @@ contains
       real(wp) :: scale
       integer :: i, j
 
-      scale = 1/(1 + usual_share)
+      scale = 1/(1 + usual_weight)
       !$omp simd
       do j = 1, n
          do i = 1, n_symmetric

@@ -44,8 +44,8 @@ module thud_mode_matrices
       real(wp), allocatable :: mass(:, :)
       !> Unknown of each displacement, 0 where it is held: [2, 0:n_line, 0:n_ring].
       integer, allocatable :: unknown(:, :, :)
-      !> Unknowns of each element, n + 1 where held: [18, n_element].
-      integer, allocatable :: place(:, :)
+      !> Indices of the unknowns of each element, n + 1 where held: [18, n_element].
+      integer, allocatable :: element_dof(:, :)
       !> Mean dilatations of each element: [3, 18, n_element].
       real(wp), allocatable :: dilatation(:, :, :)
    end type mode_matrices_type
@@ -105,18 +105,18 @@ contains
             end do
          end do
       end do
-      allocate (matrices%place(2*n_node, mesh%n_radial*mesh%n_polar))
+      allocate (matrices%element_dof(2*n_node, mesh%n_radial*mesh%n_polar))
       element = 0
       do j = 0, n_line - 2, 2
          do i = 0, n_ring - 2, 2
             element = element + 1
-            matrices%place(:, element) = [(((matrices%unknown(c, j + b, i + a), c=1, 2), a=0, 2), b=0, 2)]
-            associate (place => matrices%place(:, element))
-               matrices%n_band = max(matrices%n_band, maxval(place) - minval(place, mask=place > 0))
+            matrices%element_dof(:, element) = [(((matrices%unknown(c, j + b, i + a), c=1, 2), a=0, 2), b=0, 2)]
+            associate (dof => matrices%element_dof(:, element))
+               matrices%n_band = max(matrices%n_band, maxval(dof) - minval(dof, mask=dof > 0))
             end associate
          end do
       end do
-      where (matrices%place == 0) matrices%place = matrices%n + 1
+      where (matrices%element_dof == 0) matrices%element_dof = matrices%n + 1
    end subroutine number_unknowns
 
    !> Adds up the matrices of all elements.
@@ -131,7 +131,7 @@ contains
       integer :: a, b, i, j, element, row, column
 
       allocate (matrices%factor(0:matrices%n_band, matrices%n), matrices%mass(0:matrices%n_band, matrices%n))
-      allocate (matrices%dilatation(n_dilatation, 2*n_node, size(matrices%place, 2)))
+      allocate (matrices%dilatation(n_dilatation, 2*n_node, size(matrices%element_dof, 2)))
       inertia = 0.0_wp
       do column = 1, matrices%n
          ! The largest matrices fill gigabytes.
@@ -144,7 +144,7 @@ contains
          if (is_interrupted()) return
          do i = 0, ubound(mesh%r, 2) - 2, 2
             element = element + 1
-            associate (place => matrices%place(:, element), dilatation => matrices%dilatation(:, :, element))
+            associate (dof => matrices%element_dof(:, element), dilatation => matrices%dilatation(:, :, element))
                call get_mixed_element(reshape(transpose(mesh%r(j:j + 2, i:i + 2)), [n_node]), &
                   reshape(transpose(mesh%z(j:j + 2, i:i + 2)), [n_node]), shear_modulus, density, distortion, dilatation, &
                   mass)
@@ -152,8 +152,8 @@ contains
                inertia(2::2, 2::2) = mass
                do b = 1, 2*n_node
                   do a = b, 2*n_node
-                     row = max(place(a), place(b))
-                     column = min(place(a), place(b))
+                     row = max(dof(a), dof(b))
+                     column = min(dof(a), dof(b))
                      if (row > matrices%n) cycle
                      volume = dot_product(dilatation(:, a), dilatation(:, b))
                      matrices%factor(row - column, column) = matrices%factor(row - column, column) &
@@ -229,7 +229,7 @@ contains
       real(wp), intent(out) :: x(:)
       !> The volume could not be kept.
       logical, intent(out) :: failed
-      real(wp) :: pressure(n_dilatation, size(matrices%place, 2)), change(n_dilatation, size(matrices%place, 2))
+      real(wp), dimension(n_dilatation, size(matrices%element_dof, 2)) :: pressure, change
       real(wp) :: padded(matrices%n + 1)
       integer :: iteration, element, info
 
@@ -242,17 +242,17 @@ contains
          if (is_interrupted()) exit
          padded(:matrices%n) = x
          padded(matrices%n + 1) = 0.0_wp
-         do element = 1, size(matrices%place, 2)
+         do element = 1, size(matrices%element_dof, 2)
             change(:, element) = matrices%bulk_modulus &
-               *matmul(matrices%dilatation(:, :, element), padded(matrices%place(:, element)))
+               *matmul(matrices%dilatation(:, :, element), padded(matrices%element_dof(:, element)))
          end do
          pressure = pressure + change
          if (sum(change**2) <= constraint_tolerance**2*sum(pressure**2)) return
-         ! The change of the pressures drives what is still to be added to the displacements.
+         ! The change of the pressures is the load of the next correction of the displacements.
          padded = 0.0_wp
-         do element = 1, size(matrices%place, 2)
-            associate (place => matrices%place(:, element))
-               padded(place) = padded(place) - matmul(change(:, element), matrices%dilatation(:, :, element))
+         do element = 1, size(matrices%element_dof, 2)
+            associate (dof => matrices%element_dof(:, element))
+               padded(dof) = padded(dof) - matmul(change(:, element), matrices%dilatation(:, :, element))
             end associate
          end do
          call dpbtrs('L', matrices%n, matrices%n_band, 1, matrices%factor, matrices%n_band + 1, padded, matrices%n + 1, &

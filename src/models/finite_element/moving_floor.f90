@@ -35,14 +35,14 @@ module thud_moving_floor
       !> Twice the travel from the middle before to the instant, and from there to the middle after, over the time
       !> from middle to middle, m/s; velocity at the instant without that of the direct mobility, m/s.
       real(wp) :: velocity_before = 0.0_wp, velocity_after = 0.0_wp, velocity = 0.0_wp
-      !> Energy that the floor was given up to the instant, and up to the middle after it, J.
+      !> Energy transferred to the floor up to the instant, and up to the middle after it, J.
       real(wp) :: work = 0.0_wp, work_after = 0.0_wp
       !> Lengths of the step before and of this one that the factors below are of, s; below 0 for none.
       real(wp) :: last_interval = -1.0_wp, interval = -1.0_wp
       !> Displacements without force at the instants, m; compliances, m/N: [3].
       real(wp) :: free(3) = 0.0_wp, compliance(3) = 0.0_wp
       !> Displacement that an amplitude gives up to the instants, m/(N s): [n_pole, 3].
-      complex(wp), allocatable :: part(:, :)
+      complex(wp), allocatable :: displacement_factor(:, :)
       !> The step from middle to middle.
       type(receiver_step_type) :: step
    end type moving_floor_type
@@ -51,7 +51,7 @@ contains
 
    !> A floor at rest.
    pure function new_moving_floor(receiver) result(floor)
-      !> What the ball drops on; rigid where it is absent.
+      !> The floor under the ball; rigid where absent.
       type(receiver_type), intent(in), optional :: receiver
       type(moving_floor_type) :: floor
 
@@ -72,7 +72,7 @@ contains
       same = .not. (abs(last_interval - floor%last_interval) > 0.0_wp .or. abs(interval - floor%interval) > 0.0_wp)
       if (.not. same) call set_factors(floor, last_interval, interval)
       do i = 1, 3
-         floor%free(i) = floor%motion%displacement + get_real_sum(floor%part(:, i), floor%motion%amplitude)
+         floor%free(i) = floor%motion%displacement + get_real_sum(floor%displacement_factor(:, i), floor%motion%amplitude)
       end do
    end subroutine predict
 
@@ -102,13 +102,13 @@ contains
       floor%last_interval = last_interval
       floor%interval = interval
       length([here, after, next]) = last_interval/2 + [0.0_wp, interval/2, interval]
-      if (allocated(floor%part)) deallocate (floor%part)
-      allocate (floor%part(size(floor%motion%amplitude), 3))
+      if (allocated(floor%displacement_factor)) deallocate (floor%displacement_factor)
+      allocate (floor%displacement_factor(size(floor%motion%amplitude), 3))
       do i = 1, 3
          step = new_receiver_step(floor%receiver, length(i))
          floor%compliance(i) = length(i)*floor%receiver%direct
-         if (size(floor%part, 1) > 0) then
-            floor%part(:, i) = floor%receiver%residue*step%gain
+         if (size(floor%displacement_factor, 1) > 0) then
+            floor%displacement_factor(:, i) = floor%receiver%residue*step%gain
             floor%compliance(i) = floor%compliance(i) + sum(real(floor%receiver%residue*step%travel, wp))
          end if
          if (i == after) floor%step = step
@@ -181,7 +181,7 @@ contains
 
    !> Takes a floor to the middle after an instant.
    pure subroutine advance_floor(floor, force)
-      !> The floor, found.
+      !> The floor, its displacement and stop known.
       type(moving_floor_type), intent(inout) :: floor
       !> Force downwards, N.
       real(wp), intent(in) :: force

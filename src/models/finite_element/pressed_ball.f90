@@ -1,9 +1,9 @@
 !> Quasi-static compression of the ball by finite elements: the elements of the impact at rest, between two rigid plates
 !> without friction, one at height 0 and one coming down on the ball.
 !>
-!> Newton's method, with the nodes that touch found on the way (a primal-dual active set): nodes below a plate are put
-!> on it, nodes that it would have to pull are let go. The tangent comes from differences of the forces, in 18
-!> evaluations for any mesh: nodes three apart share no element.
+!> Newton's method, with the nodes that touch determined in each iteration (a primal-dual active set): nodes below a
+!> plate are put on it, nodes that it would have to pull are released. The tangent comes from differences of the forces,
+!> in 18 evaluations for any mesh: nodes three apart share no element.
 module thud_pressed_ball
    use thud_ball, only: ball_type
    use thud_cavity, only: add_gas_forces, cavity_type, get_gas_energy, get_gas_pressure, get_volume
@@ -112,7 +112,7 @@ contains
       type(pressed_ball_type), intent(inout) :: pressed
       !> The approach, not less than before, m.
       real(wp), intent(in) :: deflection
-      !> There is no state of rest, or none that was found.
+      !> No state of rest exists, or the iteration does not converge to it.
       type(error_type), allocatable, intent(out) :: error
       type(pressed_ball_type) :: next
       real(wp) :: step
@@ -166,7 +166,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp), dimension(0:pressed%body%mesh%n_polar, 0:pressed%body%mesh%n_radial, 2) :: force, target, change
       logical :: fixed(0:pressed%body%mesh%n_polar, 0:pressed%body%mesh%n_radial, 2)
-      logical :: found(0:pressed%body%mesh%n_polar, 2)
+      logical :: touching(0:pressed%body%mesh%n_polar, 2)
       integer :: iteration, last, plate
       logical :: failed, same
 
@@ -188,14 +188,14 @@ contains
          call get_forces(pressed, pressed%position, force, failed)
          if (failed) return
          do plate = 1, 2
-            associate (height => get_heights(pressed, plate), push => merge(-1, 1, plate == 1)*force(:, last, 2))
-               found(:, plate) = merge(push > -pressed%tolerance, height < 0.0_wp, pressed%touches(:, plate))
+            associate (height => get_heights(pressed, plate), contact_force => merge(-1, 1, plate == 1)*force(:, last, 2))
+               touching(:, plate) = merge(contact_force > -pressed%tolerance, height < 0.0_wp, pressed%touches(:, plate))
             end associate
          end do
-         same = all(found .eqv. pressed%touches)
-         pressed%touches = found
+         same = all(touching .eqv. pressed%touches)
+         pressed%touches = touching
          converged = same .and. maxval(abs(force), mask=.not. fixed) < pressed%tolerance
-         if (.not. any(found(:, 1)) .or. .not. any(found(:, 2))) return
+         if (.not. any(touching(:, 1)) .or. .not. any(touching(:, 2))) return
          if (converged) exit
       end do
       pressed%force = -sum(force(:, last, 2), mask=pressed%touches(:, 1))
@@ -253,7 +253,7 @@ contains
       type(pressed_ball_type), intent(inout) :: pressed
       !> Forces where it is, N.
       real(wp), intent(in) :: force(0:, 0:, :)
-      !> Coordinates that are given, and their changes, m.
+      !> Prescribed coordinates, and their changes, m.
       logical, intent(in) :: fixed(0:, 0:, :)
       real(wp), intent(in) :: shift(0:, 0:, :)
       !> Changes of all coordinates, m.
@@ -308,7 +308,7 @@ contains
    !> Derivatives of the forces, negative, with the gas at its pressure.
    subroutine get_tangent(pressed, fixed, width, band, failed)
       type(pressed_ball_type), intent(in) :: pressed
-      !> Coordinates that are given; their rows become those of the unit matrix.
+      !> Prescribed coordinates; their rows become those of the unit matrix.
       logical, intent(in) :: fixed(0:, 0:, :)
       !> Diagonals on each side.
       integer, intent(in) :: width

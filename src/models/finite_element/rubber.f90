@@ -51,7 +51,7 @@ contains
       real(wp), intent(in) :: x(n)
       !> Their roots: [n].
       real(wp), intent(out) :: root(n)
-      real(wp) :: rest, n_not_near, n_not_far
+      real(wp) :: residual, n_not_near, n_not_far
       integer :: j, iteration
 
       ! As sums: gfortran does not vectorize minimum and maximum.
@@ -64,19 +64,19 @@ contains
       end do
       ! Polynomials of least error, 3e-5 and 4 %; each iteration raises it to its fourth power.
       if (.not. n_not_near > 0.0_wp) then
-         !$omp simd private(rest)
+         !$omp simd private(residual)
          do j = 1, n
             root(j) = 1.74098956_wp + x(j)*(-1.32838497_wp + x(j)*(0.76697019_wp - x(j)*0.17960475_wp))
-            rest = 1 - x(j)*root(j)**3
-            root(j) = root(j)*(1 + rest*(1/3.0_wp + rest*(2/9.0_wp + rest*(14/81.0_wp))))
+            residual = 1 - x(j)*root(j)**3
+            root(j) = root(j)*(1 + residual*(1/3.0_wp + residual*(2/9.0_wp + residual*(14/81.0_wp))))
          end do
       else if (.not. n_not_far > 0.0_wp) then
-         !$omp simd private(rest)
+         !$omp simd private(residual)
          do j = 1, n
             root(j) = 1.53872574_wp + x(j)*(-0.64308593_wp + x(j)*0.13116605_wp)
             do iteration = 1, 2
-               rest = 1 - x(j)*root(j)**3
-               root(j) = root(j)*(1 + rest*(1/3.0_wp + rest*(2/9.0_wp + rest*(14/81.0_wp))))
+               residual = 1 - x(j)*root(j)**3
+               root(j) = root(j)*(1 + residual*(1/3.0_wp + residual*(2/9.0_wp + residual*(14/81.0_wp))))
             end do
          end do
       else

@@ -26,7 +26,7 @@ module thud_hollow_sphere
 
    !> Options of the model.
    type, extends(source_model_type) :: hollow_sphere_type
-      !> What becomes of the momentum of wall that enters or leaves the flat cap.
+      !> Momentum flux of the wall that enters or leaves the flat cap, one of `flux_choices`.
       character(len=name_length) :: momentum_flux = 'momentum_balance'
    contains
       procedure, pass(options) :: get_fields

@@ -41,7 +41,7 @@ module thud_impact_batch
       !> The ball was released: [batch_size].
       logical(c_bool) :: released(batch_size)
       !> A stage has left the domain of the equation: [batch_size].
-      logical(c_bool) :: left(batch_size)
+      logical(c_bool) :: out_of_domain(batch_size)
       !> The last step led beyond the reach of the series: [batch_size].
       logical(c_bool) :: out_of_range(batch_size)
    end type impact_batch_type
@@ -180,7 +180,7 @@ contains
       logical, intent(in) :: active(batch_size)
       !> The part: [batch_size].
       real(wp), intent(in) :: length(batch_size)
-      !> What the end of the phase brings to zero: [batch_size].
+      !> Quantity that is zero at the end of the phase: [batch_size].
       real(wp), intent(out) :: value(batch_size)
       real(wp), dimension(batch_size) :: elastic_force, floor_force
       logical :: missed
@@ -189,7 +189,7 @@ contains
       value = get_watched(impacts%states(3 - impacts%now), compressing)
    end subroutine try_length
 
-   !> What the end of the phase brings to zero: velocity or deflection.
+   !> Quantity that is zero at the end of the phase: velocity or deflection.
    pure function get_watched(state, compressing) result(watched)
       type(state_batch_type), intent(in) :: state
       !> The phase ends with the velocity.

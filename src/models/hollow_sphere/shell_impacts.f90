@@ -21,14 +21,14 @@ module thud_shell_impacts
 contains
 
    !> Impacts from first touch to release, and their forces.
-   subroutine solve_impacts(impacts, n_sample, substeps, force, last_sample)
+   subroutine solve_impacts(impacts, n_sample, substeps, force, n_written)
       type(impact_batch_type), intent(inout) :: impacts
       !> Samples of the record; steps per sampling interval.
       integer, intent(in) :: n_sample, substeps
       !> Elastic forces, then floor forces, N, up to the last contact: [2 batch_size, n_sample].
       real(wp), intent(inout) :: force(2*batch_size, n_sample)
-      !> Index of the last sample that was written.
-      integer, intent(out) :: last_sample
+      !> Number of samples that were written.
+      integer, intent(out) :: n_written
       real(wp), dimension(batch_size) :: start, last, length, elastic_force, floor_force
       logical :: turning(batch_size), released(batch_size)
       integer :: n_step, last_step
@@ -40,22 +40,22 @@ contains
       impacts%states(1)%velocity = impacts%impact_velocity
       impacts%states(1)%impulse = 0.0_wp
       impacts%states(1)%loss = 0.0_wp
-      impacts%left = .false.
+      impacts%out_of_domain = .false.
       impacts%whole_step = 1.0_wp
 
       start = 0.0_wp
       call march(impacts, .true., start, last, n_step, substeps, n_sample, force, last_step)
-      turning = last < never .and. .not. impacts%left
-      call turn(impacts, turning)
+      turning = last < never .and. .not. impacts%out_of_domain
+      call pass_turning_point(impacts, turning)
       start = merge(last + 1, never, turning)
       call march(impacts, .false., start, last, n_step, substeps, n_sample, force, last_step)
-      released = last < never .and. .not. impacts%left
+      released = last < never .and. .not. impacts%out_of_domain
       impacts%released = released
       call locate(impacts, .false., released, length)
       call finish_step(impacts, released, length, elastic_force, floor_force)
       impacts%contact = last + length
-      last_sample = last_step/substeps + 1
-      call get_peaks(force(:, :last_sample), impacts%peak_elastic_force, impacts%peak_force)
+      n_written = last_step/substeps + 1
+      call get_peaks(force(:, :n_written), impacts%peak_elastic_force, impacts%peak_force)
       ! A part that starts with a jump at first touch: a sample of a jump is the mean of its two sides.
       force(:, 1) = force(:, 1)/2
    end subroutine solve_impacts
@@ -129,8 +129,8 @@ contains
       impacts%out_of_range = .false.
    end subroutine renew_series
 
-   !> Forces of one sample: those of moving balls, none after the contact; balls that have yet to turn keep
-   !> theirs.
+   !> Forces of one sample: those of moving balls, none after the contact; balls before their turning point
+   !> keep theirs.
    pure subroutine record(elastic_force, floor_force, n, start, last, force)
       !> Elastic forces, N: [batch_size].
       real(wp), intent(in) :: elastic_force(batch_size)
@@ -167,7 +167,7 @@ contains
          if (.not. undisturbed) then
             on = n >= start .and. n < last
             stays = on .and. is_finite(next%velocity) .and. get_watched(next, compressing) > 0.0_wp
-            impacts%left = impacts%left .or. (on .and. .not. is_finite(next%velocity))
+            impacts%out_of_domain = impacts%out_of_domain .or. (on .and. .not. is_finite(next%velocity))
             where (on .and. .not. stays) last = n
             where (.not. stays)
                next%deflection = state%deflection
@@ -206,7 +206,7 @@ contains
    end function all_stay
 
    !> To the turning point and on to the end of its step, with the flux term of restitution.
-   subroutine turn(impacts, turning)
+   subroutine pass_turning_point(impacts, turning)
       type(impact_batch_type), intent(inout) :: impacts
       !> The ball has a turning point: [batch_size].
       logical, intent(in) :: turning(batch_size)
@@ -221,7 +221,7 @@ contains
       ! Those at the turning point.
       impacts%peak_elastic_force = elastic_force
       impacts%peak_force = floor_force
-   end subroutine turn
+   end subroutine pass_turning_point
 
    !> Raises the forces at the turning point to the maximum of all samples.
    pure subroutine get_peaks(force, peak_elastic_force, peak_force)

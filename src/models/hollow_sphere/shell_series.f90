@@ -59,7 +59,7 @@ contains
          inner*reach
    end function will_last
 
-   !> Expands balls about the middle of their next way; the present deflection is in reach.
+   !> Expands balls about the middle of their next steps; the present deflection is in reach.
    pure subroutine expand_series(shell, state, wanted, series)
       type(shell_batch_type), intent(in) :: shell
       type(state_batch_type), intent(in) :: state

@@ -49,7 +49,7 @@ contains
       !> Length of a step, s.
       real(wp), intent(in) :: interval
       type(surface_rings_type), intent(in) :: rings
-      !> What the ball drops on.
+      !> The floor under the ball.
       type(receiver_type), intent(in) :: floor
       !> Outer radius, m; velocity at first touch, m/s; gravity during the contact, m/s2.
       real(wp), intent(in) :: outer_radius, impact_velocity, gravity
@@ -115,7 +115,7 @@ contains
             end do
             state%speed = state%speed + impulse/mass
             state%height = state%height + interval*impulse/mass
-            ! What the impulses take from the ball at once.
+            ! Energy that the impulses take from the ball instantaneously.
             state%contact_loss = state%contact_loss - impulse*(speed + impulse/(2*mass)) &
                + dot_product(mode_impulse, before(:, place_v) - mode_impulse/2)
          end if

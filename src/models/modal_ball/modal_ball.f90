@@ -84,8 +84,8 @@ contains
       modulus = 1.6e6_wp
    end function get_paper_modulus
 
-   !> Limits of linear modes, and of what rings and harmonics resolve: beyond them the octave of 500 Hz is off by more than
-   !> about 0.5 dB (docs/modal_ball.md).
+   !> Limits of linear modes, and of the resolution by rings and harmonics: beyond them the octave of 500 Hz is off by
+   !> more than about 0.5 dB (docs/modal_ball.md).
    function get_validity_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
@@ -169,7 +169,7 @@ contains
       !> Modes and damping.
       class(modal_ball_options_type), intent(in) :: options
       type(surface_rings_type), intent(in) :: rings
-      !> What the ball drops on.
+      !> The floor under the ball.
       type(receiver_type), intent(in) :: floor
       !> Length of a step, s.
       real(wp), intent(in) :: interval
@@ -196,7 +196,7 @@ contains
          //' cannot be distinguished; allowed: fewer rings, more static_harmonics, or more substeps')
    end subroutine prepare
 
-   !> Modes of all harmonics, and the static response of the rings to what these leave out.
+   !> Modes of all harmonics, and the static response of the rings to the truncated ones.
    subroutine add_modes(ball, options, rings, interval, step, response, error)
       type(ball_type), intent(in) :: ball
       !> Modes.
@@ -264,13 +264,13 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: impulse, settling_time
       integer :: i, j, n_step, last
-      logical :: has_left
+      logical :: has_separated
 
       ! The surface may touch again while the slowest mode swings back, half a period later.
       settling_time = 0.0_wp
       if (size(step%omega) > 0) settling_time = pi/(sqrt(step%equilibrium_ratio)*minval(step%omega))
       last = 0
-      has_left = .false.
+      has_separated = .false.
       samples: do i = 1, size(history%floor_force)
          call record_motion(ball, step, state, i, history)
          do j = 1, sampling%substeps
@@ -286,12 +286,12 @@ contains
             end if
             if (contact%last == size(rings%radius)) then
                error = numerical_error('&drop: '//to_text(1.0e3_wp*n_step*interval)//' ms after first touch the ball lies ' &
-                  //'on its outermost ring, its center sunk by '//to_text(1.0e3_wp*(ball%outer_radius - state%height)) &
+                  //'on its outermost ring, its center lowered by '//to_text(1.0e3_wp*(ball%outer_radius - state%height)) &
                   //' mm; allowed: a lower height, or a stiffer ball')
                return
             end if
-            has_left = state%speed > 0.0_wp .and. (n_step - last)*interval > settling_time
-            if (has_left .and. .not. state%floor_moves) exit samples
+            has_separated = state%speed > 0.0_wp .and. (n_step - last)*interval > settling_time
+            if (has_separated .and. .not. state%floor_moves) exit samples
          end do
          if (state%floor_moves) then
             ! The mean of the interval, as the force is.
@@ -300,7 +300,7 @@ contains
             history%velocity(i) = history%velocity(i) - history%floor_velocity(i)
          end if
       end do samples
-      call check_end(sampling, settling_time, has_left, contact, state, error)
+      call check_end(sampling, settling_time, has_separated, contact, state, error)
       if (allocated(error)) return
       history%contact_time = last*interval
       call check_contact_samples(sampling, history%contact_time, error)
@@ -308,12 +308,12 @@ contains
    end subroutine march
 
    !> Refuses a record that ends too early.
-   subroutine check_end(sampling, settling_time, has_left, contact, state, error)
+   subroutine check_end(sampling, settling_time, has_separated, contact, state, error)
       type(sampling_type), intent(in) :: sampling
       !> Time without contact after which the surface touches no more, s.
       real(wp), intent(in) :: settling_time
       !> It has passed, and the ball rises.
-      logical, intent(in) :: has_left
+      logical, intent(in) :: has_separated
       type(ring_contact_type), intent(in) :: contact
       !> Motion of ball and floor.
       type(ball_motion_type), intent(in) :: state
@@ -321,7 +321,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       character(len=64) :: allowed
 
-      if (.not. has_left) then
+      if (.not. has_separated) then
          allowed = 'longer than that'
          if (state%floor_moves) allowed = 'longer than that, and a floor from which the ball rebounds'
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &

@@ -47,7 +47,7 @@ contains
       start(::rings%n_dof) = ball%outer_radius*(1 - rings%height)
       before = 0.0_wp
       do i = 1, size(deflection)
-         ! Where rings stick, the way there counts.
+         ! With sticking rings the result depends on the path.
          n_step = 1
          if (rings%n_dof == 2) n_step = 1 + int((deflection(i) - before)/(max_step*ball%outer_radius))
          do k = 1, n_step

@@ -67,7 +67,7 @@ contains
       type(ring_contact_type), intent(inout) :: contact
       !> Gaps without contact, m: [n_gap].
       real(wp), intent(in) :: gap(:)
-      !> The touching rings were not found.
+      !> The active set of rings does not converge.
       type(error_type), allocatable, intent(out) :: error
       logical :: wrong(size(contact%touches))
       integer :: round, first_wrong

@@ -57,7 +57,7 @@ module thud_sphere_modes
       real(wp), allocatable :: omega(:)
       !> U and V at the outer surface of modes of unit modal mass, 1/sqrt(kg): [2, n_mode].
       real(wp), allocatable :: surface(:, :)
-      !> Static displacements of the surface by what the modes leave out, U and V by unit
+      !> Static displacements of the surface by the truncated modes, U and V by unit
       !> generalized forces on U and V, m/N: [2, 2].
       real(wp) :: flexibility(2, 2) = 0.0_wp
    end type family_type
@@ -156,7 +156,7 @@ contains
          matrix = matmul(transpose(a), spread(basis%weight, 2, size(b, 2))*b)
       end function product_of
 
-      !> `product_of` both ways.
+      !> `product_of` in both orders.
       function mixed(a, b) result(matrix)
          real(wp), intent(in) :: a(:, :)
          real(wp), intent(in) :: b(:, :)
