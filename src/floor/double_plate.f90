@@ -35,8 +35,8 @@ contains
    !> Transfer mobility from a source to a point of the upper plate.
    !>
    !> Both plates have the same mode shapes. Each shape has two modes, those of two masses on three springs. The loss factor
-   !> of a mode is the mean of those of plates and layer, weighted by their shares of its elastic energy; the error is of
-   !> second order in the differences of the loss factors. Residual modes are treated as for one plate.
+   !> of a mode is the mean of the loss factors of plates and layer, weighted by elastic energy; the error is of second order
+   !> in the differences of the loss factors. Residual modes are treated as for one plate.
    subroutine new_double_receiver(floor, source, point, receiver, error)
       type(double_plate_type), intent(in) :: floor
       !> Positions of source and point, as fractions of length and width.

@@ -87,9 +87,8 @@ contains
 
    !> The orthotropic plate with smeared joists, as thick as the sheathing.
    !>
-   !> Bending stiffness along the joists: EI of the composite section/spacing (EN 1995-1-1 annex B, equations B.1 to B.6);
-   !> across them: that of the sheathing; H = B' of the sheathing + G J of a joist/(2 spacing) (Timoshenko and
-   !> Woinowsky-Krieger).
+   !> The bending stiffness along the joists is EI of the composite section/spacing (EN 1995-1-1 annex B, equations B.1 to
+   !> B.6), across them B' of the sheathing; H = B' + G J of a joist/(2 spacing) (Timoshenko and Woinowsky-Krieger).
    pure function get_smeared(options) result(plate)
       class(joist_floor_type), intent(in) :: options
       type(plate_type) :: plate

@@ -23,7 +23,7 @@ module thud_receiver
       real(wp) :: direct = 0.0_wp
       !> Poles, 1/s, imaginary parts not negative, real parts not positive: [n_pole].
       complex(wp), allocatable :: pole(:)
-      !> Residues, m/(N s2), those of conjugate pairs doubled: [n_pole].
+      !> Residues, m/(N s2), doubled for conjugate pairs: [n_pole].
       complex(wp), allocatable :: residue(:)
    end type receiver_type
 

@@ -37,7 +37,7 @@ module thud_source_model
    end type source_model_type
 
    abstract interface
-      !> Fields of the options: each connects a namelist key to a component of the options.
+      !> Fields of the options: each connects a namelist key to a component.
       function get_fields(options) result(fields)
          import :: field_type, source_model_type
          implicit none (type, external)

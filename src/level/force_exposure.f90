@@ -32,7 +32,7 @@ module thud_force_exposure
    !> Maximum sampling rate, Hz: one second of samples fits into memory.
    real(wp), parameter :: max_rate = 1.0e7_wp
 
-   !> Number of samples whose sines and cosines follow from those of the first of them.
+   !> Number of samples in a block, whose sines and cosines follow from those of its first sample.
    integer, parameter :: block = 32
 
 contains

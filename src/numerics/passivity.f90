@@ -18,7 +18,7 @@ module thud_passivity
    !> Minimum of the corrected real part, divided by the mean magnitude: above rounding.
    real(wp), parameter :: margin = 1.0e-9_wp
 
-   !> Ridge added to the unit diagonal of the normal equations: close poles make them singular.
+   !> Ridge added to the unit diagonal of the normal equations, which close poles make singular.
    real(wp), parameter :: ridge = 1.0e-12_wp
 
    !> Number of golden sections in the search for a minimum; each leaves 0.618 of the interval.
@@ -32,7 +32,7 @@ contains
    !> A (b c/d - A) (half-size test; Gustavsen and Semlyen, IEEE Trans. Power Delivery 24, 2009). Between two such
    !> frequencies the sign of the real part does not change.
    subroutine find_violations(pole, residue, direct, omega, failed)
-      !> Poles, 1/s, and residues, those of pairs doubled: [n].
+      !> Poles, 1/s, and residues, doubled for pairs: [n].
       complex(wp), intent(in) :: pole(:), residue(:)
       !> Constant part, above 0.
       real(wp), intent(in) :: direct
@@ -72,7 +72,7 @@ contains
       real(wp), intent(in) :: frequency(:), weight(:)
       !> Poles, 1/s: [n].
       complex(wp), intent(in) :: pole(:)
-      !> Residues, those of pairs doubled: [n].
+      !> Residues, doubled for pairs: [n].
       complex(wp), intent(inout) :: residue(:)
       !> Constant part.
       real(wp), intent(inout) :: direct

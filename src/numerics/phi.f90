@@ -7,7 +7,7 @@ module thud_phi
 
    public :: get_phi, max_phi
 
-   !> Highest index of a function.
+   !> Highest index n.
    integer, parameter :: max_phi = 8
 
    !> Number of terms of the series of phi_n for |z| < 1: the remainder is about 1/18!.
@@ -33,7 +33,7 @@ contains
       integer :: k, n
 
       if (real(z, wp)**2 + aimag(z)**2 < 1.0_wp) then
-         ! Upwards, the recursion divides by z, which is not stable here.
+         ! Upwards, the recursion divides by z, which is unstable for small |z|.
          phi(highest) = inverse_factorial(highest + n_term)
          do k = highest + n_term - 1, highest, -1
             phi(highest) = inverse_factorial(k) + phi(highest)*z

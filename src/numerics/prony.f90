@@ -15,10 +15,10 @@ module thud_prony
    !> Band in which a series fits a fractional law, Hz.
    real(wp), parameter, public :: series_from = 5.0_wp, series_to = 3000.0_wp
 
-   !> Number of branches for a fractional law, and factor by which the outer ones lie outside the band, which spreads the
-   !> error evenly. With a spring and a viscosity for all times beyond, they keep the complex modulus within 0.8 % for any
-   !> order (4 branches: 2.2 %, 6: 0.5 %).
+   !> Number of branches for a fractional law. With a spring and a viscosity for all times beyond, they keep the complex
+   !> modulus within 0.8 % for any order (4 branches: 2.2 %, 6: 0.5 %).
    integer, parameter :: n_fractional = 5
+   !> Factor by which the outer branches lie outside the band: the nearest spacing that spreads the error evenly.
    real(wp), parameter :: outside = 1.26_wp
 
    !> Band in which the loss factor is constant, Hz.
@@ -62,7 +62,7 @@ contains
    !> Series whose loss factor is constant from 10 to 1000 Hz.
    !>
    !> The condition loss modulus = loss factor times storage modulus is linear in the moduli of the branches: least squares
-   !> over frequencies that are spaced evenly in their logarithm.
+   !> over logarithmically spaced frequencies.
    subroutine fit_constant_loss(loss_factor, relative_modulus, time, failed)
       real(wp), intent(in) :: loss_factor
       !> Relative moduli of the branches: [n_branch].
@@ -94,7 +94,7 @@ contains
    !> Checks that a fractional law has a series. It has none if its loss factor is not below that of the spring-pot alone
    !> (the spring would be negative), or if the frequency of the loss factor lies outside the band.
    subroutine check_fractional_loss(group, order, loss_factor, frequency, error)
-      !> Group of the keys, for the message.
+      !> Namelist group, for the message.
       character(len=*), intent(in) :: group
       real(wp), intent(in) :: order, loss_factor
       !> Frequency of the loss factor, Hz.
@@ -113,8 +113,8 @@ contains
 
    !> Series of a fractional law from 5 to 3000 Hz: a spring, branches and a viscosity in parallel.
    !>
-   !> Least squares of the complex power law over frequencies that are spaced evenly in their logarithm, relative to its
-   !> magnitude. The spring of the law only reduces the relative error of the whole.
+   !> Least squares of the complex power law over logarithmically spaced frequencies, relative to its magnitude. The spring
+   !> of the law only reduces the relative error of the whole.
    subroutine fit_fractional_loss(law, relative_modulus, time, viscosity)
       type(fractional_loss_type), intent(in) :: law
       !> Relative moduli of the branches: [n_branch].

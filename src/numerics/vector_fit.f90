@@ -10,7 +10,7 @@ module thud_vector_fit
 
    public :: fit_rational
 
-   !> Maximum number of relocations of the poles; good values need about five.
+   !> Maximum number of relocations of the poles; good data need about five.
    integer, parameter :: max_relocations = 40
 
    !> Number of relocations without a gain after which the search ends.
@@ -115,7 +115,7 @@ contains
    !> Relocates poles to the zeros of sigma = c.basis + d. The product sigma f is fitted by a rational function with the
    !> present poles, and the real part of sigma has the mean 1 (relaxed non-triviality, Gustavsen 2006 eq. 8).
    subroutine relocate_poles(s, response, weight, pole, failed)
-      !> Complex frequencies, scaled to a last one of i, and values: [n_frequency].
+      !> Complex frequencies, the last scaled to i, and values: [n_frequency].
       complex(wp), intent(in) :: s(:), response(:)
       !> Weights: [n_frequency].
       real(wp), intent(in) :: weight(:)

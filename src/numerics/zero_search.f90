@@ -107,7 +107,7 @@ contains
    !> Keeps one half of a bracket.
    pure subroutine halve(self, keep_right)
       class(bisection_type), intent(inout) :: self
-      !> True for the right half.
+      !> Whether to keep the right half.
       logical, intent(in) :: keep_right
 
       if (keep_right) then
