@@ -1,5 +1,5 @@
-!> The table of quantities: every number of a result, with its symbol, unit, meaning and display format.
-!> Summary, tables, schema and, through the schema, the Python package take them from here.
+!> The table of quantities: every number of a result can have, with its symbol, unit, meaning and display format. Summary,
+!> tables and schema use this table, and so does the Python package through the schema.
 module thud_quantities
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
@@ -8,7 +8,7 @@ module thud_quantities
 
    public :: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, sample_quantity_count
 
-   !> Description of one quantity.
+   !> A number that a result can have.
    type :: quantity_type
       !> Name in files and programs.
       character(len=24) :: name = ''
@@ -20,20 +20,20 @@ module thud_quantities
       character(len=8) :: unit = ''
       !> Unit on the screen.
       character(len=8) :: display_unit = ''
-      !> Factor from the SI unit to the display unit.
+      !> Number of display units in one SI unit.
       real(wp) :: display_scale = 1.0_wp
       !> Decimals on the screen.
       integer :: decimals = 3
-      !> Meaning, in a few words.
+      !> Meaning.
       character(len=72) :: meaning = ''
       !> Results with this quantity: `of_sample`, `of_impact` or `of_others`.
       integer :: results = 0
    end type quantity_type
 
-   !> The quantity belongs to samples of a sweep and to impacts, to impacts only, or to other results.
+   !> Results with the quantity: every sample of a sweep and every impact, every impact, or another result.
    integer, parameter :: of_sample = 1, of_impact = 2, of_others = 3
 
-   !> The quantities: first those of samples, then those of impacts, in the order of `get_quantities`; then all others.
+   !> The quantities: first those of samples, then those of impacts, in the order of `get_quantities`, then all others.
    type(quantity_type), parameter :: quantities(*) = [ &
       quantity_type('contact_time', 'contact time', 'T', 's', 'ms', 1.0e3_wp, 3, 'contact time', of_sample), &
       quantity_type('peak_force', 'peak force', 'F_{max}', 'N', 'N', 1.0_wp, 1, 'maximum force on the floor', of_sample), &
@@ -70,7 +70,7 @@ module thud_quantities
       quantity_type('standardized_rating', 'standardized level', "L'_{iA,Fmax,V,T}", 'dB', 'dB', 1.0_wp, 1, &
       'A-weighted maximum Fast level, standardized, re 20 uPa', of_others)]
 
-   !> Number of quantities of a sample, and of an impact.
+   !> Numbers of quantities of every sample, and of every impact.
    integer, parameter :: sample_quantity_count = count(quantities%results == of_sample)
    integer, parameter :: history_quantity_count = count(quantities%results <= of_impact)
 
@@ -90,7 +90,7 @@ contains
 
    !> A quantity of the table by its name.
    pure function get_quantity(name) result(quantity)
-      !> Name of a quantity of the table.
+      !> Name of a quantity in the table.
       character(len=*), intent(in) :: name
       type(quantity_type) :: quantity
 
