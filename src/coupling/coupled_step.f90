@@ -216,11 +216,10 @@ contains
       end associate
    end function get_residual
 
-   !> Mass of the cap at the stages, 0 after release.
+   !> Mass of the cap at the stages, 0 after release, kg: [n_stage].
    pure function get_cap_mass(source, trial) result(mass)
       class(contact_source_type), intent(in) :: source
       type(trial_type), intent(in) :: trial
-      !> The mass, kg: [n_stage].
       real(wp) :: mass(n_stage)
 
       mass = 0.0_wp

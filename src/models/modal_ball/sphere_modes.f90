@@ -302,11 +302,10 @@ contains
       surface(1, :) = basis%at_end(1, :n, 1)
    end subroutine assemble_breathing
 
-   !> Vector times its transpose.
+   !> Vector times its transpose: [n, n].
    pure function outer(vector) result(matrix)
       !> The vector: [n].
       real(wp), intent(in) :: vector(:)
-      !> The matrix: [n, n].
       real(wp) :: matrix(size(vector), size(vector))
 
       matrix = spread(vector, 2, size(vector))*spread(vector, 1, size(vector))
