@@ -3,7 +3,7 @@ module thud_bundle
    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_intptr_t, c_loc, c_null_ptr, c_ptr
    use thud_error, only: error_type
    use thud_kinds, only: int64, wp
-   use thud_text, only: to_text
+   use thud_text, only: newline, tab, to_text
    implicit none (type, external)
    private
 
@@ -37,9 +37,6 @@ module thud_bundle
       procedure :: count_values
       procedure :: copy_values
    end type bundle_type
-
-   !> Ends a name in the header, and a line of it.
-   character(len=*), parameter :: tab = achar(9), line_feed = achar(10)
 
 contains
 
@@ -110,7 +107,7 @@ contains
       character(len=*), intent(in) :: name, form
 
       if (.not. allocated(self%header)) self%header = ''
-      self%header = self%header//trim(name)//tab//form//line_feed
+      self%header = self%header//trim(name)//tab//form//newline
    end subroutine add_line
 
    !> Adds an empty item.

@@ -5,7 +5,7 @@ module thud_phi
    implicit none (type, external)
    private
 
-   public :: get_phi, max_phi
+   public :: get_phi
 
    !> Index of the last function that is offered.
    integer, parameter :: max_phi = 8

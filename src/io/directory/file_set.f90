@@ -9,7 +9,7 @@ module thud_file_set
    use thud_interrupt, only: check_interrupt
    use thud_system, only: close_descriptor, exchange_directories, get_file_checksum, get_file_size, get_system_message, &
       is_missing, is_regular_file, link_file, list_directory, name_length, open_end, remove_file, rename_file, write_text
-   use thud_text, only: newline
+   use thud_text, only: newline, tab
    implicit none (type, external)
    private
 
@@ -26,10 +26,7 @@ module thud_file_set
    !> Before the name of a file that is set aside in the workspace.
    character(len=*), parameter :: aside = manifest//'~'
 
-   !> Between name, checksum and command.
-   character(len=*), parameter :: tab = achar(9)
-
-   !> A line of a manifest.
+   !> A line of a manifest: name, checksum and command with tabs between.
    type :: entry_type
       !> Name of the file.
       character(len=name_length) :: name = ''

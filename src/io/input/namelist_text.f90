@@ -3,11 +3,11 @@
 !> which key holds a bad value.
 module thud_namelist_text
    use thud_error, only: error_type, input_error
-   use thud_text, only: lower_case, newline, replaced, shortened, to_text
+   use thud_text, only: lower_case, newline, replaced, shortened, tab, to_text
    implicit none (type, external)
    private
 
-   public :: assignment_type, group_type, parse_groups
+   public :: group_type, parse_groups
 
    !> One `key = value`.
    type :: assignment_type
@@ -33,7 +33,7 @@ module thud_namelist_text
    character(len=*), parameter :: name_characters = 'abcdefghijklmnopqrstuvwxyz0123456789_'
 
    !> Separators of the parts.
-   character(len=*), parameter :: blanks = ' '//achar(9)//achar(10)//achar(13)
+   character(len=*), parameter :: blanks = ' '//tab//newline//achar(13)
 
 contains
 
