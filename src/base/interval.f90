@@ -3,7 +3,7 @@
 module thud_interval
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use thud_kinds, only: wp
-   use thud_text, only: to_text
+   use thud_text, only: is_number, to_text
    implicit none (type, external)
    private
 
@@ -64,15 +64,6 @@ contains
          expression = adjustl(text)
       end if
    end subroutine read_end
-
-   !> Whether a text is a number and no expression.
-   pure function is_number(text) result(yes)
-      !> The text, without blanks before it.
-      character(len=*), intent(in) :: text
-      logical :: yes
-
-      yes = scan(text, '0123456789+-.') == 1 .and. verify(trim(text), '0123456789+-.eEdD') == 0
-   end function is_number
 
    !> Sets the ends that depend on other keys.
    pure subroutine resolve(self, keys, values)

@@ -199,7 +199,6 @@ contains
    function is_terminal(descriptor) result(yes)
       !> `standard_output` or `standard_error`.
       integer, intent(in) :: descriptor
-      !> The descriptor is a terminal.
       logical :: yes
 
       yes = c_isatty(int(descriptor, c_int)) == 1
@@ -299,15 +298,15 @@ contains
    end subroutine flush_directory
 
    !> Whether a directory of that name is there.
-   function directory_exists(path) result(there)
+   function directory_exists(path) result(exists)
       character(len=*), intent(in) :: path
       !> It exists and can be read.
-      logical :: there
+      logical :: exists
       type(c_ptr) :: directory
 
       directory = c_opendir(path//c_null_char)
-      there = c_associated(directory)
-      if (there) there = c_closedir(directory) == 0
+      exists = c_associated(directory)
+      if (exists) exists = c_closedir(directory) == 0
    end function directory_exists
 
    !> Names in a directory.
