@@ -17,7 +17,7 @@ contains
       character(len=*), intent(in) :: word
       !> The known words: [n_known].
       character(len=*), intent(in) :: known(:)
-      !> ` (did you mean 'height'?)`; empty where no word comes close.
+      !> ` (did you mean 'height'?)`; empty if no word is close.
       character(len=:), allocatable, intent(out) :: suggestion
       integer :: distance(size(known))
       integer :: i
@@ -30,12 +30,12 @@ contains
       if (3*distance(i) <= max(len(word), len_trim(known(i)))) suggestion = ' (did you mean '//quoted(known(i))//'?)'
    end subroutine get_suggestion
 
-   !> Number of letters to insert, delete, replace or swap with their neighbors, to make one word of the other
-   !> (Damerau and Levenshtein, adjacent swaps only).
+   !> Number of insertions, deletions, replacements and swaps of adjacent letters that turn one word into the other
+   !> (Damerau-Levenshtein distance, adjacent swaps only).
    pure function get_distance(first, second) result(distance)
       character(len=*), intent(in) :: first, second
       integer :: distance
-      ! Distances of the beginnings: row i belongs to the first i letters of `first`.
+      ! Element (j, i): distance between the first i letters of `one` and the first j of `other`.
       integer :: row(0:len(second), 0:len(first))
       integer :: i, j, p, q
       logical :: swapped

@@ -1,4 +1,4 @@
-!> Results on a mobile floor: levels of the contact force, the energy that goes into the floor, and the velocities of points.
+!> Results on a mobile floor: levels of the contact force, energy injected into the floor, and velocities of points.
 module thud_floor_result
    use thud_band, only: band_type, get_level_bands
    use thud_case, only: case_type, get_floor_number
@@ -15,17 +15,17 @@ module thud_floor_result
 
    public :: floor_result_type, get_floor_result, get_point_velocity
 
-   !> Results on a floor, by bands of one set after the other.
+   !> Results on a mobile floor; bands of several sets follow each other.
    type :: floor_result_type
-      !> The bands that the case asks for: [n_band].
+      !> The bands: [n_band].
       type(band_type), allocatable :: bands(:)
       !> Levels of the force on the floor, dB: [n_band].
       real(wp), allocatable :: contact_level(:)
-      !> Energy that the force gives to the floor, by its velocity and by its mobility, J: [n_band].
+      !> Energy injected into the floor, from its velocity and from its mobility, J: [n_band].
       real(wp), allocatable :: energy_by_motion(:), energy_by_mobility(:)
-      !> Mean of the real part of the mobility, m/(N s): [n_band].
+      !> Mean real part of the mobility, m/(N s): [n_band].
       real(wp), allocatable :: conductance(:)
-      !> Velocity of the points of the floor, m/s: [n_sample, n_point].
+      !> Velocities of points of the floor, m/s: [n_sample, n_point].
       real(wp), allocatable :: point_velocity(:, :)
    end type floor_result_type
 
@@ -36,10 +36,10 @@ contains
       type(case_type), intent(in) :: case
       !> The drop on the floor.
       type(force_history_type), intent(in) :: contact
-      !> Compute also energies and velocities of points.
+      !> Also compute energies and velocities of points.
       logical, intent(in) :: energies
       type(floor_result_type), intent(out) :: floor_result
-      !> A level cannot be computed, or the floor has no such point.
+      !> Set if a level cannot be computed, or a point is not on the floor.
       type(error_type), allocatable, intent(out) :: error
       type(receiver_type) :: receiver
       integer :: first, n, i
@@ -78,7 +78,7 @@ contains
       real(wp), intent(in) :: x, y
       !> Velocity downwards, m/s: [n_sample].
       real(wp), intent(out) :: velocity(:)
-      !> The floor has no such point.
+      !> Set if the floor has no such point.
       type(error_type), allocatable, intent(out) :: error
       type(receiver_type) :: transfer
       type(receiver_step_type) :: step

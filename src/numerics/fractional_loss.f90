@@ -1,6 +1,6 @@
-!> The fractional law of Kelvin and Voigt: a spring beside a spring-pot, G(i omega) = G0 + c (i omega)**order.
+!> The fractional Kelvin-Voigt law: a spring parallel to a spring-pot, G(i omega) = G0 + c (i omega)**order.
 !>
-!> Order 1 is the viscosity of Kelvin and Voigt; near 0 the loss factor hardly depends on frequency.
+!> Order 1 is the classical Kelvin-Voigt viscosity; near order 0 the loss factor hardly depends on frequency.
 module thud_fractional_loss
    use thud_constants, only: pi
    use thud_kinds, only: wp
@@ -9,13 +9,13 @@ module thud_fractional_loss
 
    public :: fractional_loss_type, new_fractional_loss
 
-   !> The law; moduli over the storage modulus at the frequency of the loss factor.
+   !> The damping law; moduli are divided by the storage modulus at the frequency of the loss factor.
    type :: fractional_loss_type
       !> Order of the derivative.
       real(wp) :: order
       !> Modulus of the spring, G0.
       real(wp) :: spring
-      !> Absolute modulus of the spring-pot at `omega`.
+      !> Magnitude of the modulus of the spring-pot at `omega`.
       real(wp) :: springpot
       !> Angular frequency of the loss factor, rad/s.
       real(wp) :: omega
@@ -23,7 +23,7 @@ module thud_fractional_loss
 
 contains
 
-   !> The law that has a loss factor at a frequency.
+   !> The damping law with a given loss factor at a given frequency.
    pure function new_fractional_loss(order, loss_factor, frequency) result(law)
       real(wp), intent(in) :: order, loss_factor
       !> The frequency, Hz.

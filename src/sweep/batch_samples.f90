@@ -1,4 +1,4 @@
-!> Samples of a case as samples of the shell model, which are computed in batches (`thud_ensemble`).
+!> Samples of a case as samples of the shell model, which `thud_ensemble` computes in batches.
 module thud_batch_samples
    use thud_case, only: case_type, get_active_fields, get_model_number
    use thud_column, only: column_type
@@ -13,7 +13,7 @@ module thud_batch_samples
 
 contains
 
-   !> Whether samples can be computed in batches: by the shell model, with exact levels, on a rigid floor, if they
+   !> Whether samples can be computed in batches: the case has the shell model, exact levels and no floor, and the samples
    !> differ only in ball, drop and options of the model.
    function suits_batch(case, columns) result(suits)
       type(case_type), intent(in), target :: case
@@ -33,13 +33,13 @@ contains
       end select
    end function suits_batch
 
-   !> Samples of the shell model: ball, drop and flux term of each.
+   !> Makes the samples of the shell model.
    subroutine fill_samples(case, columns, values, samples)
-      !> The case, which has the values of all other keys.
+      !> The case, for all values that are not in the columns.
       type(case_type), intent(in), target :: case
       !> Keys in which the samples differ: [n_column].
       type(column_type), intent(in) :: columns(:)
-      !> Their values: [n_column, n_sample].
+      !> Values of the keys: [n_column, n_sample].
       real(wp), intent(in) :: values(:, :)
       !> The samples: [n_sample].
       type(sample_type), intent(out) :: samples(:)
@@ -64,7 +64,7 @@ contains
                sample_fields(index_of(j))%real_value = values(j, i)
             else
                sample%flux = nint(values(j, i))
-               ! A number that is not whole chooses nothing.
+               ! A number that is not whole is no valid choice.
                if (abs(values(j, i) - sample%flux) > 0.0_wp) sample%flux = 0
             end if
          end do

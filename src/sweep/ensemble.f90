@@ -1,8 +1,8 @@
-!> Many drops of the shell model: blocks of them are shared among threads, and levels of a block are computed while its
-!> forces are in cache.
+!> Many drops of the shell model: threads share blocks of samples, and the levels of a block are computed while
+!> its forces are in cache.
 !>
-!> Every number of a sample comes from its own column of arrays of fixed shape, or, for levels of a long contact, from
-!> its own record: it does not depend on the number of threads, on the other samples or on its index.
+!> The results of a sample do not depend on the number of threads, the other samples or its index: they come from its
+!> own column in arrays of fixed shape or, for levels of a long contact, from its own record.
 module thud_ensemble
    use thud_band, only: band_type, get_octaves, octave_count
    use thud_band_projection, only: band_projection_type, get_band_energies, get_class_window, get_window_class, &
@@ -26,25 +26,25 @@ module thud_ensemble
 
    public :: are_alike, new_projections, projections_type, solve_ensemble
 
-   !> Matrices of the levels, one per window length, made when first needed.
+   !> Matrices that give the levels, one per window length, computed when first needed.
    type :: projections_type
       !> Samples per second, Hz.
       real(wp) :: sample_rate = 0.0_wp
-      !> The bands, octaves first: [n_band].
+      !> Bands of the levels, octaves first: [n_band].
       type(band_type), allocatable :: bands(:)
       !> The matrices: [n_window].
       type(band_projection_type), allocatable :: window(:)
    end type projections_type
 
-   !> Arrays of one thread.
+   !> Workspace of one thread.
    type :: workspace_type
-      !> Forces, with space for their alignment: [2 block_size n_row + line_length].
+      !> Forces, N, with space for alignment: [2 block_size n_row + line_length].
       real(wp), allocatable :: force(:)
-      !> Folded forces: [2 block_size n_row].
+      !> Folded forces, N: [2 block_size n_row].
       real(wp), allocatable :: folded(:)
-      !> Number of instants up to the last that is not zero.
+      !> Index of the last force sample that is not zero.
       integer :: n_written = 0
-      !> Criteria of the standards, one sample's values at a time.
+      !> Criteria, with the values of one sample at a time.
       type(criterion_type) :: criteria(criterion_count)
       !> Error that stops the thread.
       type(error_type), allocatable :: error
@@ -52,15 +52,14 @@ module thud_ensemble
 
 contains
 
-   !> No matrices yet.
+   !> The projections, still without matrices.
    pure function new_projections(sample_rate, bands, n_time) result(projections)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
-      !> The bands other than the octaves: [n_more].
+      !> Bands in addition to the octaves: [n_more].
       type(band_type), intent(in) :: bands(:)
-      !> Samples of the longest record.
+      !> Number of samples of the longest record.
       integer, intent(in) :: n_time
-      !> All windows, still empty.
       type(projections_type) :: projections
 
       projections%sample_rate = sample_rate
@@ -70,7 +69,7 @@ contains
       allocate (projections%window(get_window_class(n_time)))
    end function new_projections
 
-   !> Whether matrices of one serve for the other: same rate, bands and longest window.
+   !> Whether two sets of matrices are interchangeable: same rate, bands and longest window.
    pure function are_alike(first, other) result(alike)
       type(projections_type), intent(in) :: first
       !> The other, which may be empty.
@@ -84,7 +83,7 @@ contains
       alike = abs(first%sample_rate - other%sample_rate) <= 0.0_wp .and. all(first%bands%set == other%bands%set)
    end function are_alike
 
-   !> Quantities, levels and verdicts of all samples.
+   !> Computes quantities, levels and verdicts of all samples.
    subroutine solve_ensemble(samples, sampling, source, threads, with_levels, projections, computed, quantity, levels, met, &
       forces, error)
       !> The samples: [n_sample].
@@ -93,21 +92,21 @@ contains
       !> Source whose limits apply.
       character(len=*), intent(in) :: source
       integer, intent(in) :: threads
-      !> Compute levels and verdicts; without them they are NaN and not conforming.
+      !> Compute levels and verdicts; otherwise levels are NaN and no sample conforms.
       logical, intent(in) :: with_levels
       !> Matrices of the levels for this sampling rate.
       type(projections_type), intent(inout) :: projections
-      !> Whether the batch has computed a sample: [n_sample].
+      !> The sample has been computed: [n_sample].
       logical, intent(out) :: computed(:)
-      !> The first of the table of quantities, NaN where not computed: [sample_quantity_count, n_sample].
+      !> The quantities of samples, SI units, NaN if not computed: [sample_quantity_count, n_sample].
       real(wp), intent(out) :: quantity(:, :)
-      !> Force exposure levels, dB, NaN where not computed: [n_band, force_count, n_sample].
+      !> Force exposure levels, dB, NaN if not computed: [n_band, force_count, n_sample].
       real(wp), intent(out) :: levels(:, :, :)
-      !> The source conforms by each force: [force_count, n_sample].
+      !> The source conforms, by each force: [force_count, n_sample].
       logical, intent(out) :: met(:, :)
-      !> Forces, N, NaN where not computed; of no size where they are not wanted: [n_time, force_count, n_sample].
+      !> Forces, N, NaN if not computed; of size 0 if not wanted: [n_time, force_count, n_sample].
       real(wp), intent(out) :: forces(:, :, :)
-      !> The sampling cannot be used, its records do not fit into memory, the source is not known, or an interrupt.
+      !> Set if the sampling is invalid, its records do not fit into memory, the source is unknown, or after an interrupt.
       type(error_type), allocatable, intent(out) :: error
       type(source_limits_type) :: limits
       integer, allocatable :: order(:), first(:)
@@ -128,7 +127,7 @@ contains
 
    contains
 
-      !> The blocks of one thread, in its own workspace.
+      !> Computes the blocks of one thread, in its own workspace.
       subroutine run_blocks()
          type(workspace_type) :: workspace
          integer :: block
@@ -145,7 +144,7 @@ contains
          !$omp end critical (thud_ensemble_error)
       end subroutine run_blocks
 
-      !> One block, from its samples to its verdicts.
+      !> Computes one block, from samples to verdicts.
       subroutine run_block(workspace, indices)
          type(workspace_type), intent(inout) :: workspace
          !> Indices of the samples: [n_in_block].
@@ -174,14 +173,14 @@ contains
 
    end subroutine solve_ensemble
 
-   !> Arrays of a thread. Memory beyond the longest contact is never touched.
+   !> Allocates a workspace. Its memory beyond the longest contact is never touched.
    subroutine set_workspace(workspace, sampling, limits, n_row)
-      !> The arrays, or an error where there is no memory for them.
+      !> The workspace, with `error` set if memory is lacking.
       type(workspace_type), intent(out) :: workspace
-      !> The sampling, for the error.
+      !> The sampling, for the error message.
       type(sampling_type), intent(in) :: sampling
       type(source_limits_type), intent(in) :: limits
-      !> Samples of the longest window.
+      !> Number of samples of the longest window.
       integer, intent(in) :: n_row
       character(len=128) :: message
       integer :: status
@@ -202,13 +201,12 @@ contains
       type(sampling_type), intent(in) :: sampling
       !> Compute levels and verdicts.
       logical, intent(in) :: with_levels
-      !> Matrices of the levels.
       type(projections_type), intent(inout) :: projections
       !> The outcomes: [n_sample].
       type(sample_outcome_type), intent(out) :: outcomes(:)
       !> Levels, dB: [n_band, force_count, n_sample].
       real(wp), intent(out) :: levels(:, :, :)
-      !> The source conforms: [force_count, n_sample].
+      !> The source conforms, by each force: [force_count, n_sample].
       logical, intent(out) :: met(:, :)
       real(wp), pointer, contiguous :: force(:, :)
       integer :: class(size(samples))
@@ -226,7 +224,7 @@ contains
          class(i) = get_window_class(min(int(outcomes(i)%contact_time*sampling%sample_rate) + 1, size(force, 2)))
       end do
       force(:, n_written + 1:get_class_window(max(1, maxval(class)))) = 0.0_wp
-      ! The window is the sample's own, so that its levels do not depend on its neighbors.
+      ! Each sample has its own window, so that its levels do not depend on the other samples of the block.
       do window = minval(class, mask=class > 0), maxval(class)
          if (.not. any(class == window)) cycle
          if (is_projected(get_class_window(window), projections%sample_rate, projections%bands)) then
@@ -245,16 +243,16 @@ contains
       end do
    end subroutine solve_workspace
 
-   !> Levels of the samples of one window, all at once.
+   !> Levels of all samples with the same window, by matrix products.
    subroutine project(workspace, force, window, chosen, projections, levels)
       type(workspace_type), intent(inout) :: workspace
       !> Forces, N: [force_count block_size, n_row].
       real(wp), intent(in), contiguous :: force(:, :)
       integer, intent(in) :: window
-      !> Whether a sample has this window: [n_sample].
+      !> The sample has this window: [n_sample].
       logical, intent(in) :: chosen(:)
       type(projections_type), intent(inout) :: projections
-      !> Levels, dB; those of the chosen samples are set: [n_band, force_count, n_sample].
+      !> Levels, dB; only those of chosen samples are written: [n_band, force_count, n_sample].
       real(wp), intent(inout) :: levels(:, :, :)
       real(wp) :: energy(force_count*block_size, size(projections%bands)), square_sum(force_count*block_size)
       integer :: i, j, row
@@ -272,7 +270,7 @@ contains
       end do
    end subroutine project
 
-   !> The same record by record, as of single drops; it fails only if it is interrupted.
+   !> The levels of `project`, record by record as for single drops; fails only after an interrupt.
    subroutine get_single_levels(workspace, force, window, chosen, projections, levels)
       type(workspace_type), intent(inout) :: workspace
       !> As in `project`.
@@ -293,10 +291,10 @@ contains
       end do
    end subroutine get_single_levels
 
-   !> The forces of the block in a workspace: [force_count block_size, n_row].
+   !> The forces of the block in a workspace, as an array.
    function get_force(workspace) result(force)
       type(workspace_type), intent(in), target :: workspace
-      !> Elastic forces, then floor forces, N.
+      !> Elastic forces, then forces on the floor, N: [force_count block_size, n_row].
       real(wp), pointer, contiguous :: force(:, :)
       integer :: first
 
@@ -305,11 +303,11 @@ contains
          workspace%force(first:first + size(workspace%folded) - 1)
    end function get_force
 
-   !> Makes the matrices of a window unless they are there.
+   !> Computes the matrices of a window unless they exist.
    subroutine require_window(projections, window, error)
       type(projections_type), intent(inout) :: projections
       integer, intent(in) :: window
-      !> They cannot be made.
+      !> Set if the matrices cannot be computed.
       type(error_type), allocatable, intent(inout) :: error
       logical :: failed
 
@@ -322,7 +320,7 @@ contains
          //to_text(get_class_window(window))//' samples cannot be made; allowed: other rates')
    end subroutine require_window
 
-   !> Whether a sample meets all criteria. Peaks are counted last: that takes longer than all the rest.
+   !> Whether a sample meets all criteria. Peaks are counted last, as this takes longer than all other criteria.
    function is_conforming(criteria, sample, outcome, levels, force, row, sampling) result(met)
       !> The criteria; their values are overwritten: [criterion_count].
       type(criterion_type), intent(inout) :: criteria(:)
@@ -330,7 +328,7 @@ contains
       type(sample_outcome_type), intent(in) :: outcome
       !> Levels, dB, octaves first: [n_band].
       real(wp), intent(in) :: levels(:)
-      !> Forces, N, zero after that: [force_count block_size, n_time].
+      !> Forces, N, without the zeros at the end: [force_count block_size, n_sample].
       real(wp), intent(in) :: force(:, :)
       !> Row of the force of this sample.
       integer, intent(in) :: row
@@ -348,12 +346,13 @@ contains
       met = all(conforms(criteria))
    end function is_conforming
 
-   !> One force of one sample, N: [n_time].
+   !> One force of one sample.
    function get_record(workspace, i, j, sampling) result(record)
       type(workspace_type), intent(in), target :: workspace
       !> Index of the sample in the block, and of the force in `force_names`.
       integer, intent(in) :: i, j
       type(sampling_type), intent(in) :: sampling
+      !> The force, N: [n_time].
       real(wp) :: record(get_sample_count(sampling))
       real(wp), pointer, contiguous :: force(:, :)
 

@@ -20,15 +20,15 @@ module thud_floor_report
    !> Widths of the columns of the table: names, numbers, units.
    integer, parameter :: name_column = 22, number_column = 10, unit_column = 4
 
-   !> Columns of the file of forces that every floor has.
+   !> Additional columns of `floor_force.csv` for every floor.
    character(len=32), parameter :: own_columns(3) = [character(len=32) :: &
       'blocked_force_N', 'floor_displacement_m', 'floor_velocity_m_per_s']
 
 contains
 
-   !> Forces and motions against time.
+   !> Forces and motion of the floor against time.
    subroutine get_floor_force_csv(blocked, contact, floor_result, text)
-      !> The drop on a rigid floor, and on the floor.
+      !> The drops on rigid and mobile floor.
       type(force_history_type), intent(in) :: blocked, contact
       type(floor_result_type), intent(in) :: floor_result
       !> Text of `floor_force.csv`.
@@ -48,7 +48,7 @@ contains
       text = get_force_csv(contact, names, columns)
    end subroutine get_floor_force_csv
 
-   !> Levels of both forces and energies per band.
+   !> Levels of both forces, and energies, in each band.
    subroutine get_floor_levels_csv(impact, floor_result, text)
       !> The drop on a rigid floor.
       type(impact_type), intent(in) :: impact
@@ -64,15 +64,16 @@ contains
       end associate
    end subroutine get_floor_levels_csv
 
-   !> Levels of the force on a rigid floor in the bands that the case asks for, dB: [n_band].
+   !> Levels of the force on a rigid floor.
    pure function get_blocked_levels(impact) result(level)
       type(impact_type), intent(in) :: impact
+      !> Levels in the bands that the case asks for, dB: [n_band].
       real(wp), allocatable :: level(:)
 
       level = impact%assessment%level(impact%assessment%first_band:, findloc(force_names, 'floor', dim=1))
    end function get_blocked_levels
 
-   !> The quantities of the drop on the floor.
+   !> The quantities of the drop on the mobile floor.
    subroutine get_floor_summary(contact, text)
       type(force_history_type), intent(in) :: contact
       !> Groups of `summary.nml`.
@@ -83,12 +84,12 @@ contains
       if (size(contact%model_quantity) > 0) text = text//newline//get_model_quantities('floor_model_quantities', contact)
    end subroutine get_floor_summary
 
-   !> The drop on the floor beside the blocked one.
+   !> Table that compares the drops on mobile and rigid floor.
    subroutine get_floor_table(case, impact, contact, floor_result, text)
       type(case_type), intent(in) :: case
       !> The drop on a rigid floor.
       type(impact_type), intent(in) :: impact
-      !> The drop on the floor.
+      !> The drop on the mobile floor.
       type(force_history_type), intent(in) :: contact
       type(floor_result_type), intent(in) :: floor_result
       !> The table.
@@ -129,7 +130,7 @@ contains
       !> Adds a quantity of both drops.
       subroutine add_quantity(quantity, rigid, moving)
          type(quantity_type), intent(in) :: quantity
-         !> On a rigid floor, and on the floor, SI units.
+         !> Values on rigid and mobile floor, SI units.
          real(wp), intent(in) :: rigid, moving
 
          call add_row(trim(quantity%title), quantity%display_scale*rigid, quantity%display_scale*moving, &
@@ -139,7 +140,7 @@ contains
       !> Adds a number of both drops.
       subroutine add_row(title, rigid, moving, decimals, unit)
          character(len=*), intent(in) :: title
-         !> On a rigid floor, and on the floor.
+         !> Values on rigid and mobile floor, in the shown unit.
          real(wp), intent(in) :: rigid, moving
          integer, intent(in) :: decimals
          character(len=*), intent(in) :: unit
@@ -151,7 +152,7 @@ contains
 
    end subroutine get_floor_table
 
-   !> Maximum difference of the two energies of a band over the energy of the bands of its set.
+   !> Maximum difference between the two energies of a band, divided by the total energy of the bands of its set.
    pure function get_disagreement(floor_result) result(ratio)
       type(floor_result_type), intent(in) :: floor_result
       real(wp) :: ratio
@@ -167,7 +168,7 @@ contains
       !> The numbers: [n].
       real(wp), intent(in) :: values(:)
       integer, intent(in) :: decimals
-      !> Their units: [n].
+      !> Units of the numbers: [n].
       character(len=*), intent(in) :: units(:)
       character(len=:), allocatable, intent(out) :: text
       integer :: i

@@ -1,10 +1,9 @@
-!> Elements of the transient model: four nodes, four Gauss points, one mean dilatation (Q1P0), which
-!> does not lock (Simo, Taylor and Pister 1985, Comput. Methods Appl. Mech. Eng. 51, 177-208).
+!> Elements of the transient model: four nodes, four Gauss points, one mean dilatation (Q1P0), which does not lock (Simo,
+!> Taylor and Pister 1985, Comput. Methods Appl. Mech. Eng. 51, 177-208).
 !>
-!> The elements of one ring of the mesh are worked on together, lane by lane: nothing is gathered or
-!> scattered, since neighbors lie side by side in memory. Arithmetic is the limit, then the first
-!> level of cache. Tensors with two axes and the hoop direction have the components
-!> 1 = rr, 2 = rz, 3 = zr, 4 = zz, 5 = hoop; symmetric ones 1 = rr, 2 = zz, 3 = hoop, 4 = rz.
+!> The elements of one ring of the mesh are processed together, one per lane: nothing is gathered or scattered, since
+!> neighbors lie side by side in memory. Arithmetic is the limit, then the first level of cache. General tensors have the
+!> components 1 = rr, 2 = rz, 3 = zr, 4 = zz, 5 = hoop; symmetric tensors 1 = rr, 2 = zz, 3 = hoop, 4 = rz.
 module thud_element_row
    use thud_constants, only: pi
    use thud_kinds, only: wp
@@ -24,7 +23,7 @@ module thud_element_row
 
    !> The elements between two rings of nodes, undeformed.
    type :: element_row_type
-      !> Derivatives of the shape functions by r and z, and their values over r, 1/m:
+      !> Derivatives of the shape functions with respect to r and z, and their values divided by r, 1/m:
       !> [n_element, 3, node 1 to 4, point].
       real(wp), allocatable :: gradient(:, :, :, :)
       !> Volume of each Gauss point, m3: [n_element, point].
@@ -73,8 +72,7 @@ contains
       end do
    end function new_element_row
 
-   !> Gradients of a vector field at all Gauss points: of positions the deformation gradient F, of
-   !> velocities its rate.
+   !> Gradients of a vector field at all Gauss points: the deformation gradient F of positions, its rate of velocities.
    pure subroutine get_gradients(row, n, r, z, gradient)
       type(element_row_type), intent(in) :: row
       !> Number of elements.
@@ -106,7 +104,7 @@ contains
       end do
    end subroutine get_gradients
 
-   !> Takes the nodal forces of first Piola-Kirchhoff stresses off the forces of two rings of nodes.
+   !> Subtracts the nodal forces of first Piola-Kirchhoff stresses from the forces on two rings of nodes.
    pure subroutine add_nodal_forces(row, n, stress, r, z)
       type(element_row_type), intent(in) :: row
       !> Number of elements.

@@ -1,7 +1,7 @@
-!> Many drops of `thud_hollow_sphere`, a block of balls at a time: the same equation, steps and checks
-!> as `solve_hollow_sphere`, and the same numbers to 1e-10; the impulse to the residual of its balance.
+!> Many drops of `thud_hollow_sphere`, a block of balls at a time: the same equation, steps and checks as
+!> `solve_hollow_sphere`, and the same values to 1e-10, the impulse to the residual of its balance.
 !>
-!> Samples that cannot be computed have NaN; they leave the others as they are.
+!> Samples that cannot be computed are NaN and do not affect others.
 module thud_shell_samples
    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc, c_sizeof
    use thud_ball, only: ball_type, get_ball_fields
@@ -37,9 +37,9 @@ module thud_shell_samples
       integer :: flux = 1
    end type sample_type
 
-   !> Outcome of one drop; NaN where it could not be computed.
+   !> Outcome of one drop; NaN if it could not be computed.
    type :: sample_outcome_type
-      !> The batch has computed it; else the single solver has the result or the error.
+      !> Whether the batch has computed the drop; otherwise the single solver has the result or the error.
       logical :: computed = .false.
       !> Time from first touch to release, s.
       real(wp) :: contact_time = not_a_number
@@ -49,14 +49,14 @@ module thud_shell_samples
       real(wp) :: peak_force = not_a_number
       !> Maximum deflection, m.
       real(wp) :: max_deflection = not_a_number
-      !> Velocity at release over velocity at first touch.
+      !> Velocity at release divided by velocity at first touch.
       real(wp) :: restitution = not_a_number
-      !> Impulse given to the floor, N s: the change of momentum, which the sum of the forces has confirmed.
+      !> Impulse on the floor, N s: the change of momentum, confirmed by the sum of the forces.
       real(wp) :: impulse = not_a_number
    end type sample_outcome_type
 
-   !> Residual of the balances of impulse and energy above which the single solver decides: the sums that
-   !> are taken here have up to some twenty times the error of the single solver's.
+   !> Residual of the balances of impulse and energy above which the single solver decides: the sums of the batch have up to
+   !> about twenty times the error.
    real(wp), parameter :: max_batch_residual = 0.1_wp*max_residual
 
 contains
@@ -71,7 +71,7 @@ contains
       fields = [in_group('ball', get_ball_fields(sample%ball)), in_group('drop', get_drop_fields(sample%drop))]
    end function get_sample_fields
 
-   !> The numbers of a sample: ball and drop hold nothing else, in the order of their keys.
+   !> The numbers of a sample, in the order of their keys: ball and drop contain nothing else.
    pure function get_numbers(sample) result(values)
       type(sample_type), intent(in) :: sample
       !> The numbers: [n_key].
@@ -80,18 +80,18 @@ contains
       values = [transfer(sample%ball, values), transfer(sample%drop, values)]
    end function get_numbers
 
-   !> Blocks of the samples that can be computed: of one choice of the flux term, so that balls share their
-   !> equation, and with similar contact times, because a block takes as long as its longest contact.
+   !> Blocks of the samples that can be computed: with one choice of the flux term, so that balls share their equation, and
+   !> with similar contact times, because a block takes as long as its longest contact.
    subroutine get_blocks(samples, valid, order, first)
       !> The samples: [n_sample].
       type(sample_type), intent(in) :: samples(:)
-      !> The values of each sample lie inside their ranges: [n_sample].
+      !> Whether the values of each sample lie inside their ranges: [n_sample].
       logical, intent(out) :: valid(:)
-      !> Indices of the samples whose input is right: [n_valid].
+      !> Indices of the valid samples: [n_valid].
       integer, allocatable, intent(out) :: order(:)
-      !> Indices in `order` where blocks begin, and the one after the last: [n_block + 1].
+      !> Indices in `order` at which blocks begin, and the index after the last: [n_block + 1].
       integer, allocatable, intent(out) :: first(:)
-      !> Classes of contact times per doubling.
+      !> Number of classes of contact times per doubling.
       integer, parameter :: classes = 64
       !> Maximum number of classes, for each choice of the flux term.
       integer, parameter :: max_class = 64*classes
@@ -123,7 +123,7 @@ contains
    !> Whether the values of each sample lie inside their ranges.
    subroutine check_samples(samples, valid)
       type(sample_type), intent(in) :: samples(:)
-      !> Whether they do: [n_sample].
+      !> Whether the values do: [n_sample].
       logical, intent(out) :: valid(:)
       type(sample_type), target :: any_sample
       type(field_type), allocatable :: fields(:)
@@ -143,8 +143,8 @@ contains
       end do
    end subroutine check_samples
 
-   !> Half a period of the linear spring and the gas to third order, s: the amplitude from the energy,
-   !> the period of a Duffing oscillator by harmonic balance. Good to 10 %, and alike for like samples.
+   !> Half a period with the linear spring and the gas to third order, s: amplitude from the energy, period of a Duffing
+   !> oscillator by harmonic balance. Accurate to 10 %, and similar for similar samples.
    pure function get_rough_contact_time(sample) result(time)
       type(sample_type), intent(in) :: sample
       !> The time, s.
@@ -162,7 +162,7 @@ contains
 
    !> Outcomes and forces of up to `block_size` samples with the same choice of the flux term.
    subroutine solve_block(samples, sampling, force, n_written, outcomes)
-      !> The samples, their input checked: [n_sample].
+      !> The samples, with checked input: [n_sample].
       type(sample_type), intent(in) :: samples(:)
       type(sampling_type), intent(in) :: sampling
       !> Elastic forces, then floor forces, N, up to the last contact: [2 block_size, n_time].
@@ -183,7 +183,7 @@ contains
       impacts%shell%weight = compression_weights(samples(1)%flux)
       impacts%restitution_weight = restitution_weights(samples(1)%flux)
       do i = 1, block_size
-         ! Balls without a sample repeat the last one.
+         ! Lanes without a sample repeat the last one.
          call initialize_ball(impacts, i, samples(min(i, size(samples))), step)
       end do
       call solve_impacts(impacts, get_sample_count(sampling), sampling%substeps, force, n_written)
@@ -203,7 +203,7 @@ contains
       end do
    end subroutine solve_block
 
-   !> Equation and beginning of one ball; see `thud_shell_batch` for the units.
+   !> Sets equation and initial values of one ball; see `thud_shell_batch` for the units.
    pure subroutine initialize_ball(impacts, i, sample, step)
       type(impact_batch_type), intent(inout) :: impacts
       !> Index of the ball.
@@ -225,7 +225,7 @@ contains
       end associate
    end subroutine initialize_ball
 
-   !> Whether a ball has a result: the checks of `solve_lumped`.
+   !> Whether a ball has a result, by the checks of `solve_lumped`.
    function is_computed(impacts, i, sample, sampling) result(computed)
       type(impact_batch_type), intent(in) :: impacts
       integer, intent(in) :: i
