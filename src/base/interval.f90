@@ -77,7 +77,7 @@ contains
       if (self%upper_expression /= '') self%upper = evaluate(self%upper_expression, keys, values)
    end subroutine resolve
 
-   !> Whether the value of one key lies in the interval, for each row of values of all keys.
+   !> Whether the value of one key lies in the interval, for each row of values of all keys: [n_row].
    pure function contains_rows(self, key, keys, values) result(inside)
       class(interval_type), intent(in) :: self
       !> Index of the key.
@@ -85,7 +85,6 @@ contains
       character(len=*), intent(in) :: keys(:)
       !> Values of the keys: [n_row, n_key].
       real(wp), intent(in) :: values(:, :)
-      !> The value lies in the interval: [n_row].
       logical :: inside(size(values, 1))
       type(interval_type) :: resolved
       real(wp), allocatable :: lower(:), upper(:)

@@ -236,7 +236,6 @@ contains
    pure function quoted(text) result(constant)
       !> Any text; trailing blanks are dropped.
       character(len=*), intent(in) :: text
-      !> The text in single quotes.
       character(len=quoted_length(text)) :: constant
       integer :: i, at
 
@@ -312,11 +311,10 @@ contains
       text = join_words(format_real(values))
    end function join_numbers
 
-   !> Words of a comma-separated list.
+   !> Words of a comma-separated list: [n_word].
    pure function split(list, n_word) result(words)
       character(len=*), intent(in) :: list
       integer, intent(in) :: n_word
-      !> The words: [n_word].
       character(len=32) :: words(n_word)
       integer :: i, at, length
 

@@ -346,13 +346,12 @@ contains
       met = all(conforms(criteria))
    end function is_conforming
 
-   !> One force of one sample.
+   !> One force of one sample, N: [n_time].
    function get_record(workspace, i, j, sampling) result(record)
       type(workspace_type), intent(in), target :: workspace
       !> Index of the sample in the block, and of the force in `force_names`.
       integer, intent(in) :: i, j
       type(sampling_type), intent(in) :: sampling
-      !> The force, N: [n_time].
       real(wp) :: record(get_sample_count(sampling))
       real(wp), pointer, contiguous :: force(:, :)
 

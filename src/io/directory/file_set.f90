@@ -47,13 +47,12 @@ contains
       yes = size(names) == 0 .or. any(index(names, manifest) == 1)
    end function is_workspace
 
-   !> Manifest entries of files.
+   !> Manifest entries of files: [n_file].
    pure function new_entries(names, sums) result(entries)
       !> The names: [n_file].
       character(len=*), intent(in) :: names(:)
       !> Checksums of their contents: [n_file].
       integer(int32), intent(in) :: sums(:)
-      !> The entries: [n_file].
       type(entry_type) :: entries(size(names))
       integer :: i
 

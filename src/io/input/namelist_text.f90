@@ -215,12 +215,11 @@ contains
       if (first > 0 .and. last >= first) value = replaced(text(first:last), blanks, ' ')
    end subroutine get_value
 
-   !> Line number of a position.
+   !> Line number of a position, from 1.
    pure function line_of(text, position) result(line)
       character(len=*), intent(in) :: text
       !> Position of a character.
       integer, intent(in) :: position
-      !> Line number, from 1.
       integer :: line
       integer :: i
 

@@ -71,10 +71,9 @@ contains
       text = get_history_csv(header, get_times(history), history%model_history)
    end function get_model_histories_csv
 
-   !> Times of the samples.
+   !> Times of the samples, s: [n_time].
    pure function get_times(history) result(times)
       type(force_history_type), intent(in) :: history
-      !> Times, s: [n_time].
       real(wp) :: times(size(history%floor_force))
       integer :: i
 
