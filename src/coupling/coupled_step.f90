@@ -57,11 +57,10 @@ module thud_coupled_step
 
 contains
 
-   !> State of the equations of the source, relative to the floor.
+   !> State of the equations of the source, relative to the floor: [n_state].
    pure function get_relative_state(source, coupled) result(state)
       class(contact_source_type), intent(in) :: source
       type(coupled_state_type), intent(in) :: coupled
-      !> The state: [n_state].
       real(wp) :: state(source%n_state)
       integer :: n
 

@@ -229,10 +229,9 @@ contains
          run%dissipated + run%contact_loss + run%friction_loss + run%floor%work
    end function get_energy
 
-   !> Height of the center of mass.
+   !> Height of the center of mass, m.
    pure function get_mean_height(run) result(height)
       type(impact_run_type), intent(in) :: run
-      !> The height, m.
       real(wp) :: height
 
       height = sum(run%mass(:, :, 2)*run%position(:, :, 2))/sum(run%mass(:, :, 2))

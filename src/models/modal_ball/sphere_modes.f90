@@ -143,13 +143,12 @@ contains
 
    contains
 
-      !> Integrals over the wall of products of columns.
+      !> Integrals over the wall of products of columns: [n, n].
       function product_of(a, b) result(matrix)
          !> Values at the radii: [n_node, n].
          real(wp), intent(in) :: a(:, :)
          !> Values at the radii: [n_node, n].
          real(wp), intent(in) :: b(:, :)
-         !> The integrals: [n, n].
          real(wp) :: matrix(size(a, 2), size(b, 2))
 
          matrix = matmul(transpose(a), spread(basis%weight, 2, size(b, 2))*b)
