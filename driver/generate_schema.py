@@ -79,12 +79,12 @@ STANDARD_BALL = '''
 EXTRAS = {"ball": STANDARD_BALL}
 # Groups that a case may ask for.
 OPTIONAL = {
-    "modes": "Free modes that are asked for.",
-    "compression": "Slow compression that is asked for.",
+    "modes": "Free modes that are requested.",
+    "compression": "Quasi-static compression that is requested.",
     "room": "Room below the floor.",
 }
 # What uses the keys of such an owner.
-USERS = {"modes": "free modes", "compression": "a slow compression"}
+USERS = {"modes": "free modes", "compression": "a quasi-static compression"}
 USERS["floor"] = "drops on a floor"
 USERS["room"] = "the level in the room below"
 INDENT = " " * 8

@@ -1,4 +1,4 @@
-"""Slow compression: from Python, from a file, and what it refuses."""
+"""Quasi-static compression: from Python, from a file, and what it refuses."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def test_file_asks_for_a_compression(run: Run, tmp_path: Path) -> None:
     assert [float(row[-2]) for row in rows] == pytest.approx(stiffness, abs=5.1e-3)
     again = thud.read_results(folder)
     assert again.case.compression == thud.Compression(0.02, 5, "isothermal")
-    assert "slow compression" in repr(again.case)
+    assert "quasi-static compression" in repr(again.case)
 
 
 def test_compression_takes_a_model(run: Run, tmp_path: Path) -> None:

@@ -68,7 +68,7 @@ def test_texts_name_verdicts_and_numbers(flagship: thud.Impact) -> None:
     many = thud.solve_many({"mass": [-1.0, -2.0]})
     assert repr(many) == "<Ensemble: 2 drops by mass; 0 conform, 2 failed>"
     many = thud.solve_many({"mass": [2.4, 2.5]}, levels=False)
-    assert repr(many) == "<Ensemble: 2 drops by mass; not judged>"
+    assert repr(many) == "<Ensemble: 2 drops by mass; not assessed>"
     assert repr(thud.Case("one", model=None, modes=thud.Modes())) == "<Case one: free modes>"
 
 

@@ -16,7 +16,7 @@ import thud
 from thud.base.bridge import ask
 from thud.case.case import case_text
 from thud.cli import main
-from thud.floors.tapping import THIRDS
+from thud.floors.tapping import FREQUENCY
 from thud.level.rating import CLASS_LIMITS
 
 if TYPE_CHECKING:
@@ -63,10 +63,10 @@ def test_page_tells_where_a_floor_is_not_what_it_claims_to_be() -> None:
 def test_rating_of_the_tapping_machine_is_the_shifted_curve() -> None:
     """Excesses of 2 dB in all sixteen thirds are 32 dB, the maximum: the curve stays."""
     level = np.concatenate([np.zeros(3), REFERENCE + 2.0])
-    assert thud.TappingLevel(THIRDS, level).weighted == 60
+    assert thud.TappingLevel(FREQUENCY, level).weighted == 60
     level[3] += 0.1
-    assert thud.TappingLevel(THIRDS, level).weighted == 61
-    flat = thud.TappingLevel(THIRDS, np.full(19, 60.0))
+    assert thud.TappingLevel(FREQUENCY, level).weighted == 61
+    flat = thud.TappingLevel(FREQUENCY, np.full(19, 60.0))
     # 10 lg 15 = 11.8 dB above one third.
     assert flat.adaptation == round(60 + 10 * np.log10(15)) - 15 - flat.weighted
 
@@ -75,7 +75,7 @@ def test_rating_of_the_tapping_machine_is_the_least_shift_that_is_allowed() -> N
     draw = np.random.default_rng(8)
     for middle in (-20.0, 20.0, 60.0, 90.0):
         level = middle + draw.uniform(-15, 15, 19)
-        found = thud.TappingLevel(THIRDS, level)
+        found = thud.TappingLevel(FREQUENCY, level)
         # In tenths of a decibel, as ISO 717-2 rounds; thirds below 100 Hz do not count.
         tenths = np.round(10 * level[3:])
         shifts = [
@@ -89,7 +89,7 @@ def test_rating_of_the_tapping_machine_is_the_least_shift_that_is_allowed() -> N
 
 def test_adaptation_is_that_of_the_rounded_levels() -> None:
     # 10 lg 15 = 11.761 dB: 62.51 dB before the levels are rounded, 62.46 dB after.
-    found, rounded = (thud.TappingLevel(THIRDS, np.full(19, one)) for one in (50.745, 50.7))
+    found, rounded = (thud.TappingLevel(FREQUENCY, np.full(19, one)) for one in (50.745, 50.7))
     assert found.weighted == rounded.weighted
     assert found.adaptation == rounded.adaptation == 62 - 15 - found.weighted
 
@@ -98,14 +98,14 @@ def test_halves_of_a_tenth_are_rounded_up() -> None:
     # Excesses of 29.8 dB and one of 2.25 dB: 32.1 dB, of which 32 dB are allowed.
     level = np.concatenate([np.zeros(3), REFERENCE + 2.0])
     level[[3, 4]] += (0.25, -0.2)
-    assert thud.TappingLevel(THIRDS, level).weighted == 61
+    assert thud.TappingLevel(FREQUENCY, level).weighted == 61
     level[3] -= 0.01
-    assert thud.TappingLevel(THIRDS, level).weighted == 60
+    assert thud.TappingLevel(FREQUENCY, level).weighted == 60
 
 
 def test_tapping_level_is_the_formula_of_iso_12354_2() -> None:
     floor, room = thud.Plate(thickness=0.16, density=2400.0), thud.Room(volume=30.0)
-    known = ask("radiator", case=case_text(thud.Case(floor=floor, room=room)), frequency=THIRDS)
+    known = ask("radiator", case=case_text(thud.Case(floor=floor, room=room)), frequency=FREQUENCY)
     found = thud.tapping_level(floor, room)
     for i, frequency in enumerate((50, 63, 80, 100, 125, 160, 200, 250, 315, 400, 500, 630)):
         time = 2.2 / (frequency * known["loss_factor"][i])

@@ -17,7 +17,7 @@ from conftest import MINIMAL, REPOSITORY, names_in, naming
 
 import thud
 from thud import cli
-from thud.base.files import MANIFEST, PART
+from thud.base.files import MANIFEST, TEMPORARY
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -212,7 +212,7 @@ def test_nothing_but_regular_files_is_opened(
     # What it may read, too.
     if "s.toml" in WRITERS[name].inputs:
         tries |= {(path, 0) for path in ("s.nc", "s.zarr", "s.partial", "s_surrogate.npz")}
-    for path, kind in sorted({(PART, 0), *tries}):
+    for path, kind in sorted({(TEMPORARY, 0), *tries}):
         out.mkdir()
         kinds[kind](out / path)
         before = (out / path).lstat()

@@ -220,16 +220,18 @@ def test_maximum_has_no_slope_and_draws_have_its_curvature(background: Backgroun
     score, _ = one._derivatives(likely)  # noqa: SLF001
     assert score @ np.linalg.solve(curvature, score) < 2 * module.TOLERANCE
     draws = one.draw(likely, curvature)
-    assert draws.shape == (module.N_KEPT, 5)
+    assert draws.shape == (module.N_RESAMPLED, 5)
 
 
 def test_proposals_are_those_of_student() -> None:
     draws, logarithm = module._student(3)  # noqa: SLF001
-    expected = stats.multivariate_t.logpdf(draws, np.zeros(3), np.eye(3), df=module.FREEDOM)
+    expected = stats.multivariate_t.logpdf(
+        draws, np.zeros(3), np.eye(3), df=module.DEGREES_OF_FREEDOM
+    )
     np.testing.assert_allclose(logarithm - expected, (logarithm - expected)[0], atol=1e-9)
     # The squared radius over the dimension has the distribution F; points of Sobol follow it well.
     radius = (draws**2).sum(axis=1) / 3
-    assert stats.kstest(radius, stats.f(3, module.FREEDOM).cdf).statistic < 0.1
+    assert stats.kstest(radius, stats.f(3, module.DEGREES_OF_FREEDOM).cdf).statistic < 0.1
     assert abs(np.mean(np.sign(draws))) < 0.1
 
 
@@ -242,8 +244,8 @@ def test_draws_are_kept_as_often_as_they_weigh() -> None:
     one = SimpleNamespace(logarithm=lambda _: next(values))
     draws = module._Posterior.draw(one, np.zeros(2), np.eye(2))  # type: ignore[arg-type] # noqa: SLF001
     count = (draws[:, None] == steps).all(axis=2).sum(axis=0)
-    assert count.sum() == module.N_KEPT
-    assert (abs(count - module.N_KEPT * weight) < 1).all()
+    assert count.sum() == module.N_RESAMPLED
+    assert (abs(count - module.N_RESAMPLED * weight) < 1).all()
 
 
 def test_draws_weighted_by_the_posterior_have_its_moments() -> None:
@@ -263,7 +265,7 @@ def test_draws_weighted_by_the_posterior_have_its_moments() -> None:
         shape, half, strict=True)]  # fmt: skip
     # Of 16 draws: four standard errors of their mean.
     error = (draws.mean(axis=0) - np.mean(moments, axis=1)) / np.std(moments, axis=1)
-    assert np.square(error).sum() < stats.chi2.ppf(1 - 1e-3, 5) / module.N_KEPT
+    assert np.square(error).sum() < stats.chi2.ppf(1 - 1e-3, 5) / module.N_RESAMPLED
     ratio = draws.std(axis=0) / np.std(moments, axis=1)
     assert np.exp(np.mean(np.log(ratio))) == pytest.approx(1, abs=4 / np.sqrt(2 * 5 * 16))
 

@@ -22,7 +22,7 @@ from conftest import MINIMAL, REPOSITORY, contents, names_in, naming
 
 import thud
 from thud.base.errors import PlausibilityWarning
-from thud.base.files import HEAD, PART, Results, locked, own_path
+from thud.base.files import FIRST_LINE, TEMPORARY, Results, locked, own_path
 
 sys.path.insert(0, str(REPOSITORY / "tests/faults"))
 from injection import can_inject, injecting
@@ -185,8 +185,8 @@ def test_figures_are_not_added_to_results_of_another_input(
 def test_unfinished_figures_go_where_there_are_no_locks(
     run: Run, two_inputs: TwoInputs, out: Path
 ) -> None:
-    part = own_path(out / PART)
-    mine = out / f"{PART}s"
+    part = own_path(out / TEMPORARY)
+    mine = out / f"{TEMPORARY}s"
     part.write_bytes(b"half a figure")
     mine.write_bytes(b"mine")
     assert run("a/case.nml").returncode == 0
@@ -227,7 +227,7 @@ def test_killed_run_does_not_lock_its_directory(
 ) -> None:
     left = tmp_path / "outputs/.case.part"
     left.mkdir(parents=True)
-    (left / ".thud").write_text(f"{HEAD}\nforce.csv\n")
+    (left / ".thud").write_text(f"{FIRST_LINE}\nforce.csv\n")
     (left / "force.csv").write_text("half a fi")
     assert run(case_file(MINIMAL)).returncode == 0
     assert names_in(tmp_path / "outputs/case") == FILES

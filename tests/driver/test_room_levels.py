@@ -114,7 +114,7 @@ def test_mean_background_and_scatter_of_positions(tmp_path: Path) -> None:
     energy = np.array([10 ** (thud.rating(one).a_weighted / 10) for one in levels])
     error = energy.std(ddof=1) / np.sqrt(6) / energy.mean() * 10 / np.log(10)
     assert found.position_uncertainty == pytest.approx(error)
-    assert any("maxima" in warning for warning in found.warnings)
+    assert any("upper bounds" in warning for warning in found.warnings)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from forks import Order, forks
 from kills import judge_end, undisturbed
 from scenarios import NEW, OUT, SCENARIOS, make
 
-from thud.base.files import MANIFEST, PART
+from thud.base.files import MANIFEST, TEMPORARY
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -24,7 +24,7 @@ MINE = b"of the user\n"
 # Names that commands read, or write for a while.
 READ = (
     MANIFEST,
-    PART,
+    TEMPORARY,
     "effective.nml",
     "samples.nml",
     "sweep.partial",
@@ -61,7 +61,7 @@ def check_foreign(tries: Tries, folder: Path) -> Iterable[Finding]:
         done = forks().run(Order(words, str(place)))
         word = judge_end(done).partition(":")[0]
         # A temporary name is the program's own.
-        if path.name != PART and _state(path) != before:
+        if path.name != TEMPORARY and _state(path) != before:
             word = word or "lost"
         if source.read_bytes() != told:
             word = word or "lost"

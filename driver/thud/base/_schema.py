@@ -194,7 +194,7 @@ class Limits(Group):
 
 @dataclass(frozen=True, eq=False)
 class Modes(Group):
-    """Free modes that are asked for.
+    """Free modes that are requested.
 
     Attributes
     ----------
@@ -213,7 +213,7 @@ class Modes(Group):
 
 @dataclass(frozen=True, eq=False)
 class Compression(Group):
-    """Slow compression that is asked for.
+    """Quasi-static compression that is requested.
 
     Attributes
     ----------

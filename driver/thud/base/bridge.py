@@ -37,9 +37,9 @@ def ask(question: str, /, **request: str | bytes | float | NDArray[np.float64]) 
     """Ask the library a question of `thud_answer`; return its answer.
 
     The answer holds texts, numbers and arrays by name; those named ``group.name`` are in a
-    dictionary for each group. An interrupt ends the work early: where handlers of signals, which
-    run in the main thread, have raised nothing, it is done again; other threads raise
-    KeyboardInterrupt. Raise InputError or NumericalError with the message of the library.
+    dictionary for each group. An interrupt ends the work early: the main thread, where the signal
+    handlers run, starts it again if they raise nothing, and other threads raise KeyboardInterrupt.
+    Raise InputError or NumericalError with the message of the library.
     """
     routine = api.ask_alone if question in _ALONE else api.ask
     packed = _packed(request)

@@ -102,17 +102,16 @@ def require_pair(name: str, values: ArrayLike) -> tuple[float, float]:
 
 def require_whole(name: str, value: Any, low: int, high: int) -> None:  # noqa: ANN401
     """Raise InputError where a value is not a whole number from low to high."""
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not whole or not low <= value <= high:
+    is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not is_whole or not low <= value <= high:
         refuse_value(name, value, f"whole numbers from {low} to {high}")
 
 
 def require_number(name: str, value: Any) -> None:  # noqa: ANN401 - of a user
     """Raise InputError where a value is not a finite number."""
-    number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(
-        value, bool
-    )
-    if not number or not -LARGEST <= (value if isinstance(value, int) else float(value)) <= LARGEST:
+    kinds = int | float | np.integer | np.floating
+    valid = isinstance(value, kinds) and not isinstance(value, bool)
+    if not valid or not -LARGEST <= (value if isinstance(value, int) else float(value)) <= LARGEST:
         refuse_value(name, value, "finite numbers")
 
 

@@ -91,8 +91,7 @@ def read_titled(
     except InputError:  # is a ValueError
         raise
     except (OSError, ValueError) as error:
-        message = f"{path}: cannot be read ({error}); allowed: {allowed}"
-        raise InputError(message) from error
+        refuse(f"{path}: cannot be read ({error})", allowed, error)
     filled: Iterator[tuple[int, str]] = (
         (number, line) for number, line in enumerate(lines, start=1) if line
     )
@@ -213,10 +212,10 @@ def find_decimal(
                 ambiguous = line, cell
     if ambiguous is not None:
         line, cell = ambiguous
-        own = to_number(cell, "," if "," in cell else ".")
-        both = " or ".join(f"{to_number(cell, mark):.15g}" for mark in MARKS)
+        value = to_number(cell, "," if "," in cell else ".")
+        readings = " or ".join(f"{to_number(cell, mark):.15g}" for mark in MARKS)
         refuse(
-            f"{name}: line {line}: {cell!r} may be {both}, and no number of the table decides",
-            f"tables with a number that shows the decimal mark, such as {cell}0 for {own:.15g}",
+            f"{name}: line {line}: {cell!r} may be {readings}, and no number of the table decides",
+            f"tables with a number that shows the decimal mark, such as {cell}0 for {value:.15g}",
         )
     return DecimalMark()

@@ -9,7 +9,11 @@ from typing import TYPE_CHECKING
 from thud.base.checks import refuse
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
+
+    import numpy as np
+    import pandas as pd
+    from numpy.typing import NDArray
 
 
 # Distributions by the name of the import, if they differ.
@@ -26,6 +30,16 @@ def require_extra(extra: str) -> Iterator[None]:
         missing = _DISTRIBUTIONS.get(str(error.name), str(error.name))
         names = needed if missing in needed else [missing]
         refuse(f"{missing} is not installed", f"pip install {' '.join(names)}", error)
+
+
+def data_frame(
+    columns: Mapping[str, NDArray[np.generic]], time: NDArray[np.float64] | None = None
+) -> pd.DataFrame:
+    """Return columns as a table, over time, s, if stated; raise InputError without pandas."""
+    with require_extra("studies"):
+        import pandas as pd
+
+    return pd.DataFrame(columns, index=None if time is None else pd.Index(time, name="time_s"))
 
 
 def packages(extra: str) -> list[str]:

@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
 # Name and first line of the list of files that thud has written to a directory.
 MANIFEST = ".thud"
-HEAD = "# files that thud has written, with checksums (CRC-32)"
+FIRST_LINE = "# files that thud has written, with checksums (CRC-32)"
 # Temporary name of a file in a result directory.
-PART = f"{MANIFEST}.new"
+TEMPORARY = f"{MANIFEST}.new"
 # Age from which a temporary file of another host is abandoned, s.
 _MAX_AGE = 86400.0
 # Errors of a file system that has no locks.
@@ -52,14 +52,14 @@ def uninterrupted() -> Iterator[None]:
         yield
         return
     pending: list[int] = []
-    usual = {
+    handlers = {
         number: signal.signal(number, lambda number, _: pending.append(number))
         for number in (signal.SIGINT, signal.SIGTERM)
     }
     try:
         yield
     finally:
-        for number, handler in usual.items():
+        for number, handler in handlers.items():
             signal.signal(number, handler)
         if pending:
             signal.raise_signal(pending[0])
@@ -73,8 +73,7 @@ def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
             _require_regular(target.stat(), target)
         _replace(target, content, target.with_name(f".{target.name}.part"))
     except ValueError as error:  # a path that no file system can hold
-        message = f"{path!r} is not allowed; allowed: the path of a file"
-        raise InputError(message) from error
+        refuse(f"{path!r} is not allowed", "the path of a file", error)
 
 
 class Page(ABC):
@@ -170,33 +169,33 @@ class Results:
             if marker not in {None, *inputs}:
                 refuse(f"{self.folder} now holds results of another input", "run the case again")
             listed = self._listed()
-            new = {n: Entry((checksum(c),), self.command) for n, c in contents.items()}
-            # Whatever of both contents a killed writer leaves is listed.
-            both = listed | {
+            written = {n: Entry((checksum(c),), self.command) for n, c in contents.items()}
+            # A killed writer leaves old and new contents: both are listed.
+            allowed = listed | {
                 n: Entry((*listed.get(n, Entry(())).checksums, *e.checksums), e.command)
-                for n, e in new.items()
+                for n, e in written.items()
             }
-            self.require(contents, both)
-            gone = [
+            self.require(contents, allowed)
+            removed = [
                 n
                 for n in {*stale} - {*contents}
                 if _is_listed(self.folder / n, listed) and listed[n].command == self.command
             ]
-            if not contents and not gone:
+            if not contents and not removed:
                 return []
-            self._put({MANIFEST: _manifest(both), **contents})
-            for name in gone:
+            self._put({MANIFEST: _manifest(allowed), **contents})
+            for name in removed:
                 (self.folder / name).unlink(missing_ok=True)
-            after = {name: e for name, e in (listed | new).items() if name not in gone}
-            if after:
-                self._put({MANIFEST: _manifest(after)})
+            remaining = {name: e for name, e in (listed | written).items() if name not in removed}
+            if remaining:
+                self._put({MANIFEST: _manifest(remaining)})
             else:
                 (self.folder / MANIFEST).unlink(missing_ok=True)
         return [self.folder / name for name in contents]
 
     def _put(self, contents: Mapping[str, bytes]) -> None:
         for name, content in contents.items():
-            _replace(self.folder / name, content, self.folder / PART)
+            _replace(self.folder / name, content, self.folder / TEMPORARY)
 
     def _listed(self) -> dict[str, Entry]:
         self.require_no_input(self.folder / MANIFEST)
@@ -268,7 +267,7 @@ def read_input(path: Path) -> bytes:
     return path.read_bytes()
 
 
-def _require_own(status: os.stat_result, part: Path) -> None:
+def _require_unlinked(status: os.stat_result, part: Path) -> None:
     _require_regular(status, part)
     # Writing would also change the file of the other name.
     if status.st_nlink > 1:
@@ -303,14 +302,14 @@ def read_manifest(folder: Path) -> dict[str, Entry]:
         return {}
     content = content_of(path)
     head, *lines = (content or b"").decode("utf-8", "surrogateescape").split("\n")
-    if head != HEAD:
+    if head != FIRST_LINE:
         refuse_foreign(path)
     listed: dict[str, Entry] = {}
     for line in lines:
-        name, sums, command = [*line.split("\t"), "", ""][:3]
-        known = listed[name].checksums if name in listed else ()
-        if sums:
-            listed[name] = Entry((*known, sums), command)
+        name, digest, command = [*line.split("\t"), "", ""][:3]
+        previous = listed[name].checksums if name in listed else ()
+        if digest:
+            listed[name] = Entry((*previous, digest), command)
     return listed
 
 
@@ -320,7 +319,7 @@ def _manifest(listed: Mapping[str, Entry]) -> bytes:
         for name, entry in sorted(listed.items())
         for digest in entry.checksums
     ]
-    return "\n".join([HEAD, *lines, ""]).encode("utf-8", "surrogateescape")
+    return "\n".join([FIRST_LINE, *lines, ""]).encode("utf-8", "surrogateescape")
 
 
 def _is_listed(path: Path, listed: Mapping[str, Entry]) -> bool:
@@ -335,15 +334,15 @@ def locked(folder: Path, kind: int = fcntl.LOCK_EX) -> Iterator[None]:
 
     Raise BlockingIOError where another run holds it and `kind` has LOCK_NB.
     """
-    with _held(folder, os.O_RDONLY | os.O_DIRECTORY, kind) as (_, _, is_locked):
+    with _open_locked(folder, os.O_RDONLY | os.O_DIRECTORY, kind) as (_, _, is_locked):
         if kind & fcntl.LOCK_EX and not is_locked:
-            sentence = "the file system has no locks; let only one run at a time write there"
-            warnings.warn(f"{folder}: {sentence}", LockWarning, stacklevel=3)
+            advice = "the file system has no locks; let only one run at a time write there"
+            warnings.warn(f"{folder}: {advice}", LockWarning, stacklevel=3)
         yield
 
 
 @contextmanager
-def _held(path: Path, flags: int, kind: int) -> Iterator[tuple[Path, int, bool]]:
+def _open_locked(path: Path, flags: int, kind: int) -> Iterator[tuple[Path, int, bool]]:
     """Open a path; yield the path, the descriptor, and whether the descriptor holds the lock.
 
     Without locks a new file gets a unique name, as others may write to the same name.
@@ -410,10 +409,10 @@ def _is_running(process: int) -> bool:
 def remove(path: Path) -> None:
     """Remove a file or a directory, if it exists; an interrupt leaves all of it or nothing."""
     if is_directory(path):
-        gone = path.with_name(f".{path.name}.part")
-        shutil.rmtree(gone, ignore_errors=True)
-        path.rename(gone)
-        shutil.rmtree(gone)
+        moved = path.with_name(f".{path.name}.part")
+        shutil.rmtree(moved, ignore_errors=True)
+        path.rename(moved)
+        shutil.rmtree(moved)
     else:
         path.unlink(missing_ok=True)
 
@@ -421,21 +420,21 @@ def remove(path: Path) -> None:
 def _replace(target: Path, content: bytes, part: Path) -> None:
     """Write a file under a temporary name in the same directory, then rename it.
 
-    With locks all writers use the same name, one at a time, and replace the rest of a killed one.
+    With locks all writers use the same name, one at a time, and overwrite what a killed one left.
     """
     try:
         # Another user may have put a link to one of our files; opening a pipe could block.
         flags = os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
-        with _held(part, flags, fcntl.LOCK_EX) as (own, descriptor, _):
-            _require_own(os.fstat(descriptor), own)
+        with _open_locked(part, flags, fcntl.LOCK_EX) as (path, descriptor, _):
+            _require_unlinked(os.fstat(descriptor), path)
             try:
                 # Closed before it is renamed: some full disks raise an error only then.
                 with os.fdopen(os.dup(descriptor), "wb") as file:
                     file.truncate(0)
                     file.write(content)
-                own.replace(target)
+                path.replace(target)
             except BaseException:
-                own.unlink(missing_ok=True)
+                path.unlink(missing_ok=True)
                 raise
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(target)) from error

@@ -32,10 +32,10 @@ class Immutable:
     def __post_init__(self) -> None:
         """Copy the arrays."""
         for name, value in vars(self).items():
-            object.__setattr__(self, name, _kept(value, self._keep_array))
+            object.__setattr__(self, name, _stored(value, self._store_array))
 
     @staticmethod
-    def _keep_array(array: NDArray[Any]) -> object:
+    def _store_array(array: NDArray[Any]) -> object:
         """Return the stored form of an array."""
         return array if _is_frozen(array) else freeze(array.copy())
 
@@ -59,8 +59,8 @@ class Plain(Immutable):
     """Base of inputs: arrays become tuples of numbers, as in files."""
 
     @staticmethod
-    def _keep_array(array: NDArray[Any]) -> object:
-        return _kept(array.tolist(), freeze)
+    def _store_array(array: NDArray[Any]) -> object:
+        return _stored(array.tolist(), freeze)
 
 
 def freeze(array: Array) -> Array:
@@ -82,20 +82,20 @@ def _is_frozen(array: NDArray[Any]) -> bool:
     return _FROZEN.get(id(owner)) is owner and not (array.flags.writeable or owner.flags.writeable)
 
 
-def _kept(value: object, keep_array: Callable[[NDArray[Any]], object]) -> object:
+def _stored(value: object, store_array: Callable[[NDArray[Any]], object]) -> object:
     """Return the stored form of a value."""
     if isinstance(value, np.ndarray):
-        return keep_array(value)
+        return store_array(value)
     if type(value) is dict:
-        return {key: _kept(entry, keep_array) for key, entry in value.items()}
+        return {key: _stored(entry, store_array) for key, entry in value.items()}
     if isinstance(value, tuple) and hasattr(value, "_make"):
-        return value._make(_kept(entry, keep_array) for entry in value)
+        return value._make(_stored(entry, store_array) for entry in value)
     if type(value) in {list, tuple}:
-        return tuple(_kept(entry, keep_array) for entry in value)  # type: ignore[attr-defined]
-    return _kept_table(value, keep_array)
+        return tuple(_stored(entry, store_array) for entry in value)  # type: ignore[attr-defined]
+    return _stored_table(value, store_array)
 
 
-def _kept_table(value: object, keep_array: Callable[[NDArray[Any]], object]) -> object:
+def _stored_table(value: object, store_array: Callable[[NDArray[Any]], object]) -> object:
     """Return a dataset as a copy, and an object with values as a stored array."""
     # A dataset exists only if xarray is imported.
     xarray = sys.modules.get("xarray")
@@ -107,7 +107,7 @@ def _kept_table(value: object, keep_array: Callable[[NDArray[Any]], object]) -> 
         return dataset
     # Columns of tables, such as those of pandas.
     if hasattr(value, "__array__") and not isinstance(value, np.generic):
-        return keep_array(np.array(value))
+        return store_array(np.array(value))
     return value
 
 
@@ -133,7 +133,7 @@ def _equal(value: Any, other: Any) -> bool:  # noqa: ANN401 - values of any kind
 
 
 def _hashed(value: object) -> object:
-    """Return what has the same hash for equal values: the hash of NaN is that of the object."""
+    """Return a value that hashes alike for equal values; NaN hashes by its object otherwise."""
     if isinstance(value, tuple):
         return tuple(map(_hashed, value))
     return "nan" if np.isscalar(value) and value != value else value  # noqa: PLR0124

@@ -61,9 +61,9 @@ class Key:
 class Group(Plain):
     """Base of the dataclasses whose fields are keys, or groups of them."""
 
-    def __new__(cls, *_: object, **words: object) -> Self:
+    def __new__(cls, *_: object, **keywords: object) -> Self:
         """Raise InputError where a keyword is not a field."""
-        require_keywords(f"{cls.__name__}()", words, _names(cls))
+        require_keywords(f"{cls.__name__}()", keywords, _names(cls))
         return super().__new__(cls)
 
 
@@ -74,26 +74,24 @@ def _names(group: type[Group]) -> list[str]:
 def require_keywords(label: str, keywords: Collection[str], allowed: Collection[str]) -> None:
     """Raise InputError for an unknown keyword; name the classes that have it."""
     unknown = [word for word in keywords if word not in allowed]
-    if not unknown:
-        return
+    keys = {group.__name__: _names(group) for group in Group.__subclasses__()} if unknown else {}
     for word in unknown:
-        if owners := [group.__name__ for group in Group.__subclasses__() if word in _names(group)]:
+        if owners := [name for name, names in keys.items() if word in names]:
             refuse(
                 f"{label}: {word!r} is a key of {' and '.join(owners)}",
-                " or ".join(f"{group}({word}=...)" for group in owners),
+                " or ".join(f"{name}({word}=...)" for name in owners),
             )
-    groups = Group.__subclasses__()
-    also = [word for group in groups for word in (group.__name__.lower(), *_names(group))]
-    require_words(label, keywords, allowed, also)
+    also = [word for name, names in keys.items() for word in (name.lower(), *names)]
+    require_words(label, unknown, allowed, also)
 
 
 def check_keywords(function: Callable[P, R]) -> Callable[P, R]:
     """Let a function raise InputError for an unknown keyword."""
-    known = list(inspect.signature(function).parameters)
+    allowed = list(inspect.signature(function).parameters)
 
     @wraps(function)
     def checked(*arguments: P.args, **keywords: P.kwargs) -> R:
-        require_keywords(f"{function.__name__}()", keywords, known)
+        require_keywords(f"{function.__name__}()", keywords, allowed)
         return function(*arguments, **keywords)
 
     return checked

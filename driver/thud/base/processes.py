@@ -36,15 +36,15 @@ def process_pool(
 @contextmanager
 def no_interrupt_in_processes() -> Iterator[None]:
     """Block Ctrl-C, which terminals send to all processes, in processes started meanwhile."""
-    usual = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    previous = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, usual)
+        signal.pthread_sigmask(signal.SIG_SETMASK, previous)
 
 
 def _start(end: connection.Connection, prepare: Callable[[], object] | None) -> None:
-    """End with the parent process, or when the other end of a pipe closes."""
+    """End this process with its parent, or when the other end of a pipe closes."""
     # The default lock is a semaphore of the system, which would remain after such an end.
     tqdm.set_lock(RLock())
 

@@ -98,6 +98,6 @@ def scaled(value: float, power: int) -> float:
 
 def display_unit(unit: str, value: float) -> tuple[str, float]:
     """Return a unit in which a value is at least 1, and its size in SI units."""
-    known = {name: scaled(1.0, MULTIPLES[unit][name]) for name in DISPLAY_UNITS.get(unit, ())}
-    small = [(name, factor) for name, factor in known.items() if factor <= abs(value)]
+    sizes = {name: scaled(1.0, MULTIPLES[unit][name]) for name in DISPLAY_UNITS.get(unit, ())}
+    small = [(name, factor) for name, factor in sizes.items() if factor <= abs(value)]
     return small[-1] if small and value else (unit, 1.0)

@@ -49,9 +49,9 @@ if TYPE_CHECKING:
 Namelist: TypeAlias = "Mapping[str, Mapping[str, object]]"
 # The keys that take lists of numbers.
 LISTS = {key.name for key in KEYS if key.kind == "list"}
-# Groups that an impact may have, and all that a case may ask for.
-FURTHER: dict[str, type[Group]] = {"compression": Compression, "room": Room}
-OPTIONAL: dict[str, type[Group]] = {"modes": Modes, **FURTHER}
+# Optional groups of an impact, and of a case.
+IMPACT_GROUPS: dict[str, type[Group]] = {"compression": Compression, "room": Room}
+OPTIONAL_GROUPS: dict[str, type[Group]] = {"modes": Modes, **IMPACT_GROUPS}
 # Keys of the mesh, which free modes and finite elements share.
 _MESH = tuple(option.name for option in fields(Modes) if "group" in option.metadata)
 
@@ -91,7 +91,7 @@ class Case(Group, Displayed):
     room : Room or None
         Room below the floor; None: no level in a room.
     compression : Compression or None
-        Options of the slow compression by the source model; None: no compression.
+        Options of the quasi-static compression by the source model; None: no compression.
     ball, drop, sampling, levels, limits
         The other namelist groups.
     """
@@ -114,7 +114,7 @@ class Case(Group, Displayed):
         modes = "free modes" if self.modes else ""
         floor = f"on {self.floor.name}" if self.floor else ""
         room = "room below" if self.room else ""
-        press = "slow compression" if self.compression else ""
+        press = "quasi-static compression" if self.compression else ""
         return f"<Case {self.name}: {', '.join(filter(None, (model, floor, modes, room, press)))}>"
 
     def rows(self) -> list[tuple[str, ...]]:
@@ -140,7 +140,7 @@ class Case(Group, Displayed):
             require_kind(group, getattr(self, group), kind)
         require_kind("model", self.model, ModelOptions | None)
         require_kind("floor", self.floor, FloorOptions | None)
-        for group, optional in OPTIONAL.items():
+        for group, optional in OPTIONAL_GROUPS.items():
             require_kind(group, getattr(self, group), optional | None)
         groups: dict[str, dict[str, object]] = {
             "case": {"name": self.name},
@@ -165,7 +165,9 @@ class Case(Group, Displayed):
         if self.floor:
             groups["floor"] = {"name": self.floor.name}
             groups |= {self.floor.name: options} if (options := vars(self.floor)) else {}
-        groups |= {group: vars(present) for group in FURTHER if (present := getattr(self, group))}
+        groups |= {
+            group: vars(present) for group in IMPACT_GROUPS if (present := getattr(self, group))
+        }
         namelist = f90nml.Namelist()
         for group, options in groups.items():
             plain = {key: _plain(group, key, value) for key, value in options.items()}
@@ -202,7 +204,7 @@ class Case(Group, Displayed):
             floor = FLOORS[name](**_with_lists(content.get(name, {})))
         further: dict[str, Any] = {
             group: kind(**_with_lists(content[group]))
-            for group, kind in FURTHER.items()
+            for group, kind in IMPACT_GROUPS.items()
             if group in content
         }
         title = content.get("case", {}).get("name", cls.name)
@@ -212,18 +214,16 @@ class Case(Group, Displayed):
 def tables_case(tables: Mapping[str, Any]) -> Case:
     """Return the case of tables of keys by group, such as those of JSON or TOML; see `check_case`.
 
-    Raises
-    ------
-    InputError
-        Where a group, or the name of model or floor, is not known, or a group is no table.
+    Raise InputError where a group, or the name of model or floor, is not known, or a group is no
+    table.
     """
     require_words("the case", tables, {key.group for key in KEYS} | {"model", "floor"})
     for group, keys in tables.items():
         if not isinstance(keys, Mapping):
             refuse(f"&{group} = {shown(keys)} is no table", "keys and their values")
-    for part, known in (("model", MODELS), ("floor", FLOORS)):
-        if part in tables:
-            require_choice(f"&{part}: name", tables[part].get("name"), list(known))
+    for group, choices in (("model", MODELS), ("floor", FLOORS)):
+        if group in tables:
+            require_choice(f"&{group}: name", tables[group].get("name"), list(choices))
     return Case.from_namelist(tables)
 
 
@@ -241,8 +241,8 @@ def _plain(group: str, key: str, value: object) -> float | str | list[float | st
         value = value.tolist()
     if isinstance(value, list | tuple) and key in LISTS:
         return [_plain(group, key, entry) for entry in value]  # type: ignore[misc]
-    known = isinstance(value, int | float) or (isinstance(value, str) and value.isprintable())
-    if not known or (isinstance(value, int) and abs(value) > LARGEST):
+    is_plain = isinstance(value, int | float) or (isinstance(value, str) and value.isprintable())
+    if not is_plain or (isinstance(value, int) and abs(value) > LARGEST):
         refuse_value(f"&{group}: {key}", value, "a number or plain text")
     return value  # type: ignore[return-value]
 

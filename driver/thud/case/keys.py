@@ -41,7 +41,7 @@ TEMPERATURE = Key("", "ball", "temperature", "real", "degC", "temperature of the
 
 
 def key_owners(case: Case) -> tuple[str, ...]:
-    """Return what of a case has keys of its own: its model, its floor, its room."""
+    """Return the owners of keys in a case: its model, its floor and its room."""
     floor = case.floor.name if case.floor else ""
     result = (case.model.name if case.model else "", floor, "room" if case.room else "")
     return tuple(filter(None, result))
@@ -55,33 +55,30 @@ def known_keys(owners: tuple[str, ...]) -> Mapping[str, Key]:
     and their own where no other key has it.
     """
     model, *others = owners
-    known = {
+    keys = {
         key.name: key
         for key in KEYS
         if (key.owner == model or (not key.owner and key.group in GROUPS)) and key.group != OF_FILES
     }
-    known |= {key.name: key for key in (DENSITY, TEMPERATURE)}
+    keys |= {key.name: key for key in (DENSITY, TEMPERATURE)}
     for key in KEYS:
         if key.owner in others:
-            known.setdefault(key.name, key)
-            known[f"{key.group}.{key.name}"] = key
-    return MappingProxyType(known)
+            keys.setdefault(key.name, key)
+            keys[f"{key.group}.{key.name}"] = key
+    return MappingProxyType(keys)
 
 
 def find_key(name: str, owners: tuple[str, ...]) -> tuple[Key, int | None]:
     """Return a key by its name, and the entry of a list: of ``"frequency(2)"`` 2; see `key_owners`.
 
-    Raises
-    ------
-    InputError
-        Where there is no such key; names the groups that have keys.
+    Raise InputError with the groups that have keys where there is no such key.
     """
-    known = known_keys(owners)
+    keys = known_keys(owners)
     match = re.fullmatch(r"(\w+(?:\.\w+)?)(?:\(([1-9]\d{0,3})\))?", str(name))
-    key = known.get(match[1]) if match else None
+    key = keys.get(match[1]) if match else None
     if match is None or key is None or (match[2] and key.kind != "list"):
-        hint = suggestion(str(name).partition("(")[0], known)
-        groups = ", ".join(dict.fromkeys(f"&{entry.group}" for entry in known.values()))
+        hint = suggestion(str(name).partition("(")[0], keys)
+        groups = ", ".join(dict.fromkeys(f"&{entry.group}" for entry in keys.values()))
         refuse(
             f"{shown(name)} is not a key of {' and '.join(owners)}{hint}",
             f"keys of {groups}, density and temperature (`thud --keys` lists them)",
@@ -142,15 +139,15 @@ def limits(key: Key, case: Case) -> tuple[float, float]:
     return _end(key.lower, group), _end(key.upper, group)
 
 
-def _end(end: float | str, group: object) -> float:
+def _end(limit: float | str, group: object) -> float:
     """Return a limit; a text is a product or quotient of numbers and keys."""
-    if not isinstance(end, str):
-        return end
+    if not isinstance(limit, str):
+        return limit
     value, operator = 1.0, "*"
-    for word in re.split(r"([*/])", end):
-        if word in "*/":
-            operator = word
+    for term in re.split(r"([*/])", limit):
+        if term in "*/":
+            operator = term
             continue
-        factor = float(getattr(group, word) if hasattr(group, word) else word)
+        factor = float(getattr(group, term) if hasattr(group, term) else term)
         value = value * factor if operator == "*" else value / factor
     return value

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS
 from thud.base.units import display_unit, power_of, scaled
-from thud.case.case import OPTIONAL
+from thud.case.case import OPTIONAL_GROUPS
 from thud.case.keys import humanize
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def form() -> list[dict[str, Any]]:
     ]
     models = [_options("model", name, kind) for name, kind in MODELS.items()]
     floors = [_options("floor", name, kind) for name, kind in FLOORS.items()]
-    room = _options("room", "room", OPTIONAL["room"])
+    room = _options("room", "room", OPTIONAL_GROUPS["room"])
     return [*groups, *models, *floors, room]
 
 

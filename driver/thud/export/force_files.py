@@ -32,9 +32,9 @@ CONVENTION = (
 # Resampling: allowed rates, Hz, the largest whole number of the ratio, and the samples of the lower
 # rate that the filter of scipy.signal.resample_poly reaches.
 RATES = (2500.0, 1e6)
-LARGEST_RATIO = 1000
+MAX_RATIO = 1000
 REACH = 10
-# Begin of the last line of what another reader has to know.
+# Start of the last line of the header.
 NOTE_END = "Written by thud "
 # Length of the lines of a universal file and of its names.
 UFF_LINE = 80
@@ -48,17 +48,17 @@ class BlockedForce(DropForce):
         """Return frequencies, Hz, and the transform ∫ F exp(-i 2π f t) dt, N s, of the force.
 
         Time is 0 at first touch. The frequencies, shape (n_frequency,), run from 0 to half the
-        sample rate in steps of at most 1 Hz. The samples count as those of a force without parts
-        above: the integral is their sum.
+        sample rate in steps of at most 1 Hz. The force counts as band-limited to that: the
+        integral is the sum of its samples.
         """
         count = max(math.ceil(self.sample_rate), len(self.force))
         frequency = np.fft.rfftfreq(count, 1 / self.sample_rate)
-        turn = np.exp(-2j * np.pi * frequency * self.start)
-        spectrum: NDArray[np.complex128] = np.fft.rfft(self.force, count) / self.sample_rate * turn
+        shift = np.exp(-2j * np.pi * frequency * self.start)
+        spectrum: NDArray[np.complex128] = np.fft.rfft(self.force, count) / self.sample_rate * shift
         return frequency.astype(np.float64), spectrum
 
     def header_lines(self) -> tuple[str, ...]:
-        """Return what another program or reader needs to know, a line each."""
+        """Return the header for another program or reader, a line each."""
         lines = (
             f"Blocked force of {self.name}: {KINDS[self.kind]}, N, positive into the floor",
             f"{len(self.force)} samples, first sample at {self.start!r} s since first touch",
@@ -93,10 +93,10 @@ class BlockedForce(DropForce):
         require_choice("kind", kind, EXPORTS)
         contents = EXPORTS[kind][1](self, os.fspath(path))
         for name in map(Path, contents):
-            known = content_of(name.resolve())
-            if known is not None and hashlib.sha256(known).hexdigest() == self.checksum:
+            existing = content_of(name.resolve())
+            if existing is not None and hashlib.sha256(existing).hexdigest() == self.checksum:
                 refuse(f"{name} is the recording of the force", "another path")
-            if known is not None and name != Path(path) and NOTE_END.encode() not in known:
+            if existing is not None and name != Path(path) and NOTE_END.encode() not in existing:
                 refuse_foreign(name)
         for file, content in contents.items():
             replace_file(file, content)
@@ -128,23 +128,23 @@ def blocked_force(
 
 
 def _resampled(original: BlockedForce, rate: float) -> BlockedForce:
-    """Return a force at another rate, what is above half of the lower one removed."""
+    """Return a force at another rate, band-limited to half of the lower rate."""
     from scipy.signal import resample_poly
 
     require_number("rate", rate)
     if not RATES[0] <= rate <= RATES[1]:
         refuse_value("rate", rate, f"{RATES[0]:g} to {RATES[1]:g} Hz")
-    ratio = Fraction(rate / original.sample_rate).limit_denominator(LARGEST_RATIO)
+    ratio = Fraction(rate / original.sample_rate).limit_denominator(MAX_RATIO)
     up, down = ratio.numerator, ratio.denominator
-    if up > LARGEST_RATIO or abs(original.sample_rate * up / down - rate) > 1e-9 * rate:
+    if up > MAX_RATIO or abs(original.sample_rate * up / down - rate) > 1e-9 * rate:
         refuse(
             f"rate = {rate:g} Hz is no ratio of small whole numbers to {original.sample_rate:g} Hz",
-            f"ratios of whole numbers up to {LARGEST_RATIO}",
+            f"ratios of whole numbers up to {MAX_RATIO}",
         )
     # The filter spreads the force beyond its ends.
-    room = math.ceil(REACH * max(1.0, down / up)) + 1
-    force = resample_poly(np.pad(original.force, room), up, down)
-    start = original.start - room / original.sample_rate
+    margin = math.ceil(REACH * max(1.0, down / up)) + 1
+    force = resample_poly(np.pad(original.force, margin), up, down)
+    start = original.start - margin / original.sample_rate
     result = replace(original, force=force, sample_rate=rate, start=start)
     (frequency, old), (grid, new) = original.spectrum(), result.spectrum()
     band = np.arange(1, min(RECORDED_BAND, frequency[-1], grid[-1]))
@@ -158,15 +158,11 @@ def _resampled(original: BlockedForce, rate: float) -> BlockedForce:
 
 
 def wav_files(force: BlockedForce, path: str) -> dict[str, bytes]:
-    """Return a WAV file of 32-bit floats, and a text file beside it with what WAV cannot hold.
+    """Return a WAV file of 32-bit floats, and a text file of its header.
 
     The samples are fractions of full scale. A full scale is a power of two in newtons, so that
-    scaling costs no digit; it stands in the comment of the file and in the text.
-
-    Raises
-    ------
-    InputError
-        Where the sample rate is not a whole number.
+    scaling costs no digit; it stands in the comment of the file and in the text. Raise InputError
+    where the sample rate is not a whole number.
     """
     soundfile = library("soundfile", "WAV")
     rate = round(force.sample_rate)
@@ -189,9 +185,9 @@ def wav_files(force: BlockedForce, path: str) -> dict[str, bytes]:
 
 def csv_files(force: BlockedForce, path: str) -> dict[str, bytes]:
     """Return a table of time, s, and force, N, each with all its digits."""
-    head = [*(f"# {line}" for line in force.header_lines()), "time_s,force_N"]
+    header = [*(f"# {line}" for line in force.header_lines()), "time_s,force_N"]
     rows = zip(force.time.tolist(), force.force.tolist(), strict=True)
-    return {path: _lines([*head, *(f"{time!r},{value!r}" for time, value in rows)])}
+    return {path: _lines([*header, *(f"{time!r},{value!r}" for time, value in rows)])}
 
 
 def uff_files(force: BlockedForce, path: str) -> dict[str, bytes]:
@@ -235,7 +231,7 @@ def uff_files(force: BlockedForce, path: str) -> dict[str, bytes]:
 
 
 def mat_files(force: BlockedForce, path: str) -> dict[str, bytes]:
-    """Return a MATLAB file, version 5: time, force, spectrum and what they are."""
+    """Return a MATLAB file, version 5: time, force, spectrum and their description."""
     import scipy.io
 
     frequency, spectrum = force.spectrum()
@@ -261,14 +257,14 @@ def spectrum_files(force: BlockedForce, path: str) -> dict[str, bytes]:
     table = np.column_stack(
         [frequency, spectrum.real, spectrum.imag, np.abs(spectrum), np.angle(spectrum)]
     )
-    head = [
+    header = [
         *(f"# {line}" for line in (*force.header_lines(), f"Spectrum: {CONVENTION}")),
         "frequency_Hz,real_Ns,imaginary_Ns,magnitude_Ns,phase_rad",
     ]
-    return {path: _lines([*head, *(",".join(map(repr, row)) for row in table.tolist())])}
+    return {path: _lines([*header, *(",".join(map(repr, row)) for row in table.tolist())])}
 
 
-# By option of the command: ending of the name of the file, and what makes its content.
+# By option of the command: end of the file name, and function that returns the contents.
 EXPORTS = {
     "wav": (".wav", wav_files),
     "csv": (".csv", csv_files),

@@ -1,4 +1,4 @@
-"""Floors and rooms side by side: what an impact does to each of them."""
+"""Predictions of one impact for several floors and rooms, side by side."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class FloorComparison(Displayed, Page):
 def compare_floors(
     cases: Mapping[str, Case | RoomPrediction], *, progress: bool = False
 ) -> FloorComparison:
-    """Compare what an impact causes below several floors.
+    """Compare the levels of an impact below several floors.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def compare_floors(
     Raises
     ------
     InputError
-        Where there is nothing to compare, or a case has no room.
+        Where there are no cases, or a case has no room.
     """
     require_mapping("cases", cases, "cases or predictions")
     result: dict[str, RoomPrediction] = {}

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 RESISTANCES = np.geomspace(10**2.75, 1e6, 14)
 # Spectral lines in each band.
 _LINES_PER_BAND = 64
-# Part of the impact velocity below which the motion counts as that at maximum deflection.
+# Fraction of the impact velocity below which the motion counts as that at maximum deflection.
 _SLOW_FRACTION = 0.25
 
 
@@ -41,8 +41,8 @@ class BallImpedance(Displayed):
 
     A linear source that stays in contact acts on a floor of the impedance Z as a force F_b, that on
     a rigid floor, over its own impedance Z_B: F = F_b/(1 + Z_B/Z). An impact is neither linear nor
-    without end; its Z_B is what this equation gives for the forces F on a resistance Z and F_b, in
-    bands, and tends to a limit as Z grows.
+    endless; its Z_B solves this equation in bands, for F on a resistance Z, and tends to a limit as
+    Z grows.
 
     Attributes
     ----------
@@ -85,8 +85,7 @@ class BallImpedance(Displayed):
     @property
     def impedance(self) -> NDArray[np.complex128]:
         """Complex impedance in bands, N s/m, shape (n_band,): that on the heaviest floor."""
-        last: NDArray[np.complex128] = self.estimate[-1]
-        return last
+        return np.asarray(self.estimate[-1])
 
     @property
     def tangent_loss_factor(self) -> float:
@@ -113,8 +112,8 @@ class BallImpedance(Displayed):
     def limit(self, decibels: float = 1.0) -> Array:
         """Return the resistance below which a floor changes the level, N s/m, shape (n_band,).
 
-        As the change goes with one over the resistance, it is interpolated between the floors with
-        a power of it. NaN where no floor changes the level so much.
+        The logarithm of the change is interpolated over that of the resistance. NaN where no floor
+        changes the level so much.
 
         Parameters
         ----------
@@ -136,22 +135,22 @@ class BallImpedance(Displayed):
                 refuse_value(
                     "decibels", decibels, f"above {10 ** column[i]:.2g}, the change by the heaviest"
                 )
-            part = (column[i] - log_change) / (column[i] - column[i + 1])
+            fraction = (column[i] - log_change) / (column[i] - column[i + 1])
             result[band] = 10 ** (
-                log_resistance[i] + part * (log_resistance[i + 1] - log_resistance[i])
+                log_resistance[i] + fraction * (log_resistance[i + 1] - log_resistance[i])
             )
         return result
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, a band each."""
-        head = ("band, Hz", "impedance, N s/m", "phase, degrees", "1 dB below, N s/m")
+        header = ("band, Hz", "impedance, N s/m", "phase, degrees", "1 dB below, N s/m")
         lines = zip(self.frequency, self.impedance, self.limit(), strict=True)
         cells = [
             (f"{f:g}", f"{abs(z):.0f}", f"{np.angle(z, deg=True):.0f}",
              f"{self.resistance[0]:.0f} or less" if np.isnan(limit) else f"{limit:.0f}")
             for f, z, limit in lines
         ]  # fmt: skip
-        return [head, *cells]
+        return [header, *cells]
 
     def plot(self, floors: Mapping[str, FloorOptions] | None = None) -> Figure:
         """Draw the impedances of source and floors, and the change of the levels by floors.
@@ -172,14 +171,14 @@ def ball_impedance(
     """Return the impedance of a source during its impact.
 
     The source is dropped on floors that are resistances, as infinite plates are, and the forces are
-    compared with that on a rigid floor. Estimates on one floor and the next tell how far the source
-    is from a linear one.
+    compared with that on a rigid floor. Differences between the estimates on one floor and the next
+    show how far the source is from a linear one.
 
     Parameters
     ----------
     source
-        Impact of a model that feels a moving floor. Its record must last until the source has left
-        the lightest floor.
+        Impact of a model whose force depends on the floor. Its record must last until the source
+        has left the lightest floor.
     resistance : array_like, shape (n_floor,)
         Resistances, ascending, N s/m; by default 14 from 562 to 1e6.
     bands
@@ -188,8 +187,8 @@ def ball_impedance(
     Raises
     ------
     InputError
-        Where the model does not feel the floor, a resistance is out of range, or the source stays
-        on a floor.
+        Where the force of the model does not depend on the floor, a resistance is out of range, or
+        the source stays on a floor.
 
     Examples
     --------
@@ -236,7 +235,8 @@ def _force_on(source: Impact, resistance: float) -> Array:
     moved = new_floor_impact(case, ask("floor_impact", case=case_text(case)), source.floor_force)
     if moved is None:
         refuse(
-            "source: its model has one force on all floors", "an impact of a model that feels them"
+            "source: its model has one force on all floors",
+            "an impact of a model whose force depends on the floor",
         )
     return moved.floor_force
 

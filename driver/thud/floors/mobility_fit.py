@@ -25,7 +25,7 @@ from thud.base.checks import (
 from thud.base.columns import read_titled
 from thud.base.display import Displayed
 from thud.base.errors import NumericalError, ThudError
-from thud.base.extras import require_extra
+from thud.base.extras import data_frame
 from thud.case.case import Case
 from thud.impact.mobility import mobility
 from thud.level.levels import get_bands
@@ -55,25 +55,25 @@ _TITLES = {
     "real": "real", "re": "real", "imaginary": "imaginary", "imag": "imaginary", "im": "imaginary",
     "magnitude": "magnitude", "mag": "magnitude", "abs": "magnitude", "phase": "phase",
 }  # fmt: skip
-# What stands in a title where another unit is meant.
-_OTHERS = {
+# Words in a title that state another unit.
+_OTHER_UNITS = {
     "khz", "mhz", "ghz", "rpm", "rad", "radian", "radians", "db", "mm", "cm", "um", "nm", "inch",
     "ft", "kn", "mn", "lbf", "lb", "g", "mg", "percent",
 }  # fmt: skip
-# Numbers of poles that are tried; the library takes no more.
+# Numbers of poles to try, up to the maximum of the library.
 _ORDERS = (2, 4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64)
-# Numbers without a gain after which no more are tried.
+# Numbers of poles without improvement after which the search ends.
 _STAGNATION_LIMIT = 5
-# Error below which no more poles are tried: that of a table with eight digits.
-_EXACT = 1e-8
+# Error at which the search ends: that of a table with eight digits.
+_MIN_ERROR = 1e-8
 # Error of the fit that raises a warning, and of the change that makes it passive.
-_POOR = 0.1
-_CHANGED = 1.5
+_MAX_ERROR = 0.1
+_MAX_INCREASE = 1.5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MobilityFit(Displayed):
-    """A measured mobility and the passive sum of poles that stands for it.
+    """A measured mobility and the passive sum of poles that fits it.
 
     Attributes
     ----------
@@ -138,7 +138,7 @@ class MobilityFit(Displayed):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Why the fit may be wrong, a sentence each."""
+        """Possible faults of the fit, a sentence each."""
         result = []
         negative = np.mean(self.measured.real < 0)
         if negative > 0:
@@ -146,9 +146,9 @@ class MobilityFit(Displayed):
                 f"the measured real part is negative at {100 * negative:.2g} % of the frequencies, "
                 "which no passive floor has: the fit has none"
             )
-        if self.error > _POOR:
+        if self.error > _MAX_ERROR:
             result.append(f"the fit misses the measurement by {100 * self.error:.0f} %")
-        elif self.error > _CHANGED * self.free_error and self.error > _EXACT:
+        elif self.error > _MAX_INCREASE * self.free_error and self.error > _MIN_ERROR:
             result.append(
                 f"to be passive the fit gave up accuracy: {100 * self.error:.2g} % instead of "
                 f"{100 * self.free_error:.2g} %"
@@ -168,11 +168,8 @@ class MobilityFit(Displayed):
 
         Raise InputError where pandas is not installed.
         """
-        with require_extra("studies"):
-            import pandas as pd
-
         fitted = self.mobility(self.frequency)
-        return pd.DataFrame(
+        return data_frame(
             {"frequency_Hz": self.frequency, "measured": self.measured, "fitted": fitted}
         )
 
@@ -191,8 +188,7 @@ class MobilityFit(Displayed):
 
     def _errors(self) -> Array:
         """Return the relative errors of the frequency points."""
-        errors: Array = np.abs(self.mobility(self.frequency) / self.measured - 1)
-        return errors
+        return np.asarray(np.abs(self.mobility(self.frequency) / self.measured - 1))
 
     def __repr__(self) -> str:
         """Show poles and error."""
@@ -219,12 +215,11 @@ def fit_mobility(
         ``frequency``, Hz, ``real`` and ``imaginary`` (or ``magnitude`` and ``phase``, degrees),
         SI units, or universal files with a frequency response (data set 58).
     quantity
-        What the values are, response over force: ``"mobility"``, m/(N s), ``"accelerance"``, 1/kg,
-        or ``"receptance"``, m/N. Universal files say it themselves; the default of others is
-        mobility.
+        Response over force: ``"mobility"``, m/(N s), ``"accelerance"``, 1/kg, or ``"receptance"``,
+        m/N. Universal files state it; the default of others is mobility.
     order
-        Number of poles, both of a pair counted; by default the number with the least Bayesian
-        information criterion.
+        Number of poles, two for a pair; by default that with the minimum Bayesian information
+        criterion.
 
     Raises
     ------
@@ -240,10 +235,10 @@ def fit_mobility(
         refuse_value("table", table, "a file, or a tuple of frequencies, Hz, and complex values")
     else:
         name, label = Path(table).stem, f"{table}"
-        frequency, values, known = _read(Path(table))
-        if quantity and known and quantity != known:
-            refuse(f"{table}: quantity = {quantity!r}, but the file holds {known!r}", repr(known))
-        quantity = quantity or known
+        frequency, values, stated = _read(Path(table))
+        if quantity and stated and quantity != stated:
+            refuse(f"{table}: quantity = {quantity!r}, but the file holds {stated!r}", repr(stated))
+        quantity = quantity or stated
     # The value at 0 Hz has no phase.
     frequency, values = frequency[frequency != 0], values[frequency != 0]
     values = values * (2j * np.pi * frequency) ** _POWERS[quantity or "mobility"]
@@ -297,12 +292,12 @@ def _chosen(name: str, frequency: Array, values: NDArray[np.complex128]) -> Mobi
         except ThudError as error:
             failure = failure or error
             continue
-        miss = max(result.error, _EXACT)
+        miss = max(result.error, _MIN_ERROR)
         count = 2 * len(frequency)
         criterion = count * np.log(miss**2) + (2 * order + 1) * np.log(count)
         if criterion < least:
             best, least, worse = result, criterion, 0
-        if miss <= _EXACT:
+        if miss <= _MIN_ERROR:
             break
     if best is None:
         raise failure or NumericalError("the mobility: no fit")
@@ -322,21 +317,21 @@ def _fit(name: str, frequency: Array, values: NDArray[np.complex128], order: int
 
 
 def _read(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:
-    """Return frequencies, values and, where the file says it, what they are."""
+    """Return frequencies, values and their quantity, None if the file does not state it."""
     if path.suffix.lower() in {".uff", ".unv", ".uf"}:
         return _read_universal(path)
     titles, table = read_titled(path, _ALLOWED)
-    words = [re.findall("[a-z]+", title.lower()) for title in titles]
-    for title, (_, *others) in zip(titles, (one or [""] for one in words), strict=True):
-        if _OTHERS & {*others}:
+    words = [re.findall("[a-z]+", title.lower()) or [""] for title in titles]
+    for title, (_, *others) in zip(titles, words, strict=True):
+        if _OTHER_UNITS & {*others}:
             refuse(f"{path}: {shown(title.strip())} is not in SI units and degrees", _ALLOWED)
-    kinds = [_TITLES.get(one[0], "") if one else "" for one in words]
+    kinds = [_TITLES.get(first, "") for first, *_ in words]
     if double := {kind for kind in kinds if kind and kinds.count(kind) > 1}:
         refuse(f"{path}: more than one column of {min(double)}", _ALLOWED)
     if titles and len(titles) != table.shape[1]:
         refuse(f"{path}: {len(titles)} titles over {table.shape[1]} columns", _ALLOWED)
     columns = {kind: table[:, i] for i, kind in enumerate(kinds) if kind}
-    named = {word for one in words for word in one if word in _POWERS}
+    named = {word for title in words for word in title if word in _POWERS}
     if {"frequency", "real", "imaginary"} <= columns.keys():
         values = columns["real"] + 1j * columns["imaginary"]
     elif {"frequency", "magnitude", "phase"} <= columns.keys():
@@ -346,8 +341,8 @@ def _read(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:
             f"{path}: the columns are {shown(', '.join(titles)) if titles else 'without titles'}",
             _ALLOWED,
         )
-    known = min(named) if len(named) == 1 else None
-    return columns["frequency"], values, known
+    quantity = min(named) if len(named) == 1 else None
+    return columns["frequency"], values, quantity
 
 
 def _read_universal(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:
@@ -370,9 +365,9 @@ def _read_universal(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity
         )
     # Directions of response and reference count with their signs.
     sign = 1 if record["rsp_dir"] * record["ref_dir"] >= 0 else -1
-    known: Quantity = _RESPONSES[response]  # type: ignore[assignment]
+    quantity: Quantity = _RESPONSES[response]  # type: ignore[assignment]
     return (
         np.asarray(record["x"], dtype=float),
         sign * np.asarray(record["data"], dtype=complex),
-        known,
+        quantity,
     )

@@ -1,9 +1,9 @@
-"""A modal room under a modal plate: what the positions of ball and microphone do.
+"""Levels in a modal room under a modal plate, by positions of ball and microphone.
 
 The deterministic counterpart of the statistical prediction at low frequencies. The plate is simply
-supported and covers the ceiling of a rectangular room with rigid walls. Both are sums of modes, the
-force acts on the plate, and the plate on the air; the air does not act back on the plate, whose
-loss factor holds the radiation.
+supported and covers the ceiling of a rectangular room with rigid walls. Both are sums of modes. The
+force acts on the plate, and the plate on the air; the air does not act on the plate, whose loss
+factor includes the radiation.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class ModalRoom(Displayed):
     Attributes
     ----------
     prediction : RoomPrediction
-        The statistical answer for the same impact, floor and room.
+        The statistical prediction for the same impact, floor and room.
     size : tuple of float
         Length, width and height of the room, m.
     frequency : ndarray, shape (9,)
@@ -101,27 +101,25 @@ class ModalRoom(Displayed):
     @property
     def mean(self) -> Array:
         """Energy mean over all positions, dB, shape (9,)."""
-        mean: Array = 10 * np.log10((10 ** (self.level / 10)).mean(axis=(0, 1)))
-        return mean
+        return np.asarray(10 * np.log10((10 ** (self.level / 10)).mean(axis=(0, 1))))
 
     @property
     def spread(self) -> Array:
         """Standard deviation of the levels of all positions, dB, shape (9,)."""
-        spread: Array = self.level.std(axis=(0, 1))
-        return spread
+        return np.asarray(self.level.std(axis=(0, 1)))
 
     @property
     def statistical(self) -> Array:
         """Levels and spread of the statistical prediction, dB, shape (2, 9); NaN below 50 Hz."""
         result = np.full((2, N_BAND), np.nan)
-        there = np.isin(self.frequency, self.prediction.frequency)
-        n = there.sum()
-        result[:, there] = self.prediction.level[:n], self.prediction.spread[:n]
+        covered = np.isin(self.frequency, self.prediction.frequency)
+        n = covered.sum()
+        result[:, covered] = self.prediction.level[:n], self.prediction.spread[:n]
         return result
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, a band each."""
-        head = (
+        header = (
             "band, Hz", "mean, dB", "spread, dB", "minimum, dB", "maximum, dB",
             "statistical, dB", "its spread, dB",
         )  # fmt: skip
@@ -130,10 +128,10 @@ class ModalRoom(Displayed):
             *self.statistical,
         )  # fmt: skip
         cells = [[f"{v:.1f}" if np.isfinite(v) else "" for v in column] for column in columns]
-        return [head, *zip((f"{f:g}" for f in self.frequency), *cells, strict=True)]
+        return [header, *zip((f"{f:g}" for f in self.frequency), *cells, strict=True)]
 
     def plot(self) -> Figure:
-        """Draw the levels of all positions against the statistical answer."""
+        """Draw the levels of all positions and the statistical prediction."""
         from thud.plot.room_figures import draw_modal_room
 
         return draw_modal_room(self)
@@ -175,7 +173,7 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
     microphones : int or array_like, shape (n_microphone, 3)
         The same of the microphones; the third coordinate is the height.
     seed
-        Of the random positions, which keep 0.5 m from all boundaries.
+        Seed of the random positions, which keep 0.5 m from all boundaries.
 
     Returns
     -------
@@ -198,7 +196,7 @@ def positions_below(
     microphones: int | ArrayLike = 32,
     seed: int = 0,
 ) -> ModalRoom:
-    """Compute what `modal_room` does for the impact, the floor and the room of a prediction."""
+    """Compute `modal_room` for the impact, the floor and the room of a prediction."""
     floor, room = prediction.floor, prediction.room
     require_kind("floor", floor, Plate)
     assert isinstance(floor, Plate)  # noqa: S101 - for the type checker
@@ -275,8 +273,7 @@ def plate_frequencies(floor: Plate, numbers: ArrayLike) -> Array:
     square = (np.pi * np.asarray(numbers) / (floor.length, floor.width)) ** 2
     x, y, ratio = square[..., 0], square[..., 1], math.sqrt(floor.stiffness_ratio)
     root = np.sqrt(x**2 / ratio + 2 * floor.torsion_ratio * x * y + ratio * y**2)
-    result: Array = floor.wave_speed * floor.thickness / math.sqrt(12) * root / (2 * np.pi)
-    return result
+    return np.asarray(floor.wave_speed * floor.thickness / math.sqrt(12) * root / (2 * np.pi))
 
 
 def _plate_modes(floor: Plate) -> tuple[Array, Array]:
@@ -310,7 +307,7 @@ def _room_modes(size: tuple[float, float, float], speed: float) -> tuple[Array, 
 
 
 def _grid(counts: list[int]) -> Array:
-    """Return all combinations of whole numbers from 0 to below the given ones."""
+    """Return all combinations of whole numbers from 0 to below the counts."""
     grid = np.meshgrid(*(np.arange(float(count)) for count in counts), indexing="ij")
     return np.stack(grid, -1).reshape(-1, len(counts))
 
@@ -342,8 +339,8 @@ def _coupling(orders: Array, numbers: Array, sides: tuple[float, ...]) -> Array:
 def _duration(slowest: float) -> float:
     """Return a length of the record, s, after which the slowest mode has decayed.
 
-    It is periodic: what rings on longer would come before the impact. `slowest` is the least rate
-    of decay of an energy, 1/s; half a second is for the impact and the detector.
+    The record is periodic: longer ringing would wrap around to before the impact. `slowest` is the
+    minimum rate of decay of an energy, 1/s; impact and detector take half a second.
     """
     return 0.5 + DECAY_RANGE * math.log(10) / (10 * slowest)
 
@@ -359,7 +356,7 @@ def _receptance(omega: Array, frequency: Array, decay: Array) -> ComplexArray:
 def _spectrum(source: ImpactResult, duration: float) -> tuple[Array, ComplexArray]:
     """Return angular frequencies, rad/s, and the Fourier transform of the force, N s."""
     force = source.force("floor")
-    # An even number, which the inverse transform takes its length for.
+    # The inverse transform assumes an even number.
     n_sample = 2 * math.ceil(SAMPLE_RATE / 2 * max(duration, len(force) / source.sample_rate))
     omega = 2 * np.pi * np.arange(n_sample // 2 + 1) * SAMPLE_RATE / n_sample
     # The same period in samples of the force; rounding moves a frequency by less than 1e-5.
@@ -368,7 +365,7 @@ def _spectrum(source: ImpactResult, duration: float) -> tuple[Array, ComplexArra
 
 
 def fast_levels(pressure: Array) -> Array:
-    """Return what the Fast detector shows of sound pressure, dB, shape (9, n_record, n_sample).
+    """Return the Fast levels of sound pressure, dB, shape (9, n_record, n_sample).
 
     The pressure, Pa, has 1024 samples a second and shape (n_record, n_sample); it is filtered into
     the one-third-octave bands 25 to 160 Hz by filters of class 1.
@@ -377,28 +374,26 @@ def fast_levels(pressure: Array) -> Array:
     levels = []
     for sections in band_filters("third", SAMPLE_RATE)[:N_BAND]:
         square = sosfilt(sections, pressure, axis=-1) ** 2
-        shown = lfilter([1 - decay_factor], [1, -decay_factor], square, axis=-1)
-        levels.append(10 * np.log10(np.maximum(shown, 1e-30) / REFERENCE_PRESSURE**2))
+        mean = lfilter([1 - decay_factor], [1, -decay_factor], square, axis=-1)
+        levels.append(10 * np.log10(np.maximum(mean, 1e-30) / REFERENCE_PRESSURE**2))
     return np.array(levels)
 
 
 def _times(prediction: RoomPrediction, frequency: Array) -> Array:
     """Return reverberation times at frequencies, s: those of the nearest bands."""
     distance = abs(np.log(np.maximum(frequency, 1.0)[:, None] / prediction.frequency))
-    result: Array = prediction.reverberation_time[distance.argmin(axis=1)]
-    return result
+    return np.asarray(prediction.reverberation_time[distance.argmin(axis=1)])
 
 
 def _positions(
     name: str, value: int | ArrayLike, size: tuple[float, ...], generator: np.random.Generator
 ) -> Array:
-    """Return positions, m, shape (n, len(size)), drawn or checked."""
+    """Return positions, m, shape (n, len(size)), random or checked."""
     sides = np.array(size)
     if isinstance(value, int | np.integer | float | str):
         require_whole(name, value, 1, MAX_POSITIONS)
         border = np.minimum(BORDER, sides / 4)
-        random: Array = border + generator.random((int(value), len(size))) * (sides - 2 * border)
-        return random
+        return np.asarray(border + generator.random((int(value), len(size))) * (sides - 2 * border))
     positions = require_real(name, require_array(name, value, dimensions=(2,)))
     if positions.shape[1] != len(size) or not 1 <= len(positions) <= MAX_POSITIONS:
         refuse(

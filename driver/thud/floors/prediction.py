@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-THIRDS = BANDWIDTHS[1]
+BANDS = BANDWIDTHS[1]
 # Change of the force by a yielding floor, dB, that raises a warning.
 MIN_CHANGE = 0.1
 
@@ -41,7 +41,7 @@ class RoomPrediction(RoomLevel, Displayed):
     Attributes
     ----------
     floor, room : Plate and Room
-        What it was predicted for.
+        Floor and room of the prediction.
     source : Impact or Recording
         The impact on the floor whose force acts, or the impact or recording on a rigid one.
     force : str
@@ -61,7 +61,7 @@ class RoomPrediction(RoomLevel, Displayed):
     @property
     def rating(self) -> Rating:
         """Single numbers of the levels in the room."""
-        return rating(self.level, THIRDS)
+        return rating(self.level, BANDS)
 
     @property
     def radiated_share(self) -> Array:
@@ -86,7 +86,7 @@ class RoomPrediction(RoomLevel, Displayed):
     @property
     def standardized_rating(self) -> Rating:
         """Single numbers of the standardized levels."""
-        return rating(self.standardized, THIRDS)
+        return rating(self.standardized, BANDS)
 
     @property
     def has_few_modes(self) -> NDArray[np.bool_]:
@@ -119,7 +119,7 @@ class RoomPrediction(RoomLevel, Displayed):
         Raise InputError where the measured levels are not in one-third-octave bands.
         """
         require_kind("measured", measured, RoomLevels)
-        if measured.bands != THIRDS:
+        if measured.bands != BANDS:
             refuse(
                 "measured: the levels are octaves", "one-third-octave bands, as of the prediction"
             )
@@ -128,7 +128,7 @@ class RoomPrediction(RoomLevel, Displayed):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, a band each."""
-        head = (
+        header = (
             "band, Hz", "L_i,Fmax, dB", "standardized, dB", "spread, dB", "energy, mJ",
             "floor modes",
         )  # fmt: skip
@@ -138,7 +138,7 @@ class RoomPrediction(RoomLevel, Displayed):
             [f"{value:{form}}" for value in column]
             for column, form in zip(columns, forms, strict=True)
         ]
-        return [head, *zip((f"{f:g}" for f in self.frequency), *cells, strict=True)]
+        return [header, *zip((f"{f:g}" for f in self.frequency), *cells, strict=True)]
 
     def plot(self, measured: RoomLevels | None = None) -> Figure:
         """Draw the chain: force, energy, floor and room, with measured levels if given."""
@@ -161,8 +161,8 @@ def predict_level(
 
     Transient statistical energy analysis: the floor takes the energy of an infinite
     plate, loses and radiates it after ISO 12354-1, the room decays with its reverberation time, and
-    the Fast detector shows its maximum. The force is that on the floor, where the model knows it:
-    on floors that the impact has not seen, the source is dropped once more.
+    the Fast detector shows its maximum. The force is that on the floor, where the model knows it;
+    for a floor other than that of the impact, the impact is computed again.
 
     Parameters
     ----------
@@ -183,13 +183,13 @@ def predict_level(
         refuse(
             f"{'floor' if floor is None else 'room'} is not given", "an object of Plate and of Room"
         )
-    asked = replace(case, modes=None, floor=floor, room=room)
-    moved = _on_floor(source, asked)
+    floor_case = replace(case, modes=None, floor=floor, room=room)
+    moved = _on_floor(source, floor_case)
     level = source.room_level
     if level is None or (floor, room) != (case.floor, case.room):
-        levels = (moved or source).levels(THIRDS, force="floor")
-        rated = np.isin(get_bands(THIRDS).nominal, rated_bands(THIRDS))
-        level = new_room_level(ask("room_level", case=case_text(asked), levels=levels[rated]))
+        levels = (moved or source).levels(BANDS, force="floor")
+        rated = np.isin(get_bands(BANDS).nominal, rated_bands(BANDS))
+        level = new_room_level(ask("room_level", case=case_text(floor_case), levels=levels[rated]))
         assert level is not None  # noqa: S101 - the library has answered
     if moved:
         blocked = (
@@ -210,9 +210,9 @@ def predict_level(
 
 def _on_floor(source: ImpactResult, case: Case) -> FloorImpact | None:
     """Return the impact on the floor of a case; None where its force is the blocked one."""
-    known = source if isinstance(source, FloorImpact) else source.on_floor
+    existing = source if isinstance(source, FloorImpact) else source.on_floor
     if source.case.model is None or source.case.floor == case.floor:
-        return known
+        return existing
     plain = replace(case, compression=None)
     blocked = source.blocked_force if isinstance(source, FloorImpact) else source.force("floor")
     return new_floor_impact(case, ask("floor_impact", case=case_text(plain)), blocked)
@@ -222,8 +222,8 @@ def _force_change(mass: float, contact_time: float, resistance: float) -> float:
     """Return the change of the peak force on a resistance, dB, of a linear source.
 
     F'' + (k/Z) F' + (k/M) F = 0 with F(0) = 0 and F'(0) = k v0: against the rigid floor the peak is
-    exp(-b arctan(w/b)/w), b = k/(2 Z), w**2 = k/M - b**2; of a floor so light that the force does
-    not swing, exp(-b artanh(w/b)/w) with w**2 = b**2 - k/M.
+    exp(-b arctan(w/b)/w), b = k/(2 Z), w**2 = k/M - b**2; on a floor so light that the
+    force does not oscillate, exp(-b artanh(w/b)/w) with w**2 = b**2 - k/M.
     """
     stiffness = mass * (math.pi / contact_time) ** 2
     decay = stiffness / (2 * resistance)

@@ -6,8 +6,6 @@ the background, standardization by reverberation time and volume, rating of ISO 
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import re
 from dataclasses import dataclass
@@ -33,12 +31,12 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-# Rounded mid frequencies in a decade (ISO 3, R10), and how far a title may be from one.
+# Rounded mid frequencies in a decade (ISO 3, R10), and the relative tolerance of a stated one.
 R10 = np.array([1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0])
-NEAR = 0.03
+FREQUENCY_TOLERANCE = 0.03
 # Minimum number of positions (ISO 16283-2).
 MIN_POSITIONS = 4
-# Columns that are no levels, by their titles without units, small.
+# Columns other than levels, by their titles in lower case without units.
 TITLES = {
     "frequency": "frequency", "f": "frequency", "band": "frequency", "hz": "frequency",
     "reverberation time": "time", "t": "time", "t20": "time", "t30": "time", "t60": "time",
@@ -50,18 +48,18 @@ ALLOWED = (
     "more positions, and where they are known the columns background, dB, and "
     "reverberation_time, s"
 )
-# Units in which the columns are read, and what stands in a title where another is meant.
+# Units of the columns, and words in a title that state another unit.
 UNITS = {"frequency": "Hz", "time": "s", "background": "dB", "level": "dB"}
-OTHERS = {"khz", "ms", "min", "pa", "mpa", "upa", "np"}
-# Words in the title of a column that is no position's where there are others.
+OTHER_UNITS = {"khz", "ms", "min", "pa", "mpa", "upa", "np"}
+# Words in the titles of columns that are no positions, where there are several columns.
 NO_POSITION = {
     "mean", "average", "median", "standardized", "spread", "std", "sd", "stdev",
     "deviation", "uncertainty", "edt", "nominal",
 }  # fmt: skip
-# Difference of two positions, dB, as the mean over the bands, from which on one hardly is one.
-DIFFERENT = 15.0
-# Levels and times beyond these are mistyped.
-LEVELS, TIMES = (-50.0, 200.0), (0.01, 100.0)
+# Maximum plausible difference of two positions, dB, mean over the bands.
+MAX_DIFFERENCE = 15.0
+# Plausible levels, dB, and times, s.
+LEVEL_RANGE, TIME_RANGE = (-50.0, 200.0), (0.01, 100.0)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -75,11 +73,11 @@ class RoomLevels(Displayed):
     bands : str
         ``"octave"`` or ``"third"``.
     frequency : ndarray, shape (n_band,)
-        Rounded mid frequencies, Hz, ascending; more than the rated ones may be there.
+        Rounded mid frequencies, Hz, ascending; the rated ones or more.
     positions : ndarray, shape (n_position, n_band)
         Maximum Fast levels of each position, dB re 20 uPa.
     background, reverberation_time : ndarray, shape (n_band,), or None
-        Background level, dB, and reverberation time, s, where they are known.
+        Background level, dB, and reverberation time, s, if known.
     volume : float or None
         Volume of the room, m3.
     """
@@ -95,8 +93,7 @@ class RoomLevels(Displayed):
     @property
     def measured(self) -> Array:
         """Energy mean of the positions, with the background, dB, shape (n_band,)."""
-        mean: Array = 10 * np.log10((10 ** (self.positions / 10)).mean(axis=0))
-        return mean
+        return np.asarray(10 * np.log10((10 ** (self.positions / 10)).mean(axis=0)))
 
     @property
     def level(self) -> Array:
@@ -105,7 +102,7 @@ class RoomLevels(Displayed):
 
     @property
     def is_upper_bound(self) -> NDArray[np.bool_]:
-        """Whether a level is a maximum only: less than 6 dB above the background."""
+        """Whether a level is only an upper bound: less than 6 dB above the background."""
         return self._corrected()[1]
 
     @property
@@ -117,7 +114,7 @@ class RoomLevels(Displayed):
 
     @property
     def spread(self) -> Array | None:
-        """Standard deviation of the positions' levels, dB, shape (n_band,); None of one."""
+        """Standard deviation of the positions' levels, dB, shape (n_band,); None for one."""
         return self.positions.std(axis=0, ddof=1) if len(self.positions) > 1 else None
 
     @property
@@ -135,8 +132,8 @@ class RoomLevels(Displayed):
     def position_uncertainty(self) -> float | None:
         """Standard uncertainty of the single numbers by the scatter of positions, dB.
 
-        The A-weighted energy is a mean over the positions: this is its standard error. It holds
-        nothing else, neither the instruments nor the reverberation time; None of one position.
+        The standard error of the mean A-weighted energy over the positions. It excludes the
+        instruments and the reverberation time; None for one position.
         """
         count = len(self.positions)
         if count == 1:
@@ -156,22 +153,22 @@ class RoomLevels(Displayed):
                 "source or more"
             )
         different = float(np.ptp(self.positions.mean(axis=1)))
-        if different > DIFFERENT:
+        if different > MAX_DIFFERENCE:
             result.append(
                 f"the levels of two positions differ by {different:.0f} dB in the mean: check that "
-                "every column without a known title holds the levels of a position"
+                "every column without a known title has the levels of a position"
             )
         if self.background is None:
             result.append("the background is not known: levels are not corrected for it")
         elif self.is_upper_bound.any():
             bands = ", ".join(f"{f:g}" for f in self.frequency[self.is_upper_bound])
             result.append(
-                f"less than 6 dB above the background at {bands} Hz: levels there are maxima, and "
-                "so is what is made of them"
+                f"less than 6 dB above the background at {bands} Hz: levels there are upper "
+                "bounds, and so are the ratings"
             )
         missing = [
-            word
-            for word, value in (
+            name
+            for name, value in (
                 ("reverberation times", self.reverberation_time), ("the volume", self.volume)
             )
             if value is None
@@ -182,28 +179,27 @@ class RoomLevels(Displayed):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, a band each."""
-        titles = [f"{self.bands}, Hz", "mean, dB"]
-        columns = [self.measured]
-        if self.spread is not None:
-            titles.append("spread, dB")
-            columns.append(self.spread)
-        if self.background is not None:
-            titles += ["background, dB", "L_i,Fmax, dB"]
-            columns += [self.background, self.level]
-        if (standardized := self.standardized) is not None:
-            titles += ["T, s", "standardized, dB"]
-            columns += [np.asarray(self.reverberation_time), standardized]
+        standardized = self.standardized
+        columns = {
+            "mean, dB": self.measured,
+            "spread, dB": self.spread,
+            "background, dB": self.background,
+            "L_i,Fmax, dB": None if self.background is None else self.level,
+            "T, s": None if standardized is None else self.reverberation_time,
+            "standardized, dB": standardized,
+        }
+        present = {title: values for title, values in columns.items() if values is not None}
+        marks = ["< " if is_bound else "" for is_bound in self.is_upper_bound]
+        bounded = {"L_i,Fmax, dB", "standardized, dB"}
         cells = [
-            [f"{value:z.{2 if title == 'T, s' else 1}f}" for value in column]
-            for title, column in zip(titles[1:], columns, strict=True)
+            [
+                f"{mark if title in bounded else ''}{value:z.{2 if title == 'T, s' else 1}f}"
+                for mark, value in zip(marks, values, strict=True)
+            ]
+            for title, values in present.items()
         ]
-        for title, column in zip(titles[1:], cells, strict=True):
-            if title in {"L_i,Fmax, dB", "standardized, dB"}:
-                column[:] = [
-                    f"< {text}" if low else text
-                    for text, low in zip(column, self.is_upper_bound, strict=True)
-                ]
-        return [tuple(titles), *zip((f"{f:g}" for f in self.frequency), *cells, strict=True)]
+        header = (f"{self.bands}, Hz", *present)
+        return [header, *zip((f"{f:g}" for f in self.frequency), *cells, strict=True)]
 
     def plot(self) -> Figure:
         """Draw the levels of positions, their mean, the standardized ones and the background."""
@@ -213,9 +209,9 @@ class RoomLevels(Displayed):
 
     def __repr__(self) -> str:
         """Return the single numbers."""
-        after = self.standardized_rating
-        more = "" if after is None else f", standardized {after.rounded} dB"
-        return f"<RoomLevels, {self._count}: L_iA,Fmax {self.rating.rounded} dB{more}>"
+        standardized = self.standardized_rating
+        suffix = "" if standardized is None else f", standardized {standardized.rounded} dB"
+        return f"<RoomLevels, {self._count}: L_iA,Fmax {self.rating.rounded} dB{suffix}>"
 
     @property
     def _count(self) -> str:
@@ -224,8 +220,7 @@ class RoomLevels(Displayed):
 
     @property
     def _rated(self) -> NDArray[np.bool_]:
-        wanted = rated_bands(self.bands)
-        return np.isin(self.frequency, wanted)
+        return np.isin(self.frequency, rated_bands(self.bands))
 
     def _corrected(self) -> tuple[Array, NDArray[np.bool_]]:
         if self.background is None:
@@ -259,12 +254,9 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     _require_positions(
         [title for title, kind in zip(titles, kinds, strict=True) if kind == "level"], path
     )
-    columns: dict[str, Array] = {}
-    for kind in ("frequency", "background", "time"):
-        if kinds.count(kind) > 1:
-            refuse(f"{path}: more than one column of {kind}", ALLOWED)
-        if kind in kinds:
-            columns[kind] = table[:, kinds.index(kind)]
+    if double := [kind for kind in UNITS if kind != "level" and kinds.count(kind) > 1]:
+        refuse(f"{path}: more than one column of {double[0]}", ALLOWED)
+    columns = {kind: table[:, i] for i, kind in enumerate(kinds) if kind != "level"}
     if "frequency" not in columns or "level" not in kinds:
         missing = "frequency" if "frequency" not in columns else "levels"
         refuse(f"{path}: there is no column of {missing}", ALLOWED)
@@ -274,9 +266,9 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     bands = _bands_of(frequency, path)
     levels = table[:, [kind == "level" for kind in kinds]].T[:, order]
     for word, values, limits in (
-        ("level", levels, LEVELS),
-        ("background", columns.get("background"), LEVELS),
-        ("reverberation_time", columns.get("time"), TIMES),
+        ("level", levels, LEVEL_RANGE),
+        ("background", columns.get("background"), LEVEL_RANGE),
+        ("reverberation_time", columns.get("time"), TIME_RANGE),
     ):
         if values is None:
             continue
@@ -303,31 +295,27 @@ def levels_csv(result: RoomLevels) -> bytes:
         "is_upper_bound": result.is_upper_bound.astype(int),
         "reverberation_time_s": result.reverberation_time, "standardized_dB": result.standardized,
     }  # fmt: skip
-    known = {title: values for title, values in columns.items() if values is not None}
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(known)
-    for row in zip(*known.values(), strict=True):
-        writer.writerow(f"{value:.10g}" for value in row)
-    return text.getvalue().encode()
+    present = {title: values for title, values in columns.items() if values is not None}
+    rows = ([f"{value:.10g}" for value in row] for row in zip(*present.values(), strict=True))
+    return "".join(f"{','.join(row)}\n" for row in (present, *rows)).encode()
 
 
 def rating_table(result: RoomLevels) -> list[tuple[str, ...]]:
     """Return header and rows of the single numbers."""
-    after = result.standardized_rating
+    standardized = result.standardized_rating
     rows = [*result.rating.rows()]
-    if after is not None:
-        rows = [(*row, more[1]) for row, more in zip(rows, after.rows(), strict=True)]
+    if standardized is not None:
+        rows = [(*row, other[1]) for row, other in zip(rows, standardized.rows(), strict=True)]
         rows[0] = ("rating", "in the room", "standardized")
-        # The classes are meant for levels in the room.
+        # The classes apply to levels in the room only.
         rows[2:3] = [(*row[:2], "") for row in rows[2:3]]
     return rows
 
 
 def _kind(title: str, path: object) -> str:
-    """Return what a column holds; raise InputError where its title has another unit."""
+    """Return the kind of a column; raise InputError where its title has another unit."""
     kind = TITLES.get(_plain(title), "level")
-    if OTHERS & {word.lower() for word in re.findall(r"[A-Za-z]+", title)[1:]}:
+    if OTHER_UNITS & {word.lower() for word in re.findall(r"[A-Za-z]+", title)[1:]}:
         refuse(f"{path}: {title.strip()!r} is not in {UNITS[kind]}", f"{kind} in {UNITS[kind]}")
     return kind
 
@@ -340,7 +328,7 @@ def _require_positions(titles: list[str], path: object) -> None:
 
 
 def _plain(title: str) -> str:
-    """Return a title small and without its unit.
+    """Return a title in lower case without its unit.
 
     >>> _plain("Reverberation_time (s)")
     'reverberation time'
@@ -350,13 +338,13 @@ def _plain(title: str) -> str:
 
 
 def _nominal(frequency: float, path: object) -> float:
-    """Return the rounded mid frequency that is meant."""
+    """Return the nearest rounded mid frequency."""
     if 1 <= frequency < 1e5:  # noqa: PLR2004 - bands of sound
         decade = 10.0 ** math.floor(math.log10(frequency))
-        near = np.append(R10, 10) * decade
-        best = float(near[np.argmin(abs(near / frequency - 1))])
-        if abs(best / frequency - 1) < NEAR:
-            return float(f"{best:.3g}")
+        candidates = np.append(R10, 10) * decade
+        nearest = float(candidates[np.argmin(abs(candidates / frequency - 1))])
+        if abs(nearest / frequency - 1) < FREQUENCY_TOLERANCE:
+            return float(f"{nearest:.3g}")
     return refuse(
         f"{path}: frequency = {frequency:g} Hz is not a mid frequency",
         "those of octave or one-third-octave bands, such as 50, 63, 80",
@@ -370,12 +358,12 @@ def _bands_of(frequency: Array, path: object) -> BandSet:
         refuse(f"{path}: frequency {double[0]:g} Hz is given twice", "each band once")
     steps = np.diff(np.log10(frequency))
     bands: BandSet = BANDWIDTHS[0] if steps.size and steps.min() > 0.2 else BANDWIDTHS[1]  # noqa: PLR2004
-    wanted = rated_bands(bands)
-    missing = wanted[~np.isin(wanted, frequency)]
+    rated = rated_bands(bands)
+    missing = rated[~np.isin(rated, frequency)]
     if missing.size:
         words = ", ".join(f"{f:g}" for f in missing)
         refuse(
             f"{path}: there is no level at {words} Hz",
-            f"{bands}s {wanted[0]:g} to {wanted[-1]:g} Hz",
+            f"{bands}s {rated[0]:g} to {rated[-1]:g} Hz",
         )
     return bands

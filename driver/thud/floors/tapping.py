@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 # One-third-octave bands 50 to 3150 Hz: rounded mid frequencies; those from 100 Hz on are rated.
-THIRDS = np.array(
+FREQUENCY = np.array(
     [50, 63, 80, 100, 125, 160, 200, 250, 315, 400, 500, 630, 800, 1000, 1250, 1600, 2000, 2500,
      3150], dtype=float,
 )  # fmt: skip
@@ -29,9 +29,9 @@ RATED = slice(3, None)
 # the excesses.
 CURVE = np.array([62, 62, 62, 62, 62, 62, 61, 60, 59, 58, 57, 54, 51, 48, 45, 42], dtype=float)
 AT_500, MAX_EXCESS = 60, 32.0
-# Ratio of wave speed, m/s, and density, kg/m3, that the constant of the formula holds, that of
-# concrete, and how far another one may be: the level moves by 10 lg of the ratio, 1 dB.
-CONCRETE, WITHIN = 3500 / 2300, 1.26
+# Ratio of wave speed, m/s, and density, kg/m3, of concrete, which the constant of the formula
+# includes, and the factor by which that of a floor may differ, which changes the level by 1 dB.
+CONCRETE, MAX_RATIO = 3500 / 2300, 1.26
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,8 +69,7 @@ class TappingLevel(Displayed):
     @property
     def _tenths(self) -> NDArray[np.float64]:
         """Rated levels to one decimal, a half rounded up (ISO 717-2), in tenths of a decibel."""
-        tenths: NDArray[np.float64] = np.floor(10 * self.level[RATED] + 0.5)
-        return tenths
+        return np.asarray(np.floor(10 * self.level[RATED] + 0.5))
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, a band each."""
@@ -87,15 +86,15 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
 
     L_n = 155 - 30 lg m'' + 10 lg T_s + 10 lg sigma + 10 lg(f/1000 Hz), T_s = 2.2/(f eta), with the
     radiation and losses of the prediction of heavy impacts (ISO 12354-2 annex B). The constant
-    holds density and wave speed of concrete; it is the bare plate, without floating floor, ceiling
-    or flanking walls.
+    includes density and wave speed of concrete; the floor is the bare plate, without floating
+    floor, ceiling or flanking walls.
 
     Parameters
     ----------
     floor
         A plate.
     room
-        Its air counts (default: that of `Room`).
+        Room whose air is used (default: that of `Room`).
 
     Raises
     ------
@@ -112,8 +111,8 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
     if not _is_near_concrete(floor):
         refuse(
             f"floor: wave_speed/density = {floor.wave_speed / floor.density:.3g} is not that of "
-            "concrete, which the formula of ISO 12354-2 holds",
-            f"{CONCRETE / WITHIN:.2f} to {CONCRETE * WITHIN:.2f} m4/(kg s)",
+            "concrete, for which the formula of ISO 12354-2 is valid",
+            f"{CONCRETE / MAX_RATIO:.2f} to {CONCRETE * MAX_RATIO:.2f} m4/(kg s)",
         )
     if not _is_isotropic(floor):
         refuse(
@@ -123,11 +122,11 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
         )
     require_kind("room", room, Room | None)
     case = Case(floor=floor, room=room or Room())
-    result = ask("radiator", case=case_text(case), frequency=THIRDS)
-    time = 2.2 / (THIRDS * result["loss_factor"])
-    radiated = time * result["radiation_factor"] * THIRDS / 1000
+    result = ask("radiator", case=case_text(case), frequency=FREQUENCY)
+    time = 2.2 / (FREQUENCY * result["loss_factor"])
+    radiated = time * result["radiation_factor"] * FREQUENCY / 1000
     level = 155 - 30 * np.log10(result["surface_mass"]) + 10 * np.log10(radiated)
-    return TappingLevel(THIRDS, level)
+    return TappingLevel(FREQUENCY, level)
 
 
 def has_tapping_level(floor: FloorOptions) -> TypeGuard[Plate]:
@@ -136,7 +135,7 @@ def has_tapping_level(floor: FloorOptions) -> TypeGuard[Plate]:
 
 
 def _is_near_concrete(floor: Plate) -> bool:
-    return 1 / WITHIN <= floor.wave_speed / floor.density / CONCRETE <= WITHIN
+    return 1 / MAX_RATIO <= floor.wave_speed / floor.density / CONCRETE <= MAX_RATIO
 
 
 def _is_isotropic(floor: Plate) -> bool:

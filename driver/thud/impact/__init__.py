@@ -1,1 +1,1 @@
-"""Impacts of source models, one and many, and what else a case asks for."""
+"""Impacts of source models, one and many, and the other results of a case."""

@@ -1,4 +1,4 @@
-"""Slow compression of the ball between two plates, as in a press."""
+"""Quasi-static compression of the ball between two plates, as in a press."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from thud.base._schema import Ball, Compression
 from thud.base.bridge import ask
 from thud.base.display import Displayed
-from thud.base.extras import require_extra
+from thud.base.extras import data_frame
 from thud.base.key import check_keywords
 from thud.case.case import Case, case_text, new_model
 
@@ -63,10 +63,7 @@ class CompressionCurve(Displayed):
 
         Raise InputError where pandas is not installed.
         """
-        with require_extra("studies"):
-            import pandas as pd
-
-        return pd.DataFrame({"deflection_m": self.deflection, "force_N": self.force})
+        return data_frame({"deflection_m": self.deflection, "force_N": self.force})
 
 
 @check_keywords
@@ -78,11 +75,11 @@ def compress(
     points: int = Compression.points,
     gas: CompressionGas = Compression.gas,
 ) -> CompressionCurve:
-    """Press a ball slowly between two rigid plates without friction.
+    """Compress a ball quasi-statically between two rigid plates without friction.
 
-    Viscosity has relaxed: the force is that of the long-term modulus, which for Kelvin and Voigt's
-    law is the modulus of the ball, for Maxwell branches less than its storage modulus. A fractional
-    law, the default of finite elements, has here its modulus at about 1 Hz.
+    Viscosity has relaxed: the force is that of the long-term modulus, which is the modulus of the
+    ball for Kelvin–Voigt damping, and less than its storage modulus for Maxwell branches.
+    Fractional damping, the default of finite elements, enters with its modulus at about 1 Hz.
 
     Parameters
     ----------
@@ -108,7 +105,7 @@ def compress(
     InputError
         Names group, key, value and allowed range.
     NumericalError
-        Where the ball cannot be pressed so far.
+        Where the ball cannot be compressed so far.
     """
     case = Case(
         ball=Ball() if ball is None else ball,

@@ -6,8 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from thud.base.bridge import ask, text
-from thud.base.checks import require_kind
-from thud.base.errors import InputError
+from thud.base.checks import refuse, require_kind
 from thud.case.case import Case, case_text
 from thud.impact.floor_impact import new_floor_impact
 from thud.impact.impact import Impact, history
@@ -21,8 +20,7 @@ def compute(case: Case) -> Impact:
     """Compute the impact of a case without warnings."""
     require_kind("case", case, Case)
     if case.model is None:
-        message = "&model is missing; allowed: a case with a source model"
-        raise InputError(message)
+        refuse("&model is missing", "a case with a source model")
     # Free modes and compression of the case have their own functions.
     plain = replace(case, modes=None, compression=None)
     return new_impact(case, ask("solve", case=case_text(plain)))

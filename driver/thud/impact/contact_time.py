@@ -1,4 +1,4 @@
-"""What contact time means (docs/recordings_theory.md, section 3)."""
+"""Definition of the contact time (docs/recordings_theory.md, section 3)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-# A contact lasts from the first to the last time at which the force reaches this part of its peak,
+# A contact lasts from the first to the last time at which the force reaches this fraction of its
+# peak,
 # averaged over AVERAGED s within first touch and release.
 THRESHOLD = 0.01
 AVERAGED = 1e-4
@@ -31,10 +32,10 @@ def contact_span(force: ArrayLike, sample_rate: float) -> tuple[float, float]:
     above = np.nonzero(mean >= THRESHOLD * values.max())[0]
     ends = []
     for last, beyond in ((above[0], above[0] - 1), (above[-1], above[-1] + 1)):
-        part = 0.0
+        fraction = 0.0
         if 0 <= beyond < len(mean):
-            part = (mean[last] - THRESHOLD * values.max()) / (mean[last] - mean[beyond])
-        ends.append((last + part * (beyond - last)) / sample_rate)
+            fraction = (mean[last] - THRESHOLD * values.max()) / (mean[last] - mean[beyond])
+        ends.append((last + fraction * (beyond - last)) / sample_rate)
     return ends[0], ends[1]
 
 
@@ -49,11 +50,11 @@ def average_within(
     Parameters
     ----------
     values : ndarray, shape (n_time, n_column)
-        Values at even times, lines between them.
+        Values at uniformly spaced times, linear between them.
     time : ndarray, shape (n_time,)
         Their times.
     at : ndarray, shape (n,)
-        Times whose means are wanted.
+        Centers of the means.
     width
         Width of the mean.
     """

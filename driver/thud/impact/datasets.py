@@ -146,7 +146,7 @@ def band_coordinates(kinds: Iterable[BandSet]) -> dict[str, Any]:
 
 
 def room_coordinates() -> dict[str, Any]:
-    """Return the nominal frequencies of the thirds in a room by the name of their dimension."""
+    """Return the nominal frequencies of the bands in a room by the name of their dimension."""
     return {ROOM_BAND: _frequencies(ROOM_BAND, rated_bands(BANDWIDTHS[1]))}
 
 

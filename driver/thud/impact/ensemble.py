@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import KEYS, SAMPLE_QUANTITIES, HollowSphere, Limits, Sampling
+from thud.base._schema import KEYS, SAMPLE_QUANTITIES, HollowSphere, Limits
 from thud.base.bridge import ask, text
 from thud.base.checks import (
     refuse,
@@ -121,16 +121,13 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         get_bands(bands)
     if base.model is None and base.modes is not None and model is None:
         refuse("the case computes no impact", "a case with a model, or model = its name")
-    sampling = base.sampling
+    sampling = {"sample_rate": sample_rate, "duration": duration, "substeps": substeps}
+    keywords = {name: value for name, value in sampling.items() if value is not None}
     base = replace(
         base,
         modes=None,
         compression=None,
-        sampling=Sampling(
-            sampling.sample_rate if sample_rate is None else sample_rate,
-            sampling.duration if duration is None else duration,
-            sampling.substeps if substeps is None else substeps,
-        ),
+        sampling=replace(base.sampling, **keywords),  # type: ignore[arg-type]
         levels=replace(base.levels, bands=bands or base.levels.bands),
         limits=Limits(source) if source is not None else base.limits,
     )
@@ -145,41 +142,37 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         columns, numbers = _columns(varied, base)
     except MemoryError as error:
         refuse("the parameters do not fit in memory", "fewer samples", error)
-    shared = {
-        "sample_rate": sample_rate,
-        "duration": duration,
-        "substeps": substeps,
-        "source": source,
-    }
     for name in columns:
-        if shared.get(name) is not None:
+        if name in keywords or (name == "source" and source is not None):
             refuse(f"{name!r} is given twice", "once, as a parameter or as a keyword")
     cost = _cost(content, columns)
     width = min(len(os.sched_getaffinity(0)), MAX_THREADS) if threads is None else threads
     require_whole("threads", width, 1, MAX_THREADS)
     width = 1 if _FORKED else width
     length = int(cost["force_length"]) if forces else 0
-    most = min(_MAX_CALL, _MAX_VALUES // max(1, len(FORCES) * length))
-    work = int(np.clip(_CALL_TIME * width / cost["cost"], 1, max(1, most)))
-    parts = []
+    max_count = min(_MAX_CALL, _MAX_VALUES // max(1, len(FORCES) * length))
+    work = int(np.clip(_CALL_TIME * width / cost["cost"], 1, max(1, max_count)))
+    blocks = []
     try:
-        # What does not fit is refused before it is computed.
+        # Results that do not fit are refused before they are computed.
         np.empty((len(numbers), len(FORCES), length))
         with tqdm(total=len(numbers), unit="sample", disable=not progress, leave=False) as bar:
             for start in range(0, max(len(numbers), 1), work):
-                some = numbers[start : start + work]
-                parts.append(_compute(content, columns, some, width, levels=levels, forces=forces))
-                bar.update(len(some))
+                block = numbers[start : start + work]
+                blocks.append(
+                    _compute(content, columns, block, width, levels=levels, forces=forces)
+                )
+                bar.update(len(block))
         results = (
-            parts[0]
-            if len(parts) == 1
-            else {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+            blocks[0]
+            if len(blocks) == 1
+            else {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
         )
     except MemoryError as error:
         size = f"{len(numbers)} samples"
         size += f" with forces of {length} values" if forces else ""
         refuse(f"forces = {forces} for {size} does not fit in memory", "fewer samples", error)
-    # They may fill the memory: once is enough.
+    # Forces may fill the memory: they are not copied.
     force = freeze(results["force"])
     return Ensemble(
         case=base,
@@ -200,7 +193,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
 
 
 def _floor_results(values: NDArray[np.float64], case: Case) -> dict[str, Any]:
-    """Return what cases with a floor have in addition, by name; see `Ensemble`."""
+    """Return the additional results of cases with a floor by name; see `Ensemble`."""
     if not case.floor:
         return {}
     requested = case.levels.bands
@@ -305,6 +298,6 @@ def _numbers(key: Key, array: NDArray[Any]) -> NDArray[np.float64]:
         words, index = np.unique(array.astype(str), return_inverse=True)
         for word in words:
             require_choice(key.name, str(word), key.choices)
-        places = np.array([key.choices.index(word) + 1.0 for word in words])
-        return places[index].reshape(array.shape)
+        indices = np.array([key.choices.index(word) + 1.0 for word in words])
+        return indices[index].reshape(array.shape)
     return require_real(key.name, array, "b" if key.kind == "flag" else "iuf")

@@ -96,11 +96,11 @@ class FloorImpact(Impact):
     def difference(
         self, bands: BandSet = "octave", method: LevelsMethod | None = None
     ) -> NDArray[np.float64]:
-        """Return contact less blocked level, dB, shape (n_band,)."""
+        """Return contact − blocked level, dB, shape (n_band,)."""
         return self.levels(bands, method, "floor") - self.blocked_levels(bands, method)
 
     def injected_energy(self, bands: BandSet = "octave") -> FloorEnergy:
-        """Return the energy that goes into the floor in bands, in two ways."""
+        """Return the energy that goes into the floor in bands, by two methods."""
         answer = ask(
             "floor_energy", case=case_text(Case(floor=self.floor)), bands=bands,
             force=self.floor_force, velocity=self.floor_velocity, sample_rate=self.sample_rate,
@@ -122,8 +122,7 @@ class FloorImpact(Impact):
             "point_velocity", case=case_text(Case(floor=self.floor)), force=self.floor_force,
             sample_rate=self.sample_rate, point=np.array(require_pair("point", (x, y))),
         )  # fmt: skip
-        velocity: NDArray[np.float64] = answer["velocity"]
-        return velocity
+        return np.asarray(answer["velocity"])
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, an octave each."""

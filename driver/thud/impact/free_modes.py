@@ -10,9 +10,9 @@ import numpy as np
 
 from thud.base._schema import Ball, FiniteElement, Modes
 from thud.base.bridge import ask, text
-from thud.base.checks import require_kind
+from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
-from thud.base.errors import InputError, PlausibilityWarning
+from thud.base.errors import PlausibilityWarning
 from thud.base.key import check_keywords
 from thud.case.case import Case, case_text
 
@@ -153,8 +153,6 @@ def loss_factors(model: FiniteElement, frequency: ArrayLike) -> NDArray[np.float
     except (TypeError, ValueError):
         frequencies = np.array([])
     if frequencies.ndim != 1 or not frequencies.size or not np.all(frequencies > 0):
-        message = "frequency is not allowed; allowed: a list of frequencies above 0, Hz"
-        raise InputError(message)
+        refuse("frequency is not allowed", "a list of frequencies above 0, Hz")
     answer = ask("loss_factors", case=case_text(Case(model=model)), frequency=frequencies)
-    result: NDArray[np.float64] = answer["loss_factors"]
-    return result
+    return np.asarray(answer["loss_factors"])

@@ -12,7 +12,7 @@ import numpy as np
 from thud.base._schema import ImpactQuantities
 from thud.base.checks import require_choice, require_whole
 from thud.base.display import Displayed
-from thud.base.extras import require_extra
+from thud.base.extras import data_frame, require_extra
 from thud.case.case import case_text
 from thud.impact.contact_time import contact_span
 from thud.impact.motion import Motion, new_motion
@@ -26,12 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.base._schema import (
-        BandSet,
-        LevelsForce,
-        LevelsMethod,
-        LimitsSource,
-    )
+    from thud.base._schema import BandSet, LevelsForce, LevelsMethod, LimitsSource
     from thud.base.bridge import Bundle
     from thud.case.case import Case
     from thud.impact.floor_impact import FloorImpact
@@ -65,7 +60,7 @@ class Impact(ImpactQuantities, Displayed):
     model_quantities : dict of str to float
         Other numbers of the model, such as the bulk modulus; SI units.
     warnings : tuple of str
-        What is possible but not plausible, such as a wall with the density of no rubber.
+        Implausible input, such as a wall whose density no rubber has.
     motion : Motion or None
         Snapshots of the deformed ball; None where the model has none.
     on_floor : FloorImpact or None
@@ -196,12 +191,8 @@ class Impact(ImpactQuantities, Displayed):
         force
             ``"floor"`` or ``"elastic"``; by default that of the case.
         """
-        return force_exposure_levels(
-            self.force(force),
-            self.sample_rate,
-            bands,
-            method or self.level_method,
-        )
+        method = method or self.level_method
+        return force_exposure_levels(self.force(force), self.sample_rate, bands, method)
 
     def assess(
         self, source: LimitsSource | None = None, force: LevelsForce | None = None
@@ -261,10 +252,7 @@ class Impact(ImpactQuantities, Displayed):
 
         Raise InputError where pandas is not installed.
         """
-        with require_extra("studies"):
-            import pandas as pd
-
-        return pd.DataFrame(self.histories(), index=pd.Index(self.time, name="time_s"))
+        return data_frame(self.histories(), self.time)
 
     def histories(self) -> dict[str, NDArray[np.float64]]:
         """Return the histories by name and unit, shape (n_sample,)."""
@@ -279,12 +267,12 @@ class Impact(ImpactQuantities, Displayed):
         }
 
     def _floor_histories(self) -> dict[str, NDArray[np.float64]]:
-        """Return what a floor that moves adds to the histories."""
+        """Return the additional histories of a mobile floor."""
         return {}
 
 
 def history(case: Case, answer: Bundle, warnings: tuple[str, ...]) -> dict[str, Any]:
-    """Return what every history in a bundle has."""
+    """Return the fields of `Impact` and `FloorImpact` that a bundle of the library holds."""
     samples, quantities = answer["samples"], answer["quantities"]
     return {
         "case": case,

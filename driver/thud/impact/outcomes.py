@@ -36,12 +36,13 @@ class Ensemble(SampleQuantities, Displayed):
     status : ndarray of int, shape (n_sample,)
         0, or the exit code of the error: 1 bad input, 2 numerical failure.
     reason : ndarray of str, shape (n_sample,)
-        The sentence of the error.
+        The message of the error.
     levels : dict of (force, bands) to ndarray, shape (n_sample, n_band)
         Force exposure levels, dB: of ``"elastic"`` and ``"floor"``, in octaves, on which the
         verdict is based, and in the other bands of the case.
     margin : ndarray, shape (n_sample,)
-        Minimum distance of an octave level of the judged force to its limits, dB, positive inside.
+        Minimum distance of an octave level of the assessed force to its limits, dB; positive
+        inside.
     conforms : ndarray of bool, shape (n_sample,)
         Verdict of the standards on the force that the case assesses.
     elastic_conforms, floor_conforms : ndarray of bool, shape (n_sample,)
@@ -52,11 +53,12 @@ class Ensemble(SampleQuantities, Displayed):
         Samples per second, Hz.
     contact_levels : dict of bands to ndarray, shape (n_sample, n_band)
         Of cases with a floor: levels of the force on it, dB; on a rigid floor, and of models that
-        know no other, those of the force there.
+        have no other, those of the force there.
     floor_work : ndarray, shape (n_sample,), or None
         Likewise the energy that the source gives to the floor, J.
     room_level : ndarray, shape (n_sample, 12), or None
-        Of cases with a room: maximum Fast levels in the thirds from 50 to 630 Hz, dB re 20 uPa.
+        Of cases with a room: maximum Fast levels of the one-third-octave bands 50 to 630 Hz, dB
+        re 20 uPa.
     room_rating, standardized_rating : ndarray, shape (n_sample,), or None
         Their A-weighted sum L_iA,Fmax, dB, and that of the standardized levels; see `rating`.
     """
@@ -84,12 +86,12 @@ class Ensemble(SampleQuantities, Displayed):
         return len(self.status)
 
     def __repr__(self) -> str:
-        """Return what differs, and how many drops conform."""
+        """Return the parameters, and how many drops conform."""
         names = ", ".join(self.parameters)
         failed = f", {np.sum(self.status != 0)} failed" if self.status.any() else ""
         # Without levels the margins of drops that were computed are not known.
-        judged = np.isfinite(self.margin).any() or (self.status != 0).all()
-        verdict = f"{self.conforms.sum()} conform" if judged else "not judged"
+        is_assessed = np.isfinite(self.margin).any() or (self.status != 0).all()
+        verdict = f"{self.conforms.sum()} conform" if is_assessed else "not assessed"
         return f"<Ensemble: {len(self)} drops by {names}; {verdict}{failed}>"
 
     def rows(self) -> list[tuple[str, ...]]:
@@ -97,17 +99,15 @@ class Ensemble(SampleQuantities, Displayed):
         rows: list[tuple[str, ...]] = [("", "minimum", "median", "maximum")]
         shown = SCALAR_QUANTITIES | {"margin": SAMPLE_RESULTS["margin"]} | FLOOR_QUANTITIES
         for name, quantity in shown.items():
-            if name == ROOM_LEVEL:
-                continue
             values = getattr(self, name)
-            if values is None:
+            if name == ROOM_LEVEL or values is None:
                 continue
             known = values[self.status == 0]
             known = known[np.isfinite(known)]
             if not known.size:
                 continue
-            shares = np.quantile(known, [0, 0.5, 1])
-            rows.append((quantity.label, *map(quantity.show, shares)))
+            quantiles = np.quantile(known, [0, 0.5, 1])
+            rows.append((quantity.label, *map(quantity.show, quantiles)))
         return rows
 
     def to_xarray(self) -> xr.Dataset:

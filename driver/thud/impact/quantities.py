@@ -1,4 +1,4 @@
-"""The table of quantities with levels, and what each kind of result takes of it."""
+"""The table of quantities with levels, and the quantities of each kind of result."""
 
 from thud.base._schema import QUANTITIES, SAMPLE_QUANTITIES
 from thud.base.quantity import Quantity
@@ -39,7 +39,7 @@ SAMPLE_RESULTS = {
     "status": _number("status", "0: computed; otherwise the exit code of the error"),
     "reason": _number("reason", "why there are no results"),
 }
-# What drops on a floor have in addition, levels of the contact force apart.
+# Additional results of drops on a floor, other than levels of the contact force.
 FLOOR_QUANTITIES = {
     "floor_work": QUANTITIES["floor_work"],
     ROOM_LEVEL: Quantity(

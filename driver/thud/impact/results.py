@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 f90nml.scanner.print = lambda *_: None
 
 # Columns of every history, by the names of an impact; components follow the first three.
-_OWN = {
+_COLUMNS = {
     "time": "time_s",
     "deflection": "deflection_m",
     "velocity": "velocity_m_per_s",
@@ -73,8 +73,8 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
     except FileNotFoundError as error:
         refuse(f"{error.filename}: there is no such file", "the results of an impact", error)
     except Exception as error:  # noqa: BLE001 - parsers of damaged files raise anything
-        said = f"{type(error).__name__}: {error}".partition("\n")[0]
-        refuse(f"{directory}: cannot be read ({said})", "the results of an impact", error)
+        reason = f"{type(error).__name__}: {error}".partition("\n")[0]
+        refuse(f"{directory}: cannot be read ({reason})", "the results of an impact", error)
 
 
 class _Files:
@@ -137,13 +137,13 @@ def _read_history(
 ) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:
     """Return what the files of a history hold, and further columns of its forces."""
     force = _table(files.read(f"{prefix}force.csv"))
-    further = f"{prefix}model_histories.csv"
-    histories = _table(files.read(further)) if further in files else {}
+    file_name = f"{prefix}model_histories.csv"
+    histories = _table(files.read(file_name)) if file_name in files else {}
     # Parts of the force stand before the whole one, further columns behind.
     columns = list(force)
     last = columns.index("floor_force_N")
     history = {
-        **{name: force[column] for name, column in _OWN.items()},
+        **{name: force[column] for name, column in _COLUMNS.items()},
         "components": {
             name[: -len("_N")]: force[name] for name in columns[len(_MOTION) : last - 1]
         },
@@ -174,20 +174,20 @@ def _read_motion(files: _Files, prefix: str) -> Motion:
     """Return the snapshots of ``snapshots.xmf``."""
     text = files.read(f"{prefix}snapshots.xmf")
     _, *grids = ET.fromstring(text).iter("Grid")  # noqa: S314 - expat limits entities
-    shots = [_read_grid(grid) for grid in grids]
+    snapshots = [_read_grid(grid) for grid in grids]
     # The first element has its first two nodes on neighboring rings.
-    line = int(shots[0]["Topology"][0, 1])
-    size = (len(shots[0]["Geometry"]) // line, line)
+    stride = int(snapshots[0]["Topology"][0, 1])
+    size = (len(snapshots[0]["Geometry"]) // stride, stride)
     plane = {
-        name: np.stack([shot[name].reshape(*size, 3)[..., :2].swapaxes(0, 1) for shot in shots])
+        name: np.stack([grid[name].reshape(*size, 3)[..., :2].swapaxes(0, 1) for grid in snapshots])
         for name in ("Geometry", "displacement", "velocity")
     }
     outer = {
-        name: np.stack([shot[name].reshape(size)[-1] for shot in shots])
+        name: np.stack([grid[name].reshape(size)[-1] for grid in snapshots])
         for name in ("contact_pressure", "contact_shear")
     }
     first = {
-        name: np.array([shot[name].flat[0] for shot in shots])
+        name: np.array([grid[name].flat[0] for grid in snapshots])
         for name in ("Time", "cavity_pressure", "floor_displacement")
     }
     return Motion(
@@ -204,10 +204,10 @@ def _read_motion(files: _Files, prefix: str) -> Motion:
 
 def _read_grid(grid: ET.Element) -> dict[str, NDArray[np.float64]]:
     """Return the arrays of a grid as thud writes it."""
-    time, *parts = grid
+    time, *elements = grid
     arrays = {"Time": np.array(float(time.attrib["Value"]))}
-    for part in parts:
-        extents = [int(extent) for extent in part[0].attrib["Dimensions"].split()]
-        values = np.array((part[0].text or "").split(), dtype=np.float64)
-        arrays[part.attrib.get("Name", part.tag)] = values.reshape(extents)
+    for element in elements:
+        extents = [int(extent) for extent in element[0].attrib["Dimensions"].split()]
+        values = np.array((element[0].text or "").split(), dtype=np.float64)
+        arrays[element.attrib.get("Name", element.tag)] = values.reshape(extents)
     return arrays

@@ -1,4 +1,4 @@
-"""What every impact offers, computed by a model or recorded."""
+"""Interface of every impact, computed by a model or recorded."""
 
 from __future__ import annotations
 
@@ -68,8 +68,8 @@ class DropForce(Immutable):
 class ImpactResult(Protocol):
     """Result of a drop: an `Impact` of a model, or a `Recording` of one or more drops.
 
-    A recording gives the force of its first drop, and averages over its drops of all else. It knows
-    the force on the floor only, whatever `force` asks for.
+    A recording has the force of its first drop, and averages over its drops of all else. Its force
+    is that on the floor, whatever `force` is.
     """
 
     @property
@@ -130,7 +130,7 @@ class ImpactResult(Protocol):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What may be wrong, a sentence each."""
+        """Possible faults, a sentence each."""
 
     @property
     def on_floor(self) -> FloorImpact | None:

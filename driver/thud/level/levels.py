@@ -119,8 +119,7 @@ def force_exposure_levels(
     record = _record(force)
     rate = to_float("sample_rate", sample_rate)
     answer = ask("levels", force=record, sample_rate=rate, bands=bands, method=method)
-    levels: NDArray[np.float64] = answer["levels"]
-    return levels
+    return np.asarray(answer["levels"])
 
 
 def low_pass(
@@ -130,9 +129,8 @@ def low_pass(
 
     Forces, N, have the shape (n_sample,) and start and end at zero; rate and cutoff are in Hz.
     """
-    low: NDArray[np.float64]
-    low = ask("low_pass", force=force, sample_rate=sample_rate, cutoff=cutoff)["force"]
-    return low
+    answer = ask("low_pass", force=force, sample_rate=sample_rate, cutoff=cutoff)
+    return np.asarray(answer["force"])
 
 
 def peak_count(force: ArrayLike, sample_rate: float) -> int:

@@ -72,7 +72,7 @@ class Rating(Displayed):
 
 
 def rated_bands(bands: BandSet) -> NDArray[np.float64]:
-    """Return the rounded mid frequencies of the bands that a rating is made of, Hz.
+    """Return the rounded mid frequencies of the rated bands, Hz.
 
     Raise InputError where `bands` is not known.
     """
@@ -162,11 +162,10 @@ def standardized_level(
         )
     if (times <= 0).any():
         refuse_value("reverberation_time", float(times.min()), "reverberation_time > 0, s")
-    standardized: NDArray[np.float64]
-    standardized = ask(
+    answer = ask(
         "standardization", levels=values, reverberation_time=times, volume=require_volume(volume)
-    )["levels"]
-    return standardized
+    )
+    return np.asarray(answer["levels"])
 
 
 def require_volume(volume: Any) -> float:  # noqa: ANN401 - of a user

@@ -28,7 +28,7 @@ AMPLITUDE_DECIBEL = 20 / math.log(10)
 # Prominence of a counted peak over the peak force, and its minimum in standard deviations of the
 # noise.
 PROMINENCE = 0.1
-CLEAR_PEAK = 6.0
+MIN_PROMINENCE = 6.0
 # Quantities of drops, besides levels, that are searched for outliers: attribute, title and unit.
 SEARCHED = (
     ("contact_time", "contact time, ms,", 1e-3),
@@ -68,20 +68,20 @@ def level_estimates(
     correction of the force plate is in dB, shape (n_band,), zero if not stated.
     """
     count = len(levels.names)
-    parts = dict(levels.contributions)
+    contributions = dict(levels.contributions)
     if calibration is not None:
-        parts["calibration"] = np.full(len(levels.level), AMPLITUDE_DECIBEL * calibration)
+        contributions["calibration"] = np.full(len(levels.level), AMPLITUDE_DECIBEL * calibration)
     if plate is not None and plate.any():
-        parts["plate"] = plate
+        contributions["plate"] = plate
     budgets = (
         [
             Contribution(
                 name,
-                float(part[band]),
+                float(values[band]),
                 count - 1 if name == "repeatability" else math.inf,
                 counted=count == 1 or name not in WITHIN_REPEATABILITY,
             )
-            for name, part in parts.items()
+            for name, values in contributions.items()
         ]
         for band in range(len(levels.level))
     )
@@ -217,5 +217,5 @@ def _count_peaks(drop: Drop) -> float:
     count = peak_count(force, drop.sample_rate)
     # Noise slower than the contact tilts the pulse without adding peaks.
     noise = drop.noise.deviation_between(1 / drop.contact_time.value, RECORDED_BAND)
-    clear = PROMINENCE * drop.peak_force.value >= CLEAR_PEAK * noise
+    clear = PROMINENCE * drop.peak_force.value >= MIN_PROMINENCE * noise
     return float(count) if clear or count == 1 else math.nan

@@ -82,19 +82,20 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
             f"calibrate(): {newtons:g} N with a relative uncertainty of {uncertainty:g}",
             "a positive force, 0 <= uncertainty < 1",
         )
-    name, word, samples, count = _source(record, channel, unit)
+    name, symbol, samples, count = _source(record, channel, unit)
     steps = _steps(_means(samples, count), name)
     size, deviation = _mean(steps)
     if deviation > MAX_UNCERTAINTY * size:
         refuse(
-            f"{name}: the step is {size:.4g} {word} with an uncertainty of {deviation:.2g} {word}",
+            f"{name}: the step is {size:.4g} {symbol} with an uncertainty of {deviation:.2g} "
+            f"{symbol}",
             f"an uncertainty up to {MAX_UNCERTAINTY:.0%}",
         )
-    known = f"{newtons:.6g} N" if mass is None else f"{mass:g} kg"
+    load = f"{newtons:.6g} N" if mass is None else f"{mass:g} kg"
     return Calibration(
-        f"{newtons / size!r} N/{word}",
+        f"{newtons / size!r} N/{symbol}",
         math.hypot(deviation / size, uncertainty),
-        f"{len(steps)} step{'s' * (len(steps) > 1)} of {known} in {name}",
+        f"{len(steps)} step{'s' * (len(steps) > 1)} of {load} in {name}",
     )
 
 
@@ -111,10 +112,10 @@ def _source(
     if len(channels) != 1:
         refuse(f"{shown_path(path)}: {len(channels)} channels fit", "channel = one of them")
     selected = channels[0]
-    word = find_unit(selected.unit) if unit is None else require_unit(unit, path.name)
-    if not word:
+    symbol = find_unit(selected.unit) if unit is None else require_unit(unit, path.name)
+    if not symbol:
         refuse(f"{shown_path(path)}: the values are without a unit", f"unit = one of {ALLOWED}")
-    return shown_path(path), word, selected.samples, selected.n_sample
+    return shown_path(path), symbol, selected.samples, selected.n_sample
 
 
 def _means(samples: Callable[[int, int], NDArray[np.float64]], count: int) -> NDArray[np.float64]:
@@ -151,10 +152,10 @@ def _steps(level: NDArray[np.float64], name: str) -> list[tuple[float, float]]:
         )
     steps = []
     for before, edge, after in zip(edges, edges[1:], edges[2:], strict=False):
-        (left, u_left), (right, u_right) = (
+        (level_before, u_before), (level_after, u_after) = (
             _level_at(level, *span, edge) for span in ((before, edge), (edge, after))
         )
-        steps.append((abs(right - left), math.hypot(u_left, u_right)))
+        steps.append((abs(level_after - level_before), math.hypot(u_before, u_after)))
     return steps
 
 
@@ -175,6 +176,6 @@ def _mean(steps: list[tuple[float, float]]) -> tuple[float, float]:
     """Return the mean of steps and its standard uncertainty."""
     sizes, deviations = np.array(steps).T
     count = len(sizes)
-    own = math.sqrt(float(deviations @ deviations)) / count
+    within = math.sqrt(float(deviations @ deviations)) / count
     scatter = float(sizes.std(ddof=1)) / math.sqrt(count) if count > 1 else 0.0
-    return float(sizes.mean()), max(own, scatter)
+    return float(sizes.mean()), max(within, scatter)

@@ -1,4 +1,4 @@
-"""One channel as a file holds it, before it becomes a force."""
+"""One channel of a file in its own unit, before the conversion to a force."""
 
 from __future__ import annotations
 

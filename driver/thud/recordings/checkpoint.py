@@ -135,7 +135,7 @@ class _DataOnly(pickle.Unpickler):
     """Reads dataclasses of thud and arrays, and calls nothing else."""
 
     def find_class(self, module: str, name: str) -> Any:  # noqa: ANN401 - a class
-        """Return a class; raise UnpicklingError of what is no data."""
+        """Return a class; raise UnpicklingError for any other than those of data."""
         result = super().find_class(module, name) if module in sys.modules else None
         ours = module.startswith("thud.") and dataclasses.is_dataclass(result)
         if not ours and not (module.partition(".")[0] == "numpy" and name in NUMPY):

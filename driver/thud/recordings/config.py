@@ -253,10 +253,7 @@ class Config:
 def read_config(path: str | os.PathLike[str]) -> Config:
     """Read a configuration.
 
-    Raises
-    ------
-    InputError
-        Names the file and the key that is unknown, of another kind or out of range.
+    Raise InputError with the file and the key that is unknown, of another kind or out of range.
     """
     file = regular_file(path)
     name = shown_path(file)

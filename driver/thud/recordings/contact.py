@@ -156,9 +156,9 @@ class Edges:
     limits: tuple[int, int]
 
 
-def find_edges(window: Window, known: Background | None = None) -> tuple[Estimate, Estimate]:
+def find_edges(window: Window, noise: Background | None = None) -> tuple[Estimate, Estimate]:
     """Return begin and end of a contact within about 0.1 ms, s from the first sample."""
-    edges = find_posteriors(window, window.force, known, passes=1)
+    edges = find_posteriors(window, window.force, noise, passes=1)
     (t0, s0), (t1, s1) = edges.touch.edge()[1], edges.release.edge()[1]
     return Estimate(t0, s0), Estimate(-t1, s1)
 
@@ -168,7 +168,7 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
     rate, contact = window.sample_rate, window.contact
     middle = (contact[0] + contact[1]) / 2 / rate
     edges = find_posteriors(window, force, None, passes=2)
-    background, (left, right) = edges.background, edges.limits
+    background, (before_stop, after_start) = edges.background, edges.limits
     (t0, s0), begin = edges.touch.edge()
     (t1, s1), end = edges.release.edge()
     t1 = -t1
@@ -198,54 +198,57 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
         removed,
         gate,
         covariance,
-        (left / rate, (len(force) - right) / rate),
+        (before_stop / rate, (len(force) - after_start) / rate),
         background,
         rate,
     )
 
 
 def find_posteriors(
-    window: Window, force: NDArray[np.float64], known: Background | None, passes: int
+    window: Window, force: NDArray[np.float64], noise: Background | None, passes: int
 ) -> Edges:
-    """Return the edges of a contact; the second pass knows where the background ends.
+    """Return the edges of a contact; the second pass starts from the background found by the first.
 
     Noise that is known from another part of the signal is not fitted again.
     """
     rate, (first, stop) = window.sample_rate, window.contact
     middle = (first + stop) / 2 / rate
     # Half of a short background is kept.
-    left = int(max(first - MARGIN * rate, first / 2))
-    right = int(min(stop + MARGIN * rate, (stop + len(force)) / 2))
-    touch = (left / rate, first / rate + MARGIN)
-    release = (stop / rate - MARGIN, right / rate)
-    offset = float(np.median(np.concatenate([force[:left], force[right:]])))
+    before_stop = int(max(first - MARGIN * rate, first / 2))
+    after_start = int(min(stop + MARGIN * rate, (stop + len(force)) / 2))
+    touch = (before_stop / rate, first / rate + MARGIN)
+    release = (stop / rate - MARGIN, after_start / rate)
+    offset = float(np.median(np.concatenate([force[:before_stop], force[after_start:]])))
     force = force - offset
     width = max(1, round(rate / RECORDED_BAND))
     peak = float(uniform_filter1d(force[first:stop], width).max())
-    for last in range(passes):
+    for pass_index in range(passes):
         # The first of two passes needs the coarse grid only.
-        searches = 1 + 2 * last if passes > 1 else 2
-        cells, mean = background_means(force, left, right, rate, middle)
-        if known is None:
-            known = fit_background(cells, mean, peak)
-        background = Background(cells, mean, known.draws, peak)
-        likely = Background(cells, mean, known.variances[None], peak)
+        searches = 1 + 2 * pass_index if passes > 1 else 2
+        cells, mean = background_means(force, before_stop, after_start, rate, middle)
+        if noise is None:
+            noise = fit_background(cells, mean, peak)
+        background = Background(cells, mean, noise.draws, peak)
+        fixed = Background(cells, mean, noise.variances[None], peak)
         posteriors = []
-        for sign, near, at, bounds in ((1, left, first, touch), (-1, right, stop, release)):
+        for sign, near, at, bounds in (
+            (1, before_stop, first, touch),
+            (-1, after_start, stop, release),
+        ):
             ahead = bounds if sign > 0 else (-bounds[1], -bounds[0])
             end = min(ahead[1], sign * at / rate + MAX_DELAY) + FLANK
-            edges = sign * flank_edges(sign * near, ahead, end, rate, fine=last > 0)
+            edges = sign * flank_edges(sign * near, ahead, end, rate, fine=pass_index > 0)
             posteriors.append(
-                find_edge(force, edges, ahead, likely, rate, middle, searches, window.plate)
+                find_edge(force, edges, ahead, fixed, rate, middle, searches, window.plate)
             )
-        if last + 1 < passes:
+        if pass_index + 1 < passes:
             touch, back = (_reach(posterior.edge(), 3 / rate + 1e-4) for posterior in posteriors)
             release = (-back[1], -back[0])
             # Samples that a filter affects are no background.
             beyond = _spread(rate, window.plate)
-            left = max(int(touch[0] * rate) - beyond, first // 2)
-            right = min(int(release[1] * rate) + 1 + beyond, (stop + len(force) + 1) // 2)
-    return Edges(posteriors[0], posteriors[1], background, offset, (left, right))
+            before_stop = max(int(touch[0] * rate) - beyond, first // 2)
+            after_start = min(int(release[1] * rate) + 1 + beyond, (stop + len(force) + 1) // 2)
+    return Edges(posteriors[0], posteriors[1], background, offset, (before_stop, after_start))
 
 
 def _reach(
@@ -263,12 +266,12 @@ def uniform_edges(start: int, stop: int, rate: float) -> NDArray[np.intp]:
 
 
 def background_means(
-    force: NDArray[np.float64], left: int, right: int, rate: float, middle: float
+    force: NDArray[np.float64], before_stop: int, after_start: int, rate: float, middle: float
 ) -> tuple[Cells, NDArray[np.float64]]:
     """Return the background cells on both sides of a contact, and their mean forces, N."""
     both = (
-        left - _background_edges(left, rate)[::-1],
-        right + _background_edges(len(force) - right, rate),
+        before_stop - _background_edges(before_stop, rate)[::-1],
+        after_start + _background_edges(len(force) - after_start, rate),
     )
     begins, ends = zip(*(cells_between(edges, rate, middle) for edges in both), strict=True)
     mean = [_means(force, edges) for edges in both if len(edges) > 1]

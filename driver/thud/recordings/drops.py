@@ -36,7 +36,7 @@ FOOT = 0.2
 MARGIN = 2
 # Background next to a pulse: distance from half its height, and length, in cells.
 DISTANCE = 6
-BESIDE = 20
+LENGTH = 20
 # Maximum number of cells between two components of one pulse.
 MAX_GAP = 4
 # Minimum height of a pulse over the highest one of a signal.
@@ -135,21 +135,21 @@ def _pieces(signal: Signal, *, progress: bool) -> Iterator[tuple[int, NDArray[np
     )  # fmt: skip
     block = 4_096 * width
     ready = 0
-    parts: list[NDArray[np.float64]] = []
+    means: list[NDArray[np.float64]] = []
     for start in range(0, signal.n_sample, block):
         stop = min(start + block, signal.n_sample)
         force = signal.read(start, stop)
-        whole = len(force) // width * width
-        parts.append(force[:whole].reshape(-1, width).mean(1))
-        if whole < len(force):
-            parts.append(force[whole:].mean(keepdims=True))
-        ready += len(parts[-1]) if whole == len(force) else len(parts[-1]) + len(parts[-2])
+        complete = len(force) // width * width
+        means.append(force[:complete].reshape(-1, width).mean(1))
+        if complete < len(force):
+            means.append(force[complete:].mean(keepdims=True))
+        ready += len(means[-1]) if complete == len(force) else len(means[-1]) + len(means[-2])
         bar.update(stop - start)
         if ready + len(cells) >= PIECE or stop == signal.n_sample:
-            cells = np.concatenate([cells, *parts])
+            cells = np.concatenate([cells, *means])
             yield first * width, cells
             first += max(len(cells) - OVERLAP, 0)
-            cells, parts, ready = cells[-OVERLAP:], [], 0
+            cells, means, ready = cells[-OVERLAP:], [], 0
     bar.close()
 
 
@@ -192,8 +192,8 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]
             continue
         # Background next to the pulse, which slow noise moves away from that of a second.
         ahead, after = (
-            level[max(free, low - BESIDE) : low - DISTANCE],
-            level[high + DISTANCE :][:BESIDE],
+            level[max(free, low - LENGTH) : low - DISTANCE],
+            level[high + DISTANCE :][:LENGTH],
         )
         beside = [np.quantile(side, 0.4) if side.size else 0.0 for side in (ahead, after)]
         fraction = np.clip((np.arange(len(level)) - low) / max(high - low, 1), 0, 1)

@@ -22,18 +22,18 @@ MIN_SAMPLES = 4
 MIN_CLIPPED = 4
 MIN_FALL = 12.0
 # Fraction of the full scale from which a sample is clipped.
-FULL = 0.999
+CLIPPED_FRACTION = 0.999
 # Minimum jump into or out of equal samples of a dropout, over the peak force: no flank rises by
 # this much between two samples of 20 kHz.
 MIN_JUMP = 0.04
 # Minimum number of equal samples of a dropout.
-MIN_HELD = 3
+MIN_FROZEN = 3
 # Maximum total length of dropouts that are repaired, s.
 MAX_REPAIRED = 1e-3
 
 
 def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
-    """Return the force with its dropouts filled, what was done, and warnings.
+    """Return the force with its dropouts filled, notes, and warnings.
 
     Raise InputError where the pulse is cut, clipped, doubled or has long dropouts.
     """
@@ -65,10 +65,10 @@ def _runs(force: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp
     return starts, np.diff(np.append(starts, len(force)))
 
 
-def _refuse_clipped(window: Window, whole: NDArray[np.float64]) -> None:
+def _refuse_clipped(window: Window, record: NDArray[np.float64]) -> None:
     """Raise InputError where the top of the pulse is flat."""
     first, stop = window.contact
-    force = whole[first:stop]
+    force = record[first:stop]
     starts, lengths = _runs(force)
     top = force.max()
     at_top = force[starts] == top
@@ -80,7 +80,7 @@ def _refuse_clipped(window: Window, whole: NDArray[np.float64]) -> None:
     beside = [force[max(start - half, 0)], force[min(start + length - 1 + half, len(force) - 1)]]
     clipped = length >= MIN_CLIPPED and top - max(beside) > MIN_FALL * step
     if window.signal.full_scale is not None:
-        at_scale = np.count_nonzero(force >= FULL * window.signal.full_scale)
+        at_scale = np.count_nonzero(force >= CLIPPED_FRACTION * window.signal.full_scale)
         clipped, length = clipped or at_scale > 1, max(length, int(at_scale))
     if clipped:
         refuse(
@@ -93,7 +93,7 @@ def _refuse_clipped(window: Window, whole: NDArray[np.float64]) -> None:
 def _fill(
     window: Window, force: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
-    """Return the force with dropouts filled from both sides, what was done, and warnings."""
+    """Return the force with dropouts filled from both sides, notes, and warnings."""
     first, stop = window.contact
     rate = window.sample_rate
     guard = int(MIN_BACKGROUND * rate)
@@ -101,17 +101,17 @@ def _fill(
     level = force - np.median(
         np.concatenate([force[: window.contact[0]], force[window.contact[1] :]])
     )
-    part = level[first:stop]
-    if not part.size:
+    pulse = level[first:stop]
+    if not pulse.size:
         return force, (), ()
-    starts, lengths = _runs(part)
-    before = np.abs(part[starts] - part[np.maximum(starts - 1, 0)])
+    starts, lengths = _runs(pulse)
+    before = np.abs(pulse[starts] - pulse[np.maximum(starts - 1, 0)])
     ends = starts + lengths - 1
-    after = np.abs(part[np.minimum(ends + 1, len(part) - 1)] - part[ends])
-    limit = MIN_JUMP * part.max()
+    after = np.abs(pulse[np.minimum(ends + 1, len(pulse) - 1)] - pulse[ends])
+    limit = MIN_JUMP * pulse.max()
     zero = (force[first:stop][starts] == 0) & (before > limit) & (after > limit)
-    held = (lengths >= MIN_HELD) & ((before > limit) | (after > limit))
-    lost = np.flatnonzero(zero | held)
+    frozen = (lengths >= MIN_FROZEN) & ((before > limit) | (after > limit))
+    lost = np.flatnonzero(zero | frozen)
     total = int(lengths[lost].sum())
     if not total:
         return force, (), ()

@@ -25,7 +25,7 @@ ORDER = 3
 MIN_RATIO = 4.0
 # Maximum fraction of the energy of a filter that the padding cuts off: 4e-7 dB if the band holds as
 # much energy as the transient of the filter.
-CUT = 1e-7
+MAX_CUT = 1e-7
 # Order of the Butterworth low-pass, which runs forwards and backwards.
 LOW_PASS_ORDER = 6
 # Energy that each run removes at the band edge over what it leaves: together they leave a half.
@@ -100,7 +100,7 @@ def _filters(bands: BandSet, sample_rate: float) -> tuple[NDArray[np.float64], N
         sections[band] = zpk2sos(zeros, poles, gain)
         radius = np.abs(poles).max()
         # The energy of the ringing decays at least as radius**(2 n).
-        ringing[band] = math.ceil(math.log(CUT) / (2 * math.log(radius)))
+        ringing[band] = math.ceil(math.log(MAX_CUT) / (2 * math.log(radius)))
     return sections, ringing
 
 

@@ -240,8 +240,8 @@ def _evidence(
     n_time, n_cell, n_column = columns.shape
     flat = np.moveaxis(columns, 1, 0).reshape(n_cell, -1)
     white = (inverse @ flat).reshape(n_cell, n_time, n_column).transpose(1, 2, 0)
-    turns = TURNS[kinds, None]
-    information = turns.swapaxes(2, 3) @ (white @ white.swapaxes(1, 2)) @ turns
+    transforms = TRANSFORMS[kinds, None]
+    information = transforms.swapaxes(2, 3) @ (white @ white.swapaxes(1, 2)) @ transforms
     shapes = np.arange(n_column - 1)
     information[..., shapes, shapes] += 1
     factors = np.asarray(np.linalg.cholesky(information), dtype=np.float64)
@@ -324,8 +324,8 @@ SPREADS = np.array([_spread(kind) for kind in KINDS])
 MEANS = np.zeros_like(SPREADS)
 MEANS[:, N_JUMP : N_JUMP + N_MEAN] = [kind.mean for kind in KINDS]
 # From shapes and force to shapes of unit deviation and the force minus its mean, by kind.
-TURNS = np.zeros((len(KINDS), SPREADS.shape[1] + 1, SPREADS.shape[1] + 1))
-TURNS[:, np.arange(SPREADS.shape[1]), np.arange(SPREADS.shape[1])] = SPREADS
-TURNS[:, :-1, -1] = -MEANS
-TURNS[:, -1, -1] = 1
+TRANSFORMS = np.zeros((len(KINDS), SPREADS.shape[1] + 1, SPREADS.shape[1] + 1))
+TRANSFORMS[:, np.arange(SPREADS.shape[1]), np.arange(SPREADS.shape[1])] = SPREADS
+TRANSFORMS[:, :-1, -1] = -MEANS
+TRANSFORMS[:, -1, -1] = 1
 PATHS = _paths()

@@ -69,11 +69,9 @@ class Calibration:
     def __post_init__(self) -> None:
         """Raise InputError where the chain or the uncertainty are not allowed."""
         read_chain(self.chain)
-        if self.uncertainty is None:
-            return
-        number = isinstance(self.uncertainty, int | float)
-        if not number or not 0 <= self.uncertainty < 1:
-            refuse(f"calibration: uncertainty = {self.uncertainty!r}", "0 <= uncertainty < 1")
+        value = self.uncertainty
+        if value is not None and not (isinstance(value, int | float) and 0 <= value < 1):
+            refuse(f"calibration: uncertainty = {value!r}", "0 <= uncertainty < 1")
 
 
 def find_unit(text: str) -> str:
@@ -82,8 +80,8 @@ def find_unit(text: str) -> str:
     >>> find_unit("Newtons"), find_unit("mmHg")
     ('N', '')
     """
-    word = text.strip()
-    return word if word in UNITS else SPELLINGS.get(word.casefold(), "")
+    name = text.strip()
+    return name if name in UNITS else SPELLINGS.get(name.casefold(), "")
 
 
 def require_unit(text: object, label: str) -> str:
@@ -133,28 +131,28 @@ def newtons_per_unit(
     base, multiple = UNITS.get(unit, ("", 1.0))
     if calibration is None:
         if base != "N":
-            words = {"FS": "full-scale values"}.get(unit, f"values in {unit}")
-            refuse(f"{label}: enter a calibration: the file holds {words}", EXAMPLES)
+            description = {"FS": "full-scale values"}.get(unit, f"values in {unit}")
+            refuse(f"{label}: enter a calibration: the file holds {description}", EXAMPLES)
         return multiple, f"values in {unit}", None
     if isinstance(calibration, int | float | np.number) and not isinstance(calibration, bool):
         if not SIZES[0] < abs(calibration) < SIZES[1]:
             refuse_value(f"{label}: calibration", calibration, EXAMPLES)
         return float(calibration), f"{calibration:.6g} N per {unit or 'recorded value'}", None
-    known = calibration if isinstance(calibration, Calibration) else Calibration(str(calibration))
-    factors = read_chain(known.chain)
+    stated = calibration if isinstance(calibration, Calibration) else Calibration(str(calibration))
+    factors = read_chain(stated.chain)
     scale = Factor(counts, "counts", "FS") if counts else None
     size = _follow(base, factors, scale)
     if size is None:
         refuse(
-            f"{label}: calibration {known.chain!r} does not lead from {unit} to N by all its "
+            f"{label}: calibration {stated.chain!r} does not lead from {unit} to N by all its "
             "factors",
             EXAMPLES,
         )
     value = size * multiple
     if not math.isfinite(value) or not SIZES[0] < abs(value) < SIZES[1]:
-        refuse(f"{label}: calibration {known.chain!r} gives {value:g} N per {unit}", EXAMPLES)
-    words = f"{known.chain}: {value:.6g} N per {unit}" + (f" ({known.origin})" * bool(known.origin))
-    return value, words, known.uncertainty
+        refuse(f"{label}: calibration {stated.chain!r} gives {value:g} N per {unit}", EXAMPLES)
+    origin = f" ({stated.origin})" if stated.origin else ""
+    return value, f"{stated.chain}: {value:.6g} N per {unit}{origin}", stated.uncertainty
 
 
 def _follow(unit: str, factors: list[Factor], scale: Factor | None) -> float | None:
@@ -165,6 +163,6 @@ def _follow(unit: str, factors: list[Factor], scale: Factor | None) -> float | N
         others = factors[:i] + factors[i + 1 :]
         # An amplifier, 10 V/V, is inverted.
         for start, end, step in ((top, bottom, 1 / value), (bottom, top, value)):
-            if start == unit and (rest := _follow(end, others, scale)) is not None:
-                return step * rest
+            if start == unit and (remainder := _follow(end, others, scale)) is not None:
+                return step * remainder
     return _follow(unit, [*factors, scale], None) if scale else None

@@ -112,14 +112,14 @@ def find_rate(items: Iterable[tuple[str, object]], decimal: str = "") -> float |
     """
     for title, value in items:
         name, unit = split_title(title)
-        word = plain(name)
-        number = read_number(value, decimal) if word in RATE or word in STEP else None
+        alias = plain(name)
+        number = read_number(value, decimal) if alias in RATE or alias in STEP else None
         if number is None or not number[0] > 0:
             continue
         own_unit = (number[1] or unit).casefold()
-        if word in RATE and own_unit in RATE_UNITS:
+        if alias in RATE and own_unit in RATE_UNITS:
             return number[0] * RATE_UNITS[own_unit]
-        if word in STEP and own_unit in TIME_UNITS:
+        if alias in STEP and own_unit in TIME_UNITS:
             rate = 1 / (number[0] * TIME_UNITS[own_unit])
             return rate if math.isfinite(rate) else None
     return None

@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     from thud.recordings.measured_drop import Drop
     from thud.recordings.signal import Signal
 
-# Drops, and seconds of a signal, from which processes pay off, which take a second to start.
+# Minimum drops, and minimum duration of a signal, s, for processes, which take a second to start.
 MIN_FOR_POOL = 40
-LONG = 600.0
+MIN_DURATION = 600.0
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def measure_signals(
             if config.calibration_uncertainty is not None:
                 signal = replace(signal, calibration_uncertainty=config.calibration_uncertainty)  # noqa: PLW2901
             # Processes start while the signal is searched.
-            if signal.path and signal.n_sample > LONG * signal.sample_rate:
+            if signal.path and signal.n_sample > MIN_DURATION * signal.sample_rate:
                 processes.start()
             windows = find_windows(signal, progress=progress)
             drops += _measure(windows, config, stored, processes, progress=progress)
@@ -152,7 +152,7 @@ class _Processes(ExitStack):
         calls = deque(self._pool.submit(call, window) for window in windows)
         try:
             while calls:
-                # A result that was taken is not held twice.
+                # A yielded result is not kept in the queue as well.
                 yield calls.popleft().result()
         except BrokenExecutor as error:
             message = (
@@ -172,7 +172,7 @@ def measure_window(window: Window, config: Config) -> Drop:
     if plate is not None:
         window, steps, warnings = correct_window(window, plate)
     drop = measure_drop(window, config.conditions(window.signal.calibration_uncertainty))
-    # The cached factors of the background serve the fit only and need much memory.
+    # A copy without the cached factors of the background, which only the fit needs.
     contact = replace(drop.contact, background=replace(drop.contact.background))
     return replace(
         drop,

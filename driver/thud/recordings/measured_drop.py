@@ -34,15 +34,15 @@ SHORT_BACKGROUND = 0.005
 # Edges of the octave of 500 Hz, Hz; the fraction of the rate above which content folds back, and
 # the error that raises a warning, dB.
 OCTAVE_500 = (354.8, 707.9)
-TOP = 0.4
-NOTABLE_ERROR = 0.1
+ALIASED_FRACTION = 0.4
+MAX_ALIASING_ERROR = 0.1
 # Minimum contact time over its uncertainty.
 MIN_CONTACT_RATIO = 4.0
 # Ratio of flight and peak, each over that of the drop, beyond which a pulse is no bounce: the force
 # follows the velocity.
 MAX_BOUNCE_RATIO = 3.0
 # Standard deviations of a difference that is noted.
-NOTABLE = 3.0
+MIN_DEVIATIONS = 3.0
 # Quantities of the table that are estimated for each drop.
 ESTIMATES = ("contact_time", "restitution", "peak_force", "impulse", "effective_mass")
 
@@ -80,7 +80,7 @@ class Drop(Immutable):
         Times since the onset at which the measured bounces begin, s: one if the drop height is
         known, else up to two.
     steps, warnings : tuple of str
-        Processing of the signal, and what may be wrong, a sentence each.
+        Processing of the signal, and possible faults, a sentence each.
     contact : Contact
         Times, background and gate of the contact.
     """
@@ -108,8 +108,7 @@ class Drop(Immutable):
     @property
     def time(self) -> NDArray[np.float64]:
         """Time since first touch, s, shape (n,)."""
-        time: NDArray[np.float64] = self.begin + np.arange(len(self.force)) / self.sample_rate
-        return time
+        return np.asarray(self.begin + np.arange(len(self.force)) / self.sample_rate)
 
     def levels(
         self, bands: BandSet = "octave", method: str = "exact", *, low_pass: bool = False
@@ -256,10 +255,10 @@ def _removed(contact: Contact) -> tuple[str, ...]:
     offset = float(contact.removed[first:stop].mean())
     steps = [f"an offset of {offset:.3g} N was removed"]
     drift, deviation = contact.background.drift
-    if abs(drift) > NOTABLE * deviation:
+    if abs(drift) > MIN_DEVIATIONS * deviation:
         steps.append(f"a drift of {drift:.3g} N/s was removed")
     frequency, amplitude, deviation = contact.background.hum
-    if amplitude > NOTABLE * deviation:
+    if amplitude > MIN_DEVIATIONS * deviation:
         steps.append(f"hum of {frequency:g} Hz with an amplitude of {amplitude:.3g} N was removed")
     return tuple(steps)
 
@@ -276,11 +275,11 @@ def _check_aliasing(contact: Contact) -> tuple[str, ...]:
     frequency = np.fft.rfftfreq(len(force), 1 / rate)
     power = np.abs(np.fft.rfft(force)) ** 2
     noise = contact.background.variances[0] * rate / 2 * len(contact.gated)
-    own = power[(frequency > lower) & (frequency < upper)].mean()
-    top = max(power[frequency > TOP * rate].mean() - 3 * noise, 0.0)
+    octave_power = power[(frequency > lower) & (frequency < upper)].mean()
+    top = max(power[frequency > ALIASED_FRACTION * rate].mean() - 3 * noise, 0.0)
     folded = top * (0.45 * rate / (rate - upper)) ** 4
-    error = 20 * math.log10(1 + math.sqrt(folded / own))
-    if error < NOTABLE_ERROR:
+    error = 20 * math.log10(1 + math.sqrt(folded / octave_power))
+    if error < MAX_ALIASING_ERROR:
         return ()
     warning = (
         f"the force has content up to half the rate, {rate / 2:g} Hz: without a filter before "

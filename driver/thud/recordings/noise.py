@@ -27,18 +27,18 @@ N_HARMONIC = 5
 OFFSET = 1.0
 DRIFT = 0.1
 # Squared lag over mean squared length of two cells below which their covariance is exact.
-NEAR = 8.0
+EXACT_LAG = 8.0
 # Priors of the logarithms of the variances: these powers of the variance, up to a deviation of a
 # cell of this fraction of the peak force; falling beyond.
 SLOPE = np.array([0.5, 0.25, 1.0, 0.25, 0.25])
-LARGE = 0.03
+PRIOR_DEVIATION = 0.03
 # Standard deviation of each cell due to quantization, over the peak force.
 QUANTIZATION = 1e-6
 # Number of draws of the variances from their posterior, and number that is kept.
 N_DRAW = 64
-N_KEPT = 16
+N_RESAMPLED = 16
 # Degrees of freedom of the distribution of the draws.
-FREEDOM = 5
+DEGREES_OF_FREEDOM = 5
 # Maximum iterations for the maximum of the posterior, and the tolerance of its logarithm.
 MAX_ITERATIONS = 25
 TOLERANCE = 0.02
@@ -62,8 +62,7 @@ class Noise:
     def spectrum(self, frequency: ArrayLike) -> NDArray[np.float64]:
         """Return the one-sided spectral density, N2/Hz, at frequencies above 0 Hz."""
         f = np.asarray(frequency, dtype=np.float64)
-        density: NDArray[np.float64] = self.white + self.pink / f + self.brown / f**2
-        return density
+        return np.asarray(self.white + self.pink / f + self.brown / f**2)
 
     def deviation_between(self, lower: float, upper: float) -> float:
         """Return the standard deviation of the noise between two frequencies, N."""
@@ -76,7 +75,7 @@ class Noise:
 
 
 def noise_covariances(cells: Cells, other: Cells) -> NDArray[np.float64]:
-    """Return covariances of means over cells that are equal or apart: [4, n_one, n_other].
+    """Return covariances of means over cells that are equal or disjoint: [4, n_cell, n_other].
 
     Of pink and brown noise of density 1 at 1 Hz and of hum of 50 and 60 Hz of variance 1. The
     covariances at a lag are -ln|lag| and -pi2 |lag|, up to a constant that the unknown offset
@@ -85,7 +84,7 @@ def noise_covariances(cells: Cells, other: Cells) -> NDArray[np.float64]:
     (a, b), (c, d) = cells, other
     lag = np.abs(((a + b) / 2)[:, None] - (c + d) / 2)
     width = (((b - a) ** 2)[:, None] + (d - c) ** 2) / 2
-    near = np.nonzero(lag**2 < NEAR * width)
+    near = np.nonzero(lag**2 < EXACT_LAG * width)
     lag[near] = 1.0
     pink = width / (12 * lag**2) - np.log(lag)
     brown = -(np.pi**2) * lag
@@ -186,9 +185,9 @@ class Background(Immutable):
         """Drift, N/s, and its standard deviation."""
         prior = (self.peak * DRIFT) ** 2
         middle = (self.cells[0] + self.cells[1]) / 2
-        known = [float(np.sum(_solve_lower(factor, middle) ** 2)) for factor in self._factors]
+        information = [float(np.sum(_solve_lower(factor, middle) ** 2)) for factor in self._factors]
         values = prior * np.array([middle @ weights for weights in self._weights])
-        variance = max(prior - prior**2 * float(np.mean(known)), 0.0) + float(values.var())
+        variance = max(prior - prior**2 * float(np.mean(information)), 0.0) + float(values.var())
         return float(values.mean()), float(np.sqrt(variance))
 
     @property
@@ -232,7 +231,7 @@ def fit_background(cells: Cells, mean: NDArray[np.float64], peak: float) -> Back
     """
     unit = covariances(cells)
     scale = np.array([np.mean(np.diagonal(unit[0])), 1.0, np.pi**2 * 0.02, 1.0, 1.0])
-    posterior = _Posterior(unit, _fixed(cells, peak), mean, (LARGE * peak) ** 2 / scale)
+    posterior = _Posterior(unit, _fixed(cells, peak), mean, (PRIOR_DEVIATION * peak) ** 2 / scale)
     # Half the variance of fast changes.
     adjoining = cells[0][1:] - cells[1][:-1] < 1e-3 * (cells[1] - cells[0])[1:]
     changes = np.diff(mean)[adjoining]
@@ -301,14 +300,14 @@ class _Posterior:
     def draw(
         self, likely: NDArray[np.float64], curvature: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return draws from the posterior, [N_KEPT, 5], by importance resampling."""
+        """Return draws from the posterior, [N_RESAMPLED, 5], by importance resampling."""
         steps, logarithm = _student(len(likely))
         # Rows x with covariance inverse(curvature) = inverse(L)' inverse(L).
         lower = np.linalg.cholesky(curvature)
         phi = likely + solve_triangular(lower, steps.T, lower=True, trans="T").T
         weight = np.array([self.logarithm(draw) for draw in phi]) - logarithm
         weight = np.exp(weight - weight.max())
-        quantiles = (np.arange(N_KEPT) + 0.5) / N_KEPT * weight.sum()
+        quantiles = (np.arange(N_RESAMPLED) + 0.5) / N_RESAMPLED * weight.sum()
         return np.asarray(phi[np.searchsorted(weight.cumsum(), quantiles)])
 
 
@@ -317,6 +316,8 @@ def _student(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return draws of Student's distribution, [N_DRAW, count], and their logarithmic density."""
     points = qmc.Sobol(count + 1, seed=0).random(N_DRAW)
     normal = ndtri(points[:, :-1])
-    draws = normal / np.sqrt(chdtri(FREEDOM, points[:, -1:]) / FREEDOM)
-    logarithm = -(FREEDOM + count) / 2 * np.log1p((draws**2).sum(axis=1) / FREEDOM)
+    draws = normal / np.sqrt(chdtri(DEGREES_OF_FREEDOM, points[:, -1:]) / DEGREES_OF_FREEDOM)
+    logarithm = (
+        -(DEGREES_OF_FREEDOM + count) / 2 * np.log1p((draws**2).sum(axis=1) / DEGREES_OF_FREEDOM)
+    )
     return draws, logarithm

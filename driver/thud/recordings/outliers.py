@@ -60,7 +60,7 @@ def find_outliers(
     Values and their standard uncertainties have the shape (n_drop,).
     """
     data = np.asarray(values, dtype=np.float64)
-    own = np.zeros(data.shape) if uncertainty is None else np.nan_to_num(uncertainty)
+    uncertainties = np.zeros(data.shape) if uncertainty is None else np.nan_to_num(uncertainty)
     remaining = np.flatnonzero(np.isfinite(data))
     removed: list[Outlier] = []
     last = 0
@@ -79,6 +79,6 @@ def find_outliers(
         removed.append(Outlier(names[worst], quantity, float(data[worst]), score, critical))
         remaining = remaining[remaining != worst]
         # Rosner: all up to the last that exceeds its critical value are outliers.
-        if score > critical and distance > EXPANDED * own[worst]:
+        if score > critical and distance > EXPANDED * uncertainties[worst]:
             last = step + 1
     return tuple(removed[:last])

@@ -1,4 +1,4 @@
-"""The force plate: correction of its first resonance, and the demands of the standard."""
+"""The force plate: correction of its first resonance, and the requirements of the standard."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from thud.recordings.drops import Window
     from thud.recordings.signal import Signal
 
-# Demands of the standard on a force plate: flat between these frequencies, Hz, up to this force, N,
-# and linear within this relative tolerance, which is used for "flat" too.
+# Requirements of the standard on a force plate: flat between these frequencies, Hz, up to this
+# force, N, and linear within this relative tolerance, which is used for "flat" too.
 FLAT = (0.2, 1000.0)
 RANGE = 5000.0
 TOLERANCE = 0.02
@@ -91,14 +91,14 @@ class Plate:
 
 @dataclass(frozen=True)
 class PlateCheck:
-    """A demand on the force plate, whether it is met, None if unknown, and the reason.
+    """A requirement on the force plate, whether it is met, None if unknown, and the reason.
 
-    Demands are ``"flat above"`` (0.2 Hz), ``"flat below"`` (1000 Hz), ``"range"`` and ``"linear"``.
+    They are ``"flat above"`` (0.2 Hz), ``"flat below"`` (1000 Hz), ``"range"`` and ``"linear"``.
     """
 
-    demand: str
+    requirement: str
     met: bool | None
-    sentence: str
+    reason: str
 
 
 def correct_plate(
@@ -182,7 +182,7 @@ def check_plate(
 
     The resonance of the plate is corrected; the time constant, s, is that of the amplifier (a
     high-pass), infinite if static; full scale of plate and recorder is in N, and the linearity has
-    pairs of a force applied and the force indicated, N. What is not stated is unknown.
+    pairs of a force applied and the force indicated, N.
     """
     return (
         _check_low(time_constant),
@@ -194,15 +194,17 @@ def check_plate(
 
 def _check_low(time_constant: float | None) -> PlateCheck:
     """Check the lowest frequency of a first-order high-pass."""
-    demand, low = "flat above", FLAT[0]
+    requirement, low = "flat above", FLAT[0]
     if time_constant is None:
-        return PlateCheck(demand, None, f"the response at {low:g} Hz is not known (time constant)")
+        return PlateCheck(
+            requirement, None, f"the response at {low:g} Hz is not known (time constant)"
+        )
     if not time_constant > 0:
         refuse_value("plate: time_constant", time_constant, "time_constant > 0, s")
     loss = 1 - 1 / math.hypot(1, 1 / (2 * math.pi * low * time_constant))
     needed = 1 / (2 * math.pi * low * math.sqrt((1 - TOLERANCE) ** -2 - 1))
     return PlateCheck(
-        demand,
+        requirement,
         loss <= TOLERANCE,
         f"at {low:g} Hz the plate reads {100 * loss:.2g} % too little (time constant "
         f"{time_constant:g} s; {100 * TOLERANCE:g} % need {needed:.1f} s)",
@@ -211,10 +213,12 @@ def _check_low(time_constant: float | None) -> PlateCheck:
 
 def _check_high(plate: Plate | None) -> PlateCheck:
     """Check the highest frequency by what the correction of the resonance leaves."""
-    demand, high = "flat below", FLAT[1]
+    requirement, high = "flat below", FLAT[1]
     if plate is None or not plate.frequency_uncertainty:
         missing = "resonance" if plate is None else "uncertainty of the resonance"
-        return PlateCheck(demand, None, f"the response up to {high:g} Hz is not known ({missing})")
+        return PlateCheck(
+            requirement, None, f"the response up to {high:g} Hz is not known ({missing})"
+        )
     frequency = np.linspace(0.0, high, 1001, dtype=np.float64)
     response = np.abs(plate.response(frequency))
     # Expanded uncertainty of the resonance, both ways.
@@ -222,7 +226,7 @@ def _check_high(plate: Plate | None) -> PlateCheck:
     ratios = [np.abs(plate.response(frequency / (1 + sign * shift))) / response for sign in (-1, 1)]
     deviation = max(float(np.abs(ratio - 1).max()) for ratio in ratios)
     return PlateCheck(
-        demand,
+        requirement,
         deviation <= TOLERANCE,
         f"up to {high:g} Hz the plate with its resonance of {plate.frequency:.4g} Hz is up to "
         f"{100 * deviation:.2g} % off (after the correction, whose resonance is known to "
@@ -244,9 +248,9 @@ def _check_range(full_scale: float | None) -> PlateCheck:
 
 def _check_linearity(linearity: Sequence[tuple[float, float]] | None) -> PlateCheck:
     """Check the linearity: deviation from the best line through zero, over the value itself."""
-    demand = "linear"
+    requirement = "linear"
     if linearity is None:
-        return PlateCheck(demand, None, "the linearity is not known (pairs of forces)")
+        return PlateCheck(requirement, None, "the linearity is not known (pairs of forces)")
     table = np.asarray(linearity, dtype=np.float64)
     if table.ndim != 2 or table.shape[1] != 2 or len(table) < 2 or not (table > 0).all():  # noqa: PLR2004
         refuse("plate: linearity is no list of pairs", "two or more pairs of forces, N, above 0")
@@ -258,7 +262,7 @@ def _check_linearity(linearity: Sequence[tuple[float, float]] | None) -> PlateCh
     reach = "" if applied.max() >= RANGE else f"; above {applied.max():.4g} N it is not known"
     met = bool(abs(relative[worst]) <= TOLERANCE)
     return PlateCheck(
-        demand,
+        requirement,
         None if met and reach else met,
         f"from {applied.min():.4g} to {applied.max():.4g} N the plate is linear within "
         f"{100 * abs(relative[worst]):.2g} % (worst at {applied[worst]:.4g} N){reach}",

@@ -21,7 +21,7 @@ MAX_FACTOR = 20.0
 THOUSAND = 1000.0
 POLARITIES = {"positive": 1.0, "negative": -1.0}
 # Minimum ratio of the two peaks that shows the sign.
-CLEAR = 1.5
+MIN_PEAK_RATIO = 1.5
 # Samples that are read at once, and that show the background level.
 BLOCK = 2**18
 SAMPLED = 2**16
@@ -39,10 +39,8 @@ class Extremes:
 
     def peak(self, scale: float) -> float:
         """Return the positive peak above the background, N."""
-        # Never -0.
-        return (
-            max((self.high - self.background) * scale, (self.low - self.background) * scale) + 0.0
-        )
+        high, low = self.high - self.background, self.low - self.background
+        return max(high * scale, low * scale) + 0.0  # never -0
 
 
 def scan(samples: Callable[[int, int], NDArray[np.float64]], count: int, name: str) -> Extremes:
@@ -81,7 +79,7 @@ def find_sign(
         changed = f"The sign was changed: polarity = {polarity!r}."
         return sign, (changed,) if sign * scale < 0 else ()
     up, down = seen.peak(scale), seen.peak(-scale)
-    if max(up, down) < CLEAR * min(up, down):
+    if max(up, down) < MIN_PEAK_RATIO * min(up, down):
         refuse(
             f"{name}: the sign is not clear, the force goes {up:.4g} N up and {down:.4g} N down",
             "polarity = 'positive' or 'negative', the sign of a compression",
@@ -111,7 +109,7 @@ def check_peak(seen: Extremes, scale: float, name: str, *, assumed: bool) -> tup
     warnings: tuple[str, ...] = ()
     if not low <= peak <= high:
         warnings += (f"The peak is {peak:.4g} N; usual are {allowed}.",)
-    if other > CLEAR * peak:
+    if other > MIN_PEAK_RATIO * peak:
         warnings += (
             f"The force goes {other:.4g} N down and {peak:.4g} N up; the polarity may be wrong.",
         )

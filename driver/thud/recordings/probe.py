@@ -26,10 +26,7 @@ MEMORY = 2**29
 def probe_in_subprocess(action: Callable[[Path], object], path: Path, kind: str) -> None:
     """Run an action on a file in a forked process.
 
-    Raises
-    ------
-    InputError
-        As the action, or where the process hangs, crashes or runs out of memory.
+    Raise InputError as the action, or where the process hangs, crashes or runs out of memory.
     """
     reader, writer = os.pipe()
     with guarded(path, kind):  # Python warns of a fork with threads; the child starts none

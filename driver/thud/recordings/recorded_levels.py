@@ -212,15 +212,15 @@ _DESCRIPTIONS = {
 
 
 def _gated(drop: Drop, *, low_pass: bool) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    """Return the force of the gate, if low-passed with zeros on both sides, and the steps."""
+    """Return the force of the gate, padded with zeros if low-passed, and the steps."""
     first, stop = drop.gate
     force = drop.force[first:stop]
     begin, end = 1e3 * drop.time[[first, stop - 1]]
     steps = [f"gate: {begin:.1f} to {end:.1f} ms after first touch, zero outside"]
     if low_pass:
         force = np.pad(force, math.ceil(MARGIN * drop.sample_rate))
-        force, sentence = low_pass_force(force, drop.sample_rate)
-        steps.append(sentence)
+        force, note = low_pass_force(force, drop.sample_rate)
+        steps.append(note)
     return force, tuple(steps)
 
 
@@ -273,12 +273,12 @@ def _level_outliers(
     """Return the outliers in any band, at 5 % for all bands together (Bonferroni)."""
     nominal = get_bands(estimates[0].bands).nominal
     names = [e.name for e in estimates]
-    own = np.array([e.contributions["noise"] for e in estimates])
+    noise = np.array([e.contributions["noise"] for e in estimates])
     return tuple(
         outlier
         for band, middle in enumerate(nominal)
         for outlier in find_outliers(
-            drops[:, band], names, f"level at {middle:g} Hz, dB,", own[:, band],
+            drops[:, band], names, f"level at {middle:g} Hz, dB,", noise[:, band],
             SIGNIFICANCE / len(nominal),
         )
     )  # fmt: skip

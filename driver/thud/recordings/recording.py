@@ -12,16 +12,11 @@ import numpy as np
 
 from thud.base.checks import require_whole
 from thud.base.display import Displayed
-from thud.base.extras import require_extra
+from thud.base.extras import data_frame, require_extra
 from thud.case.case import Case
 from thud.level.assessment import assess
 from thud.level.impact_result import DropForce
-from thud.recordings.budgets import (
-    check_restitution,
-    drop_estimates,
-    find_deviant,
-    level_estimates,
-)
+from thud.recordings.budgets import check_restitution, drop_estimates, find_deviant, level_estimates
 from thud.recordings.config import Config, checked_config
 from thud.recordings.filters import describe_low_pass
 from thud.recordings.measure_drops import measure_signals
@@ -140,10 +135,7 @@ class Recording(Displayed):
     ) -> Recording:
         """Measure the drops of signals; other arguments as for `read_recording`.
 
-        Raises
-        ------
-        InputError
-            Where a drop cannot be measured.
+        Raise InputError where a drop cannot be measured.
         """
         drops, origins, uncertainty = measure_signals(
             signals,
@@ -194,7 +186,7 @@ class Recording(Displayed):
 
     @property
     def limits_source(self) -> LimitsSource | None:
-        """Source of the configuration; None if it is the default, which nobody may have stated."""
+        """Source of the configuration; None if it is the default."""
         return None if self.config.source == Config.source else self.config.source
 
     @property
@@ -234,7 +226,7 @@ class Recording(Displayed):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What may be wrong with the recording, its files and drops, a sentence each."""
+        """Possible faults of the recording, its files and drops, a sentence each."""
         result = [*self.own_warnings, *map(str, self.outliers)]
         result += [warning for origin in self.origins for warning in origin.warnings]
         result += [f"{drop.name}: {warning}" for drop in self.drops for warning in drop.warnings]
@@ -242,7 +234,7 @@ class Recording(Displayed):
 
     @cached_property
     def own_warnings(self) -> tuple[str, ...]:
-        """What may be wrong with the recording as a whole, a sentence each."""
+        """Possible faults of the recording as a whole, a sentence each."""
         config, warnings = self.config, list[str]()
         if math.isnan(self.estimates["peaks"].value):
             warnings.append("the number of peaks is unknown: some may be noise")
@@ -253,7 +245,7 @@ class Recording(Displayed):
         if config.mass is None and math.isfinite(self.estimates["mass"].value):
             warnings.append("the mass is not stated: the effective mass is assessed")
         warnings += [
-            f"force plate: {check.sentence}" for check in config.plate_checks if check.met is False
+            f"force plate: {check.reason}" for check in config.plate_checks if check.met is False
         ]
         plate = config.resonance
         missing = {
@@ -382,20 +374,12 @@ class Recording(Displayed):
 
         Raise InputError where pandas is not installed.
         """
-        with require_extra("studies"):
-            import pandas as pd
-
-        index = pd.Index(self.time, name="time_s")
-        return pd.DataFrame({"floor_force_N": self.force()}, index=index)
+        return data_frame({"floor_force_N": self.force()}, self.time)
 
     def drop_force(self, drop: int = 1) -> DropForce:
         """Return the force of a contact by its number, from 1; it is zero before and after."""
         require_whole("drop", drop, 1, len(self.drops))
-        number = drop
-        for origin in self.origins:
-            if number <= origin.drops:
-                break
-            number -= origin.drops
+        origin = [origin for origin in self.origins for _ in range(origin.drops)][drop - 1]
         measured = self.drops[drop - 1]
         first, stop = measured.gate
         return DropForce(

@@ -91,15 +91,15 @@ class DropConditions:
         if not methods:
             return Estimate.unknown(), {}
         effects = self.shared(methods, impulse)
-        own = {name: max(estimate.uncertainty, 1e-12) for name, estimate in methods.items()}
+        deviations = {name: max(estimate.uncertainty, 1e-12) for name, estimate in methods.items()}
         weights = {
-            name: 1 / (own[name] ** 2 + sum(effect**2 for effect in effects[name].values()))
+            name: 1 / (deviations[name] ** 2 + sum(effect**2 for effect in effects[name].values()))
             for name in methods
         }
         total = sum(weights.values())
         weights = {name: weight / total for name, weight in weights.items()}
         value = sum(weights[name] * estimate.value for name, estimate in methods.items())
-        uncertainty = math.hypot(*(weights[name] * own[name] for name in methods))
+        uncertainty = math.hypot(*(weights[name] * deviations[name] for name in methods))
         combined: dict[str, float] = {}
         for name, by_cause in effects.items():
             for cause, effect in by_cause.items():

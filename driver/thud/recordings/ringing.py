@@ -22,17 +22,17 @@ MIN_LENGTH = 4e-3
 MIN_FREQUENCY = 200.0
 MAX_FREQUENCY = 0.3
 # Minimum energy over that of the noise: one of about 6000 points exceeds it by noise once in 1e7.
-CLEAR = 25.0
+MIN_ENERGY = 25.0
 # Minimum energy over that before the contact, where tones are no ringing.
-OVER_BEFORE = 4.0
+MIN_INCREASE = 4.0
 # Minimum amplitude of a warning over the peak, of an unstated plate and after the correction; and
 # minimum number of oscillations.
-NOTABLE = (3e-4, 1e-3)
+MIN_AMPLITUDE = (3e-4, 1e-3)
 MIN_OSCILLATIONS = 3.0
 
 
 def check_ringing(contact: Contact, plate: Plate | None = None) -> tuple[str, ...]:
-    """Return a warning if the plate keeps ringing after the contact, else an empty string.
+    """Return a warning if the plate keeps ringing after the contact.
 
     A matched filter searches a free oscillation A exp(-t/d) cos(2 pi f t + p) after the gate, for
     some d and all f. The density of the noise is that of the background, times the gain of the
@@ -48,20 +48,21 @@ def check_ringing(contact: Contact, plate: Plate | None = None) -> tuple[str, ..
     k, index = np.unravel_index(np.argmax(energy), energy.shape)
     resonance, decay = float(frequency[index]), float(DECAYS[k])
     quality = np.pi * resonance * decay
-    if not (MIN_FREQUENCY <= resonance <= MAX_FREQUENCY * rate and energy[k, index] > CLEAR):
+    if not (MIN_FREQUENCY <= resonance <= MAX_FREQUENCY * rate and energy[k, index] > MIN_ENERGY):
         return ()
     if quality < MIN_OSCILLATIONS:
         return ()
     if len(before) >= MIN_LENGTH * rate:
-        usual, same = _matched(before, contact, plate)
-        at = int(np.argmin(np.abs(usual - resonance)))
-        if energy[k, index] < OVER_BEFORE * same[k, max(at - 1, 0) : at + 2].max():
+        frequency_before, energy_before = _matched(before, contact, plate)
+        nearest = int(np.argmin(np.abs(frequency_before - resonance)))
+        tone = energy_before[k, max(nearest - 1, 0) : nearest + 2].max()
+        if energy[k, index] < MIN_INCREASE * tone:
             return ()
     density, _ = contact.background.density(resonance)
     density *= float(_gain(plate, np.array([resonance]))[0]) if plate else 1.0
     window = np.exp(-2 * np.arange(len(after)) / rate / decay).sum()
     amplitude = 2 * np.sqrt(energy[k, index] * density * rate / 2 / window)
-    if amplitude < NOTABLE[plate is not None] * contact.peak:
+    if amplitude < MIN_AMPLITUDE[plate is not None] * contact.peak:
         return ()
     # Between the frequencies of the transform: the vertex of a parabola.
     low, top, high = np.log(energy[k, index - 1 : index + 2])

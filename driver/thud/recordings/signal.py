@@ -47,7 +47,7 @@ class Signal(Immutable):
     steps : tuple of str
         Processing by the reader, a sentence each.
     warnings : tuple of str
-        What may be wrong, a sentence each.
+        Possible faults, a sentence each.
     samples : callable
         Returns the force, N, shape (stop - start,), of the samples from start to before stop.
     """

@@ -151,11 +151,11 @@ def choose_channels(channels: list[Channel], channel: int | str | None, name: st
         return forces or channels
     matching = [entry for entry in channels if channel in {entry.number, entry.name}]
     if not matching and isinstance(channel, str):
-        word = channel.strip().casefold()
+        title = channel.strip().casefold()
         matching = [
             entry
             for entry in channels
-            if word
+            if title
             in {str(entry.number), entry.name.casefold(), entry.name.rpartition("/")[2].casefold()}
         ]
     if len(matching) != 1:
@@ -219,25 +219,25 @@ def _rate(channel: Channel, stated: _Stated, name: str) -> tuple[float, tuple[st
 
 def _unit(channel: Channel, stated: _Stated, name: str) -> tuple[str, tuple[str, ...]]:
     """Return the unit of the values of a channel, and notes."""
-    known = find_unit(channel.unit)
+    file_unit = find_unit(channel.unit)
     if stated.unit is not None:
-        if known == "FS" and stated.unit not in {"FS", "counts"}:
+        if file_unit == "FS" and stated.unit not in {"FS", "counts"}:
             refuse(
                 f"{name}: the samples are integers, not values in {stated.unit}",
                 "calibration per full scale, such as '10 V/FS, 4 mV/N' or '5000 N/FS'",
             )
-        if known in {"", "FS", stated.unit}:
+        if file_unit in {"", "FS", stated.unit}:
             return stated.unit, ()
         return stated.unit, (
-            f"The unit of the file, {known}, was replaced by {stated.unit} as stated.",
+            f"The unit of the file, {file_unit}, was replaced by {stated.unit} as stated.",
         )
-    if known:
-        return known, ()
+    if file_unit:
+        return file_unit, ()
     if not channel.unit and stated.calibration is None:
         return ASSUMED, ("The file states no unit; the values are assumed to be in N.",)
     if channel.unit or isinstance(stated.calibration, str | Calibration):
-        own = f"in {shown_text(channel.unit)!r}" if channel.unit else "without a unit"
-        refuse(f"{name}: the values are {own}", f"unit = one of {ALLOWED}")
+        state = f"in {shown_text(channel.unit)!r}" if channel.unit else "without a unit"
+        refuse(f"{name}: the values are {state}", f"unit = one of {ALLOWED}")
     return "", ()
 
 

@@ -46,30 +46,30 @@ def channels_of_variables(values: dict[str, NDArray[np.generic]], name: str) -> 
     for number, (key, index, column) in enumerate(columns, start=1):
         if key in times and len(columns) > 1:
             continue
-        group, word = _split(key)
+        group, title = _split(key)
         header = [
             (_split(other)[1], text_of(value))
             for other, value in sorted(values.items(), key=lambda item: -item[0].count("/"))
             if np.size(value) == 1 and group.startswith(_split(other)[0])
         ]
-        same = next(
+        time = next(
             (t for t in times if len(times[t]) == len(column) and _split(t)[0] == group), None
         )
-        near = [(_split(k)[1], text_of(v)) for k, v in values.items() if _split(k)[0] == group]
+        siblings = [(_split(k)[1], text_of(v)) for k, v in values.items() if _split(k)[0] == group]
         # Times in the same group have precedence over a rate above it.
-        own, steps = find_rate(header if same is None else near), tuple[str, ...]()
-        if own is None and same is not None:
-            scale = TIME_UNITS.get(split_title(_split(same)[1])[1].casefold(), 1.0)
-            _, step, steps = uniform_grid(times[same] * scale, f"{name}: {same}")
-            own = 1 / step
+        rate, steps = find_rate(header if time is None else siblings), tuple[str, ...]()
+        if rate is None and time is not None:
+            scale = TIME_UNITS.get(split_title(_split(time)[1])[1].casefold(), 1.0)
+            _, step, steps = uniform_grid(times[time] * scale, f"{name}: {time}")
+            rate = 1 / step
         channels.append(
             Channel(
                 name=key + index,
                 number=number,
                 n_sample=len(column),
                 samples=partial(read_array, column),
-                unit=split_title(word)[1] or find_word(header, UNIT),
-                sample_rate=own,
+                unit=split_title(title)[1] or find_word(header, UNIT),
+                sample_rate=rate,
                 date=find_word(header, DATE),
                 steps=steps,
             )

@@ -151,9 +151,9 @@ def _walk(h5py: Any, file: Any, path: Path) -> list[_Vectors]:  # noqa: ANN401 -
             elif _is_channel(entry, f"{shown_path(path)}: {shown_text(key)}", path):
                 vectors.append((f"{group_path}/{key}", entry))
         for key, data in vectors:
-            own = _attributes(h5py, data)
-            if find_word(own, MATLAB_CLASS) not in MATLAB_OTHERS:
-                series.append(_Vectors(key, data, [*own, *header]))
+            attributes = _attributes(h5py, data)
+            if find_word(attributes, MATLAB_CLASS) not in MATLAB_OTHERS:
+                series.append(_Vectors(key, data, [*attributes, *header]))
     return series
 
 
@@ -227,12 +227,12 @@ def _channels(path: Path, entry: _Vectors, times: list[_Vectors], before: int) -
     count = math.prod(entry.data.shape) // entry.n_sample
     rate, date = find_rate(entry.header), find_word(entry.header, DATE)
     steps: tuple[str, ...] = ()
-    same = next(
+    time = next(
         (t for t in times if t.n_sample == entry.n_sample and entry.parent.startswith(t.parent)),
         None,
     )
-    if rate is None and same is not None:
-        rate, steps, since = _rate_of_times(path, same)
+    if rate is None and time is not None:
+        rate, steps, since = _rate_of_times(path, time)
         date = date or since
     scale, offset = (_scaling(path, entry, word) for word in SCALING)
     title = entry.key.strip("/")

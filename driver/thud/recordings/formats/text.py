@@ -98,10 +98,6 @@ class _Table:
         """Return the cells of a line of numbers."""
         return split_line(strip_comment(line), self.separator)
 
-    def titles_of(self, line: str) -> list[str]:
-        """Return the cells of a line of titles."""
-        return [line.strip()] if self.width == 1 else split_line(line, self.separator)
-
 
 def read_channels(path: Path) -> list[Channel]:
     """Return the columns of numbers of a text file except the times."""
@@ -143,7 +139,7 @@ def _require_separators(lines: Iterator[str], table: _Table) -> None:
         texts = filter(None, map(strip_comment, lines))
         if any("," not in text or DECIMAL_COMMA.match(text) for text in texts):
             return
-    elif table.separator != "," or table.decimal.line or _has_titles(table):
+    elif table.separator != "," or table.decimal.line or any(map(any, table.titles)):
         return
     else:
         # A cell that begins with a sign is no decimal fraction.
@@ -158,11 +154,6 @@ def _require_separators(lines: Iterator[str], table: _Table) -> None:
         f"{table.name}: line {table.first}: the commas may separate columns or be decimal marks",
         "a title for each column, decimal points, or semicolons between columns",
     )
-
-
-def _has_titles(table: _Table) -> bool:
-    """Whether the columns of a table have titles."""
-    return any(any(cells) for cells in table.titles)
 
 
 def _read_header(lines: Iterator[str], table: _Table) -> None:
@@ -208,7 +199,8 @@ def _sort_header(above: list[str], table: _Table) -> None:
     """Sort the lines above the numbers into names with values, and titles of the columns."""
     texts = [text for line in above if (text := line.strip().lstrip(COMMENTS).strip())]
     for i, text in enumerate(texts):
-        cells = table.titles_of(text.rstrip(";"))
+        title = text.rstrip(";")
+        cells = [title.strip()] if table.width == 1 else split_line(title, table.separator)
         words = plain(split_title(re.split(PAIR, text, maxsplit=1)[0])[0])
         is_pair = words in RATE | STEP | DATE | UNIT and table.width < 3  # noqa: PLR2004
         is_near = i >= len(texts) - MAX_TITLES and len(cells) == table.width and not is_pair
@@ -292,8 +284,8 @@ def _convert_each(block: list[str], first: int, table: _Table) -> NDArray[np.flo
             wrong = table.decimal.wrong(shown_text(used[row.index(None)]))
             refuse(f"{table.name}: line {number}: {wrong}", ALLOWED)
         if len(cells) != table.width:
-            problem = f"{len(cells)} columns, {table.width} above it"
-            refuse(f"{table.name}: line {number}: {problem}", ALLOWED)
+            count = f"{len(cells)} columns, {table.width} above it"
+            refuse(f"{table.name}: line {number}: {count}", ALLOWED)
         rows.append(row)
     return np.array(rows, dtype=np.float64).reshape(len(rows), len(table.used))
 
@@ -303,8 +295,8 @@ def _channels(table: _Table, values: dict[int, NDArray[np.float64]]) -> list[Cha
     numeric = list(values)
     rows = len(values[numeric[0]])
     if rows < MIN_SAMPLES:
-        problem = f"{rows} rows of {len(numeric)} numbers"
-        refuse(f"{table.name}: {problem}", f"{MIN_SAMPLES} rows or more of numbers")
+        count = f"{rows} rows of {len(numeric)} numbers"
+        refuse(f"{table.name}: {count}", f"{MIN_SAMPLES} rows or more of numbers")
     titles, units = _titles(table, table.width)
     rate = find_rate(table.header, table.decimal.mark if table.decimal.line else "")
     steps: tuple[str, ...] = ()

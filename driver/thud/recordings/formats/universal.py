@@ -49,17 +49,17 @@ def _channel(path: Path, number: int, data_set: dict[str, Any]) -> Channel:
     """Return the channel of a data set."""
     name = f"{shown_path(path)}: data set {number}"
     data = np.asarray(data_set["data"], dtype=np.float64)
-    due = int(data_set["num_pts"])
+    expected = int(data_set["num_pts"])
     # Binary sets may end with a line feed.
-    if data.size < due or due < 1:
-        refuse(f"{name}: {data.size} samples, {due} are due", "a complete file")
+    if data.size < expected or expected < 1:
+        refuse(f"{name}: {data.size} samples, {expected} are due", "a complete file")
     scale = TIME_UNITS.get(data_set["abscissa_axis_units_lab"].casefold(), 1.0)
     steps: tuple[str, ...] = ()
     if data_set["abscissa_spacing"] == 1:
         step = data_set["abscissa_inc"] * scale
     else:
         _, step, steps = uniform_grid(
-            np.asarray(data_set["x"], dtype=np.float64)[:due] * scale, name
+            np.asarray(data_set["x"], dtype=np.float64)[:expected] * scale, name
         )
     unit = data_set["ordinate_axis_units_lab"].strip()
     if unit.upper() in NONE and data_set["ordinate_spec_data_type"] in FORCES:
@@ -69,8 +69,8 @@ def _channel(path: Path, number: int, data_set: dict[str, Any]) -> Channel:
     return Channel(
         name=data_set["id1"].strip() if label.upper() in NONE else label,
         number=number,
-        n_sample=due,
-        samples=partial(read_array, data[:due]),
+        n_sample=expected,
+        samples=partial(read_array, data[:expected]),
         unit="" if unit.upper() in NONE else unit,
         sample_rate=1 / step if step > 0 else None,
         date=data_set["id3"].strip() if data_set["id3"].strip().upper() not in NONE else "",
