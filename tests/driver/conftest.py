@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import signal
 import subprocess
+import sys
 import sysconfig
+import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from hypothesis import settings
 
 import thud
+from thud import cli
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    Run = Callable[..., subprocess.CompletedProcess[str]]
+    CaseFile = Callable[..., Path]
+    ErrorsOf = Callable[..., str]
 
 # Jobs in the background of a shell ignore interrupts, and so would all that they start.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -52,6 +60,29 @@ def naming(*parts: object) -> str:
     return NAMING + "".join(f"(?=.*{part})" for part in named)
 
 
+def quiet_fit(*arguments: Any, **options: Any) -> thud.Fit:  # noqa: ANN401 - of fit
+    """Return a fit whose warnings do not matter."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", thud.FitWarning)
+        return thud.fit(*arguments, **options)
+
+
+def names_in(folder: Path) -> list[str]:
+    """Return the sorted names of the files of a directory."""
+    return sorted(path.name for path in folder.iterdir())
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Return the contents of the files of a directory by name."""
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def python(*arguments: str | Path, **options: Any) -> subprocess.CompletedProcess[str]:  # noqa: ANN401 - of subprocess
+    """Run the interpreter of the tests."""
+    command = [sys.executable, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, **options)
+
+
 def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
     """Keep patterns of messages out of the names of tests."""
     return argname if isinstance(val, str) and val.startswith(NAMING) else None
@@ -65,8 +96,16 @@ def executable() -> str:
     return str(path)
 
 
+@pytest.fixture(scope="session")
+def flagship() -> thud.Impact:
+    """Return the impact of the standard ball by finite elements: 19.3 ms, 1.6 kN."""
+    return thud.solve(
+        thud.Ball.standard(), model="finite_element", viscosity="kelvin_voigt", loss_factor=0.2
+    )
+
+
 @pytest.fixture
-def run(executable: str, tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
+def run(executable: str, tmp_path: Path) -> Run:
     """Run the executable in an empty directory."""
 
     def run_there(*arguments: str | Path, **options: object) -> subprocess.CompletedProcess[str]:
@@ -85,7 +124,7 @@ def run(executable: str, tmp_path: Path) -> Callable[..., subprocess.CompletedPr
 
 
 @pytest.fixture
-def case_file(tmp_path: Path) -> Callable[[str], Path]:
+def case_file(tmp_path: Path) -> CaseFile:
     """Write a case file."""
 
     def write(text: str, name: str = "case.nml") -> Path:
@@ -94,3 +133,24 @@ def case_file(tmp_path: Path) -> Callable[[str], Path]:
         return path
 
     return write
+
+
+@pytest.fixture
+def errors_of(capsys: pytest.CaptureFixture[str]) -> ErrorsOf:
+    """Run a command of the driver that fails; return its errors."""
+
+    def run_failing(*arguments: object, code: int = 1) -> str:
+        assert cli.main([str(one) for one in arguments]) == code
+        return capsys.readouterr().err
+
+    return run_failing
+
+
+@pytest.fixture
+def no_locks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let calls for a lock fail as on a file system that has none."""
+
+    def refuse(*_: object) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr("fcntl.flock", refuse)

@@ -62,6 +62,13 @@ def answer_of(connection: HTTPConnection, token: str, values: dict[str, Any]) ->
     return answer
 
 
+def solve_at(address: str, values: dict[str, Any]) -> dict[str, Any]:
+    """Return the answer to a case over a connection of its own."""
+    host, port, token = place_of(address)
+    with closing(HTTPConnection(host.strip("[]"), port, timeout=60)) as connection:
+        return answer_of(connection, token, values)
+
+
 def drag(address: str, users: int, steps: int) -> list[float]:
     """Let users drag the height of models in turn, all at once; return the times of answers, s.
 

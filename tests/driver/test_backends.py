@@ -20,7 +20,6 @@ from conftest import naming
 from distributed import Client, LocalCluster
 
 import thud
-from thud import cli
 from thud.studies.backends import run_blocks
 from thud.studies.blocks import Blocks
 from thud.studies.samples import Block, evaluate
@@ -29,6 +28,8 @@ from thud.studies.sweep import KIND
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
+
+    from conftest import ErrorsOf
 
 # Some of these samples fail; by this method of the levels they make several blocks.
 STUDY: dict[str, Any] = {
@@ -214,7 +215,7 @@ def test_killed_process_is_reported_and_loses_nothing() -> None:
 
 
 def test_unreachable_scheduler_is_reported_soon(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, errors_of: ErrorsOf, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("thud.studies.backends.SCHEDULER_TIMEOUT", 1)
     path = tmp_path / "study.toml"
@@ -223,8 +224,7 @@ def test_unreachable_scheduler_is_reported_soon(
         port = silent.getsockname()[1]
         for address in ("tcp://127.0.0.1:9", "nonsense://", f"tcp://127.0.0.1:{port}"):
             arguments = ["sweep", "-q", str(path), "-o", str(tmp_path), "--scheduler", address]
-            assert cli.main(arguments) == 1
-            errors = capsys.readouterr().err
+            errors = errors_of(*arguments)
             assert re.search(naming("scheduler", f"'{address}'", "1 s"), errors)
             assert errors.count("\n") == 1
 

@@ -9,7 +9,7 @@ import sys
 from typing import TYPE_CHECKING
 
 import pytest
-from conftest import REPOSITORY
+from conftest import REPOSITORY, names_in, python
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -65,13 +65,7 @@ def test_extension_is_built_in_any_checkout(name: str, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
     assert (tmp_path / "cache").exists() == (name == ODD)
     use = "import numpy, tiny; x = numpy.array([1.5]); tiny.twice(x); print(*x)"
-    done = subprocess.run(
-        [sys.executable, "-c", use],
-        env={**os.environ, "PYTHONPATH": str(checkout / "build")},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    done = python("-c", use, env={**os.environ, "PYTHONPATH": str(checkout / "build")})
     assert done.stdout == "3.0\n"
 
 
@@ -101,4 +95,4 @@ def test_path_without_any_place_for_a_build_is_refused_at_once(tmp_path: Path) -
     assert done.stderr.count("\n") == 1
     assert str(checkout) in done.stderr
     assert "XDG_CACHE_HOME" in done.stderr
-    assert {path.name for path in checkout.iterdir()} == {"bootstrap", "help"}
+    assert set(names_in(checkout)) == {"bootstrap", "help"}

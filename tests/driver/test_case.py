@@ -7,16 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import INPUTS, MINIMAL, naming
+from conftest import INPUTS, MINIMAL, names_in, naming
 
 import thud
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from pathlib import Path
 
+    from conftest import CaseFile
 
-def test_defaults_are_those_of_the_library(case_file: Callable[..., Path]) -> None:
+
+def test_defaults_are_those_of_the_library(case_file: CaseFile) -> None:
     assert thud.read_case(case_file(MINIMAL)) == thud.Case(name="case")
 
 
@@ -58,7 +59,7 @@ def test_failed_write_leaves_nothing_behind(tmp_path: Path) -> None:
         thud.write_case(thud.Case(), path)
     with pytest.raises(OSError, match=r"nowhere/case\.nml"):
         thud.write_case(thud.Case(), tmp_path / "nowhere/case.nml")
-    assert [entry.name for entry in tmp_path.iterdir()] == ["case.nml"]
+    assert names_in(tmp_path) == ["case.nml"]
     with pytest.raises(thud.InputError, match=naming(repr("a\0b"))):
         thud.write_case(thud.Case(), "a\0b")
 
@@ -76,12 +77,12 @@ def test_names_are_plain_text(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["a" + 300 * " " + "b", "a" * 129, "a\\b", "a/b"])
-def test_name_is_refused_and_not_cut(case_file: Callable[..., Path], name: str) -> None:
+def test_name_is_refused_and_not_cut(case_file: CaseFile, name: str) -> None:
     with pytest.raises(thud.InputError, match="&case: name"):
         thud.read_case(case_file(f"&case\n name = '{name}'\n/\n&model /\n"))
 
 
-def test_long_value_does_not_hide_what_is_allowed(case_file: Callable[..., Path]) -> None:
+def test_long_value_does_not_hide_what_is_allowed(case_file: CaseFile) -> None:
     long = 2000 * "x"
     for text, allowed in (
         (f"&model name = '{long}' /", "'hollow_sphere'"),
@@ -95,7 +96,7 @@ def test_long_value_does_not_hide_what_is_allowed(case_file: Callable[..., Path]
         assert 81 * "x" not in sentence
 
 
-def test_errors_of_a_file_name_the_file(case_file: Callable[..., Path]) -> None:
+def test_errors_of_a_file_name_the_file(case_file: CaseFile) -> None:
     path = case_file("&ball mass = 'x' / &drop / &model /")
     with pytest.raises(thud.InputError, match=naming(path, "&ball: mass", "'x'", "1.0e-12")):
         thud.read_case(path)

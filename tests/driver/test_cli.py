@@ -10,15 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from conftest import INPUTS, MINIMAL, REPOSITORY, naming
+from conftest import INPUTS, MINIMAL, REPOSITORY, contents, names_in, naming, python
 
 import thud
 from thud import cli
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    CaseFile = Callable[..., Path]
+    from conftest import CaseFile, ErrorsOf, Run
 
 
 @pytest.fixture(autouse=True)
@@ -30,7 +28,7 @@ def test_run_writes_results_and_figures(
     case_file: CaseFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert cli.main(["run", str(case_file(MINIMAL, "ball.nml"))]) == 0
-    assert sorted(path.name for path in (tmp_path / "outputs/ball").iterdir()) == [
+    assert names_in(tmp_path / "outputs/ball") == [
         ".thud",
         "effective.nml",
         "force.csv",
@@ -47,15 +45,13 @@ def test_run_writes_results_and_figures(
 def test_run_writes_the_same_bytes_again(case_file: CaseFile, tmp_path: Path) -> None:
     arguments = ["run", "-q", str(case_file(MINIMAL, "ball.nml"))]
     assert cli.main(arguments) == 0
-    before = {path.name: path.read_bytes() for path in (tmp_path / "outputs/ball").iterdir()}
+    before = contents(tmp_path / "outputs/ball")
     assert cli.main(arguments) == 0
-    after = {path.name: path.read_bytes() for path in (tmp_path / "outputs/ball").iterdir()}
+    after = contents(tmp_path / "outputs/ball")
     assert before == after
 
 
-def test_run_agrees_with_the_executable(
-    run: Callable[..., object], case_file: CaseFile, tmp_path: Path
-) -> None:
+def test_run_agrees_with_the_executable(run: Run, case_file: CaseFile, tmp_path: Path) -> None:
     case = case_file(MINIMAL)
     assert cli.main(["run", "-q", "--no-figures", "-o", "driver", str(case)]) == 0
     run(case, "-o", "executable")
@@ -67,9 +63,7 @@ def test_run_agrees_with_the_executable(
 def test_several_cases_have_their_own_directories(tmp_path: Path) -> None:
     paths = list(map(str, INPUTS))
     assert cli.main(["run", "--no-figures", "-q", "-o", "all", *paths]) == 0
-    assert sorted(path.name for path in (tmp_path / "all").iterdir()) == sorted(
-        path.stem for path in INPUTS
-    )
+    assert names_in(tmp_path / "all") == sorted(path.stem for path in INPUTS)
 
 
 def test_bad_case_does_not_stop_the_others(
@@ -94,7 +88,7 @@ def test_bad_case_does_not_stop_the_others(
     ],
 )
 def test_exit_codes_are_those_of_the_executable(
-    run: Callable[..., object], case_file: CaseFile, text: str, code: int, *, check: bool
+    run: Run, case_file: CaseFile, text: str, code: int, *, check: bool
 ) -> None:
     arguments = ["--quiet", *(["--check"] if check else []), str(case_file(text))]
     assert cli.main(["run", "--no-figures", *arguments]) == code
@@ -102,9 +96,8 @@ def test_exit_codes_are_those_of_the_executable(
 
 
 @pytest.mark.parametrize("arguments", [[], ["dance"], ["run"], ["run", "--what", "x.nml"]])
-def test_bad_usage_is_told(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(arguments) == 1
-    assert "usage: thud-driver" in capsys.readouterr().err
+def test_bad_usage_is_told(arguments: list[str], errors_of: ErrorsOf) -> None:
+    assert "usage: thud-driver" in errors_of(*arguments)
 
 
 def test_version_is_that_of_the_library(capsys: pytest.CaptureFixture[str]) -> None:
@@ -122,32 +115,27 @@ def test_figures_of_the_paper(tmp_path: Path) -> None:
         *("floor_chipboard", "floor_mobilities", "floor_motion", "loss_factor"),
         *("modal_families", "momentum_flux", "tyre_levels"),
     )
-    drawn = sorted(path.name for path in (tmp_path / "drawn").iterdir())
+    drawn = names_in(tmp_path / "drawn")
     assert drawn == [".thud", *(f"{name}.svg" for name in names)]
 
 
-def test_figures_that_cannot_be_saved_are_told(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_figures_that_cannot_be_saved_are_told(tmp_path: Path, errors_of: ErrorsOf) -> None:
     (tmp_path / "file").write_text("")
-    assert cli.main(["figures", "-q", "-o", "file/drawn"]) == 1
-    assert "file/drawn" in capsys.readouterr().err
+    assert "file/drawn" in errors_of("figures", "-q", "-o", "file/drawn")
 
 
-def test_empty_output_is_told(case_file: CaseFile, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["run", "-q", "-o", " ", str(case_file(MINIMAL))]) == 1
-    assert "--output" in capsys.readouterr().err
+def test_empty_output_is_told(case_file: CaseFile, errors_of: ErrorsOf) -> None:
+    assert "--output" in errors_of("run", "-q", "-o", " ", case_file(MINIMAL))
 
 
 def test_figure_that_cannot_be_replaced_is_named(
-    case_file: CaseFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    case_file: CaseFile, tmp_path: Path, errors_of: ErrorsOf
 ) -> None:
     case = str(case_file(MINIMAL))
     assert cli.main(["run", "-q", case]) == 0
     (tmp_path / "outputs/case/force.svg").unlink()
     (tmp_path / "outputs/case/force.svg").mkdir()
-    assert cli.main(["run", "-q", case]) == 1
-    assert "outputs/case/force.svg" in capsys.readouterr().err
+    assert "outputs/case/force.svg" in errors_of("run", "-q", case)
 
 
 @pytest.mark.parametrize(
@@ -159,10 +147,9 @@ def test_figure_that_cannot_be_replaced_is_named(
     ],
 )
 def test_misspelt_commands_and_options_are_told(
-    arguments: list[str], meant: str, capsys: pytest.CaptureFixture[str]
+    arguments: list[str], meant: str, errors_of: ErrorsOf
 ) -> None:
-    assert cli.main(arguments) == 1
-    assert f"'{meant}'" in capsys.readouterr().err
+    assert f"'{meant}'" in errors_of(*arguments)
 
 
 # All of them write to standard output; runs of two cases are told once.
@@ -265,29 +252,30 @@ def test_errors_that_nobody_can_read_change_no_exit_code(
 
 
 def test_interruption_is_not_a_traceback(
-    case_file: CaseFile, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    case_file: CaseFile, monkeypatch: pytest.MonkeyPatch, errors_of: ErrorsOf
 ) -> None:
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(sys.modules["thud.cli.case_commands"], "ask", interrupt)
-    assert cli.main(["run", str(case_file(MINIMAL))]) == 130
-    assert "interrupted" in capsys.readouterr().err
+    assert "interrupted" in errors_of("run", case_file(MINIMAL), code=130)
 
 
 def test_cases_of_one_name_do_not_replace_each_other(
-    case_file: CaseFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    case_file: CaseFile, tmp_path: Path, errors_of: ErrorsOf
 ) -> None:
     (tmp_path / "other").mkdir()
     first = case_file(MINIMAL, "ball.nml")
     second = case_file(MINIMAL.replace("&drop", "&drop height = 0.5"), "other/ball.nml")
-    assert cli.main(["run", "-q", "--no-figures", str(first), str(second), "-o", "out"]) == 1
-    assert re.search(naming(first, second, "'ball'"), capsys.readouterr().err)
+    assert re.search(
+        naming(first, second, "'ball'"),
+        errors_of("run", "-q", "--no-figures", first, second, "-o", "out"),
+    )
     assert thud.read_results("out/ball").case.drop.height == 1.0
 
 
 def test_interrupted_fit_does_not_say_that_it_is_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, errors_of: ErrorsOf
 ) -> None:
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
@@ -296,8 +284,7 @@ def test_interrupted_fit_does_not_say_that_it_is_kept(
     (tmp_path / "study.toml").write_text(
         "parameters.mass = {}\n[target]\nlevels = [39, 31, 23, 17, 12]"
     )
-    assert cli.main(["fit", "-q", "study.toml"]) == 130
-    errors = capsys.readouterr().err
+    errors = errors_of("fit", "-q", "study.toml", code=130)
     assert "interrupted" in errors
     assert "kept" not in errors
     assert not list((tmp_path / "outputs/study").iterdir())
@@ -307,13 +294,7 @@ def test_screen_without_the_letters_of_a_name_shows_their_codes(
     case_file: CaseFile, tmp_path: Path
 ) -> None:
     case_file(MINIMAL, "é.nml")
-    done = subprocess.run(
-        [sys.executable, "-m", "thud", "run", "é.nml", "--no-figures"],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONIOENCODING": "ascii"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    done = python("-m", "thud", "run", "é.nml", "--no-figures", cwd=tmp_path, env=environment)
     assert (done.returncode, done.stderr.count("Traceback")) == (0, 0)
     assert "Results: outputs/\\xe9" in done.stdout

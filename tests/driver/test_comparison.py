@@ -22,8 +22,9 @@ from thud.level.impact_result import ImpactResult
 from thud.recordings.config import Config
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from pathlib import Path
+
+    from conftest import CaseFile, ErrorsOf
 
 STEPS = sorted((REPOSITORY / "inputs/comparison").glob("*.nml"))
 
@@ -186,9 +187,7 @@ def test_verdict_on_a_record_is_open_where_its_ball_is_not_known(tmp_path: Path)
     assert not recording.assess()
 
 
-def test_nothing_and_different_drops_are_told(
-    case_file: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_nothing_and_different_drops_are_told(case_file: CaseFile, tmp_path: Path) -> None:
     with pytest.raises(thud.InputError, match=naming("impacts")):
         thud.compare({})
     with pytest.raises(thud.InputError, match=r"a\b.* 4\.429 m/s.* b\b.* 3\.132 m/s"):
@@ -202,7 +201,10 @@ def test_nothing_and_different_drops_are_told(
 
 
 def test_command_writes_the_page(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    errors_of: ErrorsOf,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     write_recording(tmp_path / "plate.csv", thud.solve())
@@ -211,15 +213,11 @@ def test_command_writes_the_page(
     assert "1_shell" in output
     assert "Page: outputs/comparison/comparison.html" in output
     assert (tmp_path / "outputs/comparison/comparison.html").stat().st_size > 1e6
-    assert cli.main(["compare", "-q", "nowhere.nml"]) == 1
-    assert "nowhere.nml" in capsys.readouterr().err
-    assert cli.main(["compare", "-q", "-o", "", str(STEPS[0])]) == 1
-    assert "--output" in capsys.readouterr().err
+    assert "nowhere.nml" in errors_of("compare", "-q", "nowhere.nml")
+    assert "--output" in errors_of("compare", "-q", "-o", "", STEPS[0])
     os.mkfifo(tmp_path / "pipe.csv")
-    assert cli.main(["compare", "-q", "pipe.csv"]) == 1
-    assert "pipe.csv" in capsys.readouterr().err
-    assert cli.main(["compare", "-q", "-o", "plate.csv", str(STEPS[0])]) == 1
-    assert "plate.csv" in capsys.readouterr().err
+    assert "pipe.csv" in errors_of("compare", "-q", "pipe.csv")
+    assert "plate.csv" in errors_of("compare", "-q", "-o", "plate.csv", STEPS[0])
 
 
 def test_case_that_fails_is_named() -> None:

@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import naming
+from conftest import names_in, naming
 
 import thud
 from thud import cli
 
 if TYPE_CHECKING:
-    import subprocess
-    from collections.abc import Callable
     from pathlib import Path
 
-    Run = Callable[..., subprocess.CompletedProcess[str]]
+    from conftest import Run
 
 
 def test_curve_has_points_table_and_figure() -> None:
@@ -124,4 +122,4 @@ def test_driver_draws_the_compression_of_a_case(tmp_path: Path) -> None:
     case = tmp_path / "ball.nml"
     case.write_text(CASE + "&compression points = 5 /")
     assert cli.main(["run", "-q", "-o", str(tmp_path / "out"), str(case)]) == 0
-    assert {"compression.csv", "compression.svg"} <= {p.name for p in (tmp_path / "out").iterdir()}
+    assert {"compression.csv", "compression.svg"} <= set(names_in(tmp_path / "out"))

@@ -13,22 +13,21 @@ from thud.studies.compression_fit import _ratio, _warnings
 
 TRUE = thud.Ball(youngs_modulus=1.83e6)
 START = thud.Ball(youngs_modulus=3e6)
+Measured = tuple[np.ndarray, np.ndarray]
 # Coarse, and its own truth.
 MODEL = thud.ModalBall(harmonics=20, static_harmonics=60, rings=20)
 TOUCH = 1.2e-3
 
 
 @pytest.fixture(scope="module")
-def measured() -> tuple[np.ndarray, np.ndarray]:
+def measured() -> Measured:
     """Return deflection and force of a curve without noise, which begins before first touch."""
     curve = thud.compress(TRUE, MODEL, max_deflection=0.03, points=41)
     before = np.linspace(0, TOUCH, 4)[:-1]
     return np.append(before, curve.deflection + TOUCH), np.append(0 * before, curve.force)
 
 
-def test_modulus_and_touch_are_found_with_honest_intervals(
-    measured: tuple[np.ndarray, np.ndarray],
-) -> None:
+def test_modulus_and_touch_are_found_with_honest_intervals(measured: Measured) -> None:
     deflection, force = measured
     seeds, covered, errors = 12, np.zeros(2), []
     for seed in range(seeds):
@@ -46,7 +45,7 @@ def test_modulus_and_touch_are_found_with_honest_intervals(
     np.testing.assert_allclose(np.mean(errors, axis=0), np.diag(fit.covariance), rtol=0.9)
 
 
-def test_fit_shows_its_numbers(measured: tuple[np.ndarray, np.ndarray]) -> None:
+def test_fit_shows_its_numbers(measured: Measured) -> None:
     noise = np.random.default_rng(1).normal(scale=0.5, size=len(measured[1]))
     fit = thud.fit_compression(measured[0], measured[1] + noise, START, MODEL)
     assert repr(fit).startswith("<CompressionFit: E 1.8")
@@ -61,17 +60,13 @@ def test_fit_shows_its_numbers(measured: tuple[np.ndarray, np.ndarray]) -> None:
     np.testing.assert_allclose(shown - measured[1] - noise, fit.residuals, atol=1.0)
 
 
-def test_model_that_does_not_explain_the_curve_is_doubted(
-    measured: tuple[np.ndarray, np.ndarray],
-) -> None:
+def test_model_that_does_not_explain_the_curve_is_doubted(measured: Measured) -> None:
     with pytest.warns(thud.FitWarning, match=naming("sign", "model")):
         fit = thud.fit_compression(*measured, START, "hollow_sphere")
     assert len(fit.warnings) == 1
 
 
-def test_curve_that_begins_under_load_is_doubted(
-    measured: tuple[np.ndarray, np.ndarray],
-) -> None:
+def test_curve_that_begins_under_load_is_doubted(measured: Measured) -> None:
     with pytest.warns(thud.FitWarning) as caught:
         fit = thud.fit_compression(measured[0][20:], measured[1][20:], START, MODEL)
     assert "first touch" in fit.warnings[0]
@@ -99,17 +94,13 @@ def test_what_is_no_curve_is_refused(deflection: object, force: object, words: s
         thud.fit_compression(deflection, values, START, MODEL)  # type: ignore[arg-type]
 
 
-def test_modulus_of_a_spring_that_has_none_is_refused(
-    measured: tuple[np.ndarray, np.ndarray],
-) -> None:
+def test_modulus_of_a_spring_that_has_none_is_refused(measured: Measured) -> None:
     spring = thud.HuntCrossley(stiffness=2e5)
     with pytest.raises(thud.NumericalError, match=naming("youngs_modulus")):
         thud.fit_compression(*measured, START, spring)
 
 
-def test_covariance_is_that_of_the_linearised_curve(
-    measured: tuple[np.ndarray, np.ndarray],
-) -> None:
+def test_covariance_is_that_of_the_linearised_curve(measured: Measured) -> None:
     """Noise squared over the normal matrix of both derivatives, by differences of the model."""
     deflection, force = measured
     noise = np.random.default_rng(2).normal(scale=2.0, size=len(force))
@@ -161,9 +152,7 @@ def test_touch_at_the_limit_of_the_search_is_doubted(place: float, *, doubted: b
 
 
 @pytest.mark.parametrize("count", [4, 5])
-def test_fewest_points_leave_something_to_two_parameters(
-    measured: tuple[np.ndarray, np.ndarray], count: int
-) -> None:
+def test_fewest_points_leave_something_to_two_parameters(measured: Measured, count: int) -> None:
     some = np.linspace(3, 43, count).astype(int)
     if count < 5:
         with pytest.raises(thud.InputError, match=naming("deflection", 5)):

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, naming
+from conftest import REPOSITORY, names_in, naming, python
 
 import thud
 from thud import cli
@@ -30,7 +30,7 @@ from thud.studies.directory import open_results
 from thud.studies.sweep import KIND
 
 sys.path.insert(0, str(REPOSITORY / "tests/faults"))
-from injection import can_inject, library
+from injection import can_inject, injecting
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -62,7 +62,7 @@ def test_zarr_holds_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     # Whatever is larger than a byte is Zarr now, and written one variable at a time.
     monkeypatch.setattr("thud.studies.blocks.LARGE", 1)
     found = thud.sweep({"name": "b", **HEIGHTS}, tmp_path).dataset
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.zarr", "b.zarr"]
+    assert names_in(tmp_path) == ["a.zarr", "b.zarr"]
     assert values(found).identical(expected)
 
 
@@ -223,7 +223,7 @@ def test_disk_that_is_full_for_zarr_is_reported_and_loses_nothing(
     errors = capsys.readouterr().err
     assert "File too large" in errors
     assert errors.count("\n") == 1
-    assert sorted(found.name for found in tmp_path.iterdir()) == ["long.partial", "long.toml"]
+    assert names_in(tmp_path) == ["long.partial", "long.toml"]
     assert thud.read_sweep(tmp_path / "long.partial").dataset.sizes["sample"] == 1000
 
     def compute_again(*_: object) -> None:
@@ -276,41 +276,26 @@ def test_a_study_is_computed_once_at_a_time(tmp_path: Path) -> None:
     assert thud.sweep(study, tmp_path).dataset.sizes["height"] == 2
 
 
-def refuse_locks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let calls for a lock fail as on a file system that has none."""
-
-    def refuse(*_: object) -> None:
-        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
-
-    monkeypatch.setattr("fcntl.flock", refuse)
-
-
 def test_study_without_locks_is_computed_with_a_warning(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
     expected = values(thud.sweep(HEIGHTS).dataset)
-    refuse_locks(monkeypatch)
+    request.getfixturevalue("no_locks")
     for form in ("netcdf", "zarr"):
         with pytest.warns(thud.LockWarning, match=re.escape(str(tmp_path))) as caught:
             found = thud.sweep({"name": form, **HEIGHTS, "format": form}, tmp_path).dataset
         assert len(caught) == 1
         assert values(found).identical(expected)
-    assert {path.name for path in tmp_path.iterdir()} == {"netcdf.nc", "zarr.zarr"}
+    assert set(names_in(tmp_path)) == {"netcdf.nc", "zarr.zarr"}
 
 
 @pytest.mark.skipif(not can_inject(), reason="there is no C compiler")
 def test_command_without_locks_ends_with_results_and_one_warning(tmp_path: Path) -> None:
     """The calls of all libraries fail, of HDF5 too."""
     (tmp_path / "two.toml").write_text("parameters.height.values = [0.5, 1]")
-    faults = {"FAULT_CALLS": "flock", "FAULT_ACTION": f"{errno.ENOLCK}", "FAULT_LOG": "calls"}
-    done = subprocess.run(
-        [sys.executable, "-m", "thud", "sweep", "two.toml", "-q", "-o", "new"],
-        cwd=tmp_path,
-        env={**os.environ, "LD_PRELOAD": library(), "FAULT_AT": "1", "FAULT_FROM": "1", **faults},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    faults = injecting(calls="flock", action=errno.ENOLCK, log="calls", at=1, **{"from": 1})
+    command = ["-m", "thud", "sweep", "two.toml", "-q", "-o", "new"]
+    done = python(*command, cwd=tmp_path, env=faults)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "calls").read_text().count("flock") > 1
     assert thud.read_sweep(tmp_path / "new/two.nc").dataset.sizes["height"] == 2
@@ -340,12 +325,12 @@ def test_lock_is_that_of_the_directory_that_has_the_name(
 
 
 def test_killed_study_goes_on_where_there_are_no_locks(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
     study = thud.read_study(HEIGHTS)
     keep_one_block(study, tmp_path)
     own_path(tmp_path / "python.partial/.block_000000000001.nc.part").write_bytes(b"half")
-    refuse_locks(monkeypatch)
+    request.getfixturevalue("no_locks")
     with pytest.warns(thud.LockWarning):
         assert thud.sweep(study, tmp_path).dataset.sizes["height"] == 2
 
@@ -382,7 +367,7 @@ def test_replace_leaves_nothing_of_an_older_version(tmp_path: Path) -> None:
     path.write_text("format = 'zarr'\nparameters.height.values = [0.5, 1, 2]")
     assert cli.main(sweep) == 1
     assert cli.main([*sweep, "--no-figures", "--replace"]) == 0
-    assert [found.name for found in (tmp_path / "here").iterdir()] == ["a.zarr"]
+    assert names_in(tmp_path / "here") == ["a.zarr"]
 
 
 def test_replace_keeps_what_is_of_this_version(tmp_path: Path) -> None:
@@ -411,7 +396,7 @@ def test_interrupt_of_a_removal_leaves_no_half_directory(
             thud.sweep(changed, tmp_path, replace=True)
     found = thud.sweep(changed, tmp_path).dataset
     assert found["height"].values.tolist() == [0.7]
-    assert [path.name for path in tmp_path.iterdir()] == ["heights.zarr"]
+    assert names_in(tmp_path) == ["heights.zarr"]
 
 
 def test_files_of_something_else_are_replaced_on_request_only(tmp_path: Path) -> None:

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import naming
+from conftest import naming, python
 from hypothesis import given, settings, strategies as st
 
 import thud
@@ -243,9 +241,11 @@ def test_scalars_and_defaults() -> None:
         ({"height": [1j]}, {}, naming("height", "real")),
         ({"height": np.ma.masked_less([1.0, -1.0], 0)}, {}, naming("height", "masked")),
         ({"momentum_flux": "some"}, {}, naming("momentum_flux", "'some'", "'none'")),
+        ({"momentum_flux": ["none", "some"]}, {}, naming("'some'")),
         ([1], {}, naming("parameters", [1])),
         (np.ones(2), {}, naming("parameters")),
         ({}, {"threads": 0}, naming("threads", 0, 1, 1024)),
+        ({}, {"threads": 1025}, naming("threads", 1025, 1, 1024)),
         ({}, {"threads": 1.5}, naming("threads", 1.5)),
         ({}, {"substeps": 1.5}, naming("&sampling: substeps", 1.5)),
         ({"density": 1.0}, {}, naming("'density'", "studies")),
@@ -309,8 +309,7 @@ for _ in range(10):
     thud.solve_many({"height": heights}, duration=0.03)
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
 """
-    command = [sys.executable, "-c", code]
-    found = subprocess.run(command, check=True, capture_output=True, text=True)
+    found = python("-c", code)
     # One chunk's results are 20 000 * (6 + 2 * 5 + 10) * 8 B = 4 MB.
     assert int(found.stdout) < 8 * 1024
 
@@ -346,7 +345,7 @@ if __name__ == "__main__":
         assert pool.map(peaks, range(4)) == 4 * [before]
     assert peaks(0) == before
 """)
-    subprocess.run([sys.executable, script], check=True, timeout=60)
+    assert python(script, timeout=60).returncode == 0
 
 
 def test_levels_differ_from_single_drops_by_the_rounding_of_their_energy() -> None:
@@ -478,11 +477,6 @@ def test_keywords_replace_those_of_the_case() -> None:
     assert thud.solve_many({}, case, model="hollow_sphere").case.model == case.model
     assert thud.solve_many({}, case, model="modal_ball").case.model == thud.ModalBall()
     assert thud.solve_many({}).case.model == thud.HollowSphere()
-    with pytest.raises(thud.InputError, match=naming("'source'")):
-        thud.solve_many({"source": ["tyre"]}, source="tyre")
-    for threads in (0, 1025):
-        with pytest.raises(thud.InputError, match=naming("threads", threads, 1, 1024)):
-            thud.solve_many({}, threads=threads)
     assert thud.solve_many({}, threads=1024).status.tolist() == [0]
 
 
@@ -491,8 +485,6 @@ def test_choices_are_those_of_their_words() -> None:
     found = thud.solve_many({"momentum_flux": words})
     for word, peak in zip(words, found.peak_force, strict=True):
         assert peak == pytest.approx(thud.solve(momentum_flux=str(word)).peak_force, rel=1e-9)
-    with pytest.raises(thud.InputError, match="'some'"):
-        thud.solve_many({"momentum_flux": ["none", "some"]})
 
 
 def test_columns_of_a_table_are_parameters() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from typing import TYPE_CHECKING
 
-from conftest import REPOSITORY
+from conftest import REPOSITORY, names_in
 
 import thud
 from thud import cli
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import pytest
+    from conftest import ErrorsOf
 
 
 def test_examples_are_those_of_the_repository(tmp_path: Path) -> None:
@@ -27,7 +28,7 @@ def test_examples_are_those_of_the_repository(tmp_path: Path) -> None:
 
 
 def test_examples_are_copied_whole_or_not_at_all(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, errors_of: ErrorsOf
 ) -> None:
     def fail(_: Path, target: Path, **_options: object) -> None:
         target.mkdir()
@@ -35,13 +36,11 @@ def test_examples_are_copied_whole_or_not_at_all(
         raise shutil.Error([("source", str(target), "No space left on device")])
 
     monkeypatch.setattr("shutil.copytree", fail)
-    assert cli.main(["examples", str(tmp_path / "new")]) == 1
-    assert str(tmp_path / "new") in capsys.readouterr().err
+    assert str(tmp_path / "new") in errors_of("examples", tmp_path / "new")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_examples_replace_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_examples_replace_nothing(tmp_path: Path, errors_of: ErrorsOf) -> None:
     (tmp_path / "kept").write_text("mine")
-    assert cli.main(["examples", str(tmp_path)]) == 1
-    assert str(tmp_path) in capsys.readouterr().err
-    assert [path.name for path in tmp_path.iterdir()] == ["kept"]
+    assert str(tmp_path) in errors_of("examples", tmp_path)
+    assert names_in(tmp_path) == ["kept"]

@@ -14,21 +14,14 @@ from typing import TYPE_CHECKING
 import f90nml
 import numpy as np
 import pytest
-from conftest import INPUTS, MINIMAL, naming
+from conftest import INPUTS, MINIMAL, contents, names_in, naming
 
 import thud
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    Run = Callable[..., subprocess.CompletedProcess[str]]
-    CaseFile = Callable[..., Path]
+    from conftest import CaseFile, Run
 
 FILES = [".thud", "effective.nml", "force.csv", "levels.csv", "summary.nml"]
-
-
-def read_bytes(directory: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in directory.iterdir()}
 
 
 IMPACTS = [path for path in INPUTS if "&model" in path.read_text()]
@@ -43,7 +36,7 @@ def test_every_input_runs_and_agrees_with_the_driver(run: Run, tmp_path: Path, p
     impact = thud.solve(thud.read_case(path))
     more = ["model_histories.csv"] if impact.model_histories else []
     more += ["snapshots.xmf", "pressure.csv"] if impact.motion else []
-    assert sorted(file.name for file in directory.iterdir()) == sorted(FILES + more)
+    assert names_in(directory) == sorted(FILES + more)
     if impact.model_histories:
         table = np.genfromtxt(directory / "model_histories.csv", delimiter=",", names=True)
         for channel, values in impact.model_histories.items():
@@ -76,11 +69,11 @@ def test_effective_input_gives_the_same_bytes(
     case = case_file("&ball mass = 2.47 /\n&drop /\n&model /\n&levels bands = 'both' /\n")
     assert run(case, "--output", "first").returncode == 0
     assert run("first/effective.nml", "--output", "second").returncode == 0
-    assert read_bytes(tmp_path / "first") == read_bytes(tmp_path / "second")
+    assert contents(tmp_path / "first") == contents(tmp_path / "second")
     # And in its own place, which belongs to the same case.
-    before = read_bytes(tmp_path / "first")
+    before = contents(tmp_path / "first")
     assert run("first/effective.nml", "--output", "first").returncode == 0
-    assert read_bytes(tmp_path / "first") == before
+    assert contents(tmp_path / "first") == before
 
 
 def test_rows_after_a_gentle_contact_are_zero(

@@ -34,6 +34,8 @@ from thud.explorer.form import form
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Awaitable, Callable, Iterator
 
+    from conftest import ErrorsOf
+
 TOKEN = "secret"  # noqa: S105 - of the test
 HEAD = {server.TOKEN: TOKEN}
 CALIBRATION = "2000 N/FS"
@@ -180,7 +182,7 @@ def test_floor_and_room_are_answered(client: TestClient) -> None:
     assert solved(client, {"model": {"name": "modal_ball"}})["motion"] is None
 
 
-def test_recording_is_judged(client: TestClient) -> None:
+def test_recording_is_assessed(client: TestClient) -> None:
     path = REPOSITORY / "inputs/recordings/drop_1.wav"
     query = {"name": "drop_1.wav", "height": 1, "mass": 2.5, "calibration": CALIBRATION}
     report = last_report(client, "/measure", params=query, content=path.read_bytes())
@@ -465,13 +467,12 @@ def test_page_starts_with_a_case_or_results(tmp_path: Path) -> None:
     assert f90nml.Namelist(json.loads(text))["ball"]["mass"] == 2.5
 
 
-def test_unusable_port_is_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["explore", "--port", "99999", "--no-browser"]) == 1
-    assert re.search(naming("--port", 99999), capsys.readouterr().err)
+def test_unusable_port_is_one_sentence(errors_of: ErrorsOf) -> None:
+    explore = "explore", "--no-browser", "--port"
+    assert re.search(naming("--port", 99999), errors_of(*explore, 99999))
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        assert cli.main(["explore", "--port", str(port), "--no-browser"]) == 1
-    assert str(port) in capsys.readouterr().err
+        assert str(port) in errors_of(*explore, port)
 
 
 def test_browser_gets_the_token_by_a_file_of_its_user(
@@ -497,14 +498,25 @@ def test_browser_gets_the_token_by_a_file_of_its_user(
     assert not path.parent.exists()
 
 
+async def discard(_: object) -> None:
+    """Take what the application sends."""
+
+
+def leaving_after(*messages: dict[str, Any]) -> Callable[[], Awaitable[dict[str, Any]]]:
+    """Return what a page sends that leaves after some messages."""
+    rest = iter(messages)
+
+    async def receive() -> dict[str, Any]:
+        return next(rest, {"type": "http.disconnect"})
+
+    return receive
+
+
 def test_recordings_wait_before_they_are_copied(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     application = server.new_application({}, token=TOKEN, hosts=("127.0.0.1",))
-
-    async def send(_: object) -> None:
-        pass
 
     async def send_three() -> None:
         leave = asyncio.Event()
@@ -514,7 +526,7 @@ def test_recordings_wait_before_they_are_copied(
             return {"type": "http.disconnect"}
 
         works = [
-            asyncio.ensure_future(application(scope_of("/measure"), receive, send))
+            asyncio.ensure_future(application(scope_of("/measure"), receive, discard))
             for _ in range(3)
         ]
         while len(copies_in(tmp_path)) < 2:  # noqa: ASYNC110 - a file is no event
@@ -534,18 +546,11 @@ def test_page_that_leaves_before_the_answer_leaves_no_copy(
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     application = server.new_application({}, token=TOKEN, hosts=("127.0.0.1",), width=1)
 
-    async def send(_: object) -> None:
-        pass
-
     async def send_and_leave() -> None:
         # The second waits for ever where the first has kept its place.
         for _ in range(2):
-            messages = iter([{"type": "http.request", "body": WAV, "more_body": False}])
-
-            async def receive(messages: Iterator[dict[str, Any]] = messages) -> dict[str, Any]:
-                return next(messages, {"type": "http.disconnect"})
-
-            await asyncio.wait_for(application(scope_of("/measure"), receive, send), 20)
+            receive = leaving_after({"type": "http.request", "body": WAV, "more_body": False})
+            await asyncio.wait_for(application(scope_of("/measure"), receive, discard), 20)
 
     asyncio.run(send_and_leave())
     assert not copies_in(tmp_path)
@@ -574,10 +579,7 @@ def call(
 
 
 def test_page_that_leaves_while_it_sends_is_no_traceback(client: TestClient) -> None:
-    async def leave() -> dict[str, Any]:
-        return {"type": "http.disconnect"}
-
-    assert call(client, leave)[0]["status"] == 400
+    assert call(client, leaving_after())[0]["status"] == 400
 
 
 @pytest.mark.parametrize("path", ["/solve", "/download/report.html"])
@@ -595,15 +597,8 @@ def test_page_that_leaves_while_it_waits_ends_its_work(path: str) -> None:
     application.state.quick.run = application.state.slow.run = work
 
     async def leave() -> None:
-        messages = iter([{"type": "http.request", "body": json.dumps(SHELL).encode()}])
-
-        async def receive() -> dict[str, Any]:
-            return next(messages, {"type": "http.disconnect"})
-
-        async def send(_: object) -> None:
-            pass
-
-        await asyncio.wait_for(application(scope_of(path), receive, send), 20)
+        receive = leaving_after({"type": "http.request", "body": json.dumps(SHELL).encode()})
+        await asyncio.wait_for(application(scope_of(path), receive, discard), 20)
 
     asyncio.run(leave())
     assert ended == [path]

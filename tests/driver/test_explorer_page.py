@@ -119,7 +119,7 @@ def test_link_carries_the_case(browser: Browser, server: Served) -> None:
     sync_api.expect(page.locator("#verdict")).to_contain_text("drop height")
 
 
-def test_recording_on_the_page_is_judged(browser: Browser, server: Served) -> None:
+def test_recording_on_the_page_is_assessed(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
     page.locator("summary", has_text="Recording").click()
     page.locator("#recording_height").fill("1")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import psutil
 import pytest
-from explorer_server import Served, answer_of, drag, place_of, serve
+from explorer_server import Served, drag, place_of, serve, solve_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -62,8 +62,7 @@ def test_idle_and_slow_connections_hinder_nobody(server: Served) -> None:
     slow = [socket.create_connection((host, port)) for _ in range(300)]
     for i, one in enumerate(slow):
         one.sendall((b"", b"POST /so", begun + token.encode() + b"\r\n\r\n{")[i % 3])
-    with closing(HTTPConnection(host, port, timeout=60)) as connection:
-        assert answer_of(connection, token, SHELL)["verdict"] == "does not conform"
+    assert solve_at(server[0], SHELL)["verdict"] == "does not conform"
     for one in slow:
         one.close()
 
@@ -75,9 +74,8 @@ PATIENT = "from thud.explorer import server; server.QUICK_TIME_LIMIT = 60.0"
 @pytest.mark.parametrize("server", [PATIENT], indirect=True)
 def test_works_end_with_their_user_and_their_server(server: Served) -> None:
     host, port, token = place_of(server[0])
-    with closing(HTTPConnection(host, port, timeout=60)) as connection:
-        # Starts the process that forks the others, and the one of quick works.
-        assert answer_of(connection, token, {**SHELL, "sampling": {"substeps": 1000}})
+    # Starts the process that forks the others, and the one of quick works.
+    assert solve_at(server[0], {**SHELL, "sampling": {"substeps": 1000}})
     before = processes_of(server)
 
     def begin() -> HTTPConnection:
@@ -120,11 +118,9 @@ MODAL = {"model": {"name": "modal_ball"}, "sampling": {"substeps": 8}}
 
 @pytest.mark.slow
 def test_abandoned_works_hinder_neither_a_user_nor_the_end(server: Served) -> None:
-    host, port, token = place_of(server[0])
     for values in (SLOW, MODAL, SHELL):
         abandon(server, values, 60)
-    with closing(HTTPConnection(host, port, timeout=60)) as connection:
-        assert answer_of(connection, token, SHELL)
+    assert solve_at(server[0], SHELL)
     for values in (SLOW, MODAL, SHELL):
         abandon(server, values, 60)
     works = processes_of(server)
@@ -141,9 +137,7 @@ HANGING = "import asyncio, uvicorn; uvicorn.Server.shutdown = lambda *_, **__: a
 def test_second_signal_ends_a_server_that_hangs(number: signal.Signals, tmp_path: Path) -> None:
     before = f"import tempfile; tempfile.tempdir = {str(tmp_path)!r}; {HANGING}"
     with serve(before=before) as server:
-        host, port, token = place_of(server[0])
-        with closing(HTTPConnection(host, port, timeout=60)) as connection:
-            assert answer_of(connection, token, SHELL)
+        assert solve_at(server[0], SHELL)
         abandon(server, SLOW, 60)
         works = processes_of(server)
         server[1].send_signal(number)
@@ -161,13 +155,12 @@ def test_unfinished_heads_hinder_nobody_and_fill_no_log(files: int, tmp_path: Pa
     limit = f"import resource; resource.setrlimit(resource.RLIMIT_NOFILE, ({files}, {files}))"
     kinds = (b"", b"POST /so", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: ")
     with (tmp_path / "screen").open("w+") as screen, serve(before=limit, screen=screen) as server:
-        host, port, token = place_of(server[0])
+        host, port, _ = place_of(server[0])
         heads = []
         for i in range(3 * files // 2):
             heads.append(socket.create_connection((host, port), 60))
             heads[-1].sendall(kinds[i % 3])
-        with closing(HTTPConnection(host, port, timeout=60)) as connection:
-            assert answer_of(connection, token, SHELL)
+        assert solve_at(server[0], SHELL)
         for one in heads:
             one.close()
         screen.seek(0)
@@ -209,10 +202,10 @@ def test_answers_have_to_be_read() -> None:
 
 def test_version_6_of_this_machine_is_served() -> None:
     with serve("--host", "::1") as (address, _):
-        host, port, token = place_of(address)
+        host, port, _ = place_of(address)
         assert host == "[::1]"
+        assert solve_at(address, SHELL)
         with closing(HTTPConnection(host.strip("[]"), port, timeout=60)) as connection:
-            assert answer_of(connection, token, SHELL)
             # As a page that has found the address by another name.
             connection.request("GET", "/", headers={"Host": "rebound.example"})
             assert connection.getresponse().status == 400

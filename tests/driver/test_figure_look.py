@@ -8,8 +8,6 @@ import os
 import pkgutil
 import re
 import shutil
-import subprocess
-import sys
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from itertools import pairwise
@@ -19,7 +17,7 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 import numpy as np
 import pytest
-from conftest import INPUTS, MINIMAL, REPOSITORY
+from conftest import INPUTS, MINIMAL, REPOSITORY, names_in, python
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver, QuiverKey
 from matplotlib.text import Text
@@ -230,7 +228,7 @@ def test_users_style_changes_no_figure(shell: thud.Impact, tmp_path: Path) -> No
         with mpl.rc_context(style):
             figures = {**plot.case_figures(shell), "overview": shell.plot()}
             plot.save_all(figures, tmp_path / folder)
-    names = sorted(path.name for path in (tmp_path / "plain").iterdir())
+    names = names_in(tmp_path / "plain")
     assert "overview.svg" in names
     for name in names:
         plain, other = ((tmp_path / folder / name).read_bytes() for folder in ("plain", "other"))
@@ -244,10 +242,8 @@ def test_run_beside_a_matplotlibrc_draws_the_same_figures(tmp_path: Path) -> Non
         (tmp_path / folder / "case.nml").write_text(MINIMAL)
         lines = "".join(f"{key}: {value}\n" for key, value in style.items())
         (tmp_path / folder / "matplotlibrc").write_text(lines)
-        command = [sys.executable, "-P", "-m", "thud", "run", "-q", "case.nml", "-o", "out"]
-        done = subprocess.run(
-            command, cwd=tmp_path / folder, capture_output=True, text=True, check=False
-        )
+        command = ["-P", "-m", "thud", "run", "-q", "case.nml", "-o", "out"]
+        done = python(*command, cwd=tmp_path / folder)
         assert done.returncode == 0, done.stderr
         assert "Traceback" not in done.stderr
         drawn.append((tmp_path / folder / "out/force.svg").read_bytes())
@@ -261,11 +257,8 @@ def test_commands_without_a_matplotlib_that_works_keep_the_results(
     (tmp_path / "case.nml").write_text(MINIMAL)
     shutil.copy(REPOSITORY / "inputs/recordings/drop_1.csv", tmp_path / "record.csv")
     (tmp_path / "matplotlibrc").write_bytes(b"font.family: \xff")
-    command = [sys.executable, "-P", "-m", "thud", *words, "-q", "-o", "out"]
-    environment = os.environ | {"MPLBACKEND": "nowhere"}
-    done = subprocess.run(
-        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
-    )
+    command = ["-P", "-m", "thud", *words, "-q", "-o", "out"]
+    done = python(*command, cwd=tmp_path, env=os.environ | {"MPLBACKEND": "nowhere"})
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
     assert "utf-8" in done.stderr

@@ -7,27 +7,16 @@ import fcntl
 import os
 import platform
 import re
-import subprocess
 import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from conftest import naming
+from conftest import names_in, naming, python
 
 import thud
 from thud.base.files import Results, locked, replace_file
-
-
-@pytest.fixture
-def no_locks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let calls for a lock fail as on a file system that has none."""
-
-    def refuse(*_: object) -> None:
-        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
-
-    monkeypatch.setattr("fcntl.flock", refuse)
 
 
 @pytest.fixture(params=[True, False], ids=["locks", "no locks"])
@@ -50,20 +39,19 @@ def test_threads_that_write_the_same_file_do_not_disturb_each_other(tmp_path: Pa
 
     with ThreadPoolExecutor(len(contents)) as threads:
         list(threads.map(write, contents))
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+    assert names_in(tmp_path) == ["file"]
 
 
 def test_what_a_killed_writer_left_is_taken_up(tmp_path: Path) -> None:
     (tmp_path / ".file.part").write_bytes(b"half of a longer one")
     replace_file(tmp_path / "file", b"whole")
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+    assert names_in(tmp_path) == ["file"]
     assert (tmp_path / "file").read_bytes() == b"whole"
 
 
 @pytest.mark.usefixtures("no_locks")
 def test_leftovers_without_locks_are_removed_where_their_writer_has_ended(tmp_path: Path) -> None:
-    ended = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"],
-                           check=True, capture_output=True, text=True).stdout.strip()  # fmt: skip
+    ended = python("-c", "import os; print(os.getpid())").stdout.strip()
     names = {
         "ended": f".file.part.1.{platform.node()}.{ended}",
         "running": f".file.part.2.{platform.node()}.{os.getppid()}",
@@ -75,7 +63,7 @@ def test_leftovers_without_locks_are_removed_where_their_writer_has_ended(tmp_pa
         (tmp_path / name).write_bytes(b"half")
     os.utime(tmp_path / names["old"], (0, 0))
     replace_file(tmp_path / "file", b"whole")
-    left = {path.name for path in tmp_path.iterdir()}
+    left = set(names_in(tmp_path))
     assert left == {"file", names["running"], names["elsewhere"], names["another file"]}
 
 
@@ -104,7 +92,7 @@ def test_lock_that_is_not_had_leaves_no_open_file(tmp_path: Path) -> None:
 def test_results_without_locks_are_added_with_a_warning(tmp_path: Path) -> None:
     with pytest.warns(thud.LockWarning, match=re.escape(str(tmp_path))):
         Results(tmp_path).write({"force.png": b"figure"})
-    assert sorted(path.name for path in tmp_path.iterdir()) == [".thud", "force.png"]
+    assert names_in(tmp_path) == [".thud", "force.png"]
 
 
 def test_link_of_the_temporary_name_is_not_followed(tmp_path: Path) -> None:
@@ -165,4 +153,4 @@ def test_stale_file_may_vanish_meanwhile(tmp_path: Path, monkeypatch: pytest.Mon
 
     monkeypatch.setattr(Results, "_put", put_and_remove)
     results.write({"new": b"2"}, stale=["old"])
-    assert sorted(path.name for path in tmp_path.iterdir()) == [".thud", "new"]
+    assert names_in(tmp_path) == [".thud", "new"]

@@ -12,15 +12,13 @@ import f90nml
 import meshio
 import numpy as np
 import pytest
-from conftest import naming
+from conftest import names_in, naming
 
 import thud
 from thud import cli
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    CaseFile = Callable[..., Path]
+    from conftest import CaseFile, Run
 
 COARSE = {"radial_elements": 2, "polar_elements": 16}
 # Steps as long as a coarse mesh allows see the viscosity to 0.1 %, branches to 1 %.
@@ -54,9 +52,7 @@ def same(one: object, other: object) -> bool:
 
 
 @pytest.mark.parametrize("text", [SNAPSHOTS, f"&ball /\n&drop /\n&model /\n{FLOOR}"])
-def test_results_are_read_back_to_the_last_bit(
-    run: Callable[..., object], case_file: CaseFile, text: str
-) -> None:
+def test_results_are_read_back_to_the_last_bit(run: Run, case_file: CaseFile, text: str) -> None:
     run(case_file(text), "--all")
     found = thud.read_results("outputs/case")
     assert same(found, thud.solve(found.case))
@@ -118,7 +114,7 @@ def test_modes_alone_need_no_drop(
     case_file: CaseFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert cli.main(["run", str(case_file(MODES)), "--check"]) == 0
-    assert sorted(path.name for path in (tmp_path / "outputs/case").iterdir()) == [
+    assert names_in(tmp_path / "outputs/case") == [
         ".thud", "effective.nml", "modes.csv", "modes.svg", "modes.vtu",
     ]  # fmt: skip
     rows = capsys.readouterr().out.partition("free modes")[2].splitlines()[2:6]
@@ -133,7 +129,7 @@ def test_modes_and_impact_come_from_one_file(case_file: CaseFile, tmp_path: Path
     case = thud.read_case(case_file(IMPACT + "&modes count = 2 /\n"))
     assert case.modes == thud.Modes(2, **COARSE)
     assert cli.main(["run", "-q", "--all", str(tmp_path / "case.nml")]) == 0
-    names = {path.name for path in (tmp_path / "outputs/case").iterdir()}
+    names = set(names_in(tmp_path / "outputs/case"))
     assert {"modes.csv", "modes.svg", "force.csv", "force.svg"} < names
     again = thud.read_case(tmp_path / "outputs/case/effective.nml")
     assert again == case
@@ -149,7 +145,7 @@ def test_a_shorter_run_leaves_nothing_of_a_longer_one(case_file: CaseFile, tmp_p
     assert (folder / "model_histories.csv").exists()
     assert len(thud.read_results(folder).motion.time) > 20  # type: ignore[union-attr]
     assert cli.main(["run", "-q", "--no-figures", str(case_file(IMPACT))]) == 0
-    assert {path.name for path in folder.iterdir()} == {
+    assert set(names_in(folder)) == {
         ".thud", "effective.nml", "force.csv", "levels.csv", "summary.nml",
     }  # fmt: skip
 
@@ -281,7 +277,7 @@ def check_refusal(text: str, words: str) -> None:
 
 
 def test_snapshots_larger_than_the_disk_are_refused_before_the_run(
-    run: Callable[..., object], case_file: CaseFile
+    run: Run, case_file: CaseFile
 ) -> None:
     # The file system of processes has no room at all.
     result = run(case_file(SNAPSHOTS), "--output", "/proc/thud")
@@ -296,7 +292,7 @@ def test_free_modes_do_not_depend_on_what_was_computed_before() -> None:
 
 
 def test_record_too_short_for_any_contact_is_told_before_it_is_computed() -> None:
-    # Ten elements of 0.4 µm took minutes to the same end.
+    # Ten elements of 0.4 µm would take minutes to the same end.
     ball = thud.Ball(wall_thickness=4e-7)
     with pytest.raises(thud.InputError, match=naming("&sampling: duration", "0.05 s")):
         thud.solve(ball, model="finite_element", radial_elements=4, polar_elements=10)

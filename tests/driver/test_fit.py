@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-import warnings
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import naming
+from conftest import naming, quiet_fit
 from scipy import stats
 
 import thud
@@ -17,6 +17,11 @@ from thud.studies.fitting import misfit, search
 from thud.studies.fitting.inference import identifiability, infer, pair_messages, worst_directions
 from thud.studies.fitting.ranges import Range, bound_parameters, get_ranges
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    FailWhere = Callable[[Callable[[float], bool]], None]
+
 RATE = 44100.0
 TRUTH = thud.Ball(youngs_modulus=1.8e6)
 MODAL = thud.Case(model=thud.ModalBall(damping_law="rising"))
@@ -24,12 +29,6 @@ COARSE = thud.FiniteElement(radial_elements=2, polar_elements=16, snapshot_inter
 # Least squares end where a step or a gain is 1e-8; near a perfect fit the last step squares that
 # of the one before, but for the derivative's own error of up to 3e-3.
 SOLVED = 1e-8
-
-
-def quiet_fit(*arguments: object, **options: object) -> thud.Fit:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", thud.FitWarning)
-        return thud.fit(*arguments, **options)  # type: ignore[arg-type]
 
 
 def noisy_record(impact: thud.Impact, noise: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -448,16 +447,25 @@ def test_estimated_deviation_of_levels_is_that_of_their_residuals() -> None:
     assert fit.standard_errors["youngs_modulus"] == pytest.approx(fit.noise / slope, rel=1e-3)
 
 
-def test_impossible_places_are_stepped_away_from(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def fail_where(monkeypatch: pytest.MonkeyPatch) -> FailWhere:
+    """Let the model fail at some of the moduli, Pa."""
     solve = misfit.compute
 
-    def with_a_gap(case: thud.Case) -> thud.Impact:
-        if 0.95e6 < case.ball.youngs_modulus < 1.1e6:
-            message = "out of the model"
-            raise thud.NumericalError(message)
-        return solve(case)
+    def set_failures(fails: Callable[[float], bool]) -> None:
+        def compute(case: thud.Case) -> thud.Impact:
+            if fails(case.ball.youngs_modulus):
+                message = "out of the model"
+                raise thud.NumericalError(message)
+            return solve(case)
 
-    monkeypatch.setattr(misfit, "compute", with_a_gap)
+        monkeypatch.setattr(misfit, "compute", compute)
+
+    return set_failures
+
+
+def test_impossible_places_are_stepped_away_from(fail_where: FailWhere) -> None:
+    fail_where(lambda modulus: 0.95e6 < modulus < 1.1e6)
     # The first step, of the length of the start, leads into the gap.
     fit = thud.fit(thud.solve(TRUTH), {"youngs_modulus": 0.5e6})
     assert fit.failures
@@ -470,16 +478,8 @@ def test_one_parameter_far_from_its_start() -> None:
     assert fit.values["youngs_modulus"] == pytest.approx(1.8e6, rel=SOLVED)
 
 
-def test_model_that_fails_around_the_best_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    solve = misfit.compute
-
-    def only_here(case: thud.Case) -> thud.Impact:
-        if case.ball.youngs_modulus != 2e6:
-            message = "out of the model"
-            raise thud.NumericalError(message)
-        return solve(case)
-
-    monkeypatch.setattr(misfit, "compute", only_here)
+def test_model_that_fails_around_the_best_place(fail_where: FailWhere) -> None:
+    fail_where(lambda modulus: modulus != 2e6)
     with pytest.raises(
         thud.NumericalError, match=naming("youngs_modulus", "2e+06", "out of the model")
     ):
@@ -500,24 +500,14 @@ def test_best_of_several_starts_counts() -> None:
     assert "converged" in str(once)
 
 
-def test_start_around_which_the_model_fails_leaves_the_others(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    solve = misfit.compute
-
-    def below_or_here(case: thud.Case) -> thud.Impact:
-        if case.ball.youngs_modulus > 1.95e6 and case.ball.youngs_modulus != 2e6:
-            message = "out of the model"
-            raise thud.NumericalError(message)
-        return solve(case)
-
-    monkeypatch.setattr(misfit, "compute", below_or_here)
+def test_start_around_which_the_model_fails_leaves_the_others(fail_where: FailWhere) -> None:
+    fail_where(lambda modulus: modulus > 1.95e6 and modulus != 2e6)
     fit = thud.fit(thud.solve(TRUTH), {"youngs_modulus": 2e6}, starts=4)
     assert fit.values["youngs_modulus"] == pytest.approx(1.8e6, rel=SOLVED)
 
 
 def test_large_ball_is_valid_in_fixed_and_fit() -> None:
-    # The wall is thicker than the default ball: its range was that of the default.
+    # The wall is thicker than the default ball.
     ball = thud.Ball(outer_radius=0.2, wall_thickness=0.1, mass=20.0)
     fit = thud.fit(thud.solve(ball), {"wall_thickness": 0.11}, thud.Case(ball=ball))
     assert fit.values["wall_thickness"] == pytest.approx(0.1, rel=SOLVED)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from conftest import quiet_fit
 from scipy import stats
 
 import thud
@@ -21,9 +21,7 @@ IMPACT = thud.solve(duration=0.03)
 
 def fit_with_noise(noise: float, *parameters: str) -> thud.Fit:
     force = IMPACT.floor_force + np.random.default_rng(1).normal(scale=noise, size=1323)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", thud.FitWarning)
-        return thud.fit((IMPACT.time + 0.2, force), parameters)
+    return quiet_fit((IMPACT.time + 0.2, force), parameters)
 
 
 def labels(figure: Figure) -> list[str]:

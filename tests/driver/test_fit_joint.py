@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import re
-import warnings
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, naming
+from conftest import REPOSITORY, names_in, naming, quiet_fit
 from scipy import stats
 
 import thud
@@ -22,6 +21,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
+
+    Record = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 RATE = 44100.0
 HEIGHTS = (0.1, 1.0, 1.6)
@@ -49,9 +50,7 @@ mass = { start = 2.4 }
 """
 
 
-def record(
-    case: thud.Case, height: float, noise: float, seed: int, offset: float = 0.0
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def record(case: thud.Case, height: float, noise: float, seed: int, offset: float = 0.0) -> Record:
     """Return the force of a drop with quiet, white noise and an offset."""
     impact = thud.solve(replace(case, drop=thud.Drop(height)))
     contact = int(impact.contact_time * RATE) + 2
@@ -61,7 +60,7 @@ def record(
 
 
 @pytest.fixture(scope="module")
-def drops() -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+def drops() -> list[Record]:
     """Return records from three heights, each with its own noise and offset."""
     return [
         record(CASE, height, noise, seed, 4.0 * seed)
@@ -69,9 +68,7 @@ def drops() -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
     ]
 
 
-def test_three_heights_give_modulus_and_mass(
-    drops: list[tuple[NDArray[np.float64], NDArray[np.float64]]],
-) -> None:
+def test_three_heights_give_modulus_and_mass(drops: list[Record]) -> None:
     targets = [
         thud.ForceTarget(drop, fixed={"height": height})
         for drop, height in zip(drops, HEIGHTS, strict=True)
@@ -122,9 +119,7 @@ def test_forces_and_levels_are_fitted_together() -> None:
     assert list(fit.figures()) == ["fit_1", "fit_2", "confidence"]
 
 
-def test_record_that_does_not_fit_the_others_is_named(
-    drops: list[tuple[NDArray[np.float64], NDArray[np.float64]]],
-) -> None:
+def test_record_that_does_not_fit_the_others_is_named(drops: list[Record]) -> None:
     time, force = drops[1]
     targets = [
         thud.ForceTarget(drops[0], fixed={"height": 0.1}),
@@ -144,9 +139,7 @@ def test_residuals_of_a_target_have_its_share_of_the_parameters() -> None:
 
     def fit(uncertainty: float) -> thud.Fit:
         target = thud.LevelTarget(levels.tolist(), uncertainty, force="floor")
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", thud.FitWarning)
-            return thud.fit([target, target], ["youngs_modulus"], CASE)
+        return quiet_fit([target, target], ["youngs_modulus"], CASE)
 
     square = fit(1.0).residuals @ fit(1.0).residuals / 2
     for factor, expected in ((0.99, 0), (1.01, 2)):
@@ -155,9 +148,7 @@ def test_residuals_of_a_target_have_its_share_of_the_parameters() -> None:
         assert sum("given uncertainty" in one for one in told) == expected
 
 
-def test_heights_do_not_tell_modulus_from_wall(
-    drops: list[tuple[NDArray[np.float64], NDArray[np.float64]]],
-) -> None:
+def test_heights_do_not_tell_modulus_from_wall(drops: list[Record]) -> None:
     targets = [
         thud.ForceTarget(drop, fixed={"height": height})
         for drop, height in zip(drops[:2], HEIGHTS, strict=False)
@@ -189,11 +180,7 @@ def test_fit_says_what_is_hard_to_tell_apart() -> None:
 
 
 @pytest.fixture
-def folder(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    drops: list[tuple[NDArray[np.float64], NDArray[np.float64]]],
-) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, drops: list[Record]) -> Path:
     """Write two drops as tables and go to their directory."""
     monkeypatch.chdir(tmp_path)
     for number, drop in enumerate(drops[:2], start=1):
@@ -205,7 +192,7 @@ def test_study_of_several_records(folder: Path, capsys: pytest.CaptureFixture[st
     (folder / "study.toml").write_text(STUDY)
     assert cli.main(["fit", "-o", "found", "study.toml"]) == 0
     assert "gain(2)" in capsys.readouterr().out
-    names = {path.name for path in (folder / "found").iterdir()}
+    names = set(names_in(folder / "found"))
     assert {"fit_1.csv", "fit_2.csv", "fitted_2.nml", "fit_2.svg", "fit.json"} < names
     assert names == {".thud", *KIND.listed_files(thud.read_study("study.toml", "fit"))}
     saved = json.loads((folder / "found/fit.json").read_text())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import sys
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import naming
+from conftest import naming, quiet_fit
 from scipy import stats
 from scipy.linalg import toeplitz
 
@@ -47,12 +46,6 @@ def record(disturbance: str, seed: int = 1) -> tuple[NDArray[np.float64], NDArra
     """Return the pulse of the truth with a disturbance of the study of coverage."""
     time, force = pulse(QUIET)
     return time, force + DISTURBANCES[disturbance](time, np.random.default_rng(seed))
-
-
-def quiet_fit(*arguments: object, **options: object) -> thud.Fit:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", thud.FitWarning)
-        return thud.fit(*arguments, **options)  # type: ignore[arg-type]
 
 
 def pulls(fit: thud.Fit) -> NDArray[np.float64]:
@@ -380,7 +373,7 @@ def test_what_lies_under_the_pulse_is_found(disturbance: str, name: str, size: f
     assert (np.abs(pulls(fit)) < FAR).all()
     nuisances = fit.targets[0].nuisances
     name = next(one for one in nuisances if one.startswith(name))
-    # A tone of 16.7 Hz was told as hum of 50 Hz too.
+    # A tone of 16.7 Hz is not hum of 50 Hz too.
     assert set(nuisances) == {"offset", name}
     value, error = nuisances[name]
     assert abs(value - size) < FAR * error
@@ -414,7 +407,7 @@ def test_noise_makes_no_tone() -> None:
         for colour in ("white noise", "pink noise", "brown noise"):
             misfit = thud.ForceTarget(record(colour, seed)).misfit()
             assert misfit.tones == ()
-            # Pink noise was told as hum with an error that held for white noise.
+            # The error of hum counts the color of the noise.
             _, size, error = misfit.background_record.mains(misfit.background)
             assert size < 4.5 * error
 

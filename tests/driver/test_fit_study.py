@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, naming
+from conftest import REPOSITORY, names_in, naming
 
 import thud
 from thud import cli
@@ -18,6 +18,8 @@ from thud.studies.fit import KIND
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from conftest import ErrorsOf
 
 STUDIES = REPOSITORY / "inputs/studies"
 # What make_targets.py has put into the targets.
@@ -29,6 +31,7 @@ file = "record.csv"
 [parameters]
 youngs_modulus = { start = 1.4, unit = "MPa" }
 """
+FIT = ["fit", "-q", "--no-figures", "-o", "found", "study.toml"]
 
 
 @pytest.fixture(autouse=True)
@@ -37,6 +40,7 @@ def in_directory_with_record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     impact = thud.solve(duration=0.03)
     table = np.column_stack([impact.time + 0.2, impact.floor_force])
     np.savetxt("record.csv", table, delimiter=",")
+    (tmp_path / "study.toml").write_text(STUDY)
 
 
 @pytest.mark.parametrize("name", ["fit_force", "fit_levels"])
@@ -46,7 +50,7 @@ def test_studies_of_the_repository(
 ) -> None:
     assert cli.main(["fit", str(STUDIES / f"{name}.toml")]) == 0
     folder = tmp_path / "outputs" / name
-    assert sorted(path.name for path in folder.iterdir()) == [
+    assert names_in(folder) == [
         ".thud",
         "confidence.svg",
         "fit.csv",
@@ -69,8 +73,7 @@ def test_studies_of_the_repository(
     assert "MPa" in output
 
 
-def test_units_are_those_of_the_file(tmp_path: Path) -> None:
-    (tmp_path / "study.toml").write_text(STUDY)
+def test_units_are_those_of_the_file() -> None:
     study = thud.read_study("study.toml", "fit")
     assert [p.table for p in study.parameters] == [{"start": 1.4e6, "unit": "MPa"}]
     fit = KIND.run(study)
@@ -99,57 +102,43 @@ def test_doubts_are_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert saved["parameters"]["wall_thickness"]["standard_error"] is None
 
 
-def test_search_without_an_end_is_a_failure(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_search_without_an_end_is_a_failure(tmp_path: Path, errors_of: ErrorsOf) -> None:
     (tmp_path / "study.toml").write_text(f"max_steps = 1\n{STUDY}")
-    assert cli.main(["fit", "--no-figures", "study.toml"]) == 2
-    assert "converged" in capsys.readouterr().err
+    assert "converged" in errors_of("fit", "--no-figures", "study.toml", code=2)
 
 
 def test_window_without_an_end_is_saved(tmp_path: Path) -> None:
     (tmp_path / "study.toml").write_text(STUDY.replace("[target]", "[target]\nwindow = [0, inf]"))
     for _ in range(2):
-        assert cli.main(["fit", "-q", "--no-figures", "-o", "found", "study.toml"]) == 0
+        assert cli.main(FIT) == 0
     saved = json.loads((tmp_path / "found/fit.json").read_text())
     assert saved["study"]["target"]["window"] == [0, "Infinity"]
 
 
-def test_results_of_another_fit_are_not_touched(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "study.toml").write_text(STUDY)
-    arguments = ["fit", "-q", "--no-figures", "-o", "found", "study.toml"]
-    assert cli.main(arguments) == 0
-    assert cli.main(arguments) == 0
+def test_results_of_another_fit_are_not_touched(tmp_path: Path, errors_of: ErrorsOf) -> None:
+    assert cli.main(FIT) == 0
+    assert cli.main(FIT) == 0
     before = (tmp_path / "found/fit.json").read_bytes()
     (tmp_path / "study.toml").write_text(STUDY.replace("1.4", "1.5"))
-    assert cli.main(arguments) == 1
-    error = capsys.readouterr().err
+    error = errors_of(*FIT)
     words = naming("found/fit.json", "[parameters] youngs_modulus", 1.4, 1.5, "--replace")
     assert re.search(words, error)
     assert (tmp_path / "found/fit.json").read_bytes() == before
     (tmp_path / "found/fit.json").write_text("[]")
-    assert cli.main(arguments) == 1
+    assert cli.main(FIT) == 1
 
 
 @pytest.mark.parametrize("place", ["study.toml", "/proc"])
 def test_useless_directory_is_reported_before_the_search(
-    place: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    place: str, errors_of: ErrorsOf, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "study.toml").write_text(STUDY)
     monkeypatch.delattr("thud.studies.fit.search")
-    assert cli.main(["fit", "-q", "-o", place, "study.toml"]) == 1
-    assert place in capsys.readouterr().err
+    assert place in errors_of("fit", "-q", "-o", place, "study.toml")
 
 
 def test_fit_that_cannot_be_saved_is_refused_before_it_is_made(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "study.toml").write_text(STUDY)
     (tmp_path / "found/fit.csv").mkdir(parents=True)
     assert cli.main(["fit", "-o", "found", "study.toml"]) == 1
     captured = capsys.readouterr()
@@ -214,19 +203,17 @@ def test_fit_that_cannot_be_saved_is_refused_before_it_is_made(
     ],
 )
 def test_bad_studies_are_reported(
-    old: str, new: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    old: str, new: str, words: str, tmp_path: Path, errors_of: ErrorsOf
 ) -> None:
     assert old in STUDY
     (tmp_path / "study.toml").write_text(STUDY.replace(old, new))
-    assert cli.main(["fit", "study.toml"]) == 1
-    error = capsys.readouterr().err
+    error = errors_of("fit", "study.toml")
     assert len(error.strip().splitlines()) == 1
     assert re.search(words, error), error
 
 
-def test_study_that_is_not_there_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["fit", "nowhere.toml"]) == 1
-    assert "nowhere.toml" in capsys.readouterr().err
+def test_study_that_is_not_there_is_reported(errors_of: ErrorsOf) -> None:
+    assert "nowhere.toml" in errors_of("fit", "nowhere.toml")
 
 
 def test_targets_are_those_of_their_script(
@@ -250,15 +237,14 @@ def test_results_of_another_record_or_case_are_not_touched(
 ) -> None:
     record = np.loadtxt("record.csv", delimiter=",")
     (tmp_path / "study.toml").write_text('case = "ball.nml"\n' + STUDY)
-    fit = ["fit", "-q", "--no-figures", "study.toml", "-o", "found"]
     for mass, scale in ((2.5, 1), (2.4, 1), (2.5, 0.9)):
         (tmp_path / "ball.nml").write_text(f"&ball mass = {mass} / &drop / &model /\n")
         np.savetxt("record.csv", record * [1, scale], delimiter=",")
         if (mass, scale) == (2.5, 1):
-            assert cli.main(fit) == 0
+            assert cli.main(FIT) == 0
             before = (tmp_path / "found/fit.json").read_bytes()
             continue
-        assert cli.main(fit) == 1
+        assert cli.main(FIT) == 1
         words = naming("&ball: mass", 2.5, 2.4) if mass == 2.4 else naming("numbers", "[target]")
         assert re.search(words, capsys.readouterr().err)
         assert (tmp_path / "found/fit.json").read_bytes() == before
@@ -267,13 +253,11 @@ def test_results_of_another_record_or_case_are_not_touched(
 def test_fits_take_a_directory_one_at_a_time(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "study.toml").write_text(STUDY)
-    fit = ["fit", "-q", "--no-figures", "study.toml", "-o", "found"]
     (tmp_path / "found").mkdir()
     with locked(tmp_path / "found"):
-        assert cli.main(fit) == 1
+        assert cli.main(FIT) == 1
     assert "found/fit.json" in capsys.readouterr().err
-    assert cli.main(fit) == 0
+    assert cli.main(FIT) == 0
 
 
 def test_replace_finds_the_fit_again_and_leaves_no_older_file(tmp_path: Path) -> None:
@@ -285,7 +269,7 @@ def test_replace_finds_the_fit_again_and_leaves_no_older_file(tmp_path: Path) ->
     (tmp_path / "study.toml").write_text(STUDY.replace("[target]", "[target]\ntime_shift = false"))
     np.savetxt("record.csv", np.loadtxt("record.csv", delimiter=",") - [0.2, 0], delimiter=",")
     assert cli.main([*fit, "--replace"]) == 0
-    assert sorted(path.name for path in (tmp_path / "found").iterdir()) == [
+    assert names_in(tmp_path / "found") == [
         ".thud", "fit.csv", "fit.json", "fit.svg", "fitted.nml",
     ]  # fmt: skip
 

@@ -15,9 +15,10 @@ from conftest import naming
 import thud
 
 if TYPE_CHECKING:
-    import subprocess
     from collections.abc import Callable
     from pathlib import Path
+
+    from conftest import CaseFile, Run
 
 MODES = thud.MeasuredModes([24.0, 89.0], [0.05, 0.1], [2.4, 0.1])
 LIGHT = thud.InfinitePlate(1600.0)
@@ -76,11 +77,7 @@ def test_mobility_is_that_of_the_closed_form(oracle: Callable[..., None]) -> Non
 
 
 @pytest.mark.parametrize("model", ["hollow_sphere", "finite_element"])
-def test_results_on_a_floor_are_read_back(
-    run: Callable[..., subprocess.CompletedProcess[str]],
-    case_file: Callable[[str], Path],
-    model: str,
-) -> None:
+def test_results_on_a_floor_are_read_back(run: Run, case_file: CaseFile, model: str) -> None:
     options = "radial_elements = 2\n polar_elements = 24" if model == "finite_element" else ""
     mesh = f"&mesh\n {options}\n/\n&output snapshot_interval = 1e-3 /\n" if options else ""
     text = f"&model name = '{model}' /\n{mesh}&floor name = 'oscillator' /\n"
@@ -133,9 +130,7 @@ def test_models_of_the_blocked_force_say_so() -> None:
     assert impact.on_floor is None
 
 
-def test_points_of_a_plate_move(
-    run: Callable[..., subprocess.CompletedProcess[str]], case_file: Callable[[str], Path]
-) -> None:
+def test_points_of_a_plate_move(run: Run, case_file: CaseFile) -> None:
     """The point under the source moves as the source feels it; a farther one as its transfer."""
     text = "&model /\n&floor name = 'plate' /\n&plate point_x = 2.5, 1.0 point_y = 2.0, 0.5 /\n"
     done = run(case_file(text), "-o", "out")

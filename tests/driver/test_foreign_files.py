@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pytest
-from conftest import MINIMAL, REPOSITORY, naming
+from conftest import MINIMAL, REPOSITORY, names_in, naming
 
 import thud
 from thud import cli
@@ -149,7 +149,7 @@ def _report() -> str:
 
 def names_written(out: Path) -> list[str]:
     """Return the names of a directory of results, and empty it."""
-    names = sorted(path.name for path in out.iterdir())
+    names = names_in(out)
     assert names
     shutil.rmtree(out)
     return names

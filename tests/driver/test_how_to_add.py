@@ -14,7 +14,7 @@ import sys
 from typing import TYPE_CHECKING
 
 import pytest
-from conftest import REPOSITORY
+from conftest import REPOSITORY, python
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -127,7 +127,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     insert(quantities, "contains\n\n", example(page, "fortran function"))
     insert(quantities, "public :: ", "get_mid_peak, ")
     ensemble = root / "src/sweep/ensemble.f90"
-    insert(ensemble, "set%restitution, set%impulse", example(page, "fortran batch").rstrip("\n"))
+    insert(ensemble, "outcome%restitution, outcome%impulse", example(page, "fortran batch").rstrip("\n"))
     insert(ensemble, "   use thud_power, only: not_a_number\n",
            "   use thud_quantities, only: get_mid_peak\n")  # fmt: skip
     drop = root / "driver/thud/recordings/measured_drop.py"
@@ -179,9 +179,7 @@ def test_executable_knows_what_was_added(copy: Path, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_python_knows_what_was_added(copy: Path) -> None:
     environment = {**os.environ, "PYTHONPATH": str(copy / "driver")}
-    done = subprocess.run(
-        [sys.executable, "-c", DRIVE], env=environment, capture_output=True, text=True, check=False
-    )
+    done = python("-c", DRIVE, env=environment)
     assert done.returncode == 0, done.stderr
     assert float(done.stdout) == pytest.approx(math.pi * math.sqrt(2.5 / 62000), rel=1e-9)
     assert "`&linear_spring`" in (copy / "docs/keys.md").read_text()
@@ -202,10 +200,7 @@ def test_every_output_has_a_quantity_that_was_added(copy: Path, tmp_path: Path) 
     assert ",mid_peak_N," in (tmp_path / "outputs/case_samples/samples.csv").read_text()
     environment = {**os.environ, "PYTHONPATH": str(copy / "driver")}
     record = REPOSITORY / "inputs/recordings/drop_1.csv"
-    done = subprocess.run(
-        [sys.executable, "-c", QUANTITY, record],
-        env=environment, cwd=tmp_path, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    done = python("-c", QUANTITY, record, env=environment, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
 
 

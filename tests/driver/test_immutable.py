@@ -180,27 +180,15 @@ def test_changed_list_changes_no_case() -> None:
     assert case == thud.Case(floor=thud.Plate(point_x=(1.0, 2.0), point_y=(1.0, 2.0)))
 
 
-def test_read_only_view_of_a_callers_array_is_copied() -> None:
+@pytest.mark.parametrize("given", ["read-only view", "column of a table", "read-only array"])
+def test_array_of_a_caller_is_copied(given: str) -> None:
     time = np.arange(3.0)
-    view = time[:]
-    view.setflags(write=False)
-    bands = dataclasses.replace(thud.get_bands(), center=view)
-    time += 1
-    assert bands.center.tolist() == [0.0, 1.0, 2.0]
-
-
-def test_column_of_a_table_is_copied() -> None:
-    column = xr.DataArray(np.arange(3.0))
-    bands = dataclasses.replace(thud.get_bands(), center=column)
-    column += 1
-    assert bands.center.tolist() == [0.0, 1.0, 2.0]
-
-
-def test_read_only_array_of_a_caller_is_copied() -> None:
-    time = np.arange(3.0)
-    time.setflags(write=False)
-    bands = dataclasses.replace(thud.get_bands(), center=time)
-    time.setflags(write=True)
+    center = {"read-only view": time[:], "column of a table": xr.DataArray(time)}.get(given, time)
+    if "read-only" in given:
+        center.setflags(write=False)
+    bands = dataclasses.replace(thud.get_bands(), center=center)
+    if given == "read-only array":
+        time.setflags(write=True)
     time += 1
     assert bands.center.tolist() == [0.0, 1.0, 2.0]
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import MINIMAL, naming
+from conftest import MINIMAL, names_in, naming, python
 
 import thud
 from thud.base.files import uninterrupted
@@ -147,12 +147,7 @@ for work in (
     assert [library.openblas_get_num_threads() for library in blas] == before
 """
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "2"}
-    done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", code],
-        check=False,
-        env=environment,
-        timeout=6 * LIMIT,
-    )
+    done = python("-W", "ignore", "-c", code, env=environment, timeout=6 * LIMIT)
     if done.returncode == 3:
         pytest.skip("no OpenBLAS whose threads can be counted")
     assert done.returncode == 0
@@ -206,8 +201,7 @@ except KeyboardInterrupt:
     thud.solve()
     os._exit(7)
 """
-    done = subprocess.run([sys.executable, "-c", code], check=False, timeout=2 * LIMIT)
-    assert done.returncode == 7
+    assert python("-c", code, timeout=2 * LIMIT).returncode == 7
 
 
 @pytest.mark.parametrize(
@@ -242,10 +236,7 @@ for _ in range({forks}):
         os._exit(abs(code))
 os._exit(0)
 """
-    done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", code], check=False, timeout=6 * LIMIT
-    )
-    assert done.returncode == 0
+    assert python("-W", "ignore", "-c", code, timeout=6 * LIMIT).returncode == 0
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -269,7 +260,7 @@ def test_executable_ends_samples_and_leaves_nothing(
 
 def test_library_that_cannot_be_loaded_is_one_sentence() -> None:
     code = "import sys, thud_driver; sys.modules['numpy'] = None; sys.exit(thud_driver.main())"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = python("-c", code)
     assert done.returncode == 1
     assert "Traceback" not in done.stderr
     # The library prints what it misses.
@@ -334,7 +325,7 @@ from thud import cli
 cli.main = lambda: draw()
 sys.exit(thud_driver.main())
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = python("-c", code)
     assert KEPT.match(done.stderr)
     assert done.returncode == 130
 
@@ -349,7 +340,7 @@ def test_interrupted_cases_keep_those_that_are_done(number: int, tmp_path: Path)
             time.sleep(0.01)
         time.sleep(0.2)
         assert KEPT.match(ended(process, number))
-    assert [path.name for path in (tmp_path / "outputs").iterdir()] == ["short"]
+    assert names_in(tmp_path / "outputs") == ["short"]
     assert thud.read_results(tmp_path / "outputs/short").contact_time > 0
 
 

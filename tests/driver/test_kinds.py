@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-from conftest import REPOSITORY, naming
+from conftest import REPOSITORY, names_in, naming, python
 
 import thud
 from thud import cli
@@ -45,7 +43,7 @@ def test_command_writes_files_and_prints_a_table(
     text = f"parameters = {{mass={{{values}}}, height={{{values}}}}}"
     (tmp_path / "study.toml").write_text(design + text)
     assert cli.main([name, str(tmp_path / "study.toml"), "-o", str(tmp_path / "out")]) == 0
-    written = sorted(path.name for path in (tmp_path / "out").iterdir())
+    written = names_in(tmp_path / "out")
     assert written == sorted([".thud", "study.nc", "study.svg", *more])
     assert words in capsys.readouterr().out
     if more:
@@ -71,10 +69,8 @@ def test_kind_is_added_by_one_file_and_one_line(tmp_path: Path) -> None:
         ["-m", "thud", "scatter", "mass.toml"],
         ["-c", "import thud; print(thud.scatter('mass.toml').table())"],
     ):
-        done = subprocess.run(
-            [sys.executable, *command], cwd=tmp_path, capture_output=True, text=True, check=False
-        )
+        done = python(*command, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         assert "peak force, N" in done.stdout
-    names = sorted(path.name for path in (tmp_path / "outputs/mass").iterdir())
+    names = names_in(tmp_path / "outputs/mass")
     assert names == [".thud", "mass.nc", "mass.svg"]

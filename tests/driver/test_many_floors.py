@@ -13,9 +13,9 @@ from conftest import naming
 import thud
 
 if TYPE_CHECKING:
-    import subprocess
-    from collections.abc import Callable
     from pathlib import Path
+
+    from conftest import CaseFile, Run
 
 CASE = thud.Case(floor=thud.Plate(), room=thud.Room(), levels=thud.Levels(bands="both"))
 TEXT = "&model /\n&floor name = 'plate' /\n&room /\n"
@@ -91,9 +91,7 @@ def test_keys_of_one_name_are_told_apart_by_their_group() -> None:
 
 
 def test_table_of_floors_has_the_same_numbers(
-    run: Callable[..., subprocess.CompletedProcess[str]],
-    case_file: Callable[[str], Path],
-    tmp_path: Path,
+    run: Run, case_file: CaseFile, tmp_path: Path
 ) -> None:
     (tmp_path / "samples.txt").write_text("thickness; plate.loss_factor\n0.1; 0.01\n-1; 0.01\n")
     done = run(case_file(TEXT), "--samples", "samples.txt", "-o", "out")

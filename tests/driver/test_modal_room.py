@@ -206,7 +206,7 @@ def test_what_has_no_modal_answer_is_refused(
 
 @pytest.mark.parametrize("slowest", [0.5, 6.9, 200.0])
 def test_record_lasts_until_the_slowest_mode_has_decayed(slowest: float) -> None:
-    """By 60 dB, and half a second more: too short a record passed."""
+    """By 60 dB, and half a second more."""
     left = 10 * np.log10(np.exp(-slowest * (module._duration(slowest) - 0.5)))  # noqa: SLF001
     assert left == pytest.approx(-60.0)
 

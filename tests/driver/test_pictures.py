@@ -7,7 +7,7 @@ import sys
 from typing import TYPE_CHECKING
 
 import pytest
-from conftest import REPOSITORY
+from conftest import REPOSITORY, names_in
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -18,8 +18,8 @@ def test_pictures_are_drawn_and_shown(tmp_path: Path, monkeypatch: pytest.Monkey
     scripts = REPOSITORY / "docs/pictures"
     monkeypatch.setattr(sys, "path", [str(scripts), *sys.path])
     runpy.run_path(str(scripts / "draw.py"))["draw"](tmp_path)
-    drawn = {path.name for path in tmp_path.iterdir()}
-    kept = {path.name for path in (REPOSITORY / "docs/figures").iterdir()}
+    drawn = set(names_in(tmp_path))
+    kept = set(names_in(REPOSITORY / "docs/figures"))
     assert {"flagship.png", *(name for name in kept if name.startswith("sketch_"))} == drawn
 
 

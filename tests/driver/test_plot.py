@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, naming
+from conftest import REPOSITORY, names_in, naming
 from PIL import Image
 
 import thud
@@ -78,7 +78,7 @@ def test_figures_are_a_column_wide_and_whole(tmp_path: Path) -> None:
     assert figure.get_figwidth() == pytest.approx(3.5)
     for ending in ("png", "svg", "pdf"):
         thud.plot.save(figure, tmp_path / f"levels.{ending}")
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
+    assert names_in(tmp_path) == [
         "levels.pdf",
         "levels.png",
         "levels.svg",
@@ -101,7 +101,7 @@ def test_motion_shows_instants_from_first_touch_to_release(deformed: thud.Impact
 def test_animation_has_a_picture_for_each_snapshot(deformed: thud.Impact, tmp_path: Path) -> None:
     assert deformed.motion
     thud.plot.animate(deformed, tmp_path / "ball.gif")
-    assert [path.name for path in tmp_path.iterdir()] == ["ball.gif"]
+    assert names_in(tmp_path) == ["ball.gif"]
     with Image.open(tmp_path / "ball.gif") as pictures:
         assert pictures.n_frames == len(deformed.motion.time)
 

@@ -19,9 +19,9 @@ from thud.cli import main
 from thud.floors.prediction import _force_change
 
 if TYPE_CHECKING:
-    import subprocess
-    from collections.abc import Callable
     from pathlib import Path
+
+    from conftest import CaseFile, Run
 
 FLOORS = REPOSITORY / "inputs" / "floors"
 PLATE = "&plate\n thickness = 0.2\n/\n"
@@ -36,9 +36,7 @@ def impact() -> thud.Impact:
     return thud.solve()
 
 
-def test_executable_and_python_predict_the_same(
-    run: Callable[..., subprocess.CompletedProcess[str]], case_file: Callable[[str], Path]
-) -> None:
+def test_executable_and_python_predict_the_same(run: Run, case_file: CaseFile) -> None:
     done = run(case_file(ROOM_CASE), "-o", "out")
     assert done.returncode == 0, done.stderr
     folder = case_file(ROOM_CASE).parent / "out"
@@ -57,8 +55,8 @@ def test_executable_and_python_predict_the_same(
 
 @pytest.mark.parametrize(("thickness", "told"), [(0.02, True), (0.2, False)])
 def test_executable_tells_of_a_floor_that_gives_way(
-    run: Callable[..., subprocess.CompletedProcess[str]],
-    case_file: Callable[[str], Path],
+    run: Run,
+    case_file: CaseFile,
     thickness: float,
     told: bool,  # noqa: FBT001 - one of two cases
 ) -> None:
@@ -177,10 +175,7 @@ def test_inputs_of_floors_are_cases(name: str) -> None:
     ],
 )
 def test_floors_and_rooms_that_cannot_be_are_refused(
-    run: Callable[..., subprocess.CompletedProcess[str]],
-    case_file: Callable[[str], Path],
-    text: str,
-    words: str,
+    run: Run, case_file: CaseFile, text: str, words: str
 ) -> None:
     done = run(case_file(text))
     assert done.returncode == 1
@@ -195,9 +190,7 @@ def test_prediction_without_floor_or_room_is_refused(impact: thud.Impact) -> Non
 
 
 def test_walls_ceiling_octaves_and_history_are_written(
-    run: Callable[..., subprocess.CompletedProcess[str]],
-    case_file: Callable[[str], Path],
-    impact: thud.Impact,
+    run: Run, case_file: CaseFile, impact: thud.Impact
 ) -> None:
     more = "volume = 40\n wall_lengths = 5, 4\n ceiling_mass = 12\n reverberation_time = 0.8"
     done = run(case_file(ROOM_CASE.replace("volume = 40", more)), "-o", "out")

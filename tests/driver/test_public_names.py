@@ -8,13 +8,11 @@ import inspect
 import os
 import pydoc
 import re
-import subprocess
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, get_origin
 
 import pytest
-from conftest import REPOSITORY, naming
+from conftest import REPOSITORY, naming, python
 
 import thud
 from thud.base import units
@@ -90,8 +88,7 @@ def test_users_script_touches_every_name_and_runs(tmp_path: Path) -> None:
     used = {ast.unparse(node) for node in nodes if isinstance(node, ast.Attribute)}
     assert {f"thud.{name}" for name in thud.__all__} <= used
     environment = {**os.environ, "TMPDIR": str(tmp_path)}
-    command = [sys.executable, SCRIPT]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    done = python(SCRIPT, env=environment)
     assert done.returncode == 0, done.stderr
     assert "<Uncertainty, rubber_ball: 0 of 8 samples conform>" in done.stdout
 
@@ -117,11 +114,8 @@ def checked(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
             lines += [f"    reveal_type(it.{one})" for one in names if not one.startswith("_")]
             lines.append("    return")
     (folder / "names.py").write_text("\n".join(lines))
-    command = [sys.executable, "-m", "mypy", "--strict", *sorted(folder.glob("*.py"))]
-    environment = {**os.environ, "MYPYPATH": str(DRIVER)}
-    done = subprocess.run(
-        command, cwd=folder, capture_output=True, text=True, check=False, env=environment
-    )
+    command = ["-m", "mypy", "--strict", *sorted(folder.glob("*.py"))]
+    done = python(*command, cwd=folder, env={**os.environ, "MYPYPATH": str(DRIVER)})
     said: dict[str, list[str]] = {"script": [], "wrong": [], "names": []}
     for line in done.stdout.splitlines():
         if match := re.match(r"(\w+)\.py:", line):
@@ -170,7 +164,7 @@ def test_names_whose_packages_are_missing_say_so() -> None:
             except thud.InputError as error:
                 print(error)
     """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = python("-c", code)
     lines = done.stdout.splitlines()
     assert [re.match(r"\w+", line)[0] for line in lines] == [*3 * ["xarray"], "pandas"]  # type: ignore[index]
     assert all(re.search("pip install .*xarray", line) for line in lines[:3])
@@ -228,16 +222,9 @@ def test_model_may_be_an_object() -> None:
     assert (one.floor_force == other.floor_force).all()
 
 
-def test_standard_ball_conforms() -> None:
-    impact = thud.solve(
-        thud.Ball.standard(),
-        model="finite_element",
-        viscosity="kelvin_voigt",
-        loss_factor=0.2,
-        loss_frequency=74.0,
-    )
-    assert impact.assess()
-    assert impact.warnings == ()
+def test_standard_ball_conforms(flagship: thud.Impact) -> None:
+    assert flagship.assess()
+    assert flagship.warnings == ()
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import errno
 import logging
 import os
 import struct
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING
 import h5py
 import numpy as np
 import pytest
-from conftest import REPOSITORY, naming
+from conftest import REPOSITORY, naming, python
 from recording_files import WRITERS, half_sine
 
 from thud.base.errors import InputError
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 sys.path.insert(0, str(REPOSITORY / "tests/faults"))
-from injection import can_inject, library
+from injection import can_inject, injecting
 from mutate_recordings import mutate
 
 
@@ -40,15 +39,8 @@ def test_recording_is_read_where_the_file_system_has_no_locks(tmp_path: Path) ->
     force = half_sine(44100)
     WRITERS["plate.h5"](tmp_path / "plate.h5", force, 44100, "N")
     read = "import thud; print(len(thud.read_recording('plate.h5').drops))"
-    faults = {"FAULT_CALLS": "flock", "FAULT_AT": "1", "FAULT_FROM": "1"}
-    done = subprocess.run(
-        [sys.executable, "-c", read],
-        cwd=tmp_path,
-        env={**os.environ, "LD_PRELOAD": library(), "FAULT_ACTION": f"{errno.ENOLCK}", **faults},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    faults = injecting(calls="flock", action=errno.ENOLCK, at=1, **{"from": 1})
+    done = python("-c", read, cwd=tmp_path, env=faults)
     assert (done.stderr, done.stdout) == ("", "1\n")
 
 

@@ -656,7 +656,6 @@ def test_level_budget_has_calibration_and_plate() -> None:
 
 
 def test_plate_of_unstated_resonance_is_no_line_of_zero() -> None:
-    """The budget had a plate of 0 dB beside the warning that its uncertainty is not given."""
     average = average_levels(measure_levels([make_drop(1.0)]))
     for uncertainty, stated in ((0.0, False), (0.01, True)):
         plate = Plate(1600.0, 20.0, frequency_uncertainty=uncertainty)

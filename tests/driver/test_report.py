@@ -128,14 +128,20 @@ KINDS = {
 }
 
 
+@pytest.fixture(scope="module")
+def weasyprint() -> None:
+    """Skip what needs the extra report where it is not installed."""
+    pytest.importorskip(
+        "weasyprint", reason="the extra report is not installed", exc_type=ImportError
+    )
+
+
 @pytest.fixture(scope="module", params=KINDS)
 def written(
     request: pytest.FixtureRequest, one: Recording, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Recording, Path]:
     """Write the report of a recording of each kind."""
-    pytest.importorskip(
-        "weasyprint", reason="the extra report is not installed", exc_type=ImportError
-    )
+    request.getfixturevalue("weasyprint")
     recording = KINDS[request.param](one)
     folder = tmp_path_factory.mktemp("written")
     paths = write_report(recording, folder)
@@ -333,10 +339,8 @@ def test_dates_of_many_kinds_are_read(text: str) -> None:
     assert read_date("3/5/24") is None
 
 
+@pytest.mark.usefixtures("weasyprint")
 def test_names_are_no_code(one: Recording, tmp_path: Path) -> None:
-    pytest.importorskip(
-        "weasyprint", reason="the extra report is not installed", exc_type=ImportError
-    )
     texts = dict.fromkeys(("laboratory", "ball", "serial"), HOSTILE)
     recording = many(one, 2, **texts, instruments=(HOSTILE, HOSTILE))
     drops = tuple(replace(d, name=HOSTILE + d.name, warnings=(HOSTILE,)) for d in recording.drops)
@@ -349,10 +353,8 @@ def test_names_are_no_code(one: Recording, tmp_path: Path) -> None:
     assert json.loads((tmp_path / "report.json").read_text())["serial"] == HOSTILE
 
 
+@pytest.mark.usefixtures("weasyprint")
 def test_what_is_not_known_is_said(one: Recording, tmp_path: Path) -> None:
-    pytest.importorskip(
-        "weasyprint", reason="the extra report is not installed", exc_type=ImportError
-    )
     write_report(unknown(one), tmp_path)
     words = text_of(tmp_path / "report.pdf")
     for name in (
@@ -395,12 +397,10 @@ def test_without_weasyprint_there_is_a_page_and_a_sentence(
     assert not capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("weasyprint")
 def test_missing_font_is_told(
     one: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pytest.importorskip(
-        "weasyprint", reason="the extra report is not installed", exc_type=ImportError
-    )
     monkeypatch.setattr("matplotlib.font_manager.findSystemFonts", list)
     recording = replace(one, config=replace(LAB, laboratory="建材 lab"))
     with pytest.warns(ReportWarning, match=naming("font", "建材")):
@@ -424,10 +424,8 @@ def test_report_replaces_no_file_of_others(one: Recording, tmp_path: Path) -> No
     assert (tmp_path / "report.html").read_text() == "mine"
 
 
+@pytest.mark.usefixtures("weasyprint")
 def test_equal_recordings_give_equal_pages(one: Recording, tmp_path: Path) -> None:
-    pytest.importorskip(
-        "weasyprint", reason="the extra report is not installed", exc_type=ImportError
-    )
     for name in "ab":
         write_report(one, tmp_path / name)
     for name in ("report.json", "report.html"):
@@ -460,7 +458,7 @@ def test_figures_show_every_drop_the_average_and_the_limits(one: Recording, coun
         np.testing.assert_allclose(half, [one.expanded for one in recording.level_estimates(bands)])
 
 
-def test_levels_and_criteria_that_disagreed_on_uncertainty(one: Recording) -> None:
+def test_levels_and_criteria_agree_on_uncertainty(one: Recording) -> None:
     plate = PlateConfig(f0=1600.0, Q=20.0, f0_uncertainty=0.005)
     for recording in (one, many(one, 5), many(one, 5, plate=plate)):
         data = report_data(recording)

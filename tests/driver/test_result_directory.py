@@ -18,57 +18,58 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import pytest
-from conftest import MINIMAL, REPOSITORY, naming
+from conftest import MINIMAL, REPOSITORY, contents, names_in, naming
 
 import thud
 from thud.base.errors import PlausibilityWarning
 from thud.base.files import HEAD, PART, Results, locked, own_path
 
 sys.path.insert(0, str(REPOSITORY / "tests/faults"))
-from injection import can_inject, library
+from injection import can_inject, injecting
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
     from pathlib import Path
 
-    Run = Callable[..., subprocess.CompletedProcess[str]]
-    CaseFile = Callable[..., Path]
+    from conftest import CaseFile, Run
+
+    TwoInputs = dict[str, dict[str, bytes]]
 
 FILES = [".thud", "effective.nml", "force.csv", "levels.csv", "summary.nml"]
 OTHER = "&ball mass = 2.4 / &drop / &model / &mesh polar_elements = 8 / &modes count = 1 /"
 
 
-def read_bytes(directory: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in directory.iterdir()}
-
-
-def names_in(directory: Path) -> list[str]:
-    return sorted(path.name for path in directory.iterdir())
-
-
 @pytest.fixture
-def two_inputs(run: Run, case_file: CaseFile, tmp_path: Path) -> dict[str, dict[str, bytes]]:
+def two_inputs(run: Run, case_file: CaseFile, tmp_path: Path) -> TwoInputs:
     """Return the sets of files of two inputs of one name, a/case.nml and b/case.nml."""
     found = {}
     for name, text in (("a", MINIMAL), ("b", OTHER)):
         (tmp_path / name).mkdir()
         case_file(text, f"{name}/case.nml")
         assert run(f"{name}/case.nml", "-o", f"only_{name}").returncode == 0
-        found[name] = read_bytes(tmp_path / f"only_{name}")
+        found[name] = contents(tmp_path / f"only_{name}")
     # One of them has a file that the other one has not.
     assert set(found["a"]) < set(found["b"])
     return found
+
+
+@pytest.fixture
+def out(run: Run, two_inputs: TwoInputs, tmp_path: Path) -> Path:
+    """Return the directory of the results of a/case.nml."""
+    del two_inputs  # it writes the inputs
+    assert run("a/case.nml").returncode == 0
+    return tmp_path / "outputs/case"
 
 
 def test_case_of_another_name_is_not_overwritten(
     run: Run, case_file: CaseFile, tmp_path: Path
 ) -> None:
     run(case_file(MINIMAL, "one.nml"), "-o", "out")
-    before = read_bytes(tmp_path / "out")
+    before = contents(tmp_path / "out")
     result = run(case_file(MINIMAL, "two.nml"), "-o", "out")
     assert result.returncode == 1
     assert "--output out" in result.stderr
-    assert read_bytes(tmp_path / "out") == before
+    assert contents(tmp_path / "out") == before
 
 
 def test_files_of_somebody_else_are_not_joined(
@@ -80,12 +81,12 @@ def test_files_of_somebody_else_are_not_joined(
 
 
 def test_changed_input_of_the_same_case_replaces_its_results(
-    run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+    run: Run, two_inputs: TwoInputs, tmp_path: Path
 ) -> None:
     for name in "abba":
         result = run(f"{name}/case.nml")
         assert result.returncode == 0
-        assert read_bytes(tmp_path / "outputs/case") == two_inputs[name]
+        assert contents(tmp_path / "outputs/case") == two_inputs[name]
     # Not silently: another input of the same name may have been meant.
     assert "a/case.nml" in result.stderr
 
@@ -99,22 +100,19 @@ def test_directory_that_cannot_be_made_is_told(run: Run, case_file: CaseFile, pl
 
 @pytest.mark.parametrize("place", ["deep/er/out", "out/", ".//out///", "link", "link/", "link/out"])
 def test_any_path_of_a_directory_works(
-    run: Run,
-    two_inputs: dict[str, dict[str, bytes]],
-    tmp_path: Path,
-    place: str,
+    run: Run, two_inputs: TwoInputs, tmp_path: Path, place: str
 ) -> None:
     (tmp_path / "behind/it").mkdir(parents=True)
     (tmp_path / "link").symlink_to("behind/it")
     for name in "ab":
         assert run(f"{name}/case.nml", "-q", "-o", place).returncode == 0
-        assert read_bytes(tmp_path / place) == two_inputs[name]
+        assert contents(tmp_path / place) == two_inputs[name]
     assert (tmp_path / "link").is_symlink()
     assert not list(tmp_path.rglob("*.part"))
 
 
 def test_working_directory_works(
-    run: Run, executable: str, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+    run: Run, executable: str, two_inputs: TwoInputs, tmp_path: Path
 ) -> None:
     folder = tmp_path / "out"
     folder.mkdir()
@@ -122,7 +120,7 @@ def test_working_directory_works(
     for name in "abba":
         command = [executable, tmp_path / f"{name}/case.nml", "-q", "-o", "."]
         assert subprocess.run(command, cwd=folder, check=False).returncode == 0
-        assert read_bytes(folder) == two_inputs[name]
+        assert contents(folder) == two_inputs[name]
     # Whoever stands in it still does.
     assert folder.stat().st_ino == before
     assert run("a/case.nml", "-q", "-o", "out").returncode == 0
@@ -130,10 +128,8 @@ def test_working_directory_works(
 
 @pytest.mark.parametrize("folder", [False, True], ids=["exchanged", "moved"])
 def test_files_of_the_user_survive(
-    run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path, *, folder: bool
+    run: Run, two_inputs: TwoInputs, out: Path, *, folder: bool
 ) -> None:
-    out = tmp_path / "outputs/case"
-    assert run("a/case.nml").returncode == 0
     mine = {"notes.txt": b"mine", "force.png": b"drawn by hand"}
     for name, content in mine.items():
         (out / name).write_bytes(content)
@@ -144,7 +140,7 @@ def test_files_of_the_user_survive(
         if folder:
             (out / "more/notes").rmdir()
             (out / "more").rmdir()
-        assert read_bytes(out) == {**two_inputs[name], **mine}
+        assert contents(out) == {**two_inputs[name], **mine}
         if folder:
             (out / "more/notes").mkdir(parents=True)
     assert names_in(out.parent) == ["case"]
@@ -162,10 +158,8 @@ def test_permissions_of_the_directory_stay(
 
 
 def test_stale_figures_do_not_stand_beside_new_results(
-    run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+    run: Run, two_inputs: TwoInputs, out: Path
 ) -> None:
-    out = tmp_path / "outputs/case"
-    run("a/case.nml")
     Results(out).write({"force.png": b"drawn from the old results"})
     # A kill has left half a figure.
     (out / ".thud.new").write_bytes(b"ha")
@@ -173,26 +167,24 @@ def test_stale_figures_do_not_stand_beside_new_results(
         run("a/case.nml")
         assert names_in(out) == sorted([*two_inputs["a"], "force.png"])
     run("b/case.nml")
-    assert read_bytes(out) == two_inputs["b"]
+    assert contents(out) == two_inputs["b"]
 
 
 def test_figures_are_not_added_to_results_of_another_input(
-    run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+    run: Run, two_inputs: TwoInputs, tmp_path: Path
 ) -> None:
     out = tmp_path / "outputs/case"
     run("b/case.nml")
     with pytest.raises(thud.InputError, match=naming(out)):
         Results(out).write({"force.png": b""}, marker=two_inputs["a"]["effective.nml"])
-    assert read_bytes(out) == two_inputs["b"]
+    assert contents(out) == two_inputs["b"]
     Results(out).write({"force.png": b""}, marker=two_inputs["b"]["effective.nml"])
     assert names_in(out) == sorted([*two_inputs["b"], "force.png"])
 
 
 def test_unfinished_figures_go_where_there_are_no_locks(
-    run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+    run: Run, two_inputs: TwoInputs, out: Path
 ) -> None:
-    out = tmp_path / "outputs/case"
-    run("a/case.nml")
     part = own_path(out / PART)
     mine = out / f"{PART}s"
     part.write_bytes(b"half a figure")
@@ -218,21 +210,15 @@ def test_signal_during_a_checksum_changes_nothing(
 ) -> None:
     case = case_file(MINIMAL)
     assert run(case, "-o", "out").returncode == 0
-    before = read_bytes(tmp_path / "out")
-    faults = {
-        "LD_PRELOAD": library(),
-        "FAULT_CALLS": "read",
-        "FAULT_ACTION": f"{errno.EINTR}",
-        "FAULT_UNDER": str(tmp_path / "out/levels.csv"),
-        "FAULT_LOG": "calls",
-    }
-    for name, value in faults.items():
-        monkeypatch.setenv(name, value)
+    before = contents(tmp_path / "out")
+    levels = tmp_path / "out/levels.csv"
     for number in range(1, 9):
-        monkeypatch.setenv("FAULT_AT", f"{number}")
+        faults = injecting(calls="read", action=errno.EINTR, under=levels, log="calls", at=number)
+        for name, value in faults.items():
+            monkeypatch.setenv(name, value)
         result = run(case, "-o", "out")
         assert result.returncode == 0, result.stderr
-        assert read_bytes(tmp_path / "out") == before
+        assert contents(tmp_path / "out") == before
     assert (tmp_path / "calls").read_text()
 
 
@@ -249,7 +235,7 @@ def test_killed_run_does_not_lock_its_directory(
 
 
 def test_runs_into_one_directory_do_not_mix(
-    executable: str, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+    executable: str, two_inputs: TwoInputs, tmp_path: Path
 ) -> None:
     mine: dict[str, bytes] = {}
     for i in range(15):
@@ -259,7 +245,7 @@ def test_runs_into_one_directory_do_not_mix(
             for name in "aba"
         ]  # fmt: skip
         assert [process.wait() for process in running] == [0, 0, 0]
-        found = read_bytes(tmp_path / "o")
+        found = contents(tmp_path / "o")
         assert found in [{**files, **mine} for files in two_inputs.values()]
         mine[f"notes_{i}"] = b"mine"
         (tmp_path / f"o/notes_{i}").write_bytes(b"mine")
@@ -267,7 +253,7 @@ def test_runs_into_one_directory_do_not_mix(
 
 
 def test_figures_are_added_while_others_write(
-    executable: str, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+    executable: str, two_inputs: TwoInputs, tmp_path: Path
 ) -> None:
     subprocess.run([executable, "a/case.nml", "-q", "-o", "o"], cwd=tmp_path, check=True)
     command = f"for i in 1 2 3 4 5 6 7 8 9; do {executable} a/case.nml -q -o o; done"
@@ -288,11 +274,7 @@ def chance() -> random.Random:
 
 @pytest.mark.parametrize("place", ["exchanged", "moved"])
 def test_killed_runs_leave_files_of_one_input(
-    executable: str,
-    two_inputs: dict[str, dict[str, bytes]],
-    tmp_path: Path,
-    place: str,
-    chance: random.Random,
+    executable: str, two_inputs: TwoInputs, tmp_path: Path, place: str, chance: random.Random
 ) -> None:
     out = tmp_path / "o"
     out.mkdir()
@@ -307,13 +289,13 @@ def test_killed_runs_leave_files_of_one_input(
         with subprocess.Popen(command, cwd=where, stderr=subprocess.DEVNULL) as process:
             time.sleep(usual * chance.random())
             process.kill()
-        found = read_bytes(out) if place == "exchanged" else results_of(out)
+        found = contents(out) if place == "exchanged" else results_of(out)
         if place == "exchanged":
             assert found in two_inputs.values()
         else:
             assert any(found.items() <= files.items() for files in two_inputs.values())
     subprocess.run(command, cwd=where, check=True)
-    assert read_bytes(out) == two_inputs["b"]
+    assert contents(out) == two_inputs["b"]
     assert not list(tmp_path.rglob("*.part"))
 
 
@@ -356,23 +338,21 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
 
 
 def test_full_disk_keeps_the_results_before(
-    run: Run, two_inputs: dict[str, dict[str, bytes]], small_disk: Path
+    run: Run, two_inputs: TwoInputs, small_disk: Path
 ) -> None:
     assert run("a/case.nml", "-o", small_disk / "out").returncode == 0
     result = run("b/case.nml", "-o", small_disk / "out")
     assert result.returncode == 1
     assert "No space left on device" in result.stderr
-    assert read_bytes(small_disk / "out") == two_inputs["a"]
+    assert contents(small_disk / "out") == two_inputs["a"]
     assert names_in(small_disk) == ["out"]
 
 
-def test_mounted_disk_works_as_directory(
-    run: Run, two_inputs: dict[str, dict[str, bytes]], small_disk: Path
-) -> None:
+def test_mounted_disk_works_as_directory(run: Run, two_inputs: TwoInputs, small_disk: Path) -> None:
     assert run("a/case.nml", "-o", small_disk).returncode == 0
-    assert read_bytes(small_disk) == two_inputs["a"]
+    assert contents(small_disk) == two_inputs["a"]
     assert run("b/case.nml", "-o", small_disk).returncode == 1
-    assert read_bytes(small_disk) == two_inputs["a"]
+    assert contents(small_disk) == two_inputs["a"]
     assert not (small_disk.parent / ".disk.part").exists()
 
 
@@ -380,7 +360,7 @@ def test_mounted_disk_works_as_directory(
 def test_unwritable_directories_are_told(run: Run, case_file: CaseFile, tmp_path: Path) -> None:
     case = case_file(MINIMAL)
     assert run(case, "-o", "locked/out").returncode == 0
-    before = read_bytes(tmp_path / "locked/out")
+    before = contents(tmp_path / "locked/out")
     (tmp_path / "locked").chmod(0o500)
     result = run(case, "-o", "locked/new")
     assert result.returncode == 1
@@ -392,30 +372,28 @@ def test_unwritable_directories_are_told(run: Run, case_file: CaseFile, tmp_path
     result = run(case, "-o", "locked/out")
     assert result.returncode == 1
     assert "--output locked/out" in result.stderr
-    assert read_bytes(tmp_path / "locked/out") == before
+    assert contents(tmp_path / "locked/out") == before
     assert names_in(tmp_path / "locked") == ["out"]
 
 
 def test_results_without_their_manifest_are_replaced_on_request(
-    run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+    run: Run, two_inputs: TwoInputs, out: Path
 ) -> None:
-    out = tmp_path / "outputs/case"
-    run("a/case.nml")
     (out / ".thud").unlink()
     (out / "force.png").write_bytes(b"figure")
-    before = read_bytes(out)
+    before = contents(out)
     result = run("b/case.nml")
     assert result.returncode == 1
     assert "outputs/case/effective.nml" in result.stderr
     assert "--replace" in result.stderr
-    assert read_bytes(out) == before
+    assert contents(out) == before
     assert run("b/case.nml", "--replace").returncode == 0
-    assert read_bytes(out) == {**two_inputs["b"], "force.png": b"figure"}
+    assert contents(out) == {**two_inputs["b"], "force.png": b"figure"}
 
 
 @pytest.mark.parametrize("folder", [False, True], ids=["exchanged", "moved"])
 def test_edited_results_are_the_users(
-    run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path, *, folder: bool
+    run: Run, two_inputs: TwoInputs, tmp_path: Path, *, folder: bool
 ) -> None:
     out = tmp_path / "outputs/case"
     run("b/case.nml")
@@ -432,31 +410,27 @@ def test_edited_results_are_the_users(
     assert run("a/case.nml").returncode == 0
     if folder:
         (out / "more").rmdir()
-    assert read_bytes(out) == {**two_inputs["a"], "modes.csv": b"with my warnings"}
+    assert contents(out) == {**two_inputs["a"], "modes.csv": b"with my warnings"}
 
 
 def test_results_of_other_commands_stay_beside_those_of_any_input(
-    run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+    run: Run, two_inputs: TwoInputs, out: Path
 ) -> None:
-    out = tmp_path / "outputs/case"
-    run("a/case.nml")
     measured = {"report.json": b"{}", "measured.png": b"figure"}
     Results(out, "measure").write(measured)
     for name in "bab":
         assert run(f"{name}/case.nml").returncode == 0
-        found = read_bytes(out)
+        found = contents(out)
         assert measured.items() <= found.items()
         assert found.keys() == {*two_inputs[name], *measured}
     assert [p.name for p in Results(out, "measure").write(measured)] == list(measured)
 
 
 def test_results_are_repeated_from_their_own_input(
-    run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+    run: Run, two_inputs: TwoInputs, out: Path
 ) -> None:
-    out = tmp_path / "outputs/case"
-    run("a/case.nml")
     assert run("outputs/case/effective.nml").returncode == 0
-    assert read_bytes(out) == two_inputs["a"]
+    assert contents(out) == two_inputs["a"]
     text = two_inputs["a"]["effective.nml"] + b"! mine\n"
     (out / "effective.nml").write_bytes(text)
     for more in ([], ["--replace"]):
@@ -467,7 +441,7 @@ def test_results_are_repeated_from_their_own_input(
 
 
 def test_files_of_two_inputs_are_not_read_as_one(
-    run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+    run: Run, two_inputs: TwoInputs, tmp_path: Path
 ) -> None:
     out = tmp_path / "outputs/case"
     for name in ("force.csv", "summary.nml", "effective.nml"):

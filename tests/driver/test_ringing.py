@@ -47,7 +47,7 @@ def test_clean_record_does_not_ring(force: np.ndarray, colour: str) -> None:
 
 
 @pytest.mark.parametrize(("frequency", "quality"), [(1100.0, 25.0), (1600.0, 40.0)])
-def test_plate_that_is_not_stated_was_counted_as_peaks_without_a_word(
+def test_plate_that_is_not_stated_raises_a_warning(
     force: np.ndarray, frequency: float, quality: float
 ) -> None:
     omega = 2 * np.pi * frequency

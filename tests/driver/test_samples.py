@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import naming
+from conftest import names_in, naming
 
 import thud
 from thud.case.keys import with_values
 from thud.level.levels import SOURCES
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
     from pathlib import Path
 
-    Run = Callable[..., subprocess.CompletedProcess[str]]
+    from conftest import Run
 
 FILES = [".thud", "samples.csv", "samples.nml"]
 CASE = """&case name = 'ball' / &ball mass = 2.45 / &drop height = 1.0 /
@@ -341,7 +341,7 @@ def test_nothing_is_written_where_results_have_no_place(
     assert result.returncode == 1
     assert "samples.csv" in result.stderr
     assert (tmp_path / "o/samples.nml").read_bytes() == before
-    assert sorted(path.name for path in (tmp_path / "o").iterdir()) == FILES
+    assert names_in(tmp_path / "o") == FILES
 
 
 def test_results_replace_neither_case_nor_table(run: Run, case: Path, tmp_path: Path) -> None:
@@ -400,7 +400,7 @@ def test_run_after_a_killed_one_clears_up(
     at_work.wait()
     assert (tmp_path / ".o.part").exists()
     assert run(case, "--samples", "short.csv", "-q", "-o", "o").returncode == 0
-    assert sorted(path.name for path in (tmp_path / "o").iterdir()) == FILES
+    assert names_in(tmp_path / "o") == FILES
     assert not (tmp_path / ".o.part").exists()
 
 

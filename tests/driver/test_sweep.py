@@ -7,15 +7,13 @@ import os
 import re
 import resource
 import shutil
-import subprocess
-import sys
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 import scipy
 import xarray as xr
-from conftest import REPOSITORY, naming
+from conftest import REPOSITORY, names_in, naming, python
 from hypothesis import HealthCheck, given, settings, strategies as st
 from scipy.stats import qmc
 
@@ -33,6 +31,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
     from types import ModuleType
+
+    from conftest import ErrorsOf
 
 HEIGHTS = {"parameters": {"height": {"values": [50, 100], "unit": "cm"}}}
 
@@ -540,12 +540,11 @@ def test_many_samples_need_a_word(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_bad_studies_are_reported(
-    text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    text: str, words: str, tmp_path: Path, errors_of: ErrorsOf
 ) -> None:
     path = tmp_path / "study.toml"
     path.write_bytes(text.encode(errors="surrogateescape"))
-    assert cli.main(["sweep", "-q", str(path), "-o", str(tmp_path)]) == 1
-    errors = capsys.readouterr().err
+    errors = errors_of("sweep", "-q", path, "-o", tmp_path)
     assert str(path) in errors
     with pytest.raises(thud.InputError, match=words):
         thud.read_study(path)
@@ -585,9 +584,8 @@ def test_bad_tables_are_reported(study: dict[str, Any], words: str) -> None:
     assert "\n" not in str(told.value)
 
 
-def test_missing_study_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["sweep", str(tmp_path / "no.toml")]) == 1
-    assert "no.toml" in capsys.readouterr().err
+def test_missing_study_is_reported(tmp_path: Path, errors_of: ErrorsOf) -> None:
+    assert "no.toml" in errors_of("sweep", tmp_path / "no.toml")
     with pytest.raises(thud.InputError, match=naming("study", 3)):
         thud.sweep(3)  # type: ignore[arg-type]
 
@@ -627,20 +625,20 @@ def test_command_writes_figure_and_table(
     assert cli.main(["sweep", str(REPOSITORY / "inputs/studies/sweep.toml")]) == 0
     folder = tmp_path / "outputs/sweep"
     names = [".thud", "sweep.nc", "sweep.svg"]
-    assert sorted(path.name for path in folder.iterdir()) == names
+    assert names_in(folder) == names
     printed = capsys.readouterr()
     assert re.search(naming(80, "hollow_sphere", "0.085 MB"), printed.err)
     assert "peak_force, N" in printed.out
     assert "Results: outputs/sweep" in printed.out
 
 
-def test_study_without_results_is_a_failure(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_study_without_results_is_a_failure(tmp_path: Path, errors_of: ErrorsOf) -> None:
     path = tmp_path / "high.toml"
     path.write_text("parameters.height.values = [1000, 2000]")
-    assert cli.main(["sweep", "-q", str(path), "-o", str(tmp_path)]) == 2
-    assert re.search(naming(2, "&drop: height", "1000.0 m"), capsys.readouterr().err)
+    assert re.search(
+        naming(2, "&drop: height", "1000.0 m"),
+        errors_of("sweep", "-q", path, "-o", tmp_path, code=2),
+    )
 
 
 def test_study_of_another_kind_is_reported() -> None:
@@ -652,8 +650,7 @@ def test_study_of_another_kind_is_reported() -> None:
 
 def test_missing_packages_are_reported(tmp_path: Path) -> None:
     code = "import sys; sys.modules['xarray'] = None; from thud import cli; sys.exit(cli.main())"
-    command = [sys.executable, "-c", code, "sweep", "study.toml"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = python("-c", code, "sweep", "study.toml", cwd=tmp_path)
     assert done.returncode == 1
     needed = naming("xarray", "pip install h5netcdf h5py SALib xarray zarr")
     assert re.search(needed, done.stderr)
@@ -662,8 +659,7 @@ def test_missing_packages_are_reported(tmp_path: Path) -> None:
 
 def test_import_stays_light() -> None:
     code = "import sys, thud; print({'xarray', 'scipy', 'SALib', 'matplotlib'} & set(sys.modules))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "set()\n"
+    assert python("-c", code).stdout == "set()\n"
 
 
 def test_fixed_values_may_suit_parameters_only() -> None:
@@ -698,12 +694,9 @@ def test_design_that_exceeds_the_memory_is_told(
         f'[design]\nkind = "{design}"\nsize = {size}\n[parameters]\n{ranges}'
     )
     limit = 4 * 2**30
-    done = subprocess.run(
-        [sys.executable, "-P", "-m", "thud", kind, "-q", "--yes", "large.toml"],
+    done = python(
+        *("-P", "-m", "thud", kind, "-q", "--yes", "large.toml"),
         cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
         env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)),
     )

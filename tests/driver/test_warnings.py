@@ -13,8 +13,9 @@ import thud
 from thud import cli
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from pathlib import Path
+
+    from conftest import CaseFile
 
 # What each warning names, and input that earns it.
 DOUBTFUL = {
@@ -35,7 +36,7 @@ DOUBTFUL = {
 @pytest.mark.slow
 def test_doubtful_input_raises_a_warning_by_every_command(
     words: str,
-    case_file: Callable[..., Path],
+    case_file: CaseFile,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
@@ -69,7 +70,7 @@ def test_doubtful_input_raises_a_warning_by_every_command(
         "&ball mass = 7.3 / &model name = 'hunt_crossley' / &hunt_crossley contact_time = 0.02 /",
     ],
 )
-def test_plausible_input_raises_no_warning(text: str, case_file: Callable[..., Path]) -> None:
+def test_plausible_input_raises_no_warning(text: str, case_file: CaseFile) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert thud.solve(thud.read_case(case_file(text))).warnings == ()
@@ -111,7 +112,7 @@ OUTSIDE = {
 }
 
 
-def test_values_at_the_limits_of_rubbers_raise_no_warning(case_file: Callable[..., Path]) -> None:
+def test_values_at_the_limits_of_rubbers_raise_no_warning(case_file: CaseFile) -> None:
     text = "&ball poisson_ratio = {}, youngs_modulus = 3e9 / &sampling sample_rate = 1e6 /"
     for ratio, number in ((0.45, 0), (0.4499, 1)):
         with warnings.catch_warnings():
@@ -123,9 +124,7 @@ def test_values_at_the_limits_of_rubbers_raise_no_warning(case_file: Callable[..
 
 @pytest.mark.parametrize("words", OUTSIDE)
 @pytest.mark.slow
-def test_answer_outside_the_theory_raises_a_warning(
-    words: str, case_file: Callable[..., Path]
-) -> None:
+def test_answer_outside_the_theory_raises_a_warning(words: str, case_file: CaseFile) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         found = thud.solve(thud.read_case(case_file(OUTSIDE[words]))).warnings
@@ -142,7 +141,7 @@ def test_free_modes_with_the_modulus_of_the_shell_raise_a_warning() -> None:
 
 
 def test_run_names_the_groups_that_are_left_out(
-    case_file: Callable[..., Path],
+    case_file: CaseFile,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 import time
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from campaign import Finding
 from forks import Order, fail, forks
-from injection import ERRORS, KILLS, PATIENCE, executable, library
+from injection import ERRORS, KILLS, PATIENCE, executable, injecting
 
 import thud
 from thud.base.files import Results
@@ -176,11 +175,9 @@ def check_races(tries: Tries, folder: Path) -> Iterable[Finding]:
         for name, text in INPUTS.items():
             given = text if cases == 1 else text.replace("'case'", f"'{name}'")
             (place / f"{name}.nml").write_text(given)
-        faults = {"FAULT_AT": str(at), "FAULT_ACTION": "0.1s", "LD_PRELOAD": library()}
         command = [executable(), "a.nml", "-q", "-o", "o"]
-        with subprocess.Popen(
-            command, cwd=place, env={**os.environ, **faults}, stderr=subprocess.DEVNULL
-        ) as first:
+        slow = injecting(at=at, action="0.1s")
+        with subprocess.Popen(command, cwd=place, env=slow, stderr=subprocess.DEVNULL) as first:
             time.sleep(0.02)
             command[1] = "b.nml"
             second = subprocess.run(

@@ -27,17 +27,15 @@ def library() -> str:
     """Return the path of the compiled library of faults."""
     target = Path(mkdtemp(prefix="thud_faults_")) / "inject.so"
     source = Path(__file__).with_name("inject.c")
-    command = [
-        os.environ.get("CC", "cc"),
-        "-shared",
-        "-fPIC",
-        "-O1",
-        "-o",
-        str(target),
-        str(source),
-    ]
-    subprocess.run([*command, "-ldl"], check=True)
+    command = [os.environ.get("CC", "cc"), "-shared", "-fPIC", "-O1", "-o", target, source, "-ldl"]
+    subprocess.run(command, check=True)
     return str(target)
+
+
+def injecting(**faults: object) -> dict[str, str]:
+    """Return the environment of a process whose calls go wrong; the words are of `inject.c`."""
+    named = {f"FAULT_{name.upper()}": str(value) for name, value in faults.items()}
+    return {**os.environ, "LD_PRELOAD": library(), **named}
 
 
 def can_inject() -> bool:

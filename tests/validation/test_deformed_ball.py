@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +21,7 @@ OCTAVES = thud.get_bands().nominal
 VISCOUS = {"viscosity": "kelvin_voigt", "loss_factor": 0.2}
 
 
+@cache
 def solve(ball: thud.Ball = FLAGSHIP, **options: object) -> thud.Impact:
     given = {"snapshot_interval": 0, **VISCOUS, **options}
     return thud.solve(ball, model="finite_element", **given)  # type: ignore[arg-type]

@@ -62,11 +62,6 @@ def test_restitution_of_every_flux_choice(choice: str, restitution: float) -> No
     assert impact.restitution == pytest.approx(restitution, abs=5e-4)
 
 
-def test_two_low_octaves_conform_and_the_others_do_not(impact: thud.Impact) -> None:
-    met = [criterion.conforms for criterion in impact.assess().criteria[:5]]
-    assert met == [True, True, False, False, False]
-
-
 def test_rounding_of_the_input_covers_the_paper_s_contact_time() -> None:
     # E = 1.6 MPa stands for 1.55 to 1.65 MPa: 20.17 to 20.69 ms, the wall of 32 mm likewise.
     soft, stiff = (thud.solve(thud.Ball(youngs_modulus=e)).contact_time for e in (1.55e6, 1.65e6))
