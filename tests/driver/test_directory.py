@@ -26,7 +26,7 @@ from thud.base.files import own_path
 from thud.studies import blocks, fit, samples
 from thud.studies.blocks import Blocks
 from thud.studies.dataset import disk_space
-from thud.studies.directory import take
+from thud.studies.directory import open_results
 from thud.studies.sweep import KIND
 
 sys.path.insert(0, str(REPOSITORY / "tests/faults"))
@@ -269,7 +269,7 @@ def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
 def test_a_study_is_computed_once_at_a_time(tmp_path: Path) -> None:
     study = thud.read_study(HEIGHTS)
     with (
-        take(tmp_path, KIND, study),
+        open_results(tmp_path, KIND, study),
         pytest.raises(thud.InputError, match=naming("python")),
     ):
         thud.sweep(study, tmp_path)
@@ -317,7 +317,10 @@ def test_lock_is_that_of_the_directory_that_has_the_name(
             folder.mkdir()
 
     monkeypatch.setattr("fcntl.flock", switch)
-    with take(folder, KIND, study), pytest.raises(thud.InputError, match=naming("out/python")):
+    with (
+        open_results(folder, KIND, study),
+        pytest.raises(thud.InputError, match=naming("out/python")),
+    ):
         thud.sweep(study, folder)
 
 
@@ -336,12 +339,12 @@ def test_other_studies_leave_no_mark_on_one_at_work(tmp_path: Path) -> None:
     other = {"parameters": {"height": {"values": [70, 80], "unit": "cm"}}}
     study = thud.read_study(HEIGHTS)
     with (
-        take(tmp_path, KIND, study),
+        open_results(tmp_path, KIND, study),
         pytest.raises(thud.InputError, match=naming("python")),
     ):
         thud.sweep(other, tmp_path, replace=True)
     # Nothing was finished, so that the directory may change hands, but with nothing in it.
-    with take(tmp_path, KIND, study):
+    with open_results(tmp_path, KIND, study):
         keep_one_block(study, tmp_path)
     with pytest.raises(thud.InputError, match=naming("python", "--replace")):
         thud.sweep(other, tmp_path)

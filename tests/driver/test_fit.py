@@ -197,7 +197,7 @@ def test_directions_are_compared_where_there_are_two() -> None:
     assert identifiability(["a"], np.eye(1), np.eye(1), 1) == []
     # Of standard errors of 6 and 2 %, the first along the first parameter.
     (told,) = identifiability(["a", "b"], np.diag([0.06, 0.02]) ** 2, np.eye(2), 2)
-    assert re.search(r"least determined: a, standard error 6 %; .* 3 times as uncertain", told)
+    assert re.search(r"weakest parameter combination: a, standard error 6 %, 3 times that", told)
 
 
 def test_parameters_without_any_effect_are_all_lost() -> None:

@@ -24,6 +24,7 @@ from thud.base._schema import MODELS
 from thud.base.units import MULTIPLES, scaled
 from thud.case.keys import known_keys, with_values
 from thud.impact.ensemble import get_cost
+from thud.impact.quantities import SCALAR_QUANTITIES
 from thud.studies import directory, fit, samples, sampling, sweep
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def test_grid_holds_what_single_drops_give() -> None:
                 cell = found.sel(
                     wall_thickness=thickness, momentum_flux=flux, youngs_modulus=modulus
                 )
-                for name in samples.SCALAR_QUANTITIES:
+                for name in SCALAR_QUANTITIES:
                     assert float(cell[name]) == pytest.approx(getattr(impact, name), rel=1e-9)
                 for force in ("elastic", "floor"):
                     np.testing.assert_allclose(
