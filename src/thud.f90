@@ -1,4 +1,4 @@
-!> All that a Fortran program needs of thud: a case or a single source model, the force, its levels, the verdict.
+!> All that a Fortran program needs from thud: a case or a single source model, the force, its levels, the verdict.
 module thud
    use thud_ball, only: ball_type, get_density
    use thud_band, only: band_type, get_bands, get_octaves, octave_count

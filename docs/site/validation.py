@@ -25,16 +25,16 @@ TEXT = Path(__file__).parent / "validation.md"
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 # Kinds of oracles in the order of their strength, with what they are.
 KINDS = {
-    "closed form": "answers that mathematics gives",
+    "closed form": "exact solutions",
     "convergence": "observed orders, and finer meshes",
-    "balance": "momentum and energy, relative",
-    "independent code": "independent programs at equal assumptions",
-    "other model": "models of thud that share nothing but the physics",
+    "balance": "residuals of momentum and energy, relative",
+    "independent code": "independent programs with the same assumptions",
+    "other model": "models of thud that share only the physics",
     "published example": "worked examples of standards",
     "published measurement": "",
     "paper": "",
     "standard": "limits of standards",
-    "statistics": "many random records with a known truth",
+    "statistics": "many random records with known true values",
 }
 
 

@@ -1,4 +1,4 @@
-!> The questions that callers in other languages may ask, by name.
+!> The questions that callers in other languages can ask, by name.
 module thud_answer
    use thud_bundle, only: bundle_type
    use thud_case, only: case_type
@@ -19,19 +19,19 @@ module thud_answer
 
 contains
 
-   !> The answer to a question; where the request has the text `case`, that is read and checked first.
+   !> Answers a question. If the request has the text `case`, that case is read and checked first.
    subroutine get_answer(question, request, bundle, error)
       character(len=*), intent(in) :: question
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      !> The case is invalid, or a computation failed.
+      !> Set if the case is invalid or a computation fails.
       type(error_type), allocatable, intent(out) :: error
       type(case_type), target :: case
       character(len=:), allocatable :: text
 
       if (request%has('case')) then
          call request%get_text('case', text)
-         ! Samples may make valid what is not in the case.
+         ! The values of samples may make an invalid case valid.
          call read_case(text, 'python', case, error, unchecked=question == 'samples')
          if (allocated(error)) return
       end if

@@ -1,12 +1,12 @@
-!> The flat API for Python, the only procedures that f2py wraps: a question by name, with a request of texts, numbers and
-!> arrays, is answered by a bundle of the same.
+!> The flat API for Python, the only procedures that f2py wraps: the request for a question and the bundle with its answer
+!> hold named texts, numbers and arrays.
 !>
-!> The answer is left in the library; its handle and sizes are returned, and `collect` hands it over and frees it.
-!> `status` is 0, or the code of the error whose message is the text `message` of the bundle.
+!> `ask` stores the bundle in the library and returns its handle and sizes; `collect` hands it over and deallocates it.
+!> `status` is 0; or the error code, and the bundle holds only the text `message`.
 !> Procedures marked `threadsafe` let other Python threads run meanwhile.
 module thud_api
    use thud_answer, only: get_answer
-   use thud_bundle, only: bundle_type, leave, take
+   use thud_bundle, only: bundle_type, retrieve, store
    use thud_error, only: error_type
    use thud_kinds, only: int64, int8, wp
    use thud_progress, only: latest_progress
@@ -29,7 +29,7 @@ contains
       integer, intent(in) :: n
       !> Values of the request: [n].
       real(wp), intent(in), target :: values(n)
-      !> Code of the error, or 0; sizes as in `leave`.
+      !> Code of the error, or 0; sizes as in `store`.
       integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
       type(bundle_type), pointer :: bundle
@@ -38,15 +38,15 @@ contains
       call begin_call()
       allocate (bundle)
       call get_answer(question, request_type(header, text, values), bundle, error)
-      call leave(bundle, error, status, handle, n_byte, n_value)
+      call store(bundle, error, status, handle, n_byte, n_value)
       call end_call()
    end subroutine ask
 
-   !> The same while no other Python thread runs: for what keeps its state in static memory, as ARPACK does, and functions
-   !> that return texts of deferred length.
+   !> Answers a question while no other Python thread runs. For procedures with state in static memory, such as ARPACK and
+   !> functions that return texts of deferred length.
    subroutine ask_alone(question, header, text, values, n, status, handle, n_byte, n_value)
       !f2py integer, intent(hide), depend(values) :: n = len(values)
-      !> As of `ask`.
+      !> All arguments are those of `ask`.
       character(len=*), intent(in) :: question, header, text
       integer, intent(in) :: n
       real(wp), intent(in), target :: values(n)
@@ -56,12 +56,12 @@ contains
       call ask(question, header, text, values, n, status, handle, n_byte, n_value)
    end subroutine ask_alone
 
-   !> Hands a bundle over and frees it.
+   !> Hands a bundle over and deallocates it.
    subroutine collect(handle, n_byte, n_value, bytes, values)
       !f2py threadsafe
-      !> Handle of the bundle; it can be used once.
+      !> Handle of the bundle; valid once.
       integer(int64), intent(in) :: handle
-      !> Size of its header and its texts; number of its values, at least 1.
+      !> Sizes of the bundle, from `ask`.
       integer, intent(in) :: n_byte, n_value
       !> Header, a zero, and texts: [n_byte].
       integer(int8), intent(out) :: bytes(n_byte)
@@ -69,13 +69,13 @@ contains
       real(wp), intent(out) :: values(n_value)
       type(bundle_type), pointer :: bundle
 
-      call take(handle, bundle)
+      call retrieve(handle, bundle)
       bytes = transfer(bundle%header//achar(0)//bundle%text, bytes)
       call bundle%copy_values(values)
       deallocate (bundle)
    end subroutine collect
 
-   !> Ends the calls that are running in other threads, as an interrupt does.
+   !> Interrupts the calls that are running in other threads.
    subroutine end_calls()
 
       call end_all_calls()
@@ -83,7 +83,7 @@ contains
 
    !> Progress of the latest long work of this process.
    subroutine get_progress(done)
-      !> Fraction that is done, 0 to 1.
+      !> Fraction done, 0 to 1.
       real(wp), intent(out) :: done
 
       done = latest_progress

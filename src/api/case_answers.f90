@@ -37,7 +37,7 @@ contains
    subroutine answer_effective_case(request, bundle, error)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      !> The file is not a case.
+      !> Set if the file is not a valid case.
       type(error_type), allocatable, intent(out) :: error
       type(case_type), target :: case
       character(len=:), allocatable :: path, text
@@ -49,13 +49,13 @@ contains
       call bundle%add_text('case', text)
    end subroutine answer_effective_case
 
-   !> The run of the namelist file `path`, as by the executable, to the directory `output`; with the numbers `replace`,
-   !> `all` and `progress` not 0 it replaces files of others, writes the further quantities of the model, and shows progress
-   !> on a terminal.
+   !> Runs the namelist file `path` like the executable, with results in the directory `output`. Numbers other than 0 ask to
+   !> replace files that thud has not written (`replace`), to write additional quantities of the model (`all`), and to show
+   !> progress on a terminal (`progress`).
    subroutine answer_run(request, bundle, error)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      !> The run failed; nothing was written.
+      !> Set if the run fails; nothing has been written then.
       type(error_type), allocatable, intent(out) :: error
       type(case_type), target :: case
       type(results_type) :: results
@@ -81,11 +81,10 @@ contains
       call add_results(bundle, case, results)
    end subroutine answer_run
 
-   !> What a case asks for, without levels and energies: callers ask for those in the bands that they need.
+   !> The results that a case asks for, except levels and energies: callers ask for them in the bands that they need.
    subroutine answer_solve(case, bundle, error)
       type(case_type), intent(in) :: case
       type(bundle_type), intent(inout) :: bundle
-      !> A computation failed.
       type(error_type), allocatable, intent(out) :: error
       type(results_type) :: results
 
@@ -97,7 +96,6 @@ contains
    subroutine answer_modes(case, bundle, error)
       type(case_type), intent(inout) :: case
       type(bundle_type), intent(inout) :: bundle
-      !> A computation failed.
       type(error_type), allocatable, intent(out) :: error
 
       case%has_impact = .false.
@@ -108,7 +106,7 @@ contains
    subroutine answer_compression(case, bundle, error)
       type(case_type), intent(in) :: case
       type(bundle_type), intent(inout) :: bundle
-      !> The model has none, or the ball cannot be pressed so far.
+      !> Set if the model has no compression, or the ball cannot be pressed so far.
       type(error_type), allocatable, intent(out) :: error
       type(compression_type) :: compression
 
@@ -116,12 +114,12 @@ contains
       if (.not. allocated(error)) call add_compression(bundle, compression)
    end subroutine answer_compression
 
-   !> The loss factor of the material of a case against `frequency`, Hz.
+   !> The loss factor of a case's material at the frequencies `frequency`, Hz.
    subroutine answer_loss_factors(case, request, bundle, error)
       type(case_type), intent(in) :: case
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      !> The model has none.
+      !> Set if the model has no loss factor.
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: frequency(:), loss_factor(:)
 
@@ -133,14 +131,14 @@ contains
       if (.not. allocated(error)) call bundle%add_array('loss_factors', shape(frequency), loss_factor)
    end subroutine answer_loss_factors
 
-   !> Samples of a case that differ in the values of the keys `keys`, a text with commas between: `values`, of a choice its
-   !> number from 1, [n_key, n_sample], by `threads` threads. The numbers `levels` and `forces` say whether those are
-   !> wanted. Without values only the cost of one sample, and the length of its forces.
+   !> Computes samples of a case that differ in the `key_count` comma-separated `keys`, with `threads` threads. `values`
+   !> holds the values of the keys, for a choice its index from 1: [n_key, n_sample]. Numbers `levels` and `forces` other
+   !> than 0 ask for those. Without `values` the answer is only the cost of a sample, s, and the length of its forces.
    subroutine answer_samples(case, request, bundle, error)
       type(case_type), intent(in), target :: case
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      !> A key is unknown, or the samples cannot be computed together.
+      !> Set if a key is unknown, or the samples cannot be computed together.
       type(error_type), allocatable, intent(out) :: error
       type(column_type), allocatable :: columns(:)
       type(sweep_type), allocatable :: sweep
@@ -167,7 +165,7 @@ contains
    !> Adds the results of samples to a bundle.
    subroutine add_samples(bundle, sweep)
       type(bundle_type), intent(inout) :: bundle
-      !> The results; their forces are moved.
+      !> The results; the forces are moved out of them.
       type(sweep_type), intent(inout) :: sweep
       type(text_buffer_type) :: reasons
       integer :: i

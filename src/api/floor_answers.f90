@@ -24,12 +24,13 @@ module thud_floor_answers
 
 contains
 
-   !> Mobility of the floor of a case, m/(N s), at `frequency`, Hz: under the source, or with `point`, m, from there to it.
+   !> Mobility of a case's floor, m/(N s), at the frequencies `frequency`, Hz: under the source or, with `point`, m, from
+   !> the source to this point.
    subroutine answer_mobility(case, request, bundle, error)
       type(case_type), intent(in) :: case
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      !> The floor has no such point.
+      !> Set if the floor has no such point.
       type(error_type), allocatable, intent(out) :: error
       type(receiver_type) :: receiver
       real(wp), allocatable :: point(:)
@@ -49,13 +50,13 @@ contains
       call bundle%add_array('imaginary', shape(mobility), aimag(mobility))
    end subroutine answer_mobility
 
-   !> Energy that `force`, N, gives to the floor of a case, which has `velocity`, m/s, at `sample_rate`, Hz, in the set
-   !> `bands`.
+   !> Energy that the record `force`, N, injects into a case's floor with `velocity`, m/s, at `sample_rate`, Hz, in the band
+   !> set `bands`.
    subroutine answer_floor_energy(case, request, bundle, error)
       type(case_type), intent(in) :: case
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      !> The set is unknown, or the record has no level.
+      !> Set if the band set is unknown, or a level cannot be computed.
       type(error_type), allocatable, intent(out) :: error
       type(band_type), allocatable :: bands(:)
       type(receiver_type) :: receiver
@@ -76,12 +77,12 @@ contains
       call bundle%add_array('conductance', shape(bands), get_mean_conductances(receiver, bands))
    end subroutine answer_floor_energy
 
-   !> Velocity, m/s, of `point`, m, of the floor of a case under `force`, N, at `sample_rate`, Hz.
+   !> Velocity, m/s, of the point `point`, m, of a case's floor under the record `force`, N, at `sample_rate`, Hz.
    subroutine answer_point_velocity(case, request, bundle, error)
       type(case_type), intent(in) :: case
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      !> The floor has no such point.
+      !> Set if the floor has no such point.
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: force(:), velocity(:), point(:)
 
@@ -94,11 +95,10 @@ contains
       if (.not. allocated(error)) call bundle%add_array('velocity', shape(velocity), velocity)
    end subroutine answer_point_velocity
 
-   !> The impact of a case on its floor alone; nothing where the force is the blocked one.
+   !> The impact on a case's mobile floor; empty if the floor is rigid or the model does not couple with it.
    subroutine answer_floor_impact(case, bundle, error)
       type(case_type), intent(in) :: case
       type(bundle_type), intent(inout) :: bundle
-      !> The computation failed.
       type(error_type), allocatable, intent(out) :: error
       type(force_history_type), allocatable :: on_floor
 
@@ -106,12 +106,12 @@ contains
       if (allocated(on_floor) .and. .not. allocated(error)) call add_history(bundle, 'on_floor.', on_floor)
    end subroutine answer_floor_impact
 
-   !> Level in the room below that `levels` of the force, dB, cause: those of the rated one-third-octave bands.
+   !> Level in the room below, from levels of the force `levels`, dB, in the rated one-third-octave bands.
    subroutine answer_room_level(case, request, bundle, error)
       type(case_type), intent(in) :: case
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      !> The floor radiates into no room.
+      !> Set if the floor cannot radiate into the room.
       type(error_type), allocatable, intent(out) :: error
       type(room_level_type) :: prediction
       type(band_type), allocatable :: bands(:)
@@ -121,12 +121,12 @@ contains
       if (.not. allocated(error)) call add_room_level(bundle, case, prediction)
    end subroutine answer_room_level
 
-   !> The plate of a floor that radiates into the room below, at `frequency`, Hz.
+   !> The plate of a floor that radiates into the room below, at the frequencies `frequency`, Hz.
    subroutine answer_radiator(case, request, bundle, error)
       type(case_type), intent(in) :: case
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      !> The floor radiates into no room.
+      !> Set if the floor cannot radiate into the room.
       type(error_type), allocatable, intent(out) :: error
       type(plate_type) :: plate
       real(wp), allocatable :: frequency(:), conductance(:)
@@ -148,11 +148,11 @@ contains
       end associate
    end subroutine answer_radiator
 
-   !> Floor with `order` poles whose mobility is that of the table `frequency`, Hz, `real` and `imaginary`, m/(N s).
+   !> Fits a floor with `order` poles to the mobility `real` + i `imaginary`, m/(N s), at the frequencies `frequency`, Hz.
    subroutine answer_mobility_fit(request, bundle, error)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      !> There is no fit.
+      !> Set if the fit fails.
       type(error_type), allocatable, intent(out) :: error
       type(measured_mobility_floor_type) :: floor
       real(wp) :: free_error

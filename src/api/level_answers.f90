@@ -18,11 +18,11 @@ module thud_level_answers
 
 contains
 
-   !> Force exposure levels, dB, of `force`, N, at `sample_rate`, Hz, in the set `bands` by the method `method`.
+   !> Force exposure levels, dB, of the history `force`, N, at `sample_rate`, Hz, in the band set `bands`, by `method`.
    subroutine answer_levels(request, bundle, error)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      !> The set is unknown, or the record has no level.
+      !> Set if the band set is unknown, or a level cannot be computed.
       type(error_type), allocatable, intent(out) :: error
       type(band_type), allocatable :: bands(:)
       character(len=:), allocatable :: set, method
@@ -38,7 +38,7 @@ contains
       if (.not. allocated(error)) call bundle%add_array('levels', shape(levels), levels)
    end subroutine answer_levels
 
-   !> Number of peaks of `force`, N, at `sample_rate`, Hz.
+   !> Number of peaks of the history `force`, N, at `sample_rate`, Hz.
    subroutine answer_peak_count(request, bundle)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
@@ -47,7 +47,7 @@ contains
          request%get_number('sample_rate')), wp))
    end subroutine answer_peak_count
 
-   !> `force`, N, at `sample_rate`, Hz, low-passed at `cutoff`, Hz.
+   !> The history `force`, N, at `sample_rate`, Hz, low-passed at `cutoff`, Hz.
    subroutine answer_low_pass(request, bundle)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
@@ -59,8 +59,8 @@ contains
       call bundle%add_array('force', shape(low), low)
    end subroutine answer_low_pass
 
-   !> Single numbers of `levels` in a room, dB, in the rated bands of the set `bands`: A-weighted, as stated, class (0 for
-   !> none), and, of octaves, by the inverse A-weighted curve.
+   !> Single-number ratings of `levels` in a room, dB, in the rated bands of the set `bands`: A-weighted level, the same
+   !> rounded, class (0 for none) and, for octaves, inverse-A curve rating.
    subroutine answer_rating(request, bundle)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
@@ -77,7 +77,7 @@ contains
       if (set == octave_set) call bundle%add_number('curve', real(get_inverse_a_rating(levels), wp))
    end subroutine answer_rating
 
-   !> `levels`, dB, standardized to the reference room from `reverberation_time`, s, and `volume`, m3.
+   !> `levels`, dB, of a room with `reverberation_time`, s, and `volume`, m3, standardized to the reference room.
    subroutine answer_standardization(request, bundle)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
@@ -88,7 +88,7 @@ contains
       call bundle%add_array('levels', shape(levels), levels)
    end subroutine answer_standardization
 
-   !> `levels`, dB, corrected for those of the `background`, and whether the true level is at most the corrected one.
+   !> `levels`, dB, corrected for the levels `background`, dB, and whether a corrected level is only an upper bound.
    subroutine answer_background(request, bundle)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle

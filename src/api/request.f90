@@ -1,4 +1,4 @@
-!> What a caller in another language asks: texts, numbers and arrays by name, the counterpart of `thud_bundle`.
+!> Requests of callers in other languages: named texts, numbers and arrays, the counterpart of `thud_bundle`.
 module thud_request
    use thud_kinds, only: wp
    implicit none (type, external)
@@ -8,11 +8,11 @@ module thud_request
 
    !> Texts and arrays, each with its name.
    type :: request_type
-      !> A line for each: name, tab, `t` and the length of a text or `n` and the number of values.
+      !> One line per item: its name, a tab, and `t` with the length of a text or `n` with the number of values.
       character(len=:), allocatable :: header
-      !> All texts, one after the other.
+      !> All texts, concatenated.
       character(len=:), allocatable :: text
-      !> All values, one array after the other, those of the caller: [n_value].
+      !> All numbers and arrays, concatenated; points to memory of the caller: [n_value].
       real(wp), pointer, contiguous :: values(:) => null()
    contains
       procedure :: has
@@ -21,21 +21,21 @@ module thud_request
       procedure :: get_array
    end type request_type
 
-   !> Ends a name in the header, and a line of it.
+   !> Ends of a name and of a line in the header.
    character(len=*), parameter :: tab = achar(9), line_feed = achar(10)
 
 contains
 
-   !> Whether there is an item of a name.
-   pure function has(self, name) result(found)
+   !> Whether the request has an item of a name.
+   pure function has(self, name) result(exists)
       class(request_type), intent(in) :: self
       character(len=*), intent(in) :: name
-      logical :: found
+      logical :: exists
 
-      found = index(line_feed//self%header, line_feed//name//tab) > 0
+      exists = index(line_feed//self%header, line_feed//name//tab) > 0
    end function has
 
-   !> A text, empty where there is none of the name.
+   !> A text by its name; empty if there is none.
    pure subroutine get_text(self, name, text)
       class(request_type), intent(in) :: self
       character(len=*), intent(in) :: name
@@ -46,7 +46,7 @@ contains
       text = self%text(first:first + length - 1)
    end subroutine get_text
 
-   !> A number, 0 where there is none of the name.
+   !> A number by its name; 0 if there is none.
    pure function get_number(self, name) result(number)
       class(request_type), intent(in) :: self
       character(len=*), intent(in) :: name
@@ -58,7 +58,7 @@ contains
       if (length > 0) number = self%values(first)
    end function get_number
 
-   !> An array of the request, of no size where there is none of the name.
+   !> An array by its name; of size 0 if there is none.
    function get_array(self, name) result(values)
       class(request_type), intent(in) :: self
       character(len=*), intent(in) :: name
@@ -70,13 +70,13 @@ contains
       values => self%values(first:first + length - 1)
    end function get_array
 
-   !> Where an item is among those of its kind.
+   !> Finds an item in the texts or in the values.
    pure subroutine find(self, name, kind, first, length)
       type(request_type), intent(in) :: self
       character(len=*), intent(in) :: name
       !> `t` or `n`.
       character(len=1), intent(in) :: kind
-      !> Index of its first character or value, and their number; 0 where there is none.
+      !> Index of its first character or value, and their number; `length` is 0 if there is no such item.
       integer, intent(out) :: first, length
       integer :: begin, middle, end, count
 
@@ -96,7 +96,7 @@ contains
       end do
    end subroutine find
 
-   !> The number that digits stand for.
+   !> Value of a number in digits.
    pure function get_count(digits) result(count)
       character(len=*), intent(in) :: digits
       integer :: count

@@ -19,45 +19,45 @@ module thud_command_line
 
    public :: execute
 
-   !> Exit code where the source does not conform and `--check` asks for it.
+   !> Exit code if the source does not conform, with `--check`.
    integer, parameter :: not_conforming = 3
 
-   !> Maximum number of threads, and the allowed range as text.
+   !> Maximum number of threads, and the allowed numbers as text.
    integer, parameter :: max_threads = 1024
    character(len=*), parameter :: threads_allowed = '1 to 1024, whole'
 
-   !> Memory that OpenBLAS takes in each thread that uses it, and waits for for ever where there is none, bytes.
+   !> Memory that OpenBLAS allocates in each thread that uses it, bytes; without it OpenBLAS would wait forever.
    real(wp), parameter :: blas_memory = 160.0e6_wp
 
-   !> Options by their long names.
+   !> Long names of all options.
    character(len=*), parameter :: known_options(*) = [character(len=9) :: '--output', '--replace', '--all', &
       '--samples', '--threads', '--check', '--quiet', '--keys', '--schema', '--help', '--version']
 
-   !> What the command line asks for.
+   !> Options of the command line.
    type :: request_type
       !> Path of the case file.
       character(len=:), allocatable :: case_file
-      !> Output directory, empty where not given.
+      !> Output directory; empty if not given.
       character(len=:), allocatable :: output
-      !> Replace also files that thud has not written.
+      !> Also replace files that thud has not written.
       logical :: replace = .false.
-      !> Write also further quantities of the model against time.
+      !> Also write additional quantities of the model against time.
       logical :: all = .false.
-      !> Path of a table of samples, empty where not given.
+      !> Path of a table of samples; empty if not given.
       character(len=:), allocatable :: samples
-      !> Threads for them.
+      !> Number of threads for the samples.
       integer :: threads = 1
-      !> Exit with 3 where the source does not conform.
+      !> Exit with 3 if the source does not conform.
       logical :: check = .false.
-      !> Nothing on the screen but errors.
+      !> Show only errors and warnings.
       logical :: quiet = .false.
-      !> Text to be shown instead of a run.
+      !> Text to show instead of a run.
       character(len=:), allocatable :: information
    end type request_type
 
 contains
 
-   !> Does what the command line asks for.
+   !> Executes the command line.
    subroutine execute(exit_code)
       !> 0 done, 1 bad input or usage, 2 numerical failure, 3 checked and not conforming, 130 interrupted, 143 terminated.
       integer, intent(out) :: exit_code
@@ -103,12 +103,12 @@ contains
       end if
    end subroutine execute
 
-   !> Writes to the screen; a full disk is an error, a closed pipe is none.
+   !> Writes to the screen; a full disk is an error, a closed pipe is not.
    subroutine write_line(descriptor, text, exit_code)
       !> `standard_output` or `standard_error`.
       integer, intent(in) :: descriptor
       character(len=*), intent(in) :: text
-      !> Becomes 1 where the text could not be written.
+      !> Becomes 1 if the text cannot be written.
       integer, intent(inout) :: exit_code
       integer :: status
 
@@ -119,10 +119,10 @@ contains
          //get_system_message(status)//'); allowed: a screen, a pipe, or a disk with space'//newline, status)
    end subroutine write_line
 
-   !> Makes a request of the arguments.
+   !> Parses the arguments.
    subroutine parse_arguments(request, error)
       type(request_type), intent(out) :: request
-      !> An argument is unknown, missing or given twice.
+      !> Set if an argument is unknown, missing or given twice.
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: argument, number, suggestion
       integer :: i
@@ -192,15 +192,15 @@ contains
       end select
    end subroutine get_information
 
-   !> The value of an option.
+   !> Reads the value of an option.
    subroutine take_value(i, option, allowed, value, error)
-      !> Number of the argument, of the option before and of its value after.
+      !> Index of the option; afterwards that of its value.
       integer, intent(inout) :: i
       character(len=*), intent(in) :: option
-      !> Its allowed values.
+      !> Allowed values.
       character(len=*), intent(in) :: allowed
       character(len=:), allocatable, intent(inout) :: value
-      !> There is none.
+      !> Set if there is no value.
       type(error_type), allocatable, intent(out) :: error
 
       i = i + 1
@@ -209,11 +209,11 @@ contains
       if (value == '') error = input_error(option//' has no value; allowed: '//allowed)
    end subroutine take_value
 
-   !> A number of threads.
+   !> Reads a number of threads.
    subroutine take_threads(text, threads, error)
       character(len=*), intent(in) :: text
       integer, intent(out) :: threads
-      !> It is none.
+      !> Set if the number is not allowed.
       type(error_type), allocatable, intent(out) :: error
 
       threads = 0
@@ -224,7 +224,7 @@ contains
 
    !> One argument of the command line.
    function get_argument(i) result(argument)
-      !> Number of the argument.
+      !> Index of the argument.
       integer, intent(in) :: i
       character(len=:), allocatable :: argument
       integer :: length
@@ -234,7 +234,7 @@ contains
       call get_command_argument(i, value=argument)
    end function get_argument
 
-   !> One line on how to call the program.
+   !> Usage of the program in one line.
    pure function usage() result(text)
       character(len=:), allocatable :: text
 

@@ -1,4 +1,4 @@
-!> The executable `thud`: arguments to library to exit code.
+!> The executable `thud`: passes arguments to the library, and returns its exit code.
 program thud
    use, intrinsic :: iso_c_binding, only: c_int
    use thud_command_line, only: execute

@@ -1,4 +1,4 @@
-!> Results by name: texts, numbers and arrays of any count, self-describing for callers.
+!> Named results: any number of texts, numbers and arrays, described by a header for callers.
 module thud_bundle
    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_intptr_t, c_loc, c_null_ptr, c_ptr
    use thud_error, only: error_type
@@ -7,27 +7,27 @@ module thud_bundle
    implicit none (type, external)
    private
 
-   public :: bundle_type, leave, take
+   public :: bundle_type, retrieve, store
 
    !> Numbers of one item, in `values` or in `cube`.
    type :: item_type
-      !> The numbers, in Fortran's order: [n].
+      !> The numbers, in Fortran's array order: [n].
       real(wp), allocatable :: values(:)
-      !> A large array that was moved here: [:, :, :].
+      !> A large array, moved here instead of copied: [:, :, :].
       real(wp), allocatable :: cube(:, :, :)
    end type item_type
 
    !> Texts and arrays, each with its name.
    type :: bundle_type
       private
-      !> A line for each: name, tab, then the extents of an array with commas between (none for a single number), or
-      !> `t` and the length of a text.
+      !> One line per item: name, tab, and for a text `t` and its length, for an array its extents, each with a comma
+      !> behind it, for a single number nothing.
       character(len=:), allocatable, public :: header
-      !> All texts, one after the other.
+      !> All texts, concatenated.
       character(len=:), allocatable, public :: text
-      !> All arrays, the first `n_item` hold.
+      !> Numbers and arrays; the first `n_item` are used.
       type(item_type), allocatable :: items(:)
-      !> Number of arrays.
+      !> Number of numbers and arrays.
       integer :: n_item = 0
    contains
       procedure :: add_text
@@ -38,7 +38,7 @@ module thud_bundle
       procedure :: copy_values
    end type bundle_type
 
-   !> Ends a name in the header, and a line of it.
+   !> Ends of a name and of a line in the header.
    character(len=*), parameter :: tab = achar(9), line_feed = achar(10)
 
 contains
@@ -68,7 +68,7 @@ contains
    subroutine add_array(self, name, extents, values)
       class(bundle_type), intent(inout) :: self
       character(len=*), intent(in) :: name
-      !> Its extents: [rank].
+      !> Extents of the array: [rank].
       integer, intent(in) :: extents(:)
       real(wp), intent(in) :: values(*)
 
@@ -77,11 +77,11 @@ contains
       self%items(self%n_item)%values = values(:product(extents))
    end subroutine add_array
 
-   !> Adds an array of rank 3 without a copy of it.
+   !> Adds an array of rank 3 without copying it.
    subroutine move_array(self, name, values)
       class(bundle_type), intent(inout) :: self
       character(len=*), intent(in) :: name
-      !> The array, not allocated afterwards: [:, :, :].
+      !> The array, unallocated afterwards: [:, :, :].
       real(wp), allocatable, intent(inout) :: values(:, :, :)
 
       call add_line(self, name, get_form(shape(values)))
@@ -89,11 +89,11 @@ contains
       call move_alloc(values, self%items(self%n_item)%cube)
    end subroutine move_array
 
-   !> Extents as the header has them.
+   !> Extents of an array as in the header.
    pure function get_form(extents) result(form)
       !> Extents of an array: [rank].
       integer, intent(in) :: extents(:)
-      !> The extents with commas between.
+      !> The extents, each followed by a comma.
       character(len=:), allocatable :: form
       integer :: i
 
@@ -106,7 +106,7 @@ contains
    !> Adds a line to the header.
    subroutine add_line(self, name, form)
       type(bundle_type), intent(inout) :: self
-      !> Name of the item; what it is.
+      !> Name and form of the item.
       character(len=*), intent(in) :: name, form
 
       if (.not. allocated(self%header)) self%header = ''
@@ -131,10 +131,9 @@ contains
       self%n_item = self%n_item + 1
    end subroutine new_item
 
-   !> Number of all numbers.
+   !> Count of the numbers in all items.
    pure function count_values(self) result(n)
       class(bundle_type), intent(in) :: self
-      !> Their number.
       integer :: n
       integer :: i
 
@@ -150,7 +149,7 @@ contains
       end do
    end function count_values
 
-   !> All numbers in the order of the header.
+   !> Copies the numbers of all items, in the order of the header.
    subroutine copy_values(self, values)
       class(bundle_type), intent(in) :: self
       !> The numbers: [count_values].
@@ -172,7 +171,7 @@ contains
 
       !> Appends the numbers of one item.
       subroutine append(n, item)
-         !> Their number.
+         !> Count of the numbers.
          integer, intent(in) :: n
          real(wp), intent(in) :: item(n)
 
@@ -182,17 +181,17 @@ contains
 
    end subroutine copy_values
 
-   !> Stores a bundle to be collected, or the message of an error alone.
-   subroutine leave(bundle, error, status, handle, n_byte, n_value)
+   !> Stores a bundle for its caller to collect; after an error it holds only the message.
+   subroutine store(bundle, error, status, handle, n_byte, n_value)
       type(bundle_type), pointer, intent(inout) :: bundle
-      !> What went wrong.
+      !> Error of the computation, if any.
       type(error_type), allocatable, intent(in) :: error
       !> Code of the error, or 0.
       integer, intent(out) :: status
       integer(int64), intent(out) :: handle
-      !> Size of its header and its texts.
+      !> Bytes of header, zero and texts.
       integer, intent(out) :: n_byte
-      !> Number of its numbers, at least 1: f2py has no empty arrays.
+      !> Count of the numbers, at least 1: f2py has no empty arrays.
       integer, intent(out) :: n_value
 
       status = 0
@@ -207,17 +206,17 @@ contains
       handle = transfer(c_loc(bundle), handle)
       n_byte = len(bundle%header) + 1 + len(bundle%text)
       n_value = max(1, bundle%count_values())
-   end subroutine leave
+   end subroutine store
 
-   !> The bundle of a handle; the caller frees it.
-   subroutine take(handle, bundle)
-      !> Handle of a bundle that was stored and not yet taken.
+   !> The bundle of a handle; the caller deallocates it.
+   subroutine retrieve(handle, bundle)
+      !> Handle of a bundle, from `leave`; valid once.
       integer(int64), intent(in) :: handle
       type(bundle_type), pointer, intent(out) :: bundle
       type(c_ptr) :: address
 
       address = transfer(int(handle, c_intptr_t), c_null_ptr)
       call c_f_pointer(address, bundle)
-   end subroutine take
+   end subroutine retrieve
 
 end module thud_bundle

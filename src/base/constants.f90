@@ -16,8 +16,8 @@ module thud_constants
    !> Reference time of the force exposure level, s (JIS A 1418-2).
    real(wp), parameter :: reference_time = 1.0_wp
 
-   !> Upper edge of the band that force plates are read in, Hz (paper section 3); the standards' limits
-   !> end at 707 Hz.
+   !> Upper end of the frequency range in which force plates are read, Hz (paper section 3); the standards' limits end at
+   !> 707 Hz.
    real(wp), parameter :: recorded_band = 1250.0_wp
 
    !> Version of thud; pyproject.toml and CMakeLists.txt read it from here.
@@ -25,9 +25,9 @@ module thud_constants
 
 contains
 
-   !> Compiler of the library and its options; a function, as a constant would hold those of the calling unit.
+   !> Compiler of the library and its options; a function, because a constant would hold those of the unit that uses it.
    pure function get_compiler() result(text)
-      !> Name, version and options, then blanks.
+      !> Name, version and options, padded with blanks.
       character(len=4000) :: text
 
       text = compiler_version()//', options '//compiler_options()

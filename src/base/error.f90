@@ -1,5 +1,4 @@
-!> Errors as values: a routine that can fail has an allocatable `error` that stays
-!> unallocated when all went well.
+!> Errors as values: a procedure that can fail has an allocatable argument `error`, unallocated on success.
 module thud_error
    use thud_text, only: is_utf8
    implicit none (type, external)
@@ -7,20 +6,20 @@ module thud_error
 
    public :: error_type, bad_input, signal_base, numerical_failure, input_error, numerical_error
 
-   !> The input cannot be used; also the exit code of the executable.
+   !> Code of invalid input; also the exit code of the executable.
    integer, parameter :: bad_input = 1
 
-   !> The computation broke down; also the exit code of the executable.
+   !> Code of a failed computation; also the exit code of the executable.
    integer, parameter :: numerical_failure = 2
 
-   !> Codes of interrupts, and exit codes of the executable: this plus the number of the signal.
+   !> An interrupt has the code `signal_base` plus the signal's number; also the exit code of the executable.
    integer, parameter :: signal_base = 128
 
    !> An error, with its message for the user.
    type :: error_type
-      !> `bad_input`, `numerical_failure`, or `signal_base` plus the number of the signal.
+      !> `bad_input`, `numerical_failure`, or `signal_base` plus the signal's number.
       integer :: code = numerical_failure
-      !> One sentence that names key or position, value and allowed range.
+      !> Message that names key or position, value and allowed range.
       character(len=:), allocatable :: message
    end type error_type
 
@@ -35,8 +34,8 @@ contains
       integer :: i, last
 
       text = message
-      ! Control characters do not print, a zero byte would end the message, and bytes that are no characters spoil the
-      ! screen; input may hold them, and a character may be cut in two where a value is shortened.
+      ! Replace bytes of the input that cannot be shown: control characters, the zero byte, which would end the message,
+      ! and invalid UTF-8, which also arises when a shortened value ends within a character.
       last = merge(255, 126, is_utf8(text))
       do i = 1, len(text)
          if (iachar(text(i:i)) < 32 .or. iachar(text(i:i)) == 127 .or. iachar(text(i:i)) > last) text(i:i) = '?'
@@ -44,7 +43,7 @@ contains
       error = error_type(code=bad_input, message=text)
    end function input_error
 
-   !> Error of a computation that could not be carried through.
+   !> Error of a failed computation.
    pure function numerical_error(message) result(error)
       !> The message for the user.
       character(len=*), intent(in) :: message

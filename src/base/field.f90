@@ -1,5 +1,5 @@
-!> One key of the input: its name, unit, allowed range and meaning, and the variable that it
-!> sets. Reading, checking, writing and describing the input all use this one description.
+!> One key of the input: its name, unit, allowed range and meaning, and the variable that it sets. The input is read,
+!> checked, written and documented by this description.
 module thud_field
    use thud_error, only: error_type, input_error
    use thud_interval, only: get_range_text, interval_type, new_interval
@@ -18,7 +18,7 @@ module thud_field
    type :: list_type
       !> Number of entries.
       integer :: count = 0
-      !> The entries, the first `count` hold: [list_length].
+      !> The entries; the first `count` are used: [list_length].
       real(wp) :: values(list_length) = 0.0_wp
    end type list_type
 
@@ -31,11 +31,11 @@ module thud_field
    !> Maximum number of allowed texts of one key.
    integer, parameter :: max_choices = 12
 
-   !> What a flag may be.
+   !> Allowed texts of a logical value.
    character(len=*), parameter :: flags(*) = [character(len=7) :: '.true.', '.false.', 'true', 'false', '.t.', '.f.', &
       't', 'f']
 
-   !> Value that no entry of a list can have.
+   !> Marks list entries that are not given.
    real(wp), parameter :: unset = -huge(1.0_wp)
 
    !> Description of one key and a pointer to its variable.
@@ -44,30 +44,30 @@ module thud_field
       character(len=key_length) :: group = ''
       !> Key within the group.
       character(len=key_length) :: key = ''
-      !> What uses it: a source model, `modes` for the free modes, `compression`, blank for every impact.
+      !> What uses the key: a source model, a floor, `modes`, `compression`, `floor`, `room`; blank for every impact.
       character(len=key_length) :: owner = ''
       !> SI unit, empty for pure numbers and text.
       character(len=8) :: unit = ''
-      !> What the value is, in a few words.
+      !> Help text: what the value is, in a few words.
       character(len=96) :: meaning = ''
-      !> The real variable that is described, else null.
+      !> The variable of a real key, else null.
       real(wp), pointer :: real_value => null()
-      !> The integer variable that is described, else null.
+      !> The variable of an integer key, else null.
       integer, pointer :: integer_value => null()
-      !> The logical variable that is described, else null.
+      !> The variable of a logical key, else null.
       logical, pointer :: logical_value => null()
-      !> The list that is described, else null.
+      !> The variable of a list key, else null.
       type(list_type), pointer :: list_value => null()
-      !> The text variable that is described, else null.
+      !> The variable of a text key, else null.
       character(len=name_length), pointer :: text_value => null()
       !> Allowed range of numbers, see `thud_interval`.
       character(len=72) :: range = ''
-      !> The entries of a list are whole numbers.
+      !> The entries of the list must be whole numbers.
       logical :: whole_entries = .false.
       !> Number of allowed texts; 0 for free text.
       integer :: n_choice = 0
-      !> Allowed texts, the first `n_choice` hold; of fixed size, because compilers lose allocatable
-      !> components of array constructors: [max_choices].
+      !> Allowed texts; the first `n_choice` are used: [max_choices]. The size is fixed because some compilers lose
+      !> allocatable components in array constructors.
       character(len=key_length) :: choices(max_choices) = ''
    contains
       procedure :: set_from_text
@@ -82,11 +82,10 @@ module thud_field
 
 contains
 
-   !> Refuses the first value outside its range, NaN included.
+   !> Returns an error for the first value outside its range, NaN included.
    subroutine check_fields(fields, error)
       !> The fields: [n_field].
       type(field_type), intent(in) :: fields(:)
-      !> Names group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
       type(interval_type) :: interval
       character(len=:), allocatable :: text, suggestion
@@ -117,7 +116,7 @@ contains
       end do
    end subroutine check_fields
 
-   !> Allowed range of a number, its ends resolved by the keys of the same group.
+   !> Allowed range of a number; its ends may depend on other keys of the same group.
    function get_interval(fields, i) result(interval)
       !> All fields: [n_field].
       type(field_type), intent(in) :: fields(:)
@@ -138,7 +137,7 @@ contains
       class(field_type), intent(in) :: self
       !> Text after the equals sign.
       character(len=*), intent(in) :: text
-      !> The text is not a value of the wanted type.
+      !> Set if the text is not a value of the key's kind.
       type(error_type), allocatable, intent(out) :: error
       character(len=2*name_length) :: word
       character(len=128) :: message
@@ -175,7 +174,7 @@ contains
          if (scan(text(1:1), '''"') == 1 .and. text(len(text):) == text(1:1)) then
             read (line, nml=text_group, iostat=status, iomsg=message)
          end if
-         ! A longer constant would be cut.
+         ! A longer text would have been cut.
          if (status == 0) status = merge(0, 1, len_trim(text) <= len(word) + 2 .and. len_trim(word) <= name_length)
          if (status == 0) self%text_value = word(:name_length)
          if (status == 0 .and. self%n_choice > 0) self%text_value = lower_case(self%text_value)
@@ -183,41 +182,41 @@ contains
       if (status /= 0) error = self%get_error(text, 'is not '//wanted, new_interval(self%range))
    end subroutine set_from_text
 
-   !> Whether a list holds numbers, some with repeats such as `3*0.1`; others are mistakes, which the reader of namelists
-   !> skips without an error (`-`), or takes for null values (`1*`).
+   !> Whether a list holds only numbers, some perhaps with repeats such as `3*0.1`. The namelist reader would skip other
+   !> entries without an error (`-`), or read them as null values (`1*`).
    pure function are_numbers(text) result(yes)
       character(len=*), intent(in) :: text
       logical :: yes
-      character(len=len(text) + 1) :: rest
+      character(len=len(text) + 1) :: remaining
       integer :: last
 
       yes = .true.
-      rest = adjustl(replaced(text, ',', ' '))
-      do while (yes .and. rest /= '')
-         last = index(rest, ' ') - 1
-         yes = is_number(rest(index(rest(:last), '*') + 1:last))
-         rest = adjustl(rest(last + 1:))
+      remaining = adjustl(replaced(text, ',', ' '))
+      do while (yes .and. remaining /= '')
+         last = index(remaining, ' ') - 1
+         yes = is_number(remaining(index(remaining(:last), '*') + 1:last))
+         remaining = adjustl(remaining(last + 1:))
       end do
    end function are_numbers
 
-   !> Takes over the entries that were read.
+   !> Sets a list from the entries that were read.
    subroutine set_list(entries, list, status)
-      !> The entries, those that were not given hold `unset`: [list_length + 1].
+      !> The entries; `unset` for entries missing from the input: [list_length + 1].
       real(wp), intent(in) :: entries(:)
       type(list_type), intent(inout) :: list
-      !> Not 0 where there are too many entries or gaps between them.
+      !> Nonzero if there are too many entries or gaps between them.
       integer, intent(out) :: status
-      logical :: given(size(entries))
+      logical :: is_set(size(entries))
 
-      ! Written so that a NaN counts as given; the check of the range refuses it later.
-      given = .not. entries <= unset
-      status = merge(0, 1, all(given(:count(given))) .and. count(given) <= list_length)
+      ! Written so that a NaN counts as given; the range check reports it later.
+      is_set = .not. entries <= unset
+      status = merge(0, 1, all(is_set(:count(is_set))) .and. count(is_set) <= list_length)
       if (status /= 0) return
-      list%count = count(given)
+      list%count = count(is_set)
       list%values(:list%count) = entries(:list%count)
    end subroutine set_list
 
-   !> Value as a number: of a choice its index, of a flag 0 or 1.
+   !> Value as a number: the index of a choice, 0 or 1 for a flag.
    function get_number(self) result(number)
       class(field_type), intent(in) :: self
       !> The number; 0 for free text and lists.
@@ -230,13 +229,13 @@ contains
       if (self%n_choice > 0) number = real(findloc(self%choices(:self%n_choice) == self%text_value, .true., dim=1), wp)
    end function get_number
 
-   !> Sets the variable from such a number.
+   !> Sets the variable from a number as `get_number` returns it.
    subroutine set_number(self, number, entry, error)
       class(field_type), intent(in) :: self
       real(wp), intent(in) :: number
-      !> Which entry of a list is set; 0 for keys that are no lists.
+      !> Index of the list entry to set; 0 if the key is not a list.
       integer, intent(in) :: entry
-      !> The key takes no such number.
+      !> Set if the key cannot have this value.
       type(error_type), allocatable, intent(out) :: error
       logical :: whole
 
@@ -273,20 +272,20 @@ contains
    end function get_kind
 
    !> Error that names group, key, value and allowed range.
-   function get_error(self, value, what, interval) result(error)
+   function get_error(self, value, problem, interval) result(error)
       class(field_type), intent(in) :: self
-      !> The value as text; what is wrong with it.
-      character(len=*), intent(in) :: value, what
+      !> The value as text; the fault, as `is not a whole number`.
+      character(len=*), intent(in) :: value, problem
       type(interval_type), intent(in) :: interval
       type(error_type) :: error
       character(len=:), allocatable :: allowed
 
       call self%get_allowed(allowed, interval)
-      error = input_error('&'//trim(self%group)//': '//trim(self%key)//' = '//shortened(value)//' '//what &
+      error = input_error('&'//trim(self%group)//': '//trim(self%key)//' = '//shortened(value)//' '//problem &
          //'; allowed: '//allowed)
    end function get_error
 
-   !> The value as it stands in a namelist.
+   !> The value in namelist syntax.
    subroutine get_text(self, text)
       class(field_type), intent(in) :: self
       !> The value; text is in quotes.
@@ -315,7 +314,7 @@ contains
       class(field_type), intent(in) :: self
       !> The range with its unit, or the list of allowed words.
       character(len=:), allocatable, intent(out) :: text
-      !> The range, where its ends are resolved.
+      !> The range with resolved ends (default: unresolved).
       type(interval_type), intent(in), optional :: interval
 
       if (self%n_choice > 0) then

@@ -1,4 +1,4 @@
-!> Allowed ranges as intervals: `(0, 10]`, or `(0, outer_radius)` where an end depends on other keys. Such an
+!> Allowed ranges as intervals: `(0, 10]`, or `(0, outer_radius)` if an end depends on other keys. Such an
 !> end is a product or quotient of numbers and keys of the same group.
 module thud_interval
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
@@ -9,33 +9,33 @@ module thud_interval
 
    public :: evaluate, expression_length, get_range_text, interval_type, new_interval, to_end_text
 
-   !> Length of an end that is an expression.
+   !> Maximum length of an expression for an end.
    integer, parameter :: expression_length = 32
 
    !> An interval of real numbers.
    type :: interval_type
-      !> Its ends.
+      !> The ends.
       real(wp) :: lower = -huge(1.0_wp), upper = huge(1.0_wp)
-      !> The end does not belong to it.
+      !> The end is excluded.
       logical :: lower_open = .false., upper_open = .false.
-      !> The ends in terms of other keys; blank where they are numbers.
+      !> Ends as expressions of other keys; blank for a number.
       character(len=expression_length) :: lower_expression = '', upper_expression = ''
    contains
       procedure :: contains => contains_value
-      procedure :: contains_sets
+      procedure :: contains_rows
       procedure :: resolve
    end type interval_type
 
-   !> Value of an expression: for one set of values, or for many.
+   !> Value of an expression for one or many sets of key values.
    interface evaluate
-      module procedure evaluate_one, evaluate_sets
+      module procedure evaluate_row, evaluate_rows
    end interface evaluate
 
 contains
 
-   !> Interval of a text.
+   !> Interval from a text.
    pure function new_interval(text) result(interval)
-      !> The ends between brackets, round ones where an end is left out; blank for all numbers.
+      !> The ends between brackets, a round bracket for an excluded end; blank for all numbers.
       character(len=*), intent(in) :: text
       type(interval_type) :: interval
       integer :: comma, last
@@ -49,12 +49,12 @@ contains
       call read_end(text(comma + 1:last - 1), interval%upper, interval%upper_expression)
    end function new_interval
 
-   !> One end of an interval.
+   !> Reads one end of an interval.
    pure subroutine read_end(text, number, expression)
       character(len=*), intent(in) :: text
-      !> Its value where it is a number.
+      !> Value of the end; unchanged for an expression.
       real(wp), intent(inout) :: number
-      !> What it is otherwise.
+      !> The expression; blank for a number.
       character(len=expression_length), intent(out) :: expression
 
       expression = ''
@@ -65,38 +65,38 @@ contains
       end if
    end subroutine read_end
 
-   !> Whether a text is a number and no expression.
+   !> Whether a text is a number, not an expression.
    pure function is_number(text) result(yes)
-      !> The text, without blanks before it.
+      !> The text, without leading blanks.
       character(len=*), intent(in) :: text
       logical :: yes
 
       yes = scan(text, '0123456789+-.') == 1 .and. verify(trim(text), '0123456789+-.eEdD') == 0
    end function is_number
 
-   !> Sets the ends that depend on other keys.
+   !> Evaluates the ends that depend on other keys.
    pure subroutine resolve(self, keys, values)
       class(interval_type), intent(inout) :: self
       !> Names of the keys: [n_key].
       character(len=*), intent(in) :: keys(:)
-      !> Their values: [n_key].
+      !> Values of the keys: [n_key].
       real(wp), intent(in) :: values(:)
 
       if (self%lower_expression /= '') self%lower = evaluate(self%lower_expression, keys, values)
       if (self%upper_expression /= '') self%upper = evaluate(self%upper_expression, keys, values)
    end subroutine resolve
 
-   !> Whether values of one key, in many sets of the values of all keys, lie in the interval.
-   pure function contains_sets(self, key, keys, values) result(inside)
+   !> Whether the value of one key lies in the interval, for many sets of values of all keys.
+   pure function contains_rows(self, key, keys, values) result(inside)
       class(interval_type), intent(in) :: self
       !> Index of the key.
       integer, intent(in) :: key
       character(len=*), intent(in) :: keys(:)
-      !> Their values: [n_set, n_key].
+      !> Values of the keys: [n_set, n_key].
       real(wp), intent(in) :: values(:, :)
-      !> Whether they lie in it: [n_set].
+      !> The value lies in the interval: [n_set].
       logical :: inside(size(values, 1))
-      type(interval_type) :: one
+      type(interval_type) :: resolved
       real(wp), allocatable :: lower(:), upper(:)
       integer :: i
 
@@ -105,37 +105,37 @@ contains
       upper = self%upper
       if (self%lower_expression /= '') lower = evaluate(self%lower_expression, keys, values)
       if (self%upper_expression /= '') upper = evaluate(self%upper_expression, keys, values)
-      one = self
+      resolved = self
       do i = 1, size(inside)
-         one%lower = lower(i)
-         one%upper = upper(i)
-         inside(i) = one%contains(values(i, key))
+         resolved%lower = lower(i)
+         resolved%upper = upper(i)
+         inside(i) = resolved%contains(values(i, key))
       end do
-   end function contains_sets
+   end function contains_rows
 
-   !> Value for one set of values.
-   pure function evaluate_one(expression, keys, values) result(value)
-      !> Such as `static_harmonics/2`.
+   !> Value of an expression for one set of key values.
+   pure function evaluate_row(expression, keys, values) result(value)
+      !> An expression such as `static_harmonics/2`.
       character(len=*), intent(in) :: expression
       character(len=*), intent(in) :: keys(:)
       real(wp), intent(in) :: values(:)
       real(wp) :: value
       real(wp) :: only(1)
 
-      only = evaluate_sets(expression, keys, reshape(values, [1, size(values)]))
+      only = evaluate_rows(expression, keys, reshape(values, [1, size(values)]))
       value = only(1)
-   end function evaluate_one
+   end function evaluate_row
 
-   !> Value of a product or quotient of numbers and keys; not within any range where a key is unknown.
-   pure function evaluate_sets(expression, keys, values) result(value)
+   !> Value of a product or quotient of numbers and keys; NaN if a key is unknown.
+   pure function evaluate_rows(expression, keys, values) result(value)
       character(len=*), intent(in) :: expression
       character(len=*), intent(in) :: keys(:)
       real(wp), intent(in) :: values(:, :)
-      !> The values: [n_set].
+      !> The values: [n_row].
       real(wp) :: value(size(values, 1))
       real(wp) :: operand(size(values, 1))
       real(wp) :: number
-      integer :: start, length, place, status
+      integer :: start, length, key, status
       character(len=len(expression)) :: word
       character(len=128) :: message
       character(len=1) :: operator
@@ -146,9 +146,9 @@ contains
       do
          length = scan(expression(start:)//'*', '*/') - 1
          word = adjustl(expression(start:start + length - 1))
-         place = findloc(keys == word, .true., dim=1)
-         if (place > 0) then
-            operand = values(:, place)
+         key = findloc(keys == word, .true., dim=1)
+         if (key > 0) then
+            operand = values(:, key)
          else
             read (word, *, iostat=status, iomsg=message) number
             if (status /= 0) number = ieee_value(number, ieee_quiet_nan)
@@ -160,11 +160,11 @@ contains
          if (start > len(expression)) exit
          operator = expression(start - 1:start - 1)
       end do
-   end function evaluate_sets
+   end function evaluate_rows
 
    !> Whether a value lies in the interval; NaN never does.
    elemental function contains_value(self, value) result(inside)
-      !> The interval, its ends resolved.
+      !> The interval with resolved ends.
       class(interval_type), intent(in) :: self
       real(wp), intent(in) :: value
       logical :: inside
@@ -173,7 +173,7 @@ contains
          .and. (value < self%upper .or. (.not. self%upper_open .and. value <= self%upper))
    end function contains_value
 
-   !> The interval around the name of a key: `0 < outer_radius <= 10`.
+   !> The interval as inequalities for a key: `0 < outer_radius <= 10`.
    subroutine get_range_text(interval, name, text)
       type(interval_type), intent(in) :: interval
       character(len=*), intent(in) :: name
@@ -186,15 +186,15 @@ contains
          //trim(merge('< ', '<=', interval%upper_open))//' '//upper
    end subroutine get_range_text
 
-   !> One end as text: an expression with its value, where it is known.
+   !> One end as text; an expression with its value if known.
    subroutine to_end_text(number, expression, text)
       real(wp), intent(in) :: number
-      !> The expression; blank where the end is a number.
+      !> The expression; blank for a number.
       character(len=*), intent(in) :: expression
       character(len=:), allocatable, intent(out) :: text
 
       text = to_text(number)
-      ! Whole ends need no decimals.
+      ! Whole numbers need no decimals.
       if (len(text) > 2) then
          if (text(len(text) - 1:) == '.0') text = text(:len(text) - 2)
       end if

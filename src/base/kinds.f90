@@ -1,4 +1,4 @@
-!> Kinds of numbers: one of all real numbers, and the integers that memory is counted in.
+!> Kinds of numbers: the only real kind, and integers for bytes and sizes of memory.
 module thud_kinds
    use, intrinsic :: iso_c_binding, only: c_double
    use, intrinsic :: iso_fortran_env, only: int8, int64

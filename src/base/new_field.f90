@@ -1,5 +1,5 @@
-!> Descriptions of keys, one constructor per kind of value. Ranges are intervals such as `(0, 10]`, see
-!> `thud_interval`; `in_group` and `owned_by` set their group and their user.
+!> Constructors of key descriptions, one per kind of value. Ranges are intervals such as `(0, 10]`, see
+!> `thud_interval`; `in_group` and `owned_by` set the group and the owner of keys.
 module thud_new_field
    use thud_field, only: field_type, list_type, name_length
    use thud_kinds, only: wp
@@ -14,7 +14,7 @@ contains
    function real_field(key, variable, unit, meaning, range) result(field)
       character(len=*), intent(in) :: key
       real(wp), intent(in), target :: variable
-      !> SI unit, empty for a pure number; what the value is; allowed range.
+      !> SI unit, empty for a pure number; help text; allowed range.
       character(len=*), intent(in) :: unit, meaning, range
       type(field_type) :: field
 
@@ -26,7 +26,7 @@ contains
    function integer_field(key, variable, meaning, range) result(field)
       character(len=*), intent(in) :: key
       integer, intent(in), target :: variable
-      !> What the value is; allowed range.
+      !> Help text; allowed range.
       character(len=*), intent(in) :: meaning, range
       type(field_type) :: field
 
@@ -45,13 +45,13 @@ contains
       field%logical_value => variable
    end function logical_field
 
-   !> Describes a key with a list of numbers, each of which lies in one range.
+   !> Describes a key with a list of numbers that share one range.
    function list_field(key, variable, unit, meaning, range, whole) result(field)
       character(len=*), intent(in) :: key
       type(list_type), intent(in), target :: variable
-      !> SI unit, empty for pure numbers; what the values are; allowed range of each.
+      !> SI unit, empty for pure numbers; help text; allowed range of each entry.
       character(len=*), intent(in) :: unit, meaning, range
-      !> They are whole numbers (default: not).
+      !> Entries must be whole numbers (default: false).
       logical, intent(in), optional :: whole
       type(field_type) :: field
 
@@ -85,25 +85,25 @@ contains
       field%choices(:size(choices)) = choices
    end function choice_field
 
-   !> Puts keys into a namelist group, unless they have one already.
+   !> Puts keys into a namelist group, except keys that have one already.
    function in_group(group, fields) result(placed)
       character(len=*), intent(in) :: group
       !> The keys: [n_field].
       type(field_type), intent(in) :: fields(:)
-      !> The same in the group: [n_field].
+      !> The keys with their group: [n_field].
       type(field_type) :: placed(size(fields))
 
       placed = fields
       where (placed%group == '') placed%group = group
    end function in_group
 
-   !> Sets the user of keys.
+   !> Sets the owner of keys.
    function owned_by(owner, fields) result(owned)
-      !> A source model, `modes` or `compression`.
+      !> A source model, a floor, `modes`, `compression`, `floor` or `room`.
       character(len=*), intent(in) :: owner
       !> The keys: [n_field].
       type(field_type), intent(in) :: fields(:)
-      !> The same with their owner: [n_field].
+      !> The keys with their owner: [n_field].
       type(field_type) :: owned(size(fields))
 
       owned = fields

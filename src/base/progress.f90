@@ -8,40 +8,40 @@ module thud_progress
    public :: latest_progress, report_progress, set_progress_handler
 
    abstract interface
-      !> Shows how far the work is.
+      !> Shows the progress.
       subroutine handler(done, whole, unit)
          import :: wp
          implicit none (type, external)
-         !> How much has been computed.
+         !> Amount of work done.
          real(wp), intent(in) :: done
-         !> Upper bound of the whole; 0 where unknown.
+         !> Upper bound of the total amount; 0 if unknown.
          real(wp), intent(in) :: whole
          character(len=*), intent(in) :: unit
       end subroutine handler
    end interface
 
-   !> Fraction of the latest report of this process that is done, 0 to 1; other threads may ask.
+   !> Fraction done at the latest report of this process, 0 to 1; other threads may read it.
    real(wp), volatile, protected :: latest_progress = 0.0_wp
 
-   !> Procedure that shows it; none unless the executable or the driver sets one.
+   !> Procedure that shows the progress; null unless the executable or the driver sets it.
    procedure(handler), pointer :: show => null()
 
 contains
 
    !> Sets the procedure that shows the progress.
    subroutine set_progress_handler(new_handler)
-      !> The procedure; absent for none.
+      !> The procedure; without it progress is not shown.
       procedure(handler), optional :: new_handler
 
       show => null()
       if (present(new_handler)) show => new_handler
    end subroutine set_progress_handler
 
-   !> Reports how far the work is.
+   !> Reports the progress.
    subroutine report_progress(done, whole, unit)
-      !> How much has been computed.
+      !> Amount of work done.
       real(wp), intent(in) :: done
-      !> Upper bound of the whole; 0 where unknown.
+      !> Upper bound of the total amount; 0 if unknown.
       real(wp), intent(in) :: whole
       character(len=*), intent(in) :: unit
 
@@ -51,7 +51,7 @@ contains
       !$ if (omp_in_parallel()) return
       latest_progress = 0.0_wp
       if (whole > 0.0_wp) latest_progress = min(1.0_wp, done/whole)
-      ! Another thread may change it meanwhile.
+      ! Another thread may change `show` meanwhile.
       current => show
       if (associated(current)) call current(done, whole, unit)
    end subroutine report_progress

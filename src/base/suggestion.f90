@@ -17,7 +17,7 @@ contains
       character(len=*), intent(in) :: word
       !> The known words: [n_known].
       character(len=*), intent(in) :: known(:)
-      !> ` (did you mean 'height'?)`; empty where no word comes close.
+      !> ` (did you mean 'height'?)`; empty if no word is close.
       character(len=:), allocatable, intent(out) :: suggestion
       integer :: distance(size(known))
       integer :: i
@@ -30,28 +30,28 @@ contains
       if (3*distance(i) <= max(len(word), len_trim(known(i)))) suggestion = ' (did you mean '//quoted(known(i))//'?)'
    end subroutine get_suggestion
 
-   !> Number of letters to insert, delete, replace or swap with their neighbors, to make one word of the other
-   !> (Damerau and Levenshtein, adjacent swaps only).
-   pure function get_distance(one, other) result(distance)
-      character(len=*), intent(in) :: one, other
+   !> Number of insertions, deletions, replacements and swaps of adjacent letters that turn one word into the other
+   !> (Damerau-Levenshtein distance, adjacent swaps only).
+   pure function get_distance(first, second) result(distance)
+      character(len=*), intent(in) :: first, second
       integer :: distance
-      ! Distances of the beginnings: row i belongs to the first i letters of `one`.
-      integer :: row(0:len(other), 0:len(one))
+      ! Element (j, i): distance between the first i letters of `one` and the first j of `other`.
+      integer :: row(0:len(second), 0:len(first))
       integer :: i, j, p, q
       logical :: swapped
 
-      row(:, 0) = [(j, j=0, len(other))]
-      do i = 1, len(one)
+      row(:, 0) = [(j, j=0, len(second))]
+      do i = 1, len(first)
          row(0, i) = i
-         do j = 1, len(other)
-            row(j, i) = min(row(j, i - 1) + 1, row(j - 1, i) + 1, row(j - 1, i - 1) + merge(0, 1, one(i:i) == other(j:j)))
+         do j = 1, len(second)
+            row(j, i) = min(row(j, i - 1) + 1, row(j - 1, i) + 1, row(j - 1, i - 1) + merge(0, 1, first(i:i) == second(j:j)))
             p = max(i - 1, 1)
             q = max(j - 1, 1)
-            swapped = min(i, j) > 1 .and. one(i:i) == other(q:q) .and. one(p:p) == other(j:j)
+            swapped = min(i, j) > 1 .and. first(i:i) == second(q:q) .and. first(p:p) == second(j:j)
             if (swapped) row(j, i) = min(row(j, i), row(q - 1, p - 1) + 1)
          end do
       end do
-      distance = row(len(other), len(one))
+      distance = row(len(second), len(first))
    end function get_distance
 
 end module thud_suggestion

@@ -1,7 +1,7 @@
-!> Numbers as text and small helpers on character strings.
+!> Numbers as text, and helpers for character strings.
 !>
-!> The lengths of results are stated, not deferred: gfortran keeps the length of a deferred-length
-!> result in static memory, which threads would share.
+!> Results have an explicit, not a deferred length: gfortran keeps the length of a deferred-length result in static
+!> memory, which threads would share.
 module thud_text
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan
    use thud_kinds, only: wp
@@ -14,13 +14,13 @@ module thud_text
    !> Maximum length of a value in a message.
    integer, parameter :: longest_shown = 80
 
-   !> Line feed, the line end of every file that thud writes.
+   !> Line feed, the line end in all files that thud writes.
    character(len=*), parameter :: newline = new_line('a')
 
-   !> Length that fits any number.
+   !> Length sufficient for any number.
    integer, parameter :: number_length = 40
 
-   !> Shortest text that reads back as the same value.
+   !> Shortest text from which the same value is read.
    interface to_text
       module procedure :: integer_to_text
       module procedure :: logical_to_text
@@ -37,7 +37,7 @@ contains
       text = format_integer(value)
    end function integer_to_text
 
-   !> Logical as a namelist holds it.
+   !> Logical value in namelist syntax.
    pure function logical_to_text(value) result(text)
       logical, intent(in) :: value
       !> `.true.` or `.false.`.
@@ -46,7 +46,7 @@ contains
       text = merge('.true. ', '.false.', value)
    end function logical_to_text
 
-   !> Shortest decimal text that reads back as exactly the same number.
+   !> Shortest decimal text from which exactly the same number is read.
    pure function real_to_text(value) result(text)
       real(wp), intent(in) :: value
       !> Decimal notation from 1e-4 to 1e7, else with an exponent.
@@ -55,7 +55,7 @@ contains
       text = format_real(value)
    end function real_to_text
 
-   !> Number with a fixed count of decimals, for tables: `fixed(20.4261_wp, 2)` is `20.43`.
+   !> Number with fixed decimals, for tables: `fixed(20.4261_wp, 2)` is `20.43`.
    pure function fixed(value, decimals) result(text)
       real(wp), intent(in) :: value
       integer, intent(in) :: decimals
@@ -73,7 +73,7 @@ contains
       write (buffer, '(i0)') value
    end function format_integer
 
-   !> Number with a fixed count of decimals, padded with blanks.
+   !> Number with fixed decimals, padded with blanks.
    pure function format_fixed(value, decimals) result(buffer)
       real(wp), intent(in) :: value
       integer, intent(in) :: decimals
@@ -103,7 +103,7 @@ contains
             write (form, '(a,i0,a)') '(es40.', digits, 'e3)'
             write (buffer, form) value
             read (buffer, form) read_back
-            ! == on reals would be refused by compilers.
+            ! Compilers warn of == between reals.
             if (.not. abs(read_back - value) > 0.0_wp) exit
          end do
          buffer = tidy_exponent(adjustl(buffer))
@@ -156,7 +156,7 @@ contains
    !> Whether the bytes of a text are UTF-8.
    pure function is_utf8(text) result(valid)
       character(len=*), intent(in) :: text
-      !> They are, short and legal forms only.
+      !> True for the shortest forms of valid characters only.
       logical :: valid
       integer :: i, first, second, more
 
@@ -172,7 +172,7 @@ contains
          more = count(first >= [194, 224, 240])
          valid = valid .and. (first < 128 .or. more > 0) .and. first < 245
          if (more == 0 .or. i == len(text)) cycle
-         ! Longer forms than needed, halves of pairs, and what lies beyond the last character.
+         ! Invalid: longer forms than needed, surrogates, and code points beyond the last character.
          second = iachar(text(i + 1:i + 1))
          valid = valid .and. .not. any([first == 224 .and. second < 160, first == 237 .and. second > 159, &
             first == 240 .and. second < 144, first == 244 .and. second > 143])
@@ -180,12 +180,12 @@ contains
       valid = valid .and. more == 0
    end function is_utf8
 
-   !> Whether a text holds nothing but a number; to the reader other characters mean repeats and names, signs exponents
-   !> without a letter, and a sign or a point alone is nothing that is read, without an error.
+   !> Whether a text is one number. List-directed `read` would take other characters as repeats or names, signs as
+   !> exponents without a letter, and skip a single sign or point without an error.
    pure function is_number(text) result(yes)
       !> The text, without blanks around it.
       character(len=*), intent(in) :: text
-      !> It is a number, or one of the names of what is none.
+      !> It is a number, `nan`, `inf` or `infinity`.
       logical :: yes
       character(len=len(text)) :: word
       integer :: sign
@@ -198,9 +198,9 @@ contains
       yes = yes .or. any(word == [character(len=8) :: 'nan', 'inf', 'infinity'])
    end function is_number
 
-   !> A text with all characters of a set replaced by another one.
+   !> A text in which a character replaces all characters of a set.
    pure function replaced(text, set, new) result(changed)
-      !> The text; characters to be replaced.
+      !> The text; the characters to replace.
       character(len=*), intent(in) :: text, set
       !> The replacement.
       character(len=1), intent(in) :: new
@@ -213,7 +213,7 @@ contains
       end do
    end function replaced
 
-   !> A text for a message: longer ones end in dots.
+   !> A text for a message; cut texts end in dots.
    pure function shortened(text) result(short)
       !> Any text.
       character(len=*), intent(in) :: text
@@ -223,7 +223,7 @@ contains
       if (len(text) > longest_shown) short(longest_shown - 2:) = '...'
    end function shortened
 
-   !> Text as a namelist character constant: quotes inside are doubled.
+   !> Text as a namelist character constant, with quotes inside doubled.
    pure function quoted(text) result(constant)
       !> Any text; trailing blanks are dropped.
       character(len=*), intent(in) :: text
@@ -246,7 +246,7 @@ contains
    !> Length of a text as a namelist character constant.
    pure function quoted_length(text) result(length)
       character(len=*), intent(in) :: text
-      !> Characters with quotes around and quotes inside doubled.
+      !> Length including the quotes, with quotes inside doubled.
       integer :: length
       integer :: i
 
@@ -257,7 +257,7 @@ contains
    pure function join_quoted(words) result(text)
       !> The words: [n_word].
       character(len=*), intent(in) :: words(:)
-      !> All of them, in quotes, with commas between.
+      !> The words in quotes, separated by commas.
       character(len=joined_length(words)) :: text
       integer :: i, at
 
@@ -274,14 +274,14 @@ contains
    !> Length of a joined list.
    pure function joined_length(words) result(length)
       character(len=*), intent(in) :: words(:)
-      !> Characters of the words in quotes with commas and blanks between.
+      !> Length of the text from `join_quoted`.
       integer :: length
       integer :: i
 
       length = sum([(quoted_length(words(i)), i=1, size(words))]) + 2*max(size(words) - 1, 0)
    end function joined_length
 
-   !> Words of a list with commas between.
+   !> Words of a comma-separated list.
    pure function split(list, n_word) result(words)
       character(len=*), intent(in) :: list
       integer, intent(in) :: n_word
@@ -298,7 +298,7 @@ contains
       end do
    end function split
 
-   !> A text with blanks behind it.
+   !> A text padded with blanks on the right.
    pure function padded(text, width) result(cell)
       character(len=*), intent(in) :: text
       !> Width of the cell; longer text keeps its length.
@@ -308,7 +308,7 @@ contains
       cell = text
    end function padded
 
-   !> A text with blanks before it.
+   !> A text padded with blanks on the left.
    pure function flush_right(text, width) result(cell)
       character(len=*), intent(in) :: text
       !> Width of the cell; longer text keeps its length.

@@ -1,5 +1,5 @@
-!> A text that grows piece by piece. `text = text//piece` copies the whole text for each piece, here it is copied as often
-!> as its length doubles.
+!> A text that grows piece by piece. `text = text//piece` would copy the whole text for each piece; this buffer copies it
+!> only when its length has doubled.
 module thud_text_buffer
    implicit none (type, external)
    private
@@ -9,7 +9,7 @@ module thud_text_buffer
    !> The text so far, empty at first.
    type :: text_buffer_type
       private
-      !> The text, with space behind it.
+      !> The text, followed by unused space.
       character(len=:), allocatable :: space
       !> Length of the text.
       integer :: length = 0

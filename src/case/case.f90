@@ -1,4 +1,4 @@
-!> A case, the input of one run: its keys, which of them it uses, and their checks.
+!> A case, the input of one run: its keys, the keys that it uses, and their checks.
 module thud_case
    use thud_ball, only: ball_type, get_ball_fields
    use thud_band, only: band_choices, band_type
@@ -24,29 +24,29 @@ module thud_case
 
    !> Input of one run.
    type :: case_type
-      !> Groups that the text of the case leaves out, whose defaults apply: ` &drop &model`.
+      !> Main groups missing from the text of the case, so that their defaults apply: ` &drop &model`.
       character(len=32) :: left_out = ''
-      !> Name of the case, also of its output directory.
+      !> Name of the case and of its output directory.
       character(len=name_length) :: name = ''
-      !> An impact is asked for, by the group `&model`.
+      !> The case asks for an impact: it has the group `&model`, or no `&modes`.
       logical :: has_impact = .true.
-      !> Free modes are asked for, by the group `&modes`.
+      !> The case asks for free modes: it has the group `&modes`.
       logical :: has_modes = .false.
-      !> The drop on a mobile floor is asked for, by the group `&floor`.
+      !> The case asks for the drop on a mobile floor: it has the group `&floor`.
       logical :: has_floor = .false.
-      !> The level in the room below it is asked for, by the group `&room`.
+      !> The case asks for the level in the room below: it has the group `&room`.
       logical :: has_room = .false.
-      !> Number of free modes, and their mesh.
+      !> Number of free modes, and the mesh.
       type(modes_options_type) :: modes
-      !> A quasi-static compression is asked for, by the group `&compression`.
+      !> The case asks for a quasi-static compression: it has the group `&compression`.
       logical :: has_compression = .false.
-      !> Its options.
+      !> Options of the compression.
       type(compression_options_type) :: compression
       type(ball_type) :: ball
       type(drop_type) :: drop
       !> Source model, one of `model_names`.
       character(len=name_length) :: model = model_names(1)
-      !> Every model with its options, of which those of the chosen model are used: [n_model].
+      !> All models with their options; the case uses the chosen one: [n_model].
       type(model_slot_type), allocatable :: models(:)
       type(sampling_type) :: sampling
       !> Method of the levels.
@@ -59,7 +59,7 @@ module thud_case
       character(len=name_length) :: source = 'rubber_ball'
       !> Floor, one of `floor_names`.
       character(len=name_length) :: floor = floor_names(1)
-      !> Every floor with its options, of which those of the chosen floor are used: [n_floor].
+      !> All floors with their options; the case uses the chosen one: [n_floor].
       type(floor_slot_type), allocatable :: floors(:)
       !> Room below.
       type(room_type) :: room
@@ -78,7 +78,7 @@ contains
    !> Index of the chosen model.
    pure function get_model_number(case) result(number)
       type(case_type), intent(in) :: case
-      !> Its index among the models; 0 if there is no such model.
+      !> Index in `model_names`; 0 if there is no such model.
       integer :: number
 
       number = findloc(model_names == case%model, .true., dim=1)
@@ -87,13 +87,13 @@ contains
    !> Index of the chosen floor.
    pure function get_floor_number(case) result(number)
       type(case_type), intent(in) :: case
-      !> Its index among the floors; 0 if there is no such floor.
+      !> Index in `floor_names`; 0 if there is no such floor.
       integer :: number
 
       number = findloc(floor_names == case%floor, .true., dim=1)
    end function get_floor_number
 
-   !> Every key of the input, in the order of the written file; keys of two owners occur twice.
+   !> All keys of the input, in the order of the written file; keys with two owners occur twice.
    function get_fields(case) result(fields)
       !> The case that the fields read and set.
       type(case_type), intent(in), target :: case
@@ -102,7 +102,7 @@ contains
       integer :: i
 
       fields = [ &
-         in_group('case', [text_field('name', case%name, 'name of the case, also of its output directory')]), &
+         in_group('case', [text_field('name', case%name, 'name of the case and of its output directory')]), &
          in_group('ball', get_ball_fields(case%ball)), &
          owned_by('modes', get_modes_fields(case%modes)), &
          owned_by('compression', in_group('compression', get_compression_fields(case%compression))), &
@@ -114,9 +114,9 @@ contains
       fields = [fields, &
          in_group('sampling', get_sampling_fields(case%sampling)), &
          in_group('levels', [ &
-         choice_field('method', case%level_method, 'method of the levels', level_methods), &
+         choice_field('method', case%level_method, 'method of computing the levels', level_methods), &
          choice_field('bands', case%bands, 'bands of levels.csv', band_choices), &
-         choice_field('force', case%level_force, 'assessed force: levels, peak force and verdict are of it', &
+         choice_field('force', case%level_force, 'assessed force, for which levels, peak force and verdict are reported', &
          [character(len=8) :: 'floor', 'elastic'])]), &
          in_group('limits', [choice_field('source', case%source, 'source whose limits apply', source_names)]), &
          owned_by('floor', in_group('floor', [choice_field('name', case%floor, 'floor under the source', floor_names)]))]
@@ -126,7 +126,7 @@ contains
       fields = [fields, owned_by('room', in_group('room', get_room_fields(case%room)))]
    end function get_fields
 
-   !> Whether a case uses a key: for the impact, its model, the free modes, the compression, the floor or the room.
+   !> Whether a case uses a key, for the impact, its model, the free modes, the compression, the floor or the room.
    pure elemental function is_used(case, field) result(used)
       type(case_type), intent(in) :: case
       type(field_type), intent(in) :: field
@@ -160,10 +160,9 @@ contains
       fields = pack(fields, [(is_used(case, fields(i)) .and. .not. fields(i)%is_empty(), i=1, size(fields))])
    end function get_active_fields
 
-   !> Refuses a case whose values are out of range or contradict each other.
+   !> Returns an error if values of a case are out of range or contradict each other.
    subroutine check_case(case, error)
       type(case_type), intent(in), target :: case
-      !> Names group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
 
       call check_fields(get_active_fields(case), error)
@@ -181,10 +180,9 @@ contains
       end associate
    end subroutine check_case
 
-   !> Refuses a floor whose options contradict each other, or which cannot radiate into the room below.
+   !> Returns an error if options of the floor contradict each other, or it cannot radiate into the room below.
    subroutine check_floor(case, error)
       type(case_type), intent(in) :: case
-      !> Names group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
       type(band_type), allocatable :: bands(:)
       type(plate_type) :: plate
@@ -200,7 +198,7 @@ contains
       end associate
    end subroutine check_floor
 
-   !> Refuses a name that cannot name a directory.
+   !> Returns an error if a name cannot be that of a directory.
    subroutine check_name(name, error)
       character(len=*), intent(in) :: name
       type(error_type), allocatable, intent(out) :: error

@@ -1,5 +1,5 @@
-!> Computes all that a case asks for: free modes, quasi-static compression, the impact and its assessment, the drop on the
-!> floor, the level in the room below, and warnings. It knows no files.
+!> Computes all results that a case asks for: free modes, quasi-static compression, the impact and its assessment, the
+!> drop on the floor, the level in the room below, and warnings. It reads and writes no files.
 module thud_compute
    use thud_band, only: band_type, get_level_bands, octave_count
    use thud_case, only: case_type, check_case, get_floor_number, get_model_number
@@ -24,14 +24,14 @@ module thud_compute
    public :: assessment_type, compress_case, compute, compute_floor, compute_impact, drop_on_floor, get_assessed_force
    public :: get_cost, impact_type, is_conforming, predict_room_level, results_type, scope_type
 
-   !> Memory for one sample of a record, its transforms and text included, bytes; measured.
+   !> Memory per sample of a record, including transforms and text, bytes; measured.
    real(wp), parameter :: sample_memory = 600.0_wp
 
-   !> What is computed of that which a case asks for.
+   !> Which of the results that a case asks for are computed.
    type :: scope_type
       !> Levels and criteria.
       logical :: levels = .true.
-      !> Energies that the force gives to a mobile floor, and velocities of its points.
+      !> Energy injected into a mobile floor, and velocities of points of the floor.
       logical :: energies = .true.
       !> Level in the room below.
       logical :: room = .true.
@@ -39,13 +39,13 @@ module thud_compute
 
    !> Levels and criteria of an impact.
    type :: assessment_type
-      !> Bands of the levels, the octaves first: [n_band].
+      !> Bands of the levels, octaves first: [n_band].
       type(band_type), allocatable :: bands(:)
       !> Index of the first band that the case asks for.
       integer :: first_band = 1
       !> Levels, dB: [n_band, force_count].
       real(wp), allocatable :: level(:, :)
-      !> Criteria, the octaves first: [criterion_count, force_count].
+      !> Criteria, octave levels first: [criterion_count, force_count].
       type(criterion_type) :: criteria(criterion_count, force_count)
    end type assessment_type
 
@@ -55,33 +55,31 @@ module thud_compute
       type(assessment_type) :: assessment
    end type impact_type
 
-   !> Results of a case.
+   !> Results of a case; only those that it asks for are set.
    type :: results_type
-      !> The drop on a rigid floor, where an impact is asked for.
+      !> The drop on a rigid floor.
       type(impact_type) :: impact
-      !> The drop on a mobile floor, where one is asked for and the model couples with it.
+      !> The drop on a mobile floor, if the model couples with it.
       type(force_history_type), allocatable :: on_floor
-      !> Its levels and energies.
+      !> Levels and energies of the drop on the mobile floor.
       type(floor_result_type) :: floor
-      !> Free modes, where they are asked for.
       type(free_modes_type) :: modes
-      !> Level in the room below, where it is asked for.
+      !> Level in the room below.
       type(room_level_type) :: room
-      !> Quasi-static compression, where it is asked for.
+      !> Quasi-static compression.
       type(compression_type) :: compression
-      !> What is possible but not plausible: [n_warning].
+      !> Warnings on implausible input or results: [n_warning].
       character(len=warning_length), allocatable :: warning(:)
    end type results_type
 
 contains
 
-   !> Computes all that a case asks for.
+   !> Computes all results that a case asks for.
    subroutine compute(case, scope, results, error)
       !> The case, checked.
       type(case_type), intent(in) :: case
       type(scope_type), intent(in) :: scope
       type(results_type), intent(out) :: results
-      !> A computation failed.
       type(error_type), allocatable, intent(out) :: error
 
       if (case%has_impact) call require_memory(sample_memory*get_sample_count(case%sampling), &
@@ -101,7 +99,6 @@ contains
       type(case_type), intent(in) :: case
       type(scope_type), intent(in) :: scope
       type(impact_type), intent(out) :: impact
-      !> A computation failed.
       type(error_type), allocatable, intent(out) :: error
 
       associate (model => case%models(get_model_number(case))%model)
@@ -110,18 +107,17 @@ contains
       if (scope%levels .and. .not. allocated(error)) call assess(case, impact%history, impact%assessment, error)
    end subroutine compute_impact
 
-   !> The drop of a case on its floor, where it asks for one, and the level in the room below.
+   !> The drop on the floor and the level in the room below, if the case asks for them.
    subroutine compute_floor(case, scope, impact, on_floor, floor, room, error)
       !> The case, checked.
       type(case_type), intent(in) :: case
       type(scope_type), intent(in) :: scope
       !> The drop on a rigid floor.
       type(impact_type), intent(in) :: impact
-      !> The drop on the floor; not allocated where the floor is rigid, or the model's force is the blocked one.
+      !> The drop on the floor; not allocated if the floor is rigid or the model does not couple with it.
       type(force_history_type), allocatable, intent(out) :: on_floor
       type(floor_result_type), intent(out) :: floor
       type(room_level_type), intent(out) :: room
-      !> A computation failed.
       type(error_type), allocatable, intent(out) :: error
 
       if (case%has_floor) call drop_on_floor(case, on_floor, error)
@@ -138,9 +134,8 @@ contains
    !> The drop of a case on its floor.
    subroutine drop_on_floor(case, on_floor, error)
       type(case_type), intent(in) :: case
-      !> The history; not allocated where the floor is rigid, or the model's force is the blocked one.
+      !> The drop on the floor; not allocated if the floor is rigid or the model does not couple with it.
       type(force_history_type), allocatable, intent(out) :: on_floor
-      !> The computation failed.
       type(error_type), allocatable, intent(out) :: error
       type(receiver_type) :: receiver
 
@@ -152,14 +147,14 @@ contains
          allocate (on_floor)
          call model%solve(case%ball, case%drop, case%sampling, on_floor, error, receiver)
       end associate
-      ! Models that leave the receiver alone have dropped on a rigid floor.
+      ! Models that ignore the receiver have computed a drop on a rigid floor.
       if (.not. allocated(on_floor%floor_velocity)) deallocate (on_floor)
    end subroutine drop_on_floor
 
-   !> Approximate time of the drop of a case and its levels on one core, s.
+   !> Approximate computing time of a case's drop and levels on one core.
    function get_cost(case) result(cost)
       type(case_type), intent(in) :: case
-      !> The time, s; of a case that is refused that of the refusal.
+      !> The time, s; for an invalid case the time of its check.
       real(wp) :: cost
       type(error_type), allocatable :: error
       type(receiver_type) :: receiver
@@ -176,11 +171,11 @@ contains
       end associate
    end function get_cost
 
-   !> Quasi-static compression of the ball of a case by its model.
+   !> Quasi-static compression of a case's ball, computed by its model.
    subroutine compress_case(case, compression, error)
       type(case_type), intent(in) :: case
       type(compression_type), intent(out) :: compression
-      !> The model has none, or the ball cannot be pressed so far.
+      !> Set if the model has no compression, or the ball cannot be pressed so far.
       type(error_type), allocatable, intent(out) :: error
 
       allocate (compression%deflection, source=get_deflections(case%compression))
@@ -190,13 +185,12 @@ contains
       end associate
    end subroutine compress_case
 
-   !> Levels and criteria of the force history of a case.
+   !> Levels and criteria of the force history of a case, for both forces.
    subroutine assess(case, history, assessment, error)
       type(case_type), intent(in) :: case
       type(force_history_type), intent(in) :: history
-      !> Levels and criteria of both forces.
       type(assessment_type), intent(out) :: assessment
-      !> A level cannot be computed.
+      !> Set if a level cannot be computed.
       type(error_type), allocatable, intent(out) :: error
 
       call get_level_bands(case%bands, assessment%bands, assessment%first_band)
@@ -204,7 +198,7 @@ contains
       call assess_force(case, history, history%elastic_force, assessment%bands, assessment%level(:, 1), &
          assessment%criteria(:, 1), error)
       if (allocated(error)) return
-      ! Most models have the same force twice.
+      ! In most models both forces are equal.
       if (any(abs(history%floor_force - history%elastic_force) > 0.0_wp)) then
          call assess_force(case, history, history%floor_force, assessment%bands, assessment%level(:, 2), &
             assessment%criteria(:, 2), error)
@@ -226,7 +220,7 @@ contains
       real(wp), intent(out) :: level(:)
       !> The criteria: [criterion_count].
       type(criterion_type), intent(out) :: criteria(:)
-      !> A level cannot be computed.
+      !> Set if a level cannot be computed.
       type(error_type), allocatable, intent(out) :: error
       type(source_limits_type) :: limits
 
@@ -238,7 +232,7 @@ contains
          get_peak_count(force, history%sample_rate), case%ball%mass, case%drop%height)
    end subroutine assess_force
 
-   !> Level that a force causes in the room below.
+   !> Level in the room below, from a force history.
    subroutine predict_room(case, force, sample_rate, prediction, error)
       !> The case, with floor and room.
       type(case_type), intent(in) :: case
@@ -247,7 +241,7 @@ contains
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
       type(room_level_type), intent(out) :: prediction
-      !> A level cannot be computed.
+      !> Set if a level cannot be computed.
       type(error_type), allocatable, intent(out) :: error
       type(band_type), allocatable :: bands(:)
       real(wp), allocatable :: level(:)
@@ -259,15 +253,16 @@ contains
       if (.not. allocated(error)) call predict_room_level(case, bands, level, prediction, error)
    end subroutine predict_room
 
-   !> Level that force exposure levels cause in the room below.
+   !> Level in the room below, from force exposure levels.
    subroutine predict_room_level(case, bands, level, prediction, error)
       !> The case, with floor and room.
       type(case_type), intent(in) :: case
-      !> One-third-octave bands of `get_room_bands`, and levels of the force on the floor in them, dB: [n_band].
+      !> One-third-octave bands of `get_room_bands`: [n_band].
       type(band_type), intent(in) :: bands(:)
+      !> Levels of the force on the floor, dB: [n_band].
       real(wp), intent(in) :: level(:)
       type(room_level_type), intent(out) :: prediction
-      !> The floor radiates into no room.
+      !> Set if the floor cannot radiate into the room.
       type(error_type), allocatable, intent(out) :: error
       type(plate_type) :: plate
       real(wp) :: conductance(size(bands))
@@ -279,10 +274,10 @@ contains
       if (.not. allocated(error)) call get_room_level(plate, conductance, case%room, bands, level, prediction)
    end subroutine predict_room_level
 
-   !> Index of the force that the criteria count for.
+   !> Index of the assessed force.
    pure function get_assessed_force(case) result(index)
       type(case_type), intent(in) :: case
-      !> Its index in `force_names`.
+      !> Index in `force_names`.
       integer :: index
 
       index = findloc(force_names == case%level_force, .true., dim=1)
@@ -292,7 +287,7 @@ contains
    pure function is_conforming(case, assessment) result(yes)
       type(case_type), intent(in) :: case
       type(assessment_type), intent(in) :: assessment
-      !> All criteria of the assessed force are met.
+      !> The assessed force meets all criteria.
       logical :: yes
 
       yes = all(conforms(assessment%criteria(:, get_assessed_force(case))))

@@ -1,4 +1,4 @@
-!> Results on a mobile floor: levels of the contact force, the energy that goes into the floor, and the velocities of points.
+!> Results on a mobile floor: levels of the contact force, energy injected into the floor, and velocities of points.
 module thud_floor_result
    use thud_band, only: band_type, get_level_bands
    use thud_case, only: case_type, get_floor_number
@@ -15,53 +15,53 @@ module thud_floor_result
 
    public :: floor_result_type, get_floor_result, get_point_velocity
 
-   !> Results on a floor, by bands of one set after the other.
+   !> Results on a mobile floor; bands of several sets follow each other.
    type :: floor_result_type
-      !> The bands that the case asks for: [n_band].
+      !> The bands: [n_band].
       type(band_type), allocatable :: bands(:)
       !> Levels of the force on the floor, dB: [n_band].
       real(wp), allocatable :: contact_level(:)
-      !> Energy that the force gives to the floor, by its velocity and by its mobility, J: [n_band].
+      !> Energy injected into the floor, from its velocity and from its mobility, J: [n_band].
       real(wp), allocatable :: energy_by_motion(:), energy_by_mobility(:)
-      !> Mean of the real part of the mobility, m/(N s): [n_band].
+      !> Mean real part of the mobility, m/(N s): [n_band].
       real(wp), allocatable :: conductance(:)
-      !> Velocity of the points of the floor, m/s: [n_sample, n_point].
+      !> Velocities of points of the floor, m/s: [n_sample, n_point].
       real(wp), allocatable :: point_velocity(:, :)
    end type floor_result_type
 
 contains
 
    !> Results on the floor of a case.
-   subroutine get_floor_result(case, contact, energies, found, error)
+   subroutine get_floor_result(case, contact, energies, floor_result, error)
       type(case_type), intent(in) :: case
       !> The drop on the floor.
       type(force_history_type), intent(in) :: contact
-      !> Compute also energies and velocities of points.
+      !> Also compute energies and velocities of points.
       logical, intent(in) :: energies
-      type(floor_result_type), intent(out) :: found
-      !> A level cannot be computed, or the floor has no such point.
+      type(floor_result_type), intent(out) :: floor_result
+      !> Set if a level cannot be computed, or a point is not on the floor.
       type(error_type), allocatable, intent(out) :: error
       type(receiver_type) :: receiver
       integer :: first, n, i
 
-      call get_level_bands(case%bands, found%bands, first)
-      found%bands = found%bands(first:)
-      n = size(found%bands)
-      allocate (found%contact_level(n), found%energy_by_motion(n), found%energy_by_mobility(n))
-      call get_force_exposure_levels(contact%floor_force, contact%sample_rate, found%bands, trim(case%level_method), &
-         found%contact_level, error)
+      call get_level_bands(case%bands, floor_result%bands, first)
+      floor_result%bands = floor_result%bands(first:)
+      n = size(floor_result%bands)
+      allocate (floor_result%contact_level(n), floor_result%energy_by_motion(n), floor_result%energy_by_mobility(n))
+      call get_force_exposure_levels(contact%floor_force, contact%sample_rate, floor_result%bands, trim(case%level_method), &
+         floor_result%contact_level, error)
       if (allocated(error) .or. .not. energies) return
       associate (floor => case%floors(get_floor_number(case))%model)
          call floor%get_receiver(receiver, error)
          if (allocated(error)) return
          call get_injected_energies(receiver, contact%floor_force, contact%floor_velocity, contact%sample_rate, &
-            found%bands, found%energy_by_motion, found%energy_by_mobility, error)
+            floor_result%bands, floor_result%energy_by_motion, floor_result%energy_by_mobility, error)
          if (allocated(error)) return
-         found%conductance = get_mean_conductances(receiver, found%bands)
-         allocate (found%point_velocity(size(contact%floor_force), floor%point_x%count))
+         floor_result%conductance = get_mean_conductances(receiver, floor_result%bands)
+         allocate (floor_result%point_velocity(size(contact%floor_force), floor%point_x%count))
          do i = 1, floor%point_x%count
             call get_point_velocity(floor, contact%floor_force, contact%sample_rate, floor%point_x%values(i), &
-               floor%point_y%values(i), found%point_velocity(:, i), error)
+               floor%point_y%values(i), floor_result%point_velocity(:, i), error)
             if (allocated(error)) return
          end do
       end associate
@@ -78,7 +78,7 @@ contains
       real(wp), intent(in) :: x, y
       !> Velocity downwards, m/s: [n_sample].
       real(wp), intent(out) :: velocity(:)
-      !> The floor has no such point.
+      !> Set if the floor has no such point.
       type(error_type), allocatable, intent(out) :: error
       type(receiver_type) :: transfer
       type(receiver_step_type) :: step

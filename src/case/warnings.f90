@@ -1,4 +1,4 @@
-!> Warnings on what is possible but not plausible: input of no rubber, moduli of another model, forces of no source.
+!> Warnings on possible but implausible cases: balls unlike rubber, moduli of another model, forces of no real source.
 module thud_warnings
    use thud_ball, only: get_density
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
@@ -17,38 +17,38 @@ module thud_warnings
 
    public :: add_floor_warning, get_warnings, warning_length
 
-   !> Length of a warning.
+   !> Maximum length of a warning.
    integer, parameter :: warning_length = 240
 
-   !> Densities of rubbers, from unfilled natural rubber with pores to highly filled, kg/m3: [2].
+   !> Range of densities of rubbers, from porous unfilled natural rubber to highly filled rubber, kg/m3: [2].
    real(wp), parameter :: rubber_density(2) = [800.0_wp, 2200.0_wp]
 
-   !> Moduli of elasticity of rubbers, from gels to hard rubber, Pa: [2].
+   !> Range of moduli of elasticity of rubbers, from gels to hard rubber, Pa: [2].
    real(wp), parameter :: rubber_modulus(2) = [1.0e4_wp, 3.0e9_wp]
 
-   !> Poisson's ratios of rubbers, also of filled ones: [2].
+   !> Range of Poisson's ratios of rubbers, including filled ones: [2].
    real(wp), parameter :: rubber_ratio(2) = [0.45_wp, 0.5_wp]
 
-   !> Relative difference below which two moduli are taken as the same.
+   !> Relative difference below which two moduli are treated as equal.
    real(wp), parameter :: same_modulus = 0.02_wp
 
-   !> Levels over all frequencies of a ball and a tyre that conform, dB re 1 N and 1 s: 4.4 dB, as of the flagship and of
-   !> a half sine of 20 ms, above the sums of their nominal octaves: [2].
+   !> Levels over all frequencies of a conforming ball and a conforming tyre, dB re 1 N and 1 s: [2]. They are 4.4 dB above
+   !> the sums of the nominal octave levels, as for the flagship case and for a half sine of 20 ms.
    real(wp), parameter :: source_level(2) = [44.0_wp, 52.0_wp]
 
-   !> Distance from them of a force that is probably given in other units, dB.
+   !> Distance from `source_level` beyond which the units of the input are probably wrong, dB.
    real(wp), parameter :: max_distance = 40.0_wp
 
-   !> Outer edges of the octaves 31.5 and 500 Hz, Hz: [2].
+   !> Edges of the octaves 31.5 Hz (lower) and 500 Hz (upper), Hz: [2].
    real(wp), parameter :: standard_band(2) = [22.4_wp, 707.0_wp]
 
-   !> Octave level below the level over all frequencies at which rounding errors matter, dB.
+   !> An octave level this far below the level over all frequencies is affected by rounding errors, dB.
    real(wp), parameter :: max_decline = 120.0_wp
 
-   !> Error of a coefficient of restitution.
+   !> Numerical error of a coefficient of restitution.
    real(wp), parameter :: restitution_error = 1.0e-6_wp
 
-   !> The model that computes free modes.
+   !> Source model whose finite elements also give the free modes.
    character(len=*), parameter :: modes_model = 'finite_element'
 
 contains
@@ -57,11 +57,11 @@ contains
    subroutine get_warnings(case, history, warnings, on_floor)
       !> The case, checked.
       type(case_type), intent(in) :: case
-      !> Its force, of no samples without an impact.
+      !> Force history; without samples if the case has no impact.
       type(force_history_type), intent(in) :: history
       !> Messages: [n].
       character(len=warning_length), allocatable, intent(out) :: warnings(:)
-      !> The force on a floor that has moved under the source.
+      !> Force history on a mobile floor.
       type(force_history_type), intent(in), optional :: on_floor
 
       allocate (warnings(0))
@@ -80,7 +80,7 @@ contains
       if (present(on_floor)) call add_limit_warnings(case, on_floor, warnings)
    end subroutine get_warnings
 
-   !> Adds warnings on an answer that lies outside the theory.
+   !> Adds warnings on results outside the validity limits of the model.
    subroutine add_limit_warnings(case, history, warnings)
       type(case_type), intent(in) :: case
       type(force_history_type), intent(in) :: history
@@ -98,13 +98,13 @@ contains
       end associate
       do i = 1, size(limits)
          if (.not. is_outside(limits(i))) cycle
-         ! One warning for both floors.
+         ! No repeated warning for the mobile floor.
          if (any(index(warnings, trim(limits(i)%quantity)//' is ') > 0)) cycle
          call add(warnings, get_limit_message(limits(i)))
       end do
    end subroutine add_limit_warnings
 
-   !> Adds warnings on levels of a force in other units, and on levels that are rounding.
+   !> Adds warnings on forces in wrong units, and on levels dominated by rounding errors.
    subroutine add_level_warnings(history, warnings)
       type(force_history_type), intent(in) :: history
       !> Messages: [n].
@@ -127,7 +127,7 @@ contains
          //' Hz on hold less than 1e-12 of the energy of the force: rounding counts in their levels')
    end subroutine add_level_warnings
 
-   !> Adds a warning on octaves of the standard in which the model of the floor is not valid.
+   !> Adds warnings on octaves of the standard in which the floor model is not valid.
    subroutine add_floor_warning(case, warnings)
       !> A case with a floor.
       type(case_type), intent(in) :: case
@@ -145,19 +145,19 @@ contains
          //trim(reason))
    end subroutine add_floor_warning
 
-   !> Adds warnings on wall and modulus of the ball, for models that use them.
+   !> Adds warnings on density, modulus and Poisson's ratio of the ball, for models that use them.
    subroutine add_ball_warnings(case, model, warnings)
       type(case_type), intent(in) :: case
       !> The model that uses the ball, one of `model_names`.
       character(len=*), intent(in) :: model
       !> Messages: [n].
       character(len=warning_length), allocatable, intent(inout) :: warnings(:)
-      real(wp) :: own, other, density
+      real(wp) :: paper_modulus, other, density
       integer :: i
 
       i = findloc(model_names == model, .true., dim=1)
-      own = case%models(i)%model%get_paper_modulus()
-      if (.not. own > 0.0_wp) return
+      paper_modulus = case%models(i)%model%get_paper_modulus()
+      if (.not. paper_modulus > 0.0_wp) return
       density = get_density(case%ball)
       associate (modulus => case%ball%youngs_modulus)
          if (density < rubber_density(1) .or. density > rubber_density(2)) call add(warnings, &
@@ -171,11 +171,11 @@ contains
             //fixed(rubber_ratio(2), 2))
          do i = 1, size(model_names)
             other = case%models(i)%model%get_paper_modulus()
-            if (.not. (other > 0.0_wp .and. abs(other - own) > same_modulus*own)) cycle
+            if (.not. (other > 0.0_wp .and. abs(other - paper_modulus) > same_modulus*paper_modulus)) cycle
             if (abs(modulus - other) > same_modulus*other) cycle
             call add(warnings, '&ball: youngs_modulus = '//fixed(modulus/1.0e6_wp, 2)//' MPa is the modulus of the ' &
                //"paper's ball in the model "//quoted(model_names(i))//'; '//quoted(model)//' needs ' &
-               //fixed(own/1.0e6_wp, 2)//' MPa')
+               //fixed(paper_modulus/1.0e6_wp, 2)//' MPa')
             exit
          end do
       end associate

@@ -1,8 +1,8 @@
-!> A source of a few masses of which the first touches the floor: what the marches on rigid and mobile floors need of it.
+!> A source of a few masses, the first of which touches the floor: interface for rigid and mobile floors.
 !>
-!> Its equations of motion are laid out in pairs, displacement towards the floor (m) and velocity (m/s) of each mass, then
-!> impulse given to the floor (N s) and energy lost (J); further components are its own. On a mobile floor they hold for
-!> displacements and velocities relative to the floor, and give accelerations, force and loss all the same.
+!> The state holds displacement towards the floor (m) and velocity (m/s) of each mass in turn, then impulse on the floor
+!> (N s) and energy lost (J); a source may append components. On a mobile floor displacements and velocities are relative to
+!> the floor; accelerations, force and loss keep their meaning.
 module thud_contact_source
    use thud_drop, only: drop_type
    use thud_error, only: error_type, numerical_error
@@ -19,18 +19,18 @@ module thud_contact_source
    type, abstract, extends(ode_type) :: contact_source_type
       !> Mass of the source, kg.
       real(wp) :: mass = 0.0_wp
-      !> Masses that move, and length of the state.
+      !> Number of moving masses, and length of the state.
       integer :: n_mass = 1, n_state = 4
-      !> Mass that rests on the floor and moves with it, over the deflection, kg/m.
+      !> Mass of the cap that lies on the floor and moves with it, per unit deflection, kg/m.
       real(wp) :: cap_mass_per_deflection = 0.0_wp
-      !> The source touches the floor; its deflection grows.
+      !> Whether the source touches the floor, and whether its deflection grows.
       logical :: touching = .true., compressing = .true.
    contains
       procedure(record_sample_interface), deferred :: record_sample
       procedure(record_peaks_interface), deferred :: record_peaks
       procedure :: get_event
       procedure :: pass_event
-      procedure :: has_left
+      procedure :: has_separated
       procedure :: get_center
       procedure :: get_inner_energy
       procedure :: get_failure
@@ -38,7 +38,7 @@ module thud_contact_source
    end type contact_source_type
 
    abstract interface
-      !> Writes motion and forces of one instant into the history.
+      !> Writes motion and forces of one sample into the history.
       pure subroutine record_sample_interface(self, state, i, history)
          import :: contact_source_type, force_history_type, wp
          implicit none (type, external)
@@ -51,7 +51,7 @@ module thud_contact_source
          type(force_history_type), intent(inout) :: history
       end subroutine record_sample_interface
 
-      !> Raises the maxima in the history to those of one instant of contact.
+      !> Updates the maxima in the history from one instant of contact.
       pure subroutine record_peaks_interface(self, state, history)
          import :: contact_source_type, force_history_type, wp
          implicit none (type, external)
@@ -65,7 +65,7 @@ module thud_contact_source
 
 contains
 
-   !> Component of the state that falls to zero where the phase ends on a rigid floor: velocity, then deflection.
+   !> Component of the state that falls to zero at the end of a phase on a rigid floor: velocity, then deflection.
    pure function get_event(self) result(component)
       class(contact_source_type), intent(in) :: self
       integer :: component
@@ -93,15 +93,15 @@ contains
       end if
    end subroutine pass_event
 
-   !> Whether the source has left a rigid floor for good; a single mass does at release.
-   pure function has_left(self, state) result(left)
+   !> Whether the source has left a rigid floor for good; a single mass has at release.
+   pure function has_separated(self, state) result(separated)
       class(contact_source_type), intent(in) :: self
       !> State: [n_state].
       real(wp), intent(in) :: state(:)
-      logical :: left
+      logical :: separated
 
-      left = .not. self%touching
-   end function has_left
+      separated = .not. self%touching
+   end function has_separated
 
    !> Displacement, m, and velocity, m/s, of the center of mass: [2].
    pure function get_center(self, state) result(center)
@@ -113,7 +113,7 @@ contains
       center = state(1:2)
    end function get_center
 
-   !> Energy of the motion of the masses against each other and of the springs between them, J.
+   !> Energy of the relative motion of the masses and of the springs between them, J.
    pure function get_inner_energy(self, state) result(energy)
       class(contact_source_type), intent(in) :: self
       !> State: [n_state].
@@ -123,7 +123,7 @@ contains
       energy = 0.0_wp
    end function get_inner_energy
 
-   !> Error of a state outside the domain of the equations; sources that have such states override it.
+   !> Error for a state outside the domain of the equations; sources that have such states override it.
    function get_failure(self, drop, time, state) result(error)
       class(contact_source_type), intent(in) :: self
       type(drop_type), intent(in) :: drop
@@ -138,7 +138,7 @@ contains
          //to_text(state(1))//' m; allowed: lower drops')
    end function get_failure
 
-   !> How far motion between the masses can bring the first one below the center of mass in flight, m.
+   !> Maximum displacement of the first mass below the center of mass in flight, m.
    pure function get_amplitude(self, state) result(amplitude)
       class(contact_source_type), intent(in) :: self
       !> State: [n_state].
@@ -148,9 +148,9 @@ contains
       amplitude = 0.0_wp
    end function get_amplitude
 
-   !> Error of steps that are too long for the source.
+   !> Error for steps that are too long for the source.
    pure function coarse_error(finding) result(error)
-      !> What shows it.
+      !> Symptom, for the message.
       character(len=*), intent(in) :: finding
       type(error_type) :: error
       character(len=:), allocatable :: shown

@@ -1,5 +1,5 @@
-!> Impact of a lumped source on a mobile floor: marches through every contact of the record and checks that the
-!> source has left for good. Gravity does not act, as on a rigid floor: the bounce that it would end is another impact.
+!> Impact of a lumped source on a mobile floor: integrates every contact of the record in time and checks that the source has
+!> left for good. Gravity is left out, as on a rigid floor: a return by gravity is another impact.
 module thud_coupled_impact
    use thud_contact_source, only: coarse_error, contact_source_type
    use thud_coupled_phases, only: begin_contact, get_distance, get_event, impact_type, no_event, pass_event, update_maxima
@@ -13,13 +13,13 @@ module thud_coupled_impact
    use thud_receiver_stages, only: new_receiver_stages
    use thud_sampling, only: sampling_type
    use thud_text, only: to_text
-   use thud_zero_search, only: advance_search, is_found, new_zero_search, update_bracket, zero_search_type
+   use thud_zero_search, only: advance_search, is_converged, new_zero_search, update_bracket, zero_search_type
    implicit none (type, external)
    private
 
    public :: solve_coupled
 
-   !> Touches, releases and turning points in one step; more than a few mean that steps are too long.
+   !> Maximum number of touches, releases and turning points in one step; more than a few mean that steps are too long.
    integer, parameter :: max_events = 100
 
 contains
@@ -30,15 +30,15 @@ contains
       class(contact_source_type), intent(inout) :: source
       type(drop_type), intent(in) :: drop
       type(sampling_type), intent(in) :: sampling
-      !> Steps in each sampling interval.
+      !> Steps per sampling interval.
       integer, intent(in) :: n_step
-      !> What the source drops on.
+      !> The floor under the source.
       type(receiver_type), intent(in) :: receiver
       !> The history, prepared by the source; gets samples, maxima, contact time and the motion of the floor.
       type(force_history_type), intent(inout) :: history
       !> State at the end of the record, not relative to the floor: [n_state].
       real(wp), intent(out) :: state(:)
-      !> The equations fail, or the contact outlasts the record.
+      !> Set if the equations fail or the contact outlasts the record.
       type(error_type), allocatable, intent(out) :: error
       type(impact_type) :: impact
       real(wp) :: step
@@ -74,7 +74,7 @@ contains
       state(2:2*source%n_mass:2) = impact%motion%velocity
    end subroutine solve_coupled
 
-   !> Moves source and floor on by one step, through the events inside it.
+   !> Advances source and floor by one step, through the events inside the step.
    subroutine advance(source, drop, step, impact, history, error)
       class(contact_source_type), intent(inout) :: source
       type(drop_type), intent(in) :: drop
@@ -83,7 +83,7 @@ contains
       type(impact_type), intent(inout) :: impact
       !> Gets maxima and the time of each release.
       type(force_history_type), intent(inout) :: history
-      !> The equations fail.
+      !> Set if the equations fail.
       type(error_type), allocatable, intent(out) :: error
       type(coupled_state_type) :: end
       real(wp) :: remaining
@@ -109,22 +109,22 @@ contains
       error = coarse_error(to_text(max_events)//' touches, releases and turning points fall into one step')
    end subroutine advance
 
-   !> Moves source and floor on to an event.
+   !> Advances source and floor to an event.
    subroutine go_to_event(source, drop, event, end, remaining, impact, error)
       class(contact_source_type), intent(in) :: source
       type(drop_type), intent(in) :: drop
       !> The event.
       integer, intent(in) :: event
-      !> Motion after the rest of the step.
+      !> Motion at the end of the step; gets that at the event.
       type(coupled_state_type), intent(inout) :: end
-      !> Length of the rest, s: before and after.
+      !> Time to the end of the step, s: before and after.
       real(wp), intent(inout) :: remaining
       type(impact_type), intent(inout) :: impact
       type(error_type), allocatable, intent(out) :: error
       type(zero_search_type) :: search
 
       search = new_zero_search(get_distance(source, event, impact%motion), remaining, get_distance(source, event, end))
-      do while (.not. is_found(search))
+      do while (.not. is_converged(search))
          call advance_search(search)
          call take_step(source, drop, search%trial, impact, end, error)
          if (allocated(error)) return
@@ -137,11 +137,11 @@ contains
       remaining = remaining - search%right
    end subroutine go_to_event
 
-   !> Motion after a part of a step.
+   !> Motion after a whole or shortened step.
    subroutine take_step(source, drop, length, impact, end, error)
       class(contact_source_type), intent(in) :: source
       type(drop_type), intent(in) :: drop
-      !> Length of the part, s.
+      !> Length of this step, s.
       real(wp), intent(in) :: length
       type(impact_type), intent(in) :: impact
       type(coupled_state_type), intent(out) :: end
@@ -162,7 +162,7 @@ contains
       end if
    end subroutine take_step
 
-   !> Writes one instant into the history.
+   !> Writes one sample into the history.
    pure subroutine record(source, impact, i, history)
       class(contact_source_type), intent(in) :: source
       type(impact_type), intent(in) :: impact
@@ -174,18 +174,18 @@ contains
          history%floor_displacement(i) = motion%motion%displacement
          history%floor_velocity(i) = motion%floor_velocity
          call source%record_sample(get_relative_state(source, motion), i, history)
-         ! Of a force that sets in with a jump, and of the velocity that jumps with it, the first sample is the half.
+         ! Force and floor velocity may jump at first touch: the first sample is the mean of both sides.
          if (i > 1) history%floor_force(i) = motion%force
          if (i == 1) history%floor_velocity(i) = motion%floor_velocity/2
       end associate
    end subroutine record
 
-   !> Refuses a record that ends too early.
+   !> Returns an error if the record ends too early.
    subroutine check_end(source, sampling, impact, error)
       class(contact_source_type), intent(in) :: source
       type(sampling_type), intent(in) :: sampling
       type(impact_type), intent(in) :: impact
-      !> The source touches the floor, or the floor can strike it again.
+      !> Set if the source touches the floor, or if the floor can strike it again.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: lowest(2)
 
@@ -206,7 +206,7 @@ contains
       end associate
    end subroutine check_end
 
-   !> Clears the flight after the last contact, and writes what the march has summed up.
+   !> Clears the flight after the last contact, and writes floor work, peak force and number of contacts.
    pure subroutine finish_record(source, impact, history)
       class(contact_source_type), intent(in) :: source
       type(impact_type), intent(in) :: impact
@@ -221,7 +221,7 @@ contains
       history%model_quantity_unit = [character(len=len(history%model_quantity_unit)) :: history%model_quantity_unit, '']
       history%model_quantity = [history%model_quantity, real(impact%n_contact, wp)]
       if (.not. source%cap_mass_per_deflection > 0.0_wp) return
-      ! The cap that rests on the floor resists its acceleration.
+      ! Inertia of the cap that lies on the floor.
       n = size(history%component_name)
       history%component_name = [character(len=len(history%component_name)) :: history%component_name, 'cap_force']
       history%component = reshape([history%component, history%floor_force - sum(history%component, dim=2)], &

@@ -13,15 +13,15 @@ module thud_coupled_phases
 
    public :: begin_contact, get_distance, get_event, impact_type, pass_event, update_maxima
 
-   !> Fraction of the initial energy at which a light floor has captured the source and the contact ends; force times
-   !> deflection counts likewise.
+   !> Fraction of the initial energy at which a light floor captures the source and the contact ends, of kinetic energy and
+   !> of force times deflection.
    real(wp), parameter :: capture_tolerance = 1.0e-12_wp
 
-   !> Newton's iterations for the first force, and the relative change that ends them.
+   !> Maximum number of Newton iterations for the first force, and the relative change that ends them.
    integer, parameter :: max_iterations = 50
    real(wp), parameter :: tolerance = 1.0e-12_wp
 
-   !> Events that end a part of a step: the turning point between compression and restitution, release, touch.
+   !> Events that cut a step: turning point between compression and restitution, release, touch.
    integer, parameter :: turning_point = 1, release = 2, touch = 3
 
    !> No event.
@@ -29,29 +29,29 @@ module thud_coupled_phases
 
    !> Impact in progress.
    type :: impact_type
-      !> The receiver, and a whole step of it.
+      !> The receiver, and its response over a whole step.
       type(receiver_type) :: receiver
       type(receiver_stages_type) :: stages
       !> Motion of source and floor.
       type(coupled_state_type) :: motion
-      !> Time since first touch, s; velocity at first touch, m/s.
+      !> Time since first touch, s; velocity at first touch as a scale, m/s.
       real(wp) :: time = 0.0_wp, scale = 0.0_wp
       !> Maximum force on the floor so far, N.
       real(wp) :: peak_force = 0.0_wp
-      !> Contacts so far.
+      !> Number of contacts so far.
       integer :: n_contact = 0
-      !> A floor captured the source.
+      !> Whether the floor has captured the source.
       logical :: captured = .false.
    end type impact_type
 
 contains
 
-   !> Force and velocity of the floor when the source has just touched: the direct part of the receiver
-   !> shares the first force with the source, and the cap has no mass yet.
+   !> Sets force and velocity of the floor at touch. The first force balances source and direct mobility of the receiver; the
+   !> cap has no mass yet.
    pure subroutine begin_contact(source, impact, error)
       class(contact_source_type), intent(inout) :: source
       type(impact_type), intent(inout) :: impact
-      !> The force does not converge.
+      !> Set if the force does not converge.
       type(error_type), allocatable, intent(out) :: error
       real(wp), dimension(source%n_state) :: state, rate, slower, slower_rate
       real(wp) :: length, change
@@ -64,7 +64,7 @@ contains
       associate (motion => impact%motion, index => 2*source%n_mass + 1)
          motion%force = 0.0_wp
          length = 1.0e-7_wp*impact%scale
-         ! The force grows with the velocity at most by its square: Newton's iterations come from one side.
+         ! The force grows at most with the square of the velocity: Newton's method converges from one side.
          do k = 1, max_iterations
             motion%floor_velocity = get_receiver_velocity(impact%receiver, motion%force, motion%motion)
             state = get_relative_state(source, motion)
@@ -88,10 +88,10 @@ contains
       end associate
    end subroutine begin_contact
 
-   !> Event that a part of a step has passed.
+   !> Event that lies inside a step.
    pure function get_event(source, end) result(event)
       class(contact_source_type), intent(in) :: source
-      !> Motion after it.
+      !> Motion at the end of the step.
       type(coupled_state_type), intent(in) :: end
       integer :: event
       real(wp) :: state(source%n_state)
@@ -105,18 +105,18 @@ contains
       else if (state(1) <= 0.0_wp) then
          event = release
       else if (state(2) > 0.0_wp) then
-         ! The floor comes back.
+         ! The floor approaches again.
          event = turning_point
       end if
    end function get_event
 
-   !> What falls to zero at an event: gap, deflection, or velocity.
+   !> Quantity that falls to zero at an event: gap, deflection or velocity.
    pure function get_distance(source, event, motion) result(distance)
       class(contact_source_type), intent(in) :: source
       !> The event.
       integer, intent(in) :: event
       type(coupled_state_type), intent(in) :: motion
-      !> Positive before it, m or m/s.
+      !> Positive before the event, m or m/s.
       real(wp) :: distance
       real(wp) :: state(source%n_state)
 
@@ -139,7 +139,7 @@ contains
       type(impact_type), intent(inout) :: impact
       !> Gets maxima and the time of release.
       type(force_history_type), intent(inout) :: history
-      !> The first force of a contact does not converge.
+      !> Set if the first force of a contact does not converge.
       type(error_type), allocatable, intent(out) :: error
 
       associate (motion => impact%motion)
@@ -160,7 +160,7 @@ contains
       end associate
    end subroutine pass_event
 
-   !> Raises the maxima, and ends the contact of a source that has given its energy to the floor.
+   !> Updates the maxima, and ends the contact if the floor has captured the source.
    pure subroutine update_maxima(source, impact, history)
       class(contact_source_type), intent(inout) :: source
       type(impact_type), intent(inout) :: impact

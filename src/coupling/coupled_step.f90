@@ -1,8 +1,8 @@
-!> One time step of a source in contact with a mobile floor: collocation with the forces on the floor and the
-!> accelerations of the masses at the stages of `thud_radau` as unknowns.
+!> One time step of a source on a mobile floor: collocation at the stages of `thud_radau`, with the forces on the floor and
+!> the accelerations of the masses as unknowns.
 !>
-!> The mass of a cap that rests on the floor makes its motion arbitrarily stiff, with the time constant mass over
-!> resistance that starts from zero at first touch; the method damps such decay instead of following it.
+!> The mass of a cap that lies on the floor makes its motion arbitrarily stiff: the time constant, mass divided by
+!> resistance, starts from zero at first touch. The method damps such a decay instead of resolving it.
 module thud_coupled_step
    use thud_contact_source, only: contact_source_type
    use thud_kinds, only: wp
@@ -15,16 +15,16 @@ module thud_coupled_step
 
    public :: coupled_state_type, get_relative_state, take_coupled_step
 
-   !> Newton's iterations of a step, and those in a row with the same derivatives.
+   !> Maximum number of Newton iterations of a step, and of those in a row with the same derivatives.
    integer, parameter :: max_iterations = 30, max_reuse = 5
 
-   !> Change of velocity over the scale of velocities below which they end.
+   !> Change of velocity, as a fraction of the scale of velocities, that ends the iterations.
    real(wp), parameter :: tolerance = 1.0e-13_wp
 
-   !> Length of the differences that give the derivatives, relative.
+   !> Relative length of the finite differences for the derivatives.
    real(wp), parameter :: difference = 1.0e-7_wp
 
-   !> Second integral of a polynomial up to each stage from its values there: [n_stage, n_stage].
+   !> Weights of the second integral up to each stage, from the values at the stages: [n_stage, n_stage].
    real(wp), parameter :: second_integral(n_stage, n_stage) = matmul(radau_integral, radau_integral)
 
    !> Motion of source and floor.
@@ -33,7 +33,7 @@ module thud_coupled_step
       real(wp), allocatable :: displacement(:), velocity(:), acceleration(:)
       !> Force on the floor, N, and velocity of the floor, m/s.
       real(wp) :: force = 0.0_wp, floor_velocity = 0.0_wp
-      !> Impulse given to the floor, N s; energy given to it and lost in the source, J.
+      !> Impulse on the floor, N s; energy given to the floor and energy lost in the source, J.
       real(wp) :: impulse = 0.0_wp, work = 0.0_wp, loss = 0.0_wp
       !> Motion of the floor.
       type(receiver_motion_type) :: motion
@@ -43,7 +43,7 @@ module thud_coupled_step
    type :: trial_type
       !> Forces on the floor, N: [n_stage], and accelerations, m/s2: [n_stage, n_mass].
       real(wp), allocatable :: force(:), acceleration(:, :)
-      !> Displacements and velocities of the floor without these forces, m and m/s: [n_stage].
+      !> Displacements and velocities of the floor without the forces of this step, m and m/s: [n_stage].
       real(wp), dimension(n_stage) :: free_displacement, free_velocity
       !> Times of the stages since first touch, s: [n_stage].
       real(wp) :: time(n_stage)
@@ -51,7 +51,7 @@ module thud_coupled_step
       real(wp), dimension(n_stage) :: floor_displacement, floor_velocity, floor_acceleration
       !> State relative to the floor at the stages: [n_state, n_stage]; and its rate.
       real(wp), allocatable :: state(:, :), rate(:, :)
-      !> Derivatives of the rate by displacements and velocities: [n_state, 2*n_mass, n_stage].
+      !> Derivatives of the rate with respect to displacements and velocities: [n_state, 2*n_mass, n_stage].
       real(wp), allocatable :: derivative(:, :, :)
    end type trial_type
 
@@ -72,17 +72,17 @@ contains
       state(n + 1:n + 2) = [coupled%impulse, coupled%loss]
    end function get_relative_state
 
-   !> One step.
+   !> Advances source and floor by one step.
    pure subroutine take_coupled_step(source, stages, time, scale, start, end, valid, converged)
       class(contact_source_type), intent(in) :: source
-      !> The floor in this step.
+      !> Response of the floor over this step.
       type(receiver_stages_type), intent(in) :: stages
       !> Time at the beginning since first touch, s; scale of velocities, m/s.
       real(wp), intent(in) :: time, scale
       !> Motion at the beginning and at the end.
       type(coupled_state_type), intent(in) :: start
       type(coupled_state_type), intent(out) :: end
-      !> The source stays in the domain of its equations; the iterations end.
+      !> Whether the source stays in the domain of its equations; whether the iterations converge.
       logical, intent(out) :: valid, converged
       type(trial_type) :: trial
       real(wp) :: matrix(n_stage*(1 + source%n_mass), n_stage*(1 + source%n_mass)), change(n_stage*(1 + source%n_mass), 1)
@@ -138,7 +138,7 @@ contains
       !> Motion at the beginning.
       type(coupled_state_type), intent(in) :: start
       type(trial_type), intent(inout) :: trial
-      !> The source stays in the domain of its equations.
+      !> Whether the source stays in the domain of its equations.
       logical, intent(out) :: valid
       integer :: i, k
 
@@ -158,7 +158,7 @@ contains
       end associate
    end subroutine evaluate_stages
 
-   !> Derivatives of the response of the source.
+   !> Derivatives of the response of the source, by differences.
    pure subroutine differentiate(source, interval, scale, trial)
       class(contact_source_type), intent(in) :: source
       !> Length of the step, s; scale of velocities, m/s.
@@ -173,7 +173,7 @@ contains
          do j = 1, 2*source%n_mass
             length = difference*merge(abs(trial%state(j, i)) + scale*interval, scale, mod(j, 2) == 1)
             moved = trial%state(:, i)
-            ! Towards smaller deflections, which leave no domain.
+            ! Towards smaller deflections, which stay inside the domain.
             moved(j) = moved(j) - length
             call get_rate(source, trial%time(i), moved, rate, valid)
             trial%derivative(:, j, i) = (trial%rate(:, i) - rate)/(trial%state(j, i) - moved(j))
@@ -181,7 +181,7 @@ contains
       end do
    end subroutine differentiate
 
-   !> Accelerations, force and loss of the source; alone in flight a mass has none.
+   !> Accelerations, force and loss of the source, all zero for a single mass in flight.
    pure subroutine get_rate(source, time, state, rate, valid)
       class(contact_source_type), intent(in) :: source
       !> Time since first touch, s.
@@ -189,7 +189,7 @@ contains
       !> State relative to the floor, and its rate: [n_state].
       real(wp), intent(in) :: state(:)
       real(wp), intent(out) :: rate(:)
-      !> The state is in the domain of the equations.
+      !> Whether the state is in the domain of the equations.
       logical, intent(out) :: valid
 
       if (source%touching .or. source%n_mass > 1) then
@@ -200,11 +200,11 @@ contains
       end if
    end subroutine get_rate
 
-   !> What the forces on the floor and the accelerations miss.
+   !> Residual of force balance and equations of motion.
    pure function get_residual(source, trial) result(residual)
       class(contact_source_type), intent(in) :: source
       type(trial_type), intent(in) :: trial
-      !> The equations, less the unknowns: [n_unknown].
+      !> Values of the equations minus the unknowns: [n_unknown].
       real(wp) :: residual(n_stage*(1 + source%n_mass))
       integer :: k
 
@@ -227,7 +227,7 @@ contains
       if (source%touching) mass = source%cap_mass_per_deflection*max(trial%state(1, :), 0.0_wp)
    end function get_cap_mass
 
-   !> Derivative of the unknowns less the equations.
+   !> Derivative of the negative residual with respect to the unknowns.
    pure subroutine set_matrix(source, stages, trial, matrix)
       class(contact_source_type), intent(in) :: source
       type(receiver_stages_type), intent(in) :: stages
@@ -243,12 +243,12 @@ contains
       cap_mass = get_cap_mass(source, trial)
       by_cap = matmul(radau_derivative, stages%velocity)/stages%interval
       do i = 1, n_stage
-         ! What displacements and velocities relative to the floor gain at this stage.
+         ! Derivatives of relative displacement and velocity at this stage.
          by_force = -reshape([stages%displacement(i, :), stages%velocity(i, :)], [n_stage, 2])
          by_acceleration = reshape([stages%interval**2*second_integral(i, :), stages%interval*radau_integral(i, :)], &
             [n_stage, 2])
          do k = 0, source%n_mass
-            ! Row 0 is the balance of the cap, the others are the equations of motion.
+            ! k = 0 is the balance of the cap, the others are the equations of motion.
             row = k*n_stage + i
             index = merge(2*source%n_mass + 1, 2*k, k == 0)
             matrix(row, row) = 1.0_wp

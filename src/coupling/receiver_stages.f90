@@ -1,4 +1,4 @@
-!> Exact motion of a receiver under a force that is in each step the polynomial through its values at the stages of
+!> Exact motion of a receiver under a force that is, in each step, the polynomial through its values at the stages of
 !> `thud_radau`.
 module thud_receiver_stages
    use thud_kinds, only: wp
@@ -10,27 +10,27 @@ module thud_receiver_stages
 
    public :: advance_stages, get_free_motion, new_receiver_stages, receiver_stages_type
 
-   !> Run through the next constant.
+   !> Loop indices of the next constant.
    integer :: power, stage
-   !> Factors m! c**m of the powers m of time at the stages: [n_stage, n_stage].
+   !> Factors m! c**m for the powers m and the stages c of time: [n_stage, n_stage].
    real(wp), parameter :: weight(n_stage, n_stage) = reshape([((gamma(real(power + 1, wp))*radau_node(stage)**power, &
       power=0, n_stage - 1), stage=1, n_stage)], [n_stage, n_stage])
 
-   !> Factors of one step.
+   !> Response factors of one step.
    type :: receiver_stages_type
       !> Length of the step, s.
       real(wp) :: interval = 0.0_wp
-      !> Velocity, m/(N s), and displacement, m/N, at each stage by unit force at each: [n_stage, n_stage].
+      !> Velocity, m/(N s), and displacement, m/N, at each stage due to unit force at each stage: [n_stage, n_stage].
       real(wp) :: velocity(n_stage, n_stage), displacement(n_stage, n_stage)
-      !> The same by unit x_k at the beginning, m/(N s2) and m/(N s): [n_pole, n_stage].
+      !> The same due to unit x_k at the beginning, m/(N s2) and m/(N s): [n_pole, n_stage].
       complex(wp), allocatable :: free_velocity(:, :), free_displacement(:, :)
-      !> The x_k at the end by unit x_k at the beginning: [n_pole]; by unit force at each stage, s: [n_pole, n_stage].
+      !> The x_k at the end per unit x_k at the beginning: [n_pole]; per unit force at each stage, s: [n_pole, n_stage].
       complex(wp), allocatable :: decay(:), gain(:, :)
    end type receiver_stages_type
 
 contains
 
-   !> Factors of steps of one length.
+   !> Response factors of steps of one length.
    pure function new_receiver_stages(receiver, interval) result(stages)
       type(receiver_type), intent(in) :: receiver
       !> Length of the steps, s.
@@ -77,7 +77,7 @@ contains
       real(wp) :: v, w
       integer :: i, k
 
-      ! Sums in several parts at once; bound by the flow of the factors.
+      ! Vectorized sums; reading the factors is the limit.
       do i = 1, n_stage
          v = 0.0_wp
          w = motion%displacement
@@ -91,7 +91,7 @@ contains
       end do
    end subroutine get_free_motion
 
-   !> Motion a step on.
+   !> Advances the motion by one step.
    pure subroutine advance_stages(stages, force, motion)
       type(receiver_stages_type), intent(in) :: stages
       !> The force downwards at the stages, N: [n_stage].

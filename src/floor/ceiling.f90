@@ -1,5 +1,4 @@
-!> A light ceiling that hangs below a floor without rigid connection: its mass on the stiffness of the air between them,
-!> and the sound that runs along that air.
+!> A light ceiling without rigid connection to the floor: its mass on the stiffness of the cavity, and the sound in there.
 module thud_ceiling
    use thud_constants, only: pi
    use thud_field, only: field_type
@@ -9,15 +8,15 @@ module thud_ceiling
    implicit none (type, external)
    private
 
-   public :: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_share, get_mass_law
+   public :: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_fraction, get_mass_law
 
-   !> A ceiling; without mass there is none.
+   !> A ceiling; a mass of 0 means no ceiling.
    type :: ceiling_type
-      !> Mass per area, kg/m2.
+      !> Mass per unit area, kg/m2.
       real(wp) :: mass = 0.0_wp
-      !> Depth of the air above it, m.
+      !> Depth of the cavity above it, m.
       real(wp) :: depth = 0.1_wp
-      !> Loss factor of that air, large with absorber in it.
+      !> Loss factor of the cavity, high with absorber in it.
       real(wp) :: loss_factor = 0.3_wp
    end type ceiling_type
 
@@ -31,38 +30,38 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('ceiling_mass', ceiling%mass, 'kg/m2', 'mass of a suspended ceiling over its area; 0: none', &
+         real_field('ceiling_mass', ceiling%mass, 'kg/m2', 'mass per unit area of a suspended ceiling; 0: none', &
          '[0, 200]'), &
-         real_field('ceiling_depth', ceiling%depth, 'm', 'depth of the air above the ceiling', '[0.01, 2]'), &
+         real_field('ceiling_depth', ceiling%depth, 'm', 'depth of the air cavity above the ceiling', '[0.01, 2]'), &
          real_field('ceiling_loss_factor', ceiling%loss_factor, '', 'loss factor of the ceiling cavity', '[0.001, 1]')]
    end function get_ceiling_fields
 
-   !> Mean in a band of the square of the ceiling's velocity over the floor's, which drives it through the air's stiffness
-   !> against its mass and what it radiates, rho0 c0 sigma:
+   !> Ratio of the squared velocity of the ceiling to that of the floor, averaged over a band. The floor drives the ceiling
+   !> through the stiffness of the air; the ceiling's mass and radiation rho0 c0 sigma react:
    !> abs((1 + i eta)/(1 + i eta + i k d sigma - (f/f0)**2))**2, f0 = sqrt(rho0 c0**2/(depth mass))/(2 pi).
-   elemental function get_forced_share(ceiling, air, radiation_factor, lower, upper) result(share)
+   elemental function get_forced_fraction(ceiling, air, radiation_factor, lower, upper) result(fraction)
       type(ceiling_type), intent(in) :: ceiling
       type(air_type), intent(in) :: air
       !> Radiation factor of floor and ceiling.
       real(wp), intent(in) :: radiation_factor
       !> Edges of the band, Hz.
       real(wp), intent(in) :: lower, upper
-      real(wp) :: share
+      real(wp) :: fraction
       complex(wp) :: b
       real(wp) :: period, damping
 
-      ! The smallest number instead of masses so small that their product with the depth is 0.
+      ! The smallest number replaces a product of depth and mass that underflows.
       period = 2*pi*sqrt(max(ceiling%depth*ceiling%mass/(air%density*air%sound_speed**2), tiny(1.0_wp)))
       damping = ceiling%loss_factor + 2*pi*sqrt(lower*upper)*ceiling%depth*radiation_factor/air%sound_speed
       associate (low => lower*period, high => upper*period)
          ! 1/((1 - x**2)**2 + damping**2) = Im(1/(b**2 - x**2))/damping with b**2 = 1 - i damping. The difference of
-         ! atanh(x/b) at both ends as one: the imaginary parts lie between 0 and pi/2.
+         ! atanh(x/b) at both ends is written as one atanh: the imaginary parts lie between 0 and pi/2.
          b = sqrt(cmplx(1.0_wp, -damping, wp))
-         share = (1 + ceiling%loss_factor**2)/(damping*(high - low))*aimag(atanh((high - low)*b/(b**2 - low*high))/b)
+         fraction = (1 + ceiling%loss_factor**2)/(damping*(high - low))*aimag(atanh((high - low)*b/(b**2 - low*high))/b)
       end associate
-   end function get_forced_share
+   end function get_forced_fraction
 
-   !> Modes per hertz of the air above the ceiling: lateral ones of each half-wave across that fits.
+   !> Modes per hertz of the cavity: lateral modes for each number of half waves that fits across its depth.
    elemental function get_cavity_mode_density(ceiling, air, area, frequency) result(density)
       type(ceiling_type), intent(in) :: ceiling
       type(air_type), intent(in) :: air
@@ -74,8 +73,8 @@ contains
       density = 2*pi*area*frequency/air%sound_speed**2*(1 + int(2*ceiling%depth*frequency/air%sound_speed))
    end function get_cavity_mode_density
 
-   !> Transmission of sound through the ceiling by its mass: of a heavy one 5 dB above that of normal incidence (field
-   !> incidence), of one without mass all.
+   !> Transmission coefficient of the ceiling by its mass: 5 dB above that of normal incidence for a heavy ceiling (field
+   !> incidence), 1 for a ceiling without mass.
    elemental function get_mass_law(ceiling, air, frequency) result(transmission)
       type(ceiling_type), intent(in) :: ceiling
       type(air_type), intent(in) :: air

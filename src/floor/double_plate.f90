@@ -1,24 +1,23 @@
-!> Two simply supported plates with a resilient layer between them: the receiver that the upper plate is, and the
-!> power that reaches the lower plate.
+!> Two simply supported plates with a resilient layer between them: receiver of the upper plate, and power into the lower.
 module thud_double_plate
    use thud_constants, only: pi
    use thud_error, only: error_type
    use thud_kinds, only: wp
    use thud_modal_receiver, only: new_modal_receiver
    use thud_plate, only: air_type, get_bending_stiffness, get_surface_mass, get_total_loss, plate_type
-   use thud_plate_modes, only: far, get_far_compliance, get_half_waves, get_modal_stiffness, get_shape, mode_limit, &
-      residual_corner
+   use thud_plate_modes, only: get_far_compliance, get_half_waves, get_modal_stiffness, get_shape, mode_limit, &
+      residual_corner, sum_limit_factor
    use thud_receiver, only: receiver_type
    implicit none (type, external)
    private
 
    public :: double_plate_type, get_layer_resonance, get_lower_conductance, new_double_receiver
 
-   !> The floor.
+   !> Both plates and the layer.
    type :: double_plate_type
-      !> Plate under the source, and plate over the room; sides alike.
+      !> Plate under the source, and plate above the room, of equal length and width.
       type(plate_type) :: upper, lower
-      !> Dynamic stiffness of the layer over area, N/m3, and its loss factor.
+      !> Dynamic stiffness of the layer per unit area, N/m3, and its loss factor.
       real(wp) :: layer_stiffness = 0.0_wp, layer_loss = 0.0_wp
    end type double_plate_type
 
@@ -33,36 +32,37 @@ contains
       frequency = sqrt(floor%layer_stiffness*(1/get_surface_mass(floor%upper) + 1/get_surface_mass(floor%lower)))/(2*pi)
    end function get_layer_resonance
 
-   !> Velocity of a point of the upper plate over the force at another.
+   !> Transfer mobility from a source to a point of the upper plate.
    !>
-   !> Both plates have the same shapes, and each shape two modes: those of two masses on three springs. A mode takes the mean
-   !> of the loss factors of plates and layer, by their shares of its elastic energy; with equal shapes this is off by the
-   !> square of what the loss factors differ. Residual modes are as those of one plate.
+   !> Both plates have the same mode shapes. Each shape has two modes, those of two masses on three springs. The loss factor
+   !> of a mode is the mean of the loss factors of plates and layer, weighted by elastic energy; the error is of second order
+   !> in the differences of the loss factors. Residual modes are treated as for one plate.
    subroutine new_double_receiver(floor, source, point, receiver, error)
       type(double_plate_type), intent(in) :: floor
-      !> Positions of source and point, over length and width.
+      !> Positions of source and point, as fractions of length and width.
       real(wp), intent(in) :: source(2), point(2)
       type(receiver_type), intent(out) :: receiver
-      !> The losses are too high.
+      !> Set if the losses are too high.
       type(error_type), allocatable, intent(out) :: error
       integer, allocatable :: m(:), n(:)
-      real(wp), allocatable :: omega(:, :), share(:, :), loss_factor(:, :), gain(:, :)
-      logical, allocatable :: single(:, :)
+      real(wp), allocatable :: omega(:, :), modal_square(:, :), loss_factor(:, :), gain(:, :)
+      logical, allocatable :: individual(:, :)
       real(wp) :: compliance
 
       call get_all_half_waves(floor, m, n)
-      allocate (omega(size(m), 2), share(size(m), 2), loss_factor(size(m), 2))
+      allocate (omega(size(m), 2), modal_square(size(m), 2), loss_factor(size(m), 2))
       call get_pair(floor, get_modal_stiffness(floor%upper, m, n), get_modal_stiffness(floor%lower, m, n), omega(:, 1), &
-         omega(:, 2), share(:, 1), share(:, 2), loss_factor(:, 1), loss_factor(:, 2))
-      single = omega < 2*pi*mode_limit
-      gain = 4/(floor%upper%length*floor%upper%width)*share*spread(get_shape(m, n, source)*get_shape(m, n, point), 2, 2)
-      compliance = sum(gain/omega**2, mask=.not. single)
+         omega(:, 2), modal_square(:, 1), modal_square(:, 2), loss_factor(:, 1), loss_factor(:, 2))
+      individual = omega < 2*pi*mode_limit
+      gain = 4/(floor%upper%length*floor%upper%width)*modal_square &
+         *spread(get_shape(m, n, source)*get_shape(m, n, point), 2, 2)
+      compliance = sum(gain/omega**2, mask=.not. individual)
       if (all(abs(source - point) < epsilon(1.0_wp))) compliance = compliance + get_far_compliance(floor%upper)
-      call new_modal_receiver('floating_floor', pack(gain, single), pack(omega, single), pack(loss_factor, single), &
-         [compliance, residual_corner], receiver, error)
+      call new_modal_receiver('floating_floor', pack(gain, individual), pack(omega, individual), &
+         pack(loss_factor, individual), [compliance, residual_corner], receiver, error)
    end subroutine new_double_receiver
 
-   !> Half waves of the upper plate's modes up to far above the limit, and those that only the lower one has below it.
+   !> Half waves of the modes of the upper plate up to sum_limit_factor*mode_limit, and of the lower plate up to mode_limit.
    pure subroutine get_all_half_waves(floor, m, n)
       type(double_plate_type), intent(in) :: floor
       !> Half waves along length and width: [n_shape].
@@ -70,23 +70,23 @@ contains
       integer, allocatable :: m_lower(:), n_lower(:)
       logical, allocatable :: new(:)
 
-      call get_half_waves(floor%upper, far*mode_limit, m, n)
+      call get_half_waves(floor%upper, sum_limit_factor*mode_limit, m, n)
       call get_half_waves(floor%lower, mode_limit, m_lower, n_lower)
       new = get_modal_stiffness(floor%upper, m_lower, n_lower) &
-         >= get_surface_mass(floor%upper)*(2*pi*far*mode_limit)**2
+         >= get_surface_mass(floor%upper)*(2*pi*sum_limit_factor*mode_limit)**2
       m = [m, pack(m_lower, new)]
       n = [n, pack(n_lower, new)]
    end subroutine get_all_half_waves
 
-   !> The two modes of each shape.
-   elemental subroutine get_pair(floor, upper, lower, omega_1, omega_2, share_1, share_2, loss_1, loss_2)
+   !> The two modes of a shape.
+   elemental subroutine get_pair(floor, upper, lower, omega_1, omega_2, square_1, square_2, loss_1, loss_2)
       type(double_plate_type), intent(in) :: floor
-      !> Bending stiffness of the shape in both plates over area, N/m3.
+      !> Modal stiffness per unit area of both plates, N/m3.
       real(wp), intent(in) :: upper, lower
       !> Angular frequencies, rad/s, the lower first.
       real(wp), intent(out) :: omega_1, omega_2
-      !> Squared displacements of the upper plate of modes with modal mass 1 over area, m2/kg.
-      real(wp), intent(out) :: share_1, share_2
+      !> Squared displacements of the upper plate, for a modal mass of 1 per unit area, m2/kg.
+      real(wp), intent(out) :: square_1, square_2
       !> Loss factors.
       real(wp), intent(out) :: loss_1, loss_2
       real(wp) :: first, second, coupling, angle, top, bottom
@@ -96,26 +96,26 @@ contains
          second = (lower + s)/m2
          coupling = -s/sqrt(m1*m2)
          omega_2 = sqrt((first + second)/2 + hypot((first - second)/2, coupling))
-         ! By the product of both: their difference would cancel.
+         ! From the product of both frequencies, because a difference would cancel.
          omega_1 = sqrt((upper*lower + s*(upper + lower))/(m1*m2))/omega_2
          angle = atan2(2*coupling, first - second)/2
          top = cos(angle)/sqrt(m1)
          bottom = sin(angle)/sqrt(m2)
-         share_2 = top**2
+         square_2 = top**2
          loss_2 = get_loss(floor, omega_2, upper*top**2, lower*bottom**2, s*(top - bottom)**2)
          top = -sin(angle)/sqrt(m1)
          bottom = cos(angle)/sqrt(m2)
-         share_1 = top**2
+         square_1 = top**2
          loss_1 = get_loss(floor, omega_1, upper*top**2, lower*bottom**2, s*(top - bottom)**2)
       end associate
    end subroutine get_pair
 
-   !> Mean of the loss factors by elastic energy.
+   !> Mean of the loss factors, weighted by elastic energy.
    elemental function get_loss(floor, omega, upper, lower, layer) result(loss_factor)
       type(double_plate_type), intent(in) :: floor
       !> Angular frequency, rad/s.
       real(wp), intent(in) :: omega
-      !> Elastic energies in plates and layer, of any unit.
+      !> Elastic energies of plates and layer, in any unit.
       real(wp), intent(in) :: upper, lower, layer
       real(wp) :: loss_factor
 
@@ -123,17 +123,17 @@ contains
          + layer*floor%layer_loss)/(upper + lower + layer)
    end function get_loss
 
-   !> Power that reaches the lower plate over the mean square of the force, both plates infinite and the layer without
-   !> bending stiffness (Cremer, Heckl and Petersson, *Structure-Borne Sound*).
+   !> Power into the lower plate per mean-square force on the upper plate, for infinite plates and a layer without bending
+   !> stiffness (Cremer, Heckl and Petersson, *Structure-Borne Sound*).
    !>
-   !> In wavenumbers u = k**2 the lower plate has h2 = s/(B1 B2 (u**2 - q1) (u**2 - q2)) with the roots q of the determinant,
-   !> and dissipates omega Im B2/(4 pi) integral of u**2 |h2|**2 du, by partial fractions with
-   !> integral du/(u**2 - q) = pi/(2 sqrt(-q)). What it dissipates is what it gets.
+   !> With the wavenumber k and u = k**2, the response of the lower plate is h2 = s/(B1 B2 (u**2 - q1) (u**2 - q2)) with the
+   !> roots q of the determinant. The plate dissipates omega Im B2/(4 pi) integral of u**2 |h2|**2 du, solved by partial
+   !> fractions with integral du/(u**2 - q) = pi/(2 sqrt(-q)). It dissipates all power that it receives.
    elemental function get_lower_conductance(floor, frequency) result(conductance)
       type(double_plate_type), intent(in) :: floor
       !> Frequency, Hz.
       real(wp), intent(in) :: frequency
-      !> The power, m/(N s).
+      !> The conductance, m/(N s).
       real(wp) :: conductance
       complex(wp) :: root(4)
       complex(wp) :: b1, b2, s, k1, k2, half, term, total

@@ -1,4 +1,4 @@
-!> Coupled subsystems of a statistical energy analysis in one band: what each loses, and what flows between them.
+!> Coupled subsystems of a statistical energy analysis in one band: their losses and the energy flow between them.
 module thud_energy_flow
    use thud_kinds, only: wp
    implicit none (type, external)
@@ -10,11 +10,11 @@ module thud_energy_flow
    type :: energy_flow_type
       !> Modes per hertz of the subsystems, s: [n].
       real(wp), allocatable :: mode_density(:)
-      !> Rate at which the first subsystems lose energy, 1/s, what flows to others included: [at most n].
+      !> Total loss rates of the first subsystems, including the flow to others, 1/s: [at most n].
       real(wp), allocatable :: total(:)
       !> Minimum rate of losses that go to no other subsystem, 1/s: [n].
       real(wp), allocatable :: internal_loss(:)
-      !> Rate at which energy of j goes to i, 1/s: [n, n].
+      !> Rate at which energy flows from j to i, 1/s: [n, n].
       real(wp), allocatable :: rate(:, :)
    end type energy_flow_type
 
@@ -24,7 +24,7 @@ contains
    pure function new_energy_flow(mode_density, total, internal_loss) result(flow)
       !> Modes per hertz, s: [n].
       real(wp), intent(in) :: mode_density(:)
-      !> Rates of all losses, 1/s, of the first subsystems, where they are known: [at most n].
+      !> Total loss rates of the first subsystems, 1/s: [at most n].
       real(wp), intent(in) :: total(:)
       !> Rates of the losses that go to no other subsystem, 1/s: [n].
       real(wp), intent(in) :: internal_loss(:)
@@ -36,10 +36,10 @@ contains
       allocate (flow%rate(size(internal_loss), size(internal_loss)), source=0.0_wp)
    end function new_energy_flow
 
-   !> Adds a subsystem without flow.
+   !> Adds a subsystem without flow to others.
    pure subroutine add_subsystem(flow, mode_density, internal_loss)
       type(energy_flow_type), intent(inout) :: flow
-      !> Modes per hertz, s; rate of its losses, 1/s.
+      !> Modes per hertz, s; loss rate, 1/s.
       real(wp), intent(in) :: mode_density, internal_loss
       real(wp), allocatable :: rate(:, :)
 
@@ -52,20 +52,20 @@ contains
       flow%internal_loss = [flow%internal_loss, internal_loss]
    end subroutine add_subsystem
 
-   !> Lets energy flow from one subsystem to another, and back by reciprocity: n1 a12 = n2 a21.
+   !> Adds an energy flow from one subsystem to another, and the flow back by reciprocity: n1 a12 = n2 a21.
    pure subroutine connect(flow, from, to, rate)
       type(energy_flow_type), intent(inout) :: flow
       !> Indices of the subsystems.
       integer, intent(in) :: from, to
-      !> Rate at which the energy of the first goes to the second, 1/s.
+      !> Rate at which energy flows from the first to the second, 1/s.
       real(wp), intent(in) :: rate
 
       flow%rate(to, from) = flow%rate(to, from) + rate
       flow%rate(from, to) = flow%rate(from, to) + rate*flow%mode_density(from)/flow%mode_density(to)
    end subroutine connect
 
-   !> Matrix A of dE/dt = -A E. Its columns sum to the losses that go to no subsystem: the total ones less the flow, but at
-   !> least the internal ones.
+   !> Matrix A of dE/dt = -A E. The sum of a column is the loss that goes to no subsystem: the total loss minus the flow to
+   !> others, but at least the internal loss.
    pure function get_loss(flow) result(loss)
       type(energy_flow_type), intent(in) :: flow
       !> A, 1/s: [n, n].

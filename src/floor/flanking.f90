@@ -1,4 +1,4 @@
-!> Walls below a floor that take energy from it over their junctions and radiate into the room.
+!> Walls below a floor that take energy from it through their junctions and radiate into the room.
 module thud_flanking
    use thud_constants, only: pi
    use thud_field, only: field_type, list_type, name_length
@@ -10,15 +10,15 @@ module thud_flanking
 
    public :: get_junction_rate, get_vibration_reduction, get_wall_fields, get_walls, walls_type
 
-   !> Choices of the junction: rigid ones, and one by its index.
+   !> Types of junction: rigid ones, or one given by its vibration reduction index.
    character(len=*), parameter :: junctions(*) = [character(len=5) :: 'cross', 't', 'index']
 
    !> Reference frequency of the vibration reduction index, Hz (ISO 12354-1).
    real(wp), parameter :: reference_frequency = 1000.0_wp
 
-   !> Walls of one construction, each along a part of the floor's edge.
+   !> Walls of the same construction, each along a part of the floor's edge.
    type :: walls_type
-      !> Lengths of the junctions with the floor, m, one for each wall.
+      !> Lengths of the junctions with the floor, m, one per wall.
       type(list_type) :: lengths
       !> Height, m, and thickness, m.
       real(wp) :: height = 2.5_wp, thickness = 0.2_wp
@@ -28,10 +28,10 @@ module thud_flanking
       real(wp) :: wave_speed = 3500.0_wp
       !> Internal loss factor.
       real(wp) :: loss_factor = 0.005_wp
-      !> Rigid junction at which the wall continues above the floor, and the floor behind the wall (`cross`) or not (`t`),
-      !> or a junction by its index.
+      !> Rigid junction at which the wall continues above the floor, and the floor continues behind the wall (`cross`) or
+      !> does not (`t`), or a junction given by its index (`index`).
       character(len=name_length) :: junction = 'cross'
-      !> Vibration reduction index between floor and wall, dB, of the junction `index`.
+      !> Vibration reduction index between floor and wall, dB, for the junction `index`.
       real(wp) :: index = 10.0_wp
    end type walls_type
 
@@ -54,9 +54,9 @@ contains
          '[100, 10000]'), &
          real_field('wall_loss_factor', walls%loss_factor, '', 'internal loss factor of the walls', '[0, 1]'), &
          choice_field('wall_junction', walls%junction, &
-         'junction of floor and walls: rigid cross or t, or one of a given index', junctions), &
+         'junction of floor and walls: rigid cross or T, or described by junction_index', junctions), &
          real_field('junction_index', walls%index, 'dB', &
-         'vibration reduction index from floor to wall, of the junction index', '[-10, 80]')]
+         'vibration reduction index from floor to wall, for wall_junction index', '[-10, 80]')]
    end function get_wall_fields
 
    !> The walls as plates: [n_wall].
@@ -72,9 +72,9 @@ contains
       end do
    end function get_walls
 
-   !> Vibration reduction index between floor and wall round the corner: 8.7 + 5.7 M**2 dB of a rigid cross, 5.7 + 5.7 M**2
-   !> of a rigid T, M the decimal logarithm of the ratio of masses, or the given one; at least 10 lg(l l0 (1/S1 + 1/S2)),
-   !> l0 = 1 m (ISO 12354-1 annex E).
+   !> Vibration reduction index from floor to wall (ISO 12354-1 annex E): 8.7 + 5.7 M**2 dB for a rigid cross,
+   !> 5.7 + 5.7 M**2 dB for a rigid T, M being the decimal logarithm of the mass ratio, or the given index; at least
+   !> 10 lg(l l0 (1/S1 + 1/S2)), l0 = 1 m.
    pure function get_vibration_reduction(walls, floor, wall) result(index)
       type(walls_type), intent(in) :: walls
       type(plate_type), intent(in) :: floor, wall
@@ -94,12 +94,12 @@ contains
       index = max(index, 10*log10(wall%length*(1/(floor%length*floor%width) + 1/(wall%length*wall%width))))
    end function get_vibration_reduction
 
-   !> Rate of the flow of energy from the floor into a wall.
+   !> Rate at which energy flows from the floor into a wall.
    !>
-   !> The index is K = D + 10 lg(l/sqrt(a1 a2)), D the mean of the velocity level differences of both directions and
-   !> a = pi**2 S eta sqrt(1000 Hz f)/c0 (ISO 12354-1). With D = 5 lg(eta1 eta2/(eta12 eta21)) and
-   !> n1 eta12 = n2 eta21 the losses cancel:
-   !> eta12 = l c0/(pi**2 S1 sqrt(1000 Hz f)) sqrt(fc2/fc1) 10**(-K/10) (Nightingale and Bosmans 2003).
+   !> The index is K = D + 10 lg(l/sqrt(a1 a2)) with the mean D of the velocity level differences in both directions and
+   !> a = pi**2 S eta sqrt(1000 Hz f)/c0 (ISO 12354-1). With D = 5 lg(eta1 eta2/(eta12 eta21)) and n1 eta12 = n2 eta21, the
+   !> total loss factors eta1 and eta2 cancel: eta12 = l c0/(pi**2 S1 sqrt(1000 Hz f)) sqrt(fc2/fc1) 10**(-K/10)
+   !> (Nightingale and Bosmans 2003).
    elemental function get_junction_rate(floor, wall, air, index, frequency) result(rate)
       type(plate_type), intent(in) :: floor, wall
       type(air_type), intent(in) :: air

@@ -1,4 +1,4 @@
-!> A floating floor: a plate on a resilient layer on the plate over the room below.
+!> A floating floor: a plate on a resilient layer on the plate above the room.
 module thud_floating_floor
    use thud_double_plate, only: double_plate_type, get_lower_conductance, new_double_receiver
    use thud_error, only: error_type
@@ -15,12 +15,12 @@ module thud_floating_floor
 
    !> The floor; the defaults are a cement screed on mineral wool on concrete.
    type, extends(rectangular_floor_type) :: floating_floor_type
-      !> The plate over the room.
+      !> The plate above the room.
       type(plate_type) :: plate
       !> Thickness of the floating plate, m; its density, kg/m3; its longitudinal wave speed, m/s; its loss factor.
       real(wp) :: screed_thickness = 0.05_wp, screed_density = 2000.0_wp, screed_wave_speed = 3500.0_wp
       real(wp) :: screed_loss_factor = 0.03_wp
-      !> Dynamic stiffness of the layer over area, N/m3, and its loss factor.
+      !> Dynamic stiffness of the layer per unit area, N/m3, and its loss factor.
       real(wp) :: layer_stiffness = 1.0e7_wp, layer_loss_factor = 0.1_wp
    contains
       procedure, pass(options) :: get_fields
@@ -43,12 +43,12 @@ contains
          'speed of longitudinal waves in the floating plate', '[100, 10000]'), &
          real_field('screed_loss_factor', options%screed_loss_factor, '', 'loss factor of the floating plate', '[0, 1]'), &
          real_field('layer_stiffness', options%layer_stiffness, 'N/m3', &
-         'dynamic stiffness of the resilient layer over area (ISO 9052-1)', '[1e4, 1e12]'), &
+         'dynamic stiffness of the resilient layer per unit area (ISO 9052-1)', '[1e4, 1e12]'), &
          real_field('layer_loss_factor', options%layer_loss_factor, '', 'loss factor of the resilient layer', '[0, 1]'), &
          options%get_source_fields(), options%get_point_fields()]
    end function get_fields
 
-   !> Plates and layer.
+   !> Both plates and the layer.
    pure function get_double_plate(options) result(floor)
       class(floating_floor_type), intent(in) :: options
       type(double_plate_type) :: floor
@@ -60,7 +60,7 @@ contains
       floor%layer_loss = options%layer_loss_factor
    end function get_double_plate
 
-   !> Floating plate and plate over the room.
+   !> The floating plate, then the plate above the room.
    pure subroutine get_plates(options, group, plates)
       class(floating_floor_type), intent(in) :: options
       character(len=key_length), intent(out) :: group
@@ -72,7 +72,7 @@ contains
       plates = [floor%upper, floor%lower]
    end subroutine get_plates
 
-   !> Velocity of a point of the floating plate over the force of the source.
+   !> Transfer mobility from the source to a point of the floating plate.
    subroutine get_mobility_at(options, source, point, receiver, error)
       class(floating_floor_type), intent(in) :: options
       real(wp), intent(in) :: source(2), point(2)
@@ -82,7 +82,7 @@ contains
       call new_double_receiver(get_double_plate(options), source, point, receiver, error)
    end subroutine get_mobility_at
 
-   !> The plate over the room, and what reaches it of infinite plates.
+   !> The plate above the room, and its conductance with both plates infinite.
    subroutine get_radiator(options, frequency, plate, conductance, error)
       class(floating_floor_type), intent(in) :: options
       real(wp), intent(in) :: frequency(:)

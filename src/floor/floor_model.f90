@@ -1,9 +1,8 @@
-!> The abstract floor: options from a namelist group, what a source feels of it, and the plate that radiates into the
-!> room below.
+!> The abstract floor: options from a namelist group, mobility at the source, and the plate that radiates into the room.
 !>
-!> A floor `<name>` is a module `thud_<name>_floor` with a type `<name>_floor_type` that extends this one (a name that
-!> ends with `_floor` gets no second one); the list `floor_models` in src/CMakeLists.txt makes it known. Its options belong
-!> to the group of its name. What is said here of the arguments of a procedure holds for those of every floor.
+!> A floor `<name>` is a type `<name>_floor_type` that extends this one, in the module `thud_<name>_floor` (a name that ends
+!> with `_floor` gets no second suffix). The list `floor_models` in src/CMakeLists.txt registers it. The namelist group of
+!> its options has its name. The descriptions of arguments in this file hold for every floor.
 module thud_floor_model
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type
@@ -17,12 +16,12 @@ module thud_floor_model
 
    public :: floor_model_type, reason_length
 
-   !> Length of a reason.
+   !> Length of the text that says what limits the validity of a floor.
    integer, parameter :: reason_length = 112
 
    !> A floor with its options as components.
    type, abstract :: floor_model_type
-      !> Positions of further points whose velocity is output, of rectangular floors, m.
+      !> Coordinates along length and width of further points whose velocity is output (rectangular floors), m.
       type(list_type) :: point_x, point_y
    contains
       procedure, pass(options) :: get_point_fields
@@ -36,54 +35,55 @@ module thud_floor_model
    end type floor_model_type
 
    abstract interface
-      !> Keys of the options.
+      !> Fields of the options: each connects a namelist key to a component.
       function get_fields(options) result(fields)
          import :: field_type, floor_model_type
          implicit none (type, external)
          !> The options that the fields read and set.
          class(floor_model_type), intent(in), target :: options
-         !> The keys: [n_field].
+         !> The fields: [n_field].
          type(field_type), allocatable :: fields(:)
       end function get_fields
 
-      !> What a source feels of the floor.
+      !> Mobility of the floor at the source.
       subroutine get_receiver(options, receiver, error)
          import :: error_type, floor_model_type, receiver_type
          implicit none (type, external)
          !> The options, checked.
          class(floor_model_type), intent(in) :: options
          type(receiver_type), intent(out) :: receiver
-         !> The receiver cannot be made.
+         !> Set if the receiver cannot be made.
          type(error_type), allocatable, intent(out) :: error
       end subroutine get_receiver
    end interface
 
 contains
 
-   !> Keys of the points, for rectangular floors.
+   !> Fields of the points, for rectangular floors.
    function get_point_fields(options) result(fields)
       class(floor_model_type), intent(in), target :: options
-      !> The keys: [2].
+      !> The fields: [2].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         list_field('point_x', options%point_x, 'm', 'positions of further points along the length', '[0, 1000]'), &
-         list_field('point_y', options%point_y, 'm', 'their positions along the width', '[0, 1000]')]
+         list_field('point_x', options%point_x, 'm', &
+         'positions along the length of points whose velocity is computed', '[0, 1000]'), &
+         list_field('point_y', options%point_y, 'm', 'positions of these points along the width', '[0, 1000]')]
    end function get_point_fields
 
-   !> Refuses points that are not there.
+   !> Checks that the points lie on the floor.
    subroutine check_points(options, group, error)
       class(floor_model_type), intent(in) :: options
-      !> Group of the options.
+      !> Namelist group, for messages.
       character(len=*), intent(in) :: group
-      !> Names the point.
+      !> Set if a point lacks a coordinate or does not lie on the floor.
       type(error_type), allocatable, intent(out) :: error
       type(receiver_type) :: transfer
       integer :: i
 
       if (options%point_x%count /= options%point_y%count) then
          error = input_error('&'//trim(group)//': point_x has '//to_text(options%point_x%count)//' values and point_y ' &
-            //to_text(options%point_y%count)//'; allowed: as many of both')
+            //to_text(options%point_y%count)//'; allowed: the same number of both')
          return
       end if
       do i = 1, options%point_x%count
@@ -92,49 +92,49 @@ contains
       end do
    end subroutine check_points
 
-   !> Refuses options that do not fit each other; by default all fit.
+   !> Checks options that depend on each other; by default, none do.
    subroutine check(options, error)
       !> The options, each inside its own range.
       class(floor_model_type), intent(in) :: options
-      !> Names group, key, value and what is allowed.
+      !> Set if they contradict each other; names group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
 
    end subroutine check
 
-   !> Velocity of another point over the force of the source, as a receiver; floors without extent refuse.
+   !> Transfer mobility from the source to another point; floors defined only at the source point return an error.
    subroutine get_transfer(options, x, y, transfer, error)
       class(floor_model_type), intent(in) :: options
-      !> Position of the point on the floor, m.
+      !> Coordinates of the point along length and width, m.
       real(wp), intent(in) :: x, y
       type(receiver_type), intent(out) :: transfer
-      !> The floor has no such point.
+      !> Set if the floor has no such point.
       type(error_type), allocatable, intent(out) :: error
 
       error = input_error('&floor: name: this floor has no points but that under the source; allowed: a rectangular one')
    end subroutine get_transfer
 
-   !> The plate that radiates into the room below, and the power that a force of unit mean square on the floor gives to
-   !> it, the mean over positions; floors that have none refuse.
+   !> The plate that radiates into the room below, and its conductance: the power into this plate per mean-square force,
+   !> averaged over force positions. Floors without such a plate return an error.
    subroutine get_radiator(options, frequency, plate, conductance, error)
       class(floor_model_type), intent(in) :: options
       !> Frequencies, Hz: [n].
       real(wp), intent(in) :: frequency(:)
       type(plate_type), intent(out) :: plate
-      !> The power over the mean square of the force, m/(N s): [n].
+      !> The conductance, m/(N s): [n].
       real(wp), intent(out) :: conductance(:)
-      !> The floor has no such plate.
+      !> Set if the floor has no such plate.
       type(error_type), allocatable, intent(out) :: error
 
       conductance = 0.0_wp
       error = input_error('&floor: name: this floor has no plate that radiates into a room; allowed: one that has')
    end subroutine get_radiator
 
-   !> Band in which the floor is what it claims to be; by default at all frequencies.
+   !> Frequency band in which the model of the floor is valid; by default all frequencies.
    subroutine get_validity(options, lowest, highest, reason)
       class(floor_model_type), intent(in) :: options
-      !> Ends of the band, Hz.
+      !> Lowest and highest valid frequency, Hz.
       real(wp), intent(out) :: lowest, highest
-      !> What ends it, as the end of a message.
+      !> Reason for the limits, as the end of a message.
       character(len=reason_length), intent(out) :: reason
 
       lowest = 0.0_wp

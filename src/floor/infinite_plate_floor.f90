@@ -1,4 +1,4 @@
-!> A thin infinite plate: a resistance, at every frequency and everywhere.
+!> A thin infinite plate: a resistance, the same at all frequencies and positions.
 module thud_infinite_plate_floor
    use thud_error, only: error_type
    use thud_field, only: field_type
@@ -13,7 +13,7 @@ module thud_infinite_plate_floor
 
    !> The floor; the default is 22 mm of chipboard.
    type, extends(floor_model_type) :: infinite_plate_floor_type
-      !> Force over velocity, 8 sqrt(B' m''), N s/m.
+      !> Force divided by velocity, 8 sqrt(B' m''), N s/m.
       real(wp) :: resistance = 1600.0_wp
    contains
       procedure, pass(options) :: get_fields
@@ -28,10 +28,10 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [real_field('resistance', options%resistance, 'N s/m', &
-         'force over velocity', '[1, 1e15]')]
+         'driving-point resistance: force divided by velocity', '[1, 1e15]')]
    end function get_fields
 
-   !> The mobility is the direct part alone.
+   !> The mobility has a direct part only.
    subroutine get_receiver(options, receiver, error)
       class(infinite_plate_floor_type), intent(in) :: options
       type(receiver_type), intent(out) :: receiver

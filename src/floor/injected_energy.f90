@@ -1,10 +1,10 @@
-!> Energy that a force gives to a receiver in frequency bands, by the motion and by the mobility: both are the integral
-!> over the band of 2 Re(F* V), by the velocity V that the floor had, and by V = Y F.
+!> Energy that a force injects into a receiver in frequency bands, by the motion and by the mobility: both integrate
+!> 2 Re(F* V) over the band, with the recorded velocity V of the floor or with V = Y F.
 !>
-!> The spectrum of a force of the duration D is a polynomial of degree 15 over a step of 1/(2 D), to 2e-15. The mobility is a
-!> sum of poles: those near the step are integrated with the polynomial in closed form, by Legendre functions of the second
-!> kind, all others by Gauss-Legendre quadrature, so that narrow resonances cost no more than wide ones. The floor keeps
-!> moving after the record: its velocity then is that of the receiver, whose transform is known in closed form.
+!> Over a step of 1/(2 D), D being the duration of the force, the spectrum of the force is a polynomial of degree 15, to
+!> 2e-15. The mobility is a sum of poles. Poles near the step are integrated with the polynomial in closed form, by Legendre
+!> functions of the second kind, all others by Gauss-Legendre quadrature, so that narrow resonances cost no more than wide
+!> ones. After the record, the floor moves freely; the transform of this motion is known in closed form.
 module thud_injected_energy
    use thud_band, only: band_type
    use thud_constants, only: pi
@@ -20,22 +20,22 @@ module thud_injected_energy
 
    public :: get_injected_energies, get_mean_conductances
 
-   !> Nodes of a step.
+   !> Quadrature nodes of a frequency step.
    integer, parameter :: n_node = 16
 
-   !> Sum of the distances of a near pole from both ends of the step, in halves of it, at most: with others the nodes err by
-   !> 3**(-32).
+   !> A pole is near if the sum of its distances from both ends of the step, divided by half the step, is at most this. For
+   !> other poles the quadrature errs by 3**(-32).
    real(wp), parameter :: near = 3 + 1.0_wp/3
 
-   !> Least rate of decay, 1/s: a pole on the axis has its peak on it.
+   !> Minimum decay rate, 1/s: an undamped pole has an infinite peak.
    real(wp), parameter :: min_decay = 1.0e-6_wp
 
-   !> Nodes and weights on [-1, 1], and what makes Legendre coefficients of values at the nodes.
+   !> Nodes and weights on [-1, 1], and the matrix that turns values at the nodes into Legendre coefficients.
    type :: rule_type
       real(wp) :: node(n_node), weight(n_node), coefficient(0:n_node - 1, n_node)
    end type rule_type
 
-   !> Force and velocity from first touch on, and the receiver with its motion when the force has ended.
+   !> Force and velocity from first touch on, and the receiver with its motion at the end of the force.
    type :: record_type
       !> Samples per second, Hz.
       real(wp) :: sample_rate = 1.0_wp
@@ -43,13 +43,13 @@ module thud_injected_energy
       real(wp), allocatable :: force(:), velocity(:)
       !> Direct part of the mobility, m/(N s).
       real(wp) :: direct = 0.0_wp
-      !> Poles, 1/s, with their conjugates; residues, m/(N s2); velocity of each when force and record end, m/s: [n_pole].
+      !> Poles, 1/s, with their conjugates; residues, m/(N s2); velocities at the ends of force and record, m/s: [n_pole].
       complex(wp), allocatable :: pole(:), residue(:), end_of_force(:), end_of_record(:)
    end type record_type
 
 contains
 
-   !> Energies in bands.
+   !> Energies injected in bands.
    subroutine get_injected_energies(receiver, force, velocity, sample_rate, bands, by_motion, by_mobility, error)
       type(receiver_type), intent(in) :: receiver
       !> Force on the floor, N, zero at the end; velocity of the floor, m/s: [n_sample].
@@ -60,7 +60,7 @@ contains
       type(band_type), intent(in) :: bands(:)
       !> Energy by the velocity, J; by the mobility, J: [n_band].
       real(wp), intent(out) :: by_motion(:), by_mobility(:)
-      !> An interrupt.
+      !> Set by an interrupt.
       type(error_type), allocatable, intent(out) :: error
       type(record_type) :: record
       type(rule_type) :: rule
@@ -86,12 +86,12 @@ contains
       end do
    end subroutine get_injected_energies
 
-   !> Means of the real part of the mobility over bands, in closed form.
+   !> Band averages of the real part of the mobility, in closed form.
    pure function get_mean_conductances(receiver, bands) result(conductance)
       type(receiver_type), intent(in) :: receiver
       !> The bands: [n_band].
       type(band_type), intent(in) :: bands(:)
-      !> The means, m/(N s): [n_band].
+      !> The averages, m/(N s): [n_band].
       real(wp) :: conductance(size(bands))
       complex(wp) :: ratio(2)
       integer :: i, k
@@ -124,7 +124,7 @@ contains
       end do
    end function new_rule
 
-   !> What a force and its floor do from first touch on.
+   !> Record of a force and of the motion of its floor, from first touch on.
    pure function new_record(receiver, force, velocity, sample_rate) result(record)
       type(receiver_type), intent(in) :: receiver
       !> The force, N, and the velocity of the floor, m/s: [n_sample].
@@ -150,7 +150,7 @@ contains
       allocate (pole(0), record%residue(0), record%end_of_force(0))
       if (allocated(receiver%pole)) then
          pole = cmplx(min(receiver%pole%re, -min_decay), receiver%pole%im, wp)
-         ! Half of a doubled residue belongs to the conjugate pole; of a real pole both halves are alike.
+         ! Half of a doubled residue belongs to the conjugate pole; both halves of a real residue are equal.
          record%residue = [receiver%residue, conjg(receiver%residue)]/2
          record%end_of_force = record%residue*[motion%amplitude, conjg(motion%amplitude)]
       end if
@@ -158,7 +158,7 @@ contains
       record%end_of_record = record%end_of_force*exp(record%pole*((size(force) - last)/sample_rate))
    end function new_record
 
-   !> Energies in a step of frequency.
+   !> Energies in a frequency step.
    pure function get_step_energies(record, rule, middle, half) result(energy)
       type(record_type), intent(in) :: record
       type(rule_type), intent(in) :: rule
@@ -166,18 +166,18 @@ contains
       real(wp), intent(in) :: middle, half
       !> By the motion and by the mobility, J: [2].
       real(wp) :: energy(2)
-      complex(wp), dimension(n_node) :: s, turn, last, force, velocity, mobility
+      complex(wp), dimension(n_node) :: s, phase_factor, last, force, velocity, mobility
       complex(wp), dimension(0:n_node - 1) :: by_force, by_square, second
       complex(wp) :: z, started
       integer :: k
 
       s = cmplx(0.0_wp, 2*pi*(middle + half*rule%node), wp)
-      turn = exp(-s/record%sample_rate)
+      phase_factor = exp(-s/record%sample_rate)
       associate (duration => (size(record%force) - 1)/record%sample_rate, &
                  record_time => (size(record%velocity) - 1)/record%sample_rate)
          last = exp(-s*record_time)
-         force = get_sums(record%force, turn)/record%sample_rate
-         velocity = get_recorded_velocity(record, s, turn, last)
+         force = get_sums(record%force, phase_factor)/record%sample_rate
+         velocity = get_recorded_velocity(record, s, phase_factor, last)
          mobility = record%direct
          by_force = matmul(rule%coefficient, conjg(force))
          by_square = matmul(rule%coefficient, abs(force)**2)
@@ -189,7 +189,7 @@ contains
                   mobility = mobility + residue/(s - pole)
                   velocity = velocity + record%end_of_record(k)*last/(s - pole)
                else
-                  ! As if the motion after the force had begun with the record; its pole is left, and what is too much.
+                  ! Motion after the record: a free decay since the start of the record (a pole) minus its recorded part.
                   started = record%end_of_force(k)*exp(-pole*duration)
                   velocity = velocity - started*record_time*get_phi_1((pole - s)*record_time)
                   call get_second_legendre(z, second)
@@ -202,24 +202,25 @@ contains
                                 sum(rule%weight*abs(force)**2*real(mobility, wp))]
    end function get_step_energies
 
-   !> Transform of the velocity up to the end of the record: the trapezoidal rule with the correction of its end.
-   pure function get_recorded_velocity(record, s, turn, last) result(velocity)
+   !> Transform of the velocity up to the end of the record, by the trapezoidal rule with end correction.
+   pure function get_recorded_velocity(record, s, phase_factor, last) result(velocity)
       type(record_type), intent(in) :: record
-      !> Frequencies i w, 1/s; exp(-s t) for a sample and for the record: [n_node].
-      complex(wp), intent(in) :: s(n_node), turn(n_node), last(n_node)
+      !> Frequencies i w, 1/s; exp(-s t) after one sample and after the record: [n_node].
+      complex(wp), intent(in) :: s(n_node), phase_factor(n_node), last(n_node)
       !> The transform, m: [n_node].
       complex(wp) :: velocity(n_node)
       real(wp) :: acceleration
 
       acceleration = real(sum(record%pole*record%end_of_record), wp)
       associate (final => record%velocity(size(record%velocity)), rate => record%sample_rate)
-         velocity = (get_sums(record%velocity, turn) - last*final/2)/rate - last*(acceleration - s*final)/(12*rate**2)
+         velocity = (get_sums(record%velocity, phase_factor) - last*final/2)/rate &
+            - last*(acceleration - s*final)/(12*rate**2)
       end associate
    end function get_recorded_velocity
 
    !> (exp z - 1)/z.
    pure elemental function get_phi_1(z) result(phi_1)
-      !> Argument, its real part not large.
+      !> Argument whose real part is not large.
       complex(wp), intent(in) :: z
       complex(wp) :: phi_1
       complex(wp) :: phi(0:1)
@@ -228,24 +229,24 @@ contains
       phi_1 = phi(1)
    end function get_phi_1
 
-   !> Sums of samples times powers of some numbers, by Horner's scheme.
-   pure function get_sums(sample, turn) result(total)
+   !> Sums of sample(i) phase_factor**(i - 1), by Horner's scheme.
+   pure function get_sums(sample, phase_factor) result(total)
       !> The samples: [n_sample].
       real(wp), intent(in) :: sample(:)
-      !> The numbers: [n_node].
-      complex(wp), intent(in) :: turn(n_node)
+      !> Phase factor of one sample: [n_node].
+      complex(wp), intent(in) :: phase_factor(n_node)
       !> The sums: [n_node].
       complex(wp) :: total(n_node)
-      real(wp), dimension(n_node) :: turn_re, turn_im, re, im, next
+      real(wp), dimension(n_node) :: factor_re, factor_im, re, im, next
       integer :: i
 
-      turn_re = turn%re
-      turn_im = turn%im
+      factor_re = phase_factor%re
+      factor_im = phase_factor%im
       re = 0.0_wp
       im = 0.0_wp
       do i = size(sample), 1, -1
-         next = re*turn_re - im*turn_im + sample(i)
-         im = re*turn_im + im*turn_re
+         next = re*factor_re - im*factor_im + sample(i)
+         im = re*factor_im + im*factor_re
          re = next
       end do
       total = cmplx(re, im, wp)

@@ -1,5 +1,4 @@
-!> A timber joist floor: sheathing on parallel joists, as an orthotropic plate with smeared joists, and the sheathing
-!> between two of them.
+!> A timber joist floor: an orthotropic plate of sheathing and smeared joists, and locally the sheathing between two joists.
 module thud_joist_floor
    use thud_constants, only: pi
    use thud_error, only: error_type
@@ -16,16 +15,16 @@ module thud_joist_floor
 
    public :: joist_floor_type
 
-   !> Static compliance of sheathing that runs over many rigid joists, in the middle between two, times B'/spacing**2. One
-   !> span alone has 0.01696 (Timoshenko and Woinowsky-Krieger), three 0.01130, five 0.01108, seven 0.01107.
+   !> Static compliance of sheathing over many rigid joists, midway between two of them, multiplied by B'/spacing**2. One
+   !> span alone has 0.01696 (Timoshenko and Woinowsky-Krieger), three spans 0.01130, five 0.01108, seven 0.01107.
    real(wp), parameter :: local_compliance = 0.01107_wp
 
-   !> Shear modulus of softwood over its modulus of elasticity (EN 338).
+   !> Ratio of the shear modulus of softwood to its modulus of elasticity (EN 338).
    real(wp), parameter :: shear_ratio = 1.0_wp/16
 
    !> The floor; the defaults are chipboard screwed to softwood joists.
    type, extends(rectangular_floor_type) :: joist_floor_type
-      !> Span of the joists and width across them, m.
+      !> Span of the joists, and width across them, m.
       real(wp) :: length = 4.0_wp, width = 5.0_wp
       !> Thickness of the sheathing, m; its density, kg/m3; its modulus of elasticity in bending, Pa.
       real(wp) :: sheathing_thickness = 0.022_wp, sheathing_density = 650.0_wp, sheathing_modulus = 3.0e9_wp
@@ -33,11 +32,11 @@ module thud_joist_floor
       real(wp) :: spacing = 0.4_wp
       !> Width and height of a joist, m; its density, kg/m3; its modulus of elasticity, Pa.
       real(wp) :: joist_width = 0.06_wp, joist_height = 0.22_wp, joist_density = 420.0_wp, joist_modulus = 1.1e10_wp
-      !> Share of the full composite action of sheathing and joists.
+      !> Fraction of the full composite action of sheathing and joists.
       real(wp) :: connection = 0.1_wp
-      !> Loss factor with that of the edges, without radiation.
+      !> Loss factor including that of the edges, without radiation.
       real(wp) :: loss_factor = 0.05_wp
-      !> What the source drops on: `sheathing` between two joists, or a `joist`.
+      !> Impact location: `sheathing` between two joists, or a `joist`.
       character(len=name_length) :: source_on = 'sheathing'
    contains
       procedure, pass(options) :: get_fields
@@ -61,15 +60,16 @@ contains
          real_field('sheathing_density', options%sheathing_density, 'kg/m3', 'density of the sheathing', '[10, 20000]'), &
          real_field('sheathing_modulus', options%sheathing_modulus, 'Pa', &
          'modulus of elasticity of the sheathing in bending', '[1e7, 1e12]'), &
-         real_field('spacing', options%spacing, 'm', 'distance between the axes of two joists', '(joist_width, width)'), &
+         real_field('spacing', options%spacing, 'm', &
+         'distance between the axes of adjacent joists', '(joist_width, width)'), &
          real_field('joist_width', options%joist_width, 'm', 'width of a joist', '[0.005, 1]'), &
          real_field('joist_height', options%joist_height, 'm', 'height of a joist', '[0.01, 2]'), &
          real_field('joist_density', options%joist_density, 'kg/m3', 'density of the joists', '[10, 20000]'), &
          real_field('joist_modulus', options%joist_modulus, 'Pa', 'modulus of elasticity of the joists', '[1e7, 1e12]'), &
          real_field('connection', options%connection, '', &
-         'composite action of sheathing and joists, from 0, loose, to 1, glued (EN 1995-1-1 annex B)', '[0, 1]'), &
+         'composite action of sheathing and joists, 0 (loose) to 1 (glued), EN 1995-1-1 annex B', '[0, 1]'), &
          real_field('loss_factor', options%loss_factor, '', &
-         'loss factor of the floor and its edges, without radiation', '(0, 1]'), &
+         'loss factor of the floor including its edges, without radiation', '(0, 1]'), &
          options%get_source_fields(), &
          choice_field('source_on', options%source_on, &
          'impact location: sheathing between joists, or a joist', [character(len=9) :: 'sheathing', 'joist']), &
@@ -88,8 +88,8 @@ contains
 
    !> The orthotropic plate with smeared joists, as thick as the sheathing.
    !>
-   !> Along the joists EI of the composite section over the spacing (EN 1995-1-1 annex B, equations B.1 to B.6), across them
-   !> the sheathing, H = B' of the sheathing + G J of a joist/(2 spacing) (Timoshenko and Woinowsky-Krieger).
+   !> The bending stiffness along the joists is EI of the composite section/spacing (EN 1995-1-1 annex B, equations B.1 to
+   !> B.6), across them B' of the sheathing; H = B' + G J of a joist/(2 spacing) (Timoshenko and Woinowsky-Krieger).
    pure function get_smeared(options) result(plate)
       class(joist_floor_type), intent(in) :: options
       type(plate_type) :: plate
@@ -112,7 +112,7 @@ contains
       plate%wave_speed = sqrt(12*sqrt(along*across)/mass)/plate%thickness
    end function get_smeared
 
-   !> Bending stiffness of the sheathing over width.
+   !> Bending stiffness of the sheathing per unit width.
    pure function get_sheathing_stiffness(options) result(stiffness)
       class(joist_floor_type), intent(in) :: options
       !> The stiffness, N m.
@@ -133,7 +133,7 @@ contains
       end associate
    end function get_torsion_constant
 
-   !> Band in which joists can be smeared.
+   !> Frequency band in which joists can be smeared.
    subroutine get_validity(options, lowest, highest, reason)
       class(joist_floor_type), intent(in) :: options
       real(wp), intent(out) :: lowest, highest
@@ -144,7 +144,7 @@ contains
       reason = 'half a bending wave of the sheathing is shorter than the spacing of the joists: the plate is not homogeneous'
    end subroutine get_validity
 
-   !> Frequency at which half a bending wave of the sheathing is as long as the distance between joists.
+   !> Frequency at which half a bending wavelength in the sheathing equals the distance between joists.
    pure function get_smeared_limit(options) result(frequency)
       class(joist_floor_type), intent(in) :: options
       !> The frequency, Hz.
@@ -154,10 +154,10 @@ contains
          *sqrt(get_sheathing_stiffness(options)/(options%sheathing_density*options%sheathing_thickness))
    end function get_smeared_limit
 
-   !> Velocity of a point over the force of the source: modes of the smeared plate, across the joists at most as many half
-   !> waves as there are bays. Under a source on the sheathing the residual modes are those of the sheathing between two
-   !> joists: its static compliance, and the conductance of the infinite sheathing at high frequencies. Elsewhere they are
-   !> those of the smeared plate.
+   !> Transfer mobility from the source to a point: modes of the smeared plate, with at most as many half waves across the
+   !> joists as there are bays. At a source on the sheathing, the residual modes are those of the sheathing between two
+   !> joists, with its static compliance and, at high frequencies, the conductance of the infinite sheathing. Elsewhere they
+   !> are those of the smeared plate.
    subroutine get_mobility_at(options, source, point, receiver, error)
       class(joist_floor_type), intent(in) :: options
       real(wp), intent(in) :: source(2), point(2)
@@ -192,16 +192,16 @@ contains
       compliance = local_compliance*options%spacing**2/get_sheathing_stiffness(options)
    end function get_local_compliance
 
-   !> Corner above which the sheathing between two joists is infinite, 0.8 times the limit of the smeared plate.
+   !> Corner frequency above which the sheathing acts as an infinite plate, 0.8 times the limit of the smeared plate.
    pure function get_local_corner(options) result(corner)
       class(joist_floor_type), intent(in) :: options
-      !> The corner, rad/s.
+      !> The corner frequency, rad/s.
       real(wp) :: corner
 
       corner = 1/(get_sheathing_resistance(options)*sqrt(2.0_wp)*get_local_compliance(options))
    end function get_local_corner
 
-   !> The smeared plate, with the power of the infinite plate and of the sheathing between joists.
+   !> The smeared plate; its conductance is that of the infinite plate plus, for a source on it, that of the sheathing.
    subroutine get_radiator(options, frequency, plate, conductance, error)
       class(joist_floor_type), intent(in) :: options
       real(wp), intent(in) :: frequency(:)

@@ -1,4 +1,4 @@
-!> A floor by its measured mobility, as a sum of poles that `thud.fit_mobility` or `thud-driver mobility` has fitted.
+!> A floor given by its measured mobility: a sum of poles fitted by `thud.fit_mobility` or `thud-driver mobility`.
 module thud_measured_mobility_floor
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error, numerical_error
@@ -18,11 +18,11 @@ module thud_measured_mobility_floor
    type, extends(floor_model_type) :: measured_mobility_floor_type
       !> Mobility at high frequencies, m/(N s).
       real(wp) :: direct = 0.0_wp
-      !> Frequencies of the poles, |p|/(2 pi), Hz, and their damping ratios, 1 of a real pole.
+      !> Frequencies of the poles, |p|/(2 pi), Hz, and their damping ratios, 1 for a real pole.
       type(list_type) :: pole_frequency, damping_ratio
-      !> Residues, those of pairs of poles doubled, m/(N s2).
+      !> Residues, doubled for pairs of poles, m/(N s2).
       type(list_type) :: residue_real, residue_imaginary
-      !> Band of the measurement, Hz.
+      !> First and last frequency of the measurement, Hz.
       real(wp) :: lowest_frequency = 10.0_wp, highest_frequency = 1000.0_wp
    contains
       procedure, pass(options) :: get_fields
@@ -39,20 +39,22 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('direct', options%direct, 'm/(N s)', 'mobility at high frequencies', '[0, 1000]'), &
-         list_field('pole_frequency', options%pole_frequency, 'Hz', 'magnitudes of the poles over 2 pi', '[1e-6, 1e7]'), &
-         list_field('damping_ratio', options%damping_ratio, '', 'damping ratios of the poles, 1 of a real pole', &
+         real_field('direct', options%direct, 'm/(N s)', 'limit of the mobility at high frequencies', '[0, 1000]'), &
+         list_field('pole_frequency', options%pole_frequency, 'Hz', &
+         'magnitudes of the poles divided by 2 pi', '[1e-6, 1e7]'), &
+         list_field('damping_ratio', options%damping_ratio, '', 'damping ratios of the poles; 1 for a real pole', &
          '[1e-12, 1]'), &
          list_field('residue_real', options%residue_real, 'm/(N s2)', &
-         'real parts of the residues, of a pair of poles doubled', '[-1e12, 1e12]'), &
-         list_field('residue_imaginary', options%residue_imaginary, 'm/(N s2)', 'imaginary parts of the residues', &
-         '[-1e12, 1e12]'), &
-         real_field('lowest_frequency', options%lowest_frequency, 'Hz', 'first frequency of the measurement', &
+         'real parts of the residues, doubled for a pair of poles', '[-1e12, 1e12]'), &
+         list_field('residue_imaginary', options%residue_imaginary, 'm/(N s2)', &
+         'imaginary parts of the residues, doubled for a pair of poles', '[-1e12, 1e12]'), &
+         real_field('lowest_frequency', options%lowest_frequency, 'Hz', 'lowest frequency of the measurement', &
          '(0, highest_frequency)'), &
-         real_field('highest_frequency', options%highest_frequency, 'Hz', 'last frequency of the measurement', '(0, 1e7]')]
+         real_field('highest_frequency', options%highest_frequency, 'Hz', &
+         'highest frequency of the measurement', '(0, 1e7]')]
    end function get_fields
 
-   !> Refuses lists that do not fit each other, and a mobility that is not passive.
+   !> Checks that the lists are equally long and the mobility is passive.
    subroutine check(options, error)
       class(measured_mobility_floor_type), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error
@@ -64,14 +66,14 @@ contains
             error = input_error('&measured_mobility: pole_frequency has '//to_text(n)//' values, damping_ratio ' &
                //to_text(options%damping_ratio%count)//', residue_real '//to_text(options%residue_real%count) &
                //' and residue_imaginary '//to_text(options%residue_imaginary%count) &
-               //'; allowed: as many of each, at least one')
+               //'; allowed: the same number of each, at least one')
          else
             call get_receiver(options, receiver, error)
          end if
       end associate
    end subroutine check
 
-   !> The receiver, if it is passive.
+   !> The receiver; an error if it is not passive.
    subroutine get_receiver(options, receiver, error)
       class(measured_mobility_floor_type), intent(in) :: options
       type(receiver_type), intent(out) :: receiver
@@ -91,7 +93,7 @@ contains
          receiver%residue = cmplx(options%residue_real%values(:n), options%residue_imaginary%values(:n), wp)
          where (.not. receiver%pole%im > 0.0_wp) receiver%residue = real(receiver%residue, wp)
       end associate
-      ! The test needs a constant part; this one is below rounding.
+      ! The test needs a positive direct part; this one is below rounding.
       regularization = rounding*(receiver%direct + sum(abs(receiver%residue/receiver%pole)))
       call find_violations(receiver%pole, receiver%residue, receiver%direct + regularization, omega, failed)
       if (failed) then
@@ -104,7 +106,7 @@ contains
       end if
    end subroutine get_receiver
 
-   !> Band of the measurement.
+   !> Frequency band of the measurement.
    subroutine get_validity(options, lowest, highest, reason)
       class(measured_mobility_floor_type), intent(in) :: options
       real(wp), intent(out) :: lowest, highest

@@ -1,4 +1,4 @@
-!> From a table of a measured mobility to the floor that has it: vector fit, then the smallest change that makes it passive.
+!> Fits a floor to a table of a measured mobility: vector fit, then the smallest change that makes the fit passive.
 module thud_mobility_fit
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error, numerical_error
@@ -15,26 +15,26 @@ module thud_mobility_fit
 
    public :: fit_mobility
 
-   !> Maximum number of frequency points: the time of a fit grows with it.
+   !> Maximum number of frequency points: the time of a fit grows with their number.
    integer, parameter :: max_points = 10000
 
-   !> Minimum magnitude, over the largest, whose relative error counts in full.
+   !> Errors are relative to the magnitude, or to this fraction of the largest magnitude if that is more.
    real(wp), parameter :: min_magnitude = 1.0e-6_wp
 
 contains
 
-   !> Fits poles to a mobility; errors count relative to its magnitude.
+   !> Fits poles to a mobility, with errors relative to its magnitude.
    subroutine fit_mobility(frequency, mobility, order, floor, free_error, error)
-      !> Frequencies, Hz, rising, above 0: [n_point].
+      !> Frequencies, Hz, ascending, above 0: [n_point].
       real(wp), intent(in) :: frequency(:)
       !> The mobility, m/(N s): [n_point].
       complex(wp), intent(in) :: mobility(:)
-      !> Number of poles, both of a pair counted.
+      !> Number of poles; a conjugate pair has two.
       integer, intent(in) :: order
       type(measured_mobility_floor_type), intent(out), target :: floor
-      !> Relative error before the fit was made passive, root of the mean square.
+      !> Relative root-mean-square error before the fit was made passive.
       real(wp), intent(out) :: free_error
-      !> There are too few frequency points or too many poles, a point is not allowed, or no passive floor was found.
+      !> Set if the table or the order is not allowed, no passive fit was found, or an interrupt came.
       type(error_type), allocatable, intent(out) :: error
       complex(wp), allocatable :: pole(:), residue(:)
       real(wp) :: weight(size(mobility))
@@ -72,15 +72,15 @@ contains
       end if
    end subroutine fit_mobility
 
-   !> Refuses tables that cannot be fitted.
+   !> Checks that a table can be fitted.
    subroutine check_table(frequency, mobility, order, max_poles, error)
       !> As in `fit_mobility`: [n_point].
       real(wp), intent(in) :: frequency(:)
       complex(wp), intent(in) :: mobility(:)
       integer, intent(in) :: order
-      !> Length of a list.
+      !> Maximum number of poles.
       integer, intent(in) :: max_poles
-      !> Names the point, or what is allowed.
+      !> Set if the order, the number of points or a point is not allowed.
       type(error_type), allocatable, intent(out) :: error
       integer :: i
 
@@ -102,7 +102,7 @@ contains
                return
             end if
          end do
-         ! In the mean a passive structure takes power.
+         ! On average, a passive structure absorbs power.
          if (.not. sum(real(mobility)) > 0.0_wp) error = input_error('the mobility: the mean of its real part is ' &
             //to_text(sum(real(mobility))/n)//' m/(N s); allowed: above 0, force and response in one direction at one point')
       end associate

@@ -1,4 +1,4 @@
-!> Receivers made of modes, and of residual modes.
+!> Receivers made of modes and residual modes.
 module thud_modal_receiver
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
@@ -12,23 +12,23 @@ module thud_modal_receiver
 
 contains
 
-   !> Sum of modes, gain s/(s**2 + eta omega s + omega**2), and of residual modes.
+   !> Sum of modes, gain s/(s**2 + eta omega s + omega**2), and residual modes.
    !>
-   !> The loss factor of a mode is that of a dashpot at its frequency. Residual modes have a compliance C at low frequencies
-   !> and the conductance G = sqrt(2) C w at those above a corner w: G (s**2 + w s/sqrt(2))/(s**2 + sqrt(2) w s + w**2).
-   !> This is passive and takes hardly any power below the corner: with x = omega/w its real part is G x**4/(1 + x**4), its
-   !> imaginary part omega C (1 + x**2)/(1 + x**4).
+   !> Modes have viscous damping, with the given loss factor at their frequency. Residual modes have a compliance C at low
+   !> frequencies and, above a corner frequency w, the conductance G = sqrt(2) C w:
+   !> G (s**2 + w s/sqrt(2))/(s**2 + sqrt(2) w s + w**2). This is passive and absorbs hardly any power below the corner: with
+   !> x = omega/w its real part is G x**4/(1 + x**4), its imaginary part omega C (1 + x**2)/(1 + x**4).
    subroutine new_modal_receiver(group, gain, omega, loss_factor, residual, receiver, error)
-      !> Group of the keys, for messages.
+      !> Namelist group, for messages.
       character(len=*), intent(in) :: group
-      !> Products of the mode's shape at source and point over its modal mass, 1/kg: [n].
+      !> Product of the mode shapes at source and point, divided by the modal mass, 1/kg: [n].
       real(wp), intent(in) :: gain(:)
       !> Angular frequencies, rad/s, and loss factors: [n].
       real(wp), intent(in) :: omega(:), loss_factor(:)
-      !> Compliance, m/N, and corner, rad/s, of the residual modes: [2].
+      !> Compliance, m/N, and corner frequency, rad/s, of the residual modes: [2].
       real(wp), intent(in) :: residual(2)
       type(receiver_type), intent(out) :: receiver
-      !> A mode is overdamped: its loss factor is 2 or more.
+      !> Set if a mode is overdamped: its loss factor is 2 or more.
       type(error_type), allocatable, intent(out) :: error
       complex(wp) :: pole
       integer :: i, n
@@ -48,8 +48,8 @@ contains
          receiver%pole(i) = pole
          receiver%residue(i) = gain(i)*cmplx(1.0_wp, -pole%re/pole%im, wp)
       end do
-      ! Without G the quotient is -G (w s/sqrt(2) + w**2)/(s**2 + ...): at its pole w (i - 1)/sqrt(2), doubled, -G w (1 - i)/
-      ! sqrt(2).
+      ! Minus the direct part G, the quotient is -G (w s/sqrt(2) + w**2)/(s**2 + ...). Its doubled residue at the pole
+      ! w (i - 1)/sqrt(2) is -G w (1 - i)/sqrt(2).
       associate (compliance => residual(1), corner => residual(2))
          receiver%direct = sqrt(2.0_wp)*compliance*corner
          receiver%pole(n + 1) = corner*cmplx(-1.0_wp, 1.0_wp, wp)/sqrt(2.0_wp)

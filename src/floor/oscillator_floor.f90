@@ -11,8 +11,8 @@ module thud_oscillator_floor
 
    public :: oscillator_floor_type
 
-   !> Half the distance of the poles over their mean, below which damping counts as critical and they are held so far
-   !> apart: the mobility changes by its square, and as much cancels in the sum over both.
+   !> Minimum half distance of the poles, divided by their mean: near critical damping they are set this far apart. The
+   !> mobility changes by the square of this; cancellation in the sum of both poles has an error of the same size.
    real(wp), parameter :: apart = 6.0e-6_wp
 
    !> The floor; the default resonates at 25 Hz with a loss factor of 0.05.
@@ -36,9 +36,9 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('mass', options%mass, 'kg', 'mass that moves under the source', '[1e-3, 1e12]'), &
-         real_field('stiffness', options%stiffness, 'N/m', 'stiffness of its support', '[0, 1e15]'), &
-         real_field('damping', options%damping, 'N s/m', 'damping of its support', '[0, 1e12]')]
+         real_field('mass', options%mass, 'kg', 'moving mass under the source', '[1e-3, 1e12]'), &
+         real_field('stiffness', options%stiffness, 'N/m', 'stiffness of the support', '[0, 1e15]'), &
+         real_field('damping', options%damping, 'N s/m', 'damping coefficient of the support', '[0, 1e12]')]
    end function get_fields
 
    !> Y = s/(m s**2 + c s + k) with the poles -c/(2 m) +- sqrt(c**2/(4 m**2) - k/m).
@@ -56,7 +56,7 @@ contains
          receiver%residue = [cmplx(1/options%mass, kind=wp)]
       else if (square > (apart*decay)**2) then
          fast = -decay - sqrt(square)
-         ! By the product of the poles: their sum would cancel.
+         ! From the product of the poles, because their sum would cancel.
          slow = options%stiffness/(options%mass*fast)
          receiver%pole = cmplx([fast, slow], kind=wp)
          receiver%residue = cmplx([fast, -slow]/(options%mass*(fast - slow)), kind=wp)

@@ -1,5 +1,4 @@
-!> A homogeneous rectangular floor, isotropic or orthotropic: the mobility of the infinite plate, radiation and losses
-!> after ISO 12354-1.
+!> A homogeneous rectangular plate, isotropic or orthotropic: resistance if infinite, radiation and losses (ISO 12354-1).
 module thud_plate
    use thud_constants, only: pi
    use thud_field, only: field_type, name_length
@@ -12,10 +11,10 @@ module thud_plate
    public :: get_plate_radiation, get_radiation_factor, get_resistance, get_surface_mass, get_thin_limit
    public :: get_total_loss, plate_type
 
-   !> Directions of the waves of an orthotropic plate; as many leave 2 % of the mean of their radiation factors.
+   !> Number of wave directions of an orthotropic plate; the mean of their radiation factors errs by 2 %.
    integer, parameter :: n_direction = 64
 
-   !> Air of the rooms.
+   !> Air in the rooms.
    type :: air_type
       !> Density, kg/m3.
       real(wp) :: density = 1.2_wp
@@ -23,26 +22,26 @@ module thud_plate
       real(wp) :: sound_speed = 343.0_wp
    end type air_type
 
-   !> A floor; the defaults are a concrete floor in a laboratory.
+   !> A plate; the defaults are a concrete floor in a laboratory.
    type :: plate_type
-      !> Sides, m.
+      !> Length and width, m.
       real(wp) :: length = 5.0_wp, width = 4.0_wp
       !> Thickness, m.
       real(wp) :: thickness = 0.18_wp
       !> Density, kg/m3.
       real(wp) :: density = 2300.0_wp
-      !> Speed of longitudinal waves in the plate, m/s; of an orthotropic plate that of the geometric mean of both
-      !> bending stiffnesses.
+      !> Speed of longitudinal waves in the plate, m/s; for an orthotropic plate, the speed that belongs to the geometric
+      !> mean of both bending stiffnesses.
       real(wp) :: wave_speed = 3500.0_wp
-      !> Bending stiffness along the width over that along the length.
+      !> Ratio of the bending stiffness along the width to that along the length.
       real(wp) :: stiffness_ratio = 1.0_wp
-      !> Twisting stiffness H over the geometric mean of both bending stiffnesses.
+      !> Ratio of the twisting stiffness H to the geometric mean of both bending stiffnesses.
       real(wp) :: torsion_ratio = 1.0_wp
       !> Internal loss factor.
       real(wp) :: loss_factor = 0.005_wp
-      !> Losses at the edges: `laboratory`, or by their `absorption`.
+      !> Losses at the edges: `laboratory`, or `absorption` for given absorption coefficients.
       character(len=name_length) :: edges = 'laboratory'
-      !> Sum of the edges' lengths times their absorption coefficients, m.
+      !> Sum over the edges of length times absorption coefficient, m.
       real(wp) :: edge_absorption = 0.0_wp
    end type plate_type
 
@@ -62,17 +61,17 @@ contains
          real_field('density', plate%density, 'kg/m3', 'density of the floor', '[10, 20000]'), &
          real_field('wave_speed', plate%wave_speed, 'm/s', 'speed of longitudinal waves in the floor', '[100, 10000]'), &
          real_field('stiffness_ratio', plate%stiffness_ratio, '', &
-         'bending stiffness along the width over that along the length', '[0.0001, 10000]'), &
+         'ratio of the bending stiffness along the width to that along the length', '[0.0001, 10000]'), &
          real_field('torsion_ratio', plate%torsion_ratio, '', &
-         'twisting stiffness over the geometric mean of both bending stiffnesses', '[0, 1]'), &
+         'ratio of the twisting stiffness to the geometric mean of both bending stiffnesses', '[0, 1]'), &
          real_field('loss_factor', plate%loss_factor, '', 'internal loss factor of the floor', '[0, 1]'), &
          choice_field('edges', plate%edges, 'losses at the edges of the floor', &
          [character(len=10) :: 'laboratory', 'absorption']), &
          real_field('edge_absorption', plate%edge_absorption, 'm', &
-         'sum of lengths times absorption coefficients of the edges, of absorption', '[0, 1000]')]
+         'sum of edge lengths times absorption coefficients, for absorption', '[0, 1000]')]
    end function get_plate_fields
 
-   !> Mass per area.
+   !> Mass per unit area.
    elemental function get_surface_mass(plate) result(mass)
       type(plate_type), intent(in) :: plate
       !> The mass, kg/m2.
@@ -81,7 +80,7 @@ contains
       mass = plate%density*plate%thickness
    end function get_surface_mass
 
-   !> Bending stiffness over width, B' = m'' c_L**2 h**2/12, the geometric mean of both directions.
+   !> Bending stiffness per unit width, B' = m'' c_L**2 h**2/12, the geometric mean of both directions.
    elemental function get_bending_stiffness(plate) result(stiffness)
       type(plate_type), intent(in) :: plate
       !> The stiffness, N m.
@@ -90,7 +89,7 @@ contains
       stiffness = get_surface_mass(plate)*(plate%wave_speed*plate%thickness)**2/12
    end function get_bending_stiffness
 
-   !> Resistance of the infinite plate, 8 sqrt(B' m''), of an orthotropic one times a mean of its directions.
+   !> Resistance of the infinite plate, 8 sqrt(B' m'') M with a mean M over the directions.
    elemental function get_resistance(plate) result(resistance)
       type(plate_type), intent(in) :: plate
       !> The resistance, N s/m.
@@ -99,7 +98,7 @@ contains
       resistance = 8*sqrt(get_bending_stiffness(plate)*get_surface_mass(plate))*get_directional_mean(plate%torsion_ratio)
    end function get_resistance
 
-   !> Mean M of the directions of an orthotropic plate: Z = 8 sqrt(B' m'') M, and its modes are 1/M times as dense.
+   !> Mean M over the directions of an orthotropic plate: Z = 8 sqrt(B' m'') M, mode density S/2 sqrt(m''/B')/M.
    !>
    !> 1/Z = 1/(4 pi sqrt(m'')) integral over 0 to pi/2 of (Bx cos**4 + 2 H cos**2 sin**2 + By sin**4)**(-1/2), a complete
    !> elliptic integral: M = agm(1, sqrt((1 + H/sqrt(Bx By))/2)).
@@ -112,7 +111,7 @@ contains
 
       mean = 1.0_wp
       geometric = sqrt((1 + torsion_ratio)/2)
-      ! From 0.7 on four steps leave rounding.
+      ! The start is at least 0.7: four steps converge to rounding.
       do i = 1, 4
          next = (mean + geometric)/2
          geometric = sqrt(mean*geometric)
@@ -130,8 +129,8 @@ contains
       frequency = air%sound_speed**2/(2*pi)*sqrt(get_surface_mass(plate)/get_bending_stiffness(plate))
    end function get_critical_frequency
 
-   !> Frequency at which bending waves are six thicknesses long: above, the theory of thin plates is off by more than a
-   !> tenth in their speed (Cremer, Heckl and Petersson, *Structure-Borne Sound*). The stiffer direction counts.
+   !> Frequency at which bending waves are six thicknesses long. Above it, the wave speed of thin-plate theory errs by more
+   !> than a tenth (Cremer, Heckl and Petersson, *Structure-Borne Sound*). The stiffer direction decides.
    elemental function get_thin_limit(plate) result(frequency)
       type(plate_type), intent(in) :: plate
       !> The frequency, Hz.
@@ -142,7 +141,7 @@ contains
       frequency = (2*pi/(6*plate%thickness))**2*sqrt(stiffness/get_surface_mass(plate))/(2*pi)
    end function get_thin_limit
 
-   !> Bending modes per hertz, S/2 sqrt(m''/B').
+   !> Bending modes per hertz, S/2 sqrt(m''/B')/M.
    elemental function get_mode_density(plate) result(density)
       type(plate_type), intent(in) :: plate
       !> Modes per hertz, s.
@@ -186,11 +185,12 @@ contains
       end associate
    end function get_radiation_factor
 
-   !> Radiation factor of a plate, the mean over its free waves.
+   !> Radiation factor of a plate, averaged over its free waves.
    !>
-   !> Along each direction the plate radiates as the isotropic one of the stiffness Bx cos**4 + 2 H cos**2 sin**2 +
-   !> By sin**4. All modes have the same energy, and the modes per angle go with one over the root of that stiffness. With
-   !> tan(theta) = (Bx/By)**(1/4) tan(phi) this is (cos**4 + 2 H/B' cos**2 sin**2 + sin**4)**(-1/2) per phi, which is smooth.
+   !> In each direction the plate radiates like the isotropic plate with the stiffness
+   !> Bx cos**4 + 2 H cos**2 sin**2 + By sin**4. All modes have the same energy, and the number of modes per angle is
+   !> proportional to 1/sqrt(stiffness). With tan(theta) = (Bx/By)**(1/4) tan(phi) this number is
+   !> (cos**4 + 2 H/B' cos**2 sin**2 + sin**4)**(-1/2) per phi, which is smooth.
    elemental function get_plate_radiation(plate, air, frequency) result(sigma)
       type(plate_type), intent(in) :: plate
       type(air_type), intent(in) :: air
@@ -226,7 +226,7 @@ contains
       real(wp) :: sigma
 
       if (plate%edges == 'laboratory') then
-         ! Radiation is part of it.
+         ! The laboratory loss includes radiation.
          loss_factor = plate%loss_factor + get_surface_mass(plate)/(485*sqrt(frequency))
          return
       end if

@@ -1,4 +1,4 @@
-!> A homogeneous rectangular plate over the room below, simply supported.
+!> A homogeneous, simply supported rectangular plate above the room.
 module thud_plate_floor
    use thud_error, only: error_type
    use thud_field, only: field_type, key_length
@@ -42,7 +42,7 @@ contains
       plates = [options%plate]
    end subroutine get_plates
 
-   !> Velocity of a point over the force of the source.
+   !> Transfer mobility from the source to a point.
    subroutine get_mobility_at(options, source, point, receiver, error)
       class(plate_floor_type), intent(in) :: options
       real(wp), intent(in) :: source(2), point(2)
@@ -52,7 +52,7 @@ contains
       call new_plate_receiver('plate', options%plate, source, point, receiver, error)
    end subroutine get_mobility_at
 
-   !> The plate itself; of a finite one the conductance of the infinite one is the mean over positions.
+   !> The plate itself; its conductance, averaged over positions, is that of the infinite plate.
    subroutine get_radiator(options, frequency, plate, conductance, error)
       class(plate_floor_type), intent(in) :: options
       real(wp), intent(in) :: frequency(:)

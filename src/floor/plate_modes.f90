@@ -1,4 +1,4 @@
-!> Modes of simply supported rectangular plates, sin(m pi x/l) sin(n pi y/b), and the receivers that plates are.
+!> Modes of simply supported rectangular plates, sin(m pi x/l) sin(n pi y/b), and the receivers of such plates.
 module thud_plate_modes
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
@@ -13,28 +13,29 @@ module thud_plate_modes
 
    public :: check_mode_count, get_far_compliance, get_half_waves, get_modal_stiffness, get_shape, new_plate_receiver
 
-   !> Modes up to this frequency count one by one, Hz. Those above act by their static compliance. In the mean, at a
-   !> frequency f that misses 0.3 (f/limit)**3 of the mobility of the infinite plate: 0.4 % at 707 Hz.
+   !> Modes up to this frequency are treated individually, Hz; higher modes add their static compliance. On average, this
+   !> omits 0.3 (f/mode_limit)**3 of the mobility of the infinite plate at a frequency f: 0.4 % at 707 Hz.
    real(wp), parameter, public :: mode_limit = 3000.0_wp
 
-   !> Modes up to this many times the limit make the static compliance; that of the others is their mean.
-   real(wp), parameter, public :: far = 16.0_wp
+   !> Static compliance: sum of the modes up to this many times `mode_limit`, plus the mean compliance of the modes above.
+   real(wp), parameter, public :: sum_limit_factor = 16.0_wp
 
-   !> Corner of the residual modes, rad/s: in the mean over positions residual n(omega) modes with 1/(m'' S omega**2) each
-   !> have the compliance 2/(pi Z 2 pi limit); with this corner its conductance is 1/Z.
+   !> Corner frequency of the residual modes, rad/s. With the mode density n(omega) and the compliance 1/(m'' S omega**2) of
+   !> each (S: area), they have the compliance 2/(pi Z 2 pi mode_limit), averaged over positions (Z: resistance of the
+   !> infinite plate). With this corner, their conductance at high frequencies is 1/Z.
    real(wp), parameter, public :: residual_corner = pi/(2*sqrt(2.0_wp))*2*pi*mode_limit
 
-   !> Maximum number of modes below the limit: a drop takes time in proportion.
+   !> Maximum number of modes below `mode_limit`: the time for a drop is proportional to it.
    real(wp), parameter :: max_modes = 20000.0_wp
 
 contains
 
-   !> Refuses a plate with too many modes.
+   !> Checks the number of modes of a plate.
    subroutine check_mode_count(group, plate, error)
-      !> Group of the keys.
+      !> Namelist group, for messages.
       character(len=*), intent(in) :: group
       type(plate_type), intent(in) :: plate
-      !> Names the size.
+      !> Set if there are too many; names length and width.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: count
 
@@ -44,53 +45,54 @@ contains
          //' Hz; allowed: up to '//fixed(max_modes, 0))
    end subroutine check_mode_count
 
-   !> Half waves along length and width of the modes below a frequency.
+   !> Half waves of the modes below a frequency.
    pure subroutine get_half_waves(plate, frequency, m, n)
       type(plate_type), intent(in) :: plate
       !> The frequency, Hz.
       real(wp), intent(in) :: frequency
       !> Half waves along length and width: [n_mode].
       integer, allocatable, intent(out) :: m(:), n(:)
-      real(wp) :: limit
-      integer :: i, j, last, count
+      real(wp) :: max_stiffness
+      integer :: pass, j, last, count
 
-      limit = get_surface_mass(plate)*(2*pi*frequency)**2
-      do i = 1, 2
+      max_stiffness = get_surface_mass(plate)*(2*pi*frequency)**2
+      ! The first pass counts the modes, the second stores them.
+      do pass = 1, 2
          count = 0
          j = 1
          do
-            last = get_last(plate, limit, j)
+            last = get_last(plate, max_stiffness, j)
             if (last < 1) exit
-            if (i == 2) then
+            if (pass == 2) then
                m(count + 1:count + last) = j
                n(count + 1:count + last) = counting(last)
             end if
             count = count + last
             j = j + 1
          end do
-         if (i == 1) allocate (m(count), n(count))
+         if (pass == 1) allocate (m(count), n(count))
       end do
    end subroutine get_half_waves
 
-   !> Last number of half waves along the width below a modal stiffness.
-   pure function get_last(plate, limit, m) result(n)
+   !> Largest number of half waves along the width up to a modal stiffness.
+   pure function get_last(plate, max_stiffness, m) result(n)
       type(plate_type), intent(in) :: plate
-      !> The stiffness over area, N/m3.
-      real(wp), intent(in) :: limit
-      !> Half waves along the length.
+      !> Maximum modal stiffness per unit area, N/m3.
+      real(wp), intent(in) :: max_stiffness
+      !> Number of half waves along the length.
       integer, intent(in) :: m
-      !> 0 where there is none.
+      !> The number; 0 if there is none.
       integer :: n
-      real(wp) :: along, across, square
+      real(wp) :: quadratic, half_linear, remainder, ky_squared
 
-      ! Bx kx**4 + 2 H kx**2 ky**2 + By ky**4 = limit is quadratic in ky**2.
-      across = get_bending_stiffness(plate)*sqrt(plate%stiffness_ratio)
-      along = get_bending_stiffness(plate)*(m*pi/plate%length)**2
-      square = limit - get_modal_stiffness(plate, m, 0)
+      ! Bx kx**4 + 2 H kx**2 ky**2 + By ky**4 = max_stiffness is quadratic in ky**2.
+      quadratic = get_bending_stiffness(plate)*sqrt(plate%stiffness_ratio)
+      half_linear = get_bending_stiffness(plate)*(m*pi/plate%length)**2*plate%torsion_ratio
+      remainder = max_stiffness - get_modal_stiffness(plate, m, 0)
       n = 0
-      if (square < 0.0_wp) return
-      square = square/(along*plate%torsion_ratio + sqrt((along*plate%torsion_ratio)**2 + across*square))
-      n = int(sqrt(square)*plate%width/pi)
+      if (remainder < 0.0_wp) return
+      ky_squared = remainder/(half_linear + sqrt(half_linear**2 + quadratic*remainder))
+      n = int(sqrt(ky_squared)*plate%width/pi)
    end function get_last
 
    !> 1, 2, ..., n.
@@ -104,7 +106,7 @@ contains
       end do
    end function counting
 
-   !> Stiffness of a mode over area, Bx kx**4 + 2 H kx**2 ky**2 + By ky**4: omega**2 = stiffness/m''.
+   !> Modal stiffness per unit area, Bx kx**4 + 2 H kx**2 ky**2 + By ky**4: omega**2 = stiffness/m''.
    elemental function get_modal_stiffness(plate, m, n) result(stiffness)
       type(plate_type), intent(in) :: plate
       !> Half waves along length and width.
@@ -112,71 +114,71 @@ contains
       !> The stiffness, N/m3.
       real(wp) :: stiffness
 
-      associate (x => (m*pi/plate%length)**2, y => (n*pi/plate%width)**2, ratio => sqrt(plate%stiffness_ratio))
-         stiffness = get_bending_stiffness(plate)*(x**2/ratio + 2*plate%torsion_ratio*x*y + ratio*y**2)
+      associate (kx2 => (m*pi/plate%length)**2, ky2 => (n*pi/plate%width)**2, root_ratio => sqrt(plate%stiffness_ratio))
+         stiffness = get_bending_stiffness(plate)*(kx2**2/root_ratio + 2*plate%torsion_ratio*kx2*ky2 + root_ratio*ky2**2)
       end associate
    end function get_modal_stiffness
 
-   !> Shapes of modes at a point.
+   !> Mode shapes at a point.
    pure function get_shape(m, n, point) result(shape)
       !> Half waves along length and width: [n_mode].
       integer, intent(in) :: m(:), n(:)
-      !> The point, over length and width.
+      !> Position of the point, as fractions of length and width.
       real(wp), intent(in) :: point(2)
       !> The shapes: [n_mode].
       real(wp) :: shape(size(m))
-      real(wp) :: along(maxval([m, 0])), across(maxval([n, 0]))
+      real(wp) :: sine_x(maxval([m, 0])), sine_y(maxval([n, 0]))
 
-      along = sin(pi*point(1)*counting(size(along)))
-      across = sin(pi*point(2)*counting(size(across)))
-      shape = along(m)*across(n)
+      sine_x = sin(pi*point(1)*counting(size(sine_x)))
+      sine_y = sin(pi*point(2)*counting(size(sine_y)))
+      shape = sine_x(m)*sine_y(n)
    end function get_shape
 
-   !> Velocity of a point of a plate over the force at another. Modes above the limit are residual modes.
+   !> Transfer mobility from a source to a point of a plate. Modes above `mode_limit` are residual modes.
    subroutine new_plate_receiver(group, plate, source, point, receiver, error, max_across, residual)
-      !> Group of the plate's keys, for messages.
+      !> Namelist group, for messages.
       character(len=*), intent(in) :: group
       type(plate_type), intent(in) :: plate
-      !> Positions of source and point, over length and width: [2].
+      !> Positions of source and point, as fractions of length and width: [2].
       real(wp), intent(in) :: source(2), point(2)
       type(receiver_type), intent(out) :: receiver
-      !> The losses are too high.
+      !> Set if the losses are too high.
       type(error_type), allocatable, intent(out) :: error
-      !> Maximum number of half waves along the width (default: any).
+      !> Maximum number of half waves along the width (default: no maximum).
       integer, intent(in), optional :: max_across
-      !> Compliance, m/N, and corner, rad/s, of the residual modes (default: those of the plate): [2].
+      !> Compliance, m/N, and corner frequency, rad/s, of the residual modes (default: those of the plate): [2].
       real(wp), intent(in), optional :: residual(2)
       integer, allocatable :: m(:), n(:)
       real(wp), allocatable :: omega(:), gain(:)
-      logical, allocatable :: single(:)
-      real(wp) :: rest(2)
+      logical, allocatable :: individual(:)
+      real(wp) :: residual_terms(2)
 
-      call get_half_waves(plate, far*mode_limit, m, n)
+      call get_half_waves(plate, sum_limit_factor*mode_limit, m, n)
       if (present(max_across)) then
          m = pack(m, n <= max_across)
          n = pack(n, n <= max_across)
       end if
       omega = sqrt(get_modal_stiffness(plate, m, n)/get_surface_mass(plate))
-      single = omega < 2*pi*mode_limit
+      individual = omega < 2*pi*mode_limit
       gain = 4/(get_surface_mass(plate)*plate%length*plate%width)*get_shape(m, n, source)*get_shape(m, n, point)
-      rest = [sum(gain/omega**2, mask=.not. single), residual_corner]
-      ! Modes farther off cancel but under the source.
-      if (.not. present(max_across) .and. all(abs(source - point) < epsilon(1.0_wp))) rest(1) = rest(1) &
-         + get_far_compliance(plate)
-      if (present(residual)) rest = residual
-      associate (omega => pack(omega, single))
-         call new_modal_receiver(group, pack(gain, single), omega, get_total_loss(plate, air_type(), omega/(2*pi)), rest, &
-            receiver, error)
+      residual_terms = [sum(gain/omega**2, mask=.not. individual), residual_corner]
+      ! The modes that are not summed cancel on average, except at the source.
+      if (.not. present(max_across) .and. all(abs(source - point) < epsilon(1.0_wp))) &
+         residual_terms(1) = residual_terms(1) + get_far_compliance(plate)
+      if (present(residual)) residual_terms = residual
+      associate (omega => pack(omega, individual))
+         call new_modal_receiver(group, pack(gain, individual), omega, get_total_loss(plate, air_type(), omega/(2*pi)), &
+            residual_terms, receiver, error)
       end associate
    end subroutine new_plate_receiver
 
-   !> Static compliance of the modes that are too far off to be summed, the mean over positions.
+   !> Static compliance of the modes above the summed ones, averaged over positions.
    elemental function get_far_compliance(plate) result(compliance)
       type(plate_type), intent(in) :: plate
       !> The compliance, m/N.
       real(wp) :: compliance
 
-      compliance = 2/(pi*get_resistance(plate)*2*pi*mode_limit*far)
+      compliance = 2/(pi*get_resistance(plate)*2*pi*mode_limit*sum_limit_factor)
    end function get_far_compliance
 
 end module thud_plate_modes

@@ -1,4 +1,4 @@
-!> A floor of rectangular plates, the source on the upper one: the keys, checks and receivers that such floors share.
+!> A floor of rectangular plates with the source on the upper plate: keys, checks and receivers that such floors share.
 module thud_rectangular_floor
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, key_length
@@ -14,7 +14,7 @@ module thud_rectangular_floor
 
    public :: rectangular_floor_type
 
-   !> The floor; all plates have the same sides.
+   !> The floor; all plates have the same length and width.
    type, abstract, extends(floor_model_type) :: rectangular_floor_type
       !> Relative position of the source along length and width.
       real(wp) :: source_x = 0.5_wp, source_y = 0.5_wp
@@ -34,31 +34,31 @@ module thud_rectangular_floor
          import :: key_length, plate_type, rectangular_floor_type
          implicit none (type, external)
          class(rectangular_floor_type), intent(in) :: options
-         !> Group of their keys.
+         !> Namelist group of the plates.
          character(len=key_length), intent(out) :: group
          !> The plates: [n_plate].
          type(plate_type), allocatable, intent(out) :: plates(:)
       end subroutine get_plates
 
-      !> Velocity of a point of the upper plate over the force of the source.
+      !> Transfer mobility from a source to a point of the upper plate.
       subroutine get_mobility_at(options, source, point, receiver, error)
          import :: error_type, receiver_type, rectangular_floor_type, wp
          implicit none (type, external)
          class(rectangular_floor_type), intent(in) :: options
-         !> Positions of source and point, over length and width: [2].
+         !> Positions of source and point, as fractions of length and width: [2].
          real(wp), intent(in) :: source(2), point(2)
          type(receiver_type), intent(out) :: receiver
-         !> The losses are too high.
+         !> Set if the losses are too high.
          type(error_type), allocatable, intent(out) :: error
       end subroutine get_mobility_at
    end interface
 
 contains
 
-   !> Keys of the position of the source.
+   !> Fields of the position of the source.
    function get_source_fields(options) result(fields)
       class(rectangular_floor_type), intent(in), target :: options
-      !> The keys: [2].
+      !> The fields: [2].
       type(field_type) :: fields(2)
 
       fields = [ &
@@ -66,7 +66,7 @@ contains
          real_field('source_y', options%source_y, '', 'relative source position along the width', '(0, 1)')]
    end function get_source_fields
 
-   !> Refuses plates with too many modes.
+   !> Checks the number of modes of the plates.
    subroutine check(options, error)
       class(rectangular_floor_type), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error
@@ -80,7 +80,7 @@ contains
       end do
    end subroutine check
 
-   !> What a source feels.
+   !> Mobility at the source.
    subroutine get_receiver(options, receiver, error)
       class(rectangular_floor_type), intent(in) :: options
       type(receiver_type), intent(out) :: receiver
@@ -91,7 +91,7 @@ contains
       end associate
    end subroutine get_receiver
 
-   !> Velocity of another point; one outside is refused.
+   !> Transfer mobility to another point; a point outside the floor is an error.
    subroutine get_transfer(options, x, y, transfer, error)
       class(rectangular_floor_type), intent(in) :: options
       real(wp), intent(in) :: x, y
@@ -111,7 +111,7 @@ contains
       end associate
    end subroutine get_transfer
 
-   !> Band in which all plates are thin.
+   !> Frequency band in which all plates are thin.
    subroutine get_validity(options, lowest, highest, reason)
       class(rectangular_floor_type), intent(in) :: options
       real(wp), intent(out) :: lowest, highest

@@ -1,4 +1,4 @@
-!> How far single positions in single floors and rooms lie from a statistical mean.
+!> Scatter of individual positions, floors and rooms about the statistical mean.
 module thud_response_spread
    use thud_constants, only: pi
    use thud_kinds, only: wp
@@ -7,21 +7,21 @@ module thud_response_spread
 
    public :: get_band_variance, get_level_spread
 
-   !> Fourth moment of a sinusoidal mode over the square of its second, per dimension.
+   !> Fourth moment of a sinusoidal mode divided by the square of its second moment, per dimension.
    real(wp), parameter :: moment_ratio = 1.5_wp
 
 contains
 
-   !> Relative variance of the mean over a band of the energy of one point's excitation or response.
+   !> Relative variance of the band-averaged energy of the excitation or response at one point.
    !>
    !> (alpha - 1)/(pi m B**2) (2 B arctan B - ln(1 + B**2)) + ln(1 + B**2)/(pi m B**2) with the modal overlap
-   !> m = a n/(2 pi), a the rate of decay and n the modes per hertz, and B = 2 pi bandwidth/a, for spacings of the Gaussian
-   !> orthogonal ensemble (Langley and Cotoni 2004); alpha = 1.5**d for sinusoidal modes in d dimensions. With many
-   !> modes in the band and little damping it is (alpha - 1) over their number.
+   !> m = a n/(2 pi), the decay rate a, the modes per hertz n and B = 2 pi bandwidth/a, for mode spacings of the Gaussian
+   !> orthogonal ensemble (Langley and Cotoni 2004); alpha = 1.5**d for sinusoidal modes in d dimensions. With many modes in
+   !> the band and little damping, the variance is (alpha - 1)/(number of modes).
    elemental function get_band_variance(dimensions, mode_density, decay, bandwidth) result(variance)
-      !> Dimensions of the subsystem: 2 of a plate, 3 of a room.
+      !> Dimensions of the subsystem: 2 for a plate, 3 for a room.
       integer, intent(in) :: dimensions
-      !> Modes per hertz, s; rate of decay of the energy, 1/s; bandwidth, Hz.
+      !> Modes per hertz, s; decay rate of the energy, 1/s; bandwidth, Hz.
       real(wp), intent(in) :: mode_density, decay, bandwidth
       real(wp) :: variance
 
@@ -30,11 +30,11 @@ contains
       end associate
    end function get_band_variance
 
-   !> Standard deviation of a level whose energy is a product of independent factors, all taken as log-normal.
+   !> Standard deviation of a level whose energy is a product of independent log-normal factors.
    pure function get_level_spread(variances) result(spread)
       !> Relative variances of the factors: [n].
       real(wp), intent(in) :: variances(:)
-      !> The deviation, dB.
+      !> The standard deviation, dB.
       real(wp) :: spread
 
       spread = 10/log(10.0_wp)*sqrt(sum(log(1 + variances)))

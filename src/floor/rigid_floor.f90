@@ -1,4 +1,4 @@
-!> A floor that does not move, as the standards' force plate.
+!> A floor that does not move, like the force plate of the standards.
 module thud_rigid_floor
    use thud_error, only: error_type
    use thud_field, only: field_type

@@ -1,9 +1,8 @@
 !> Level of an impact in the room below a floor, by transient statistical energy analysis in one-third-octave bands: the
-!> force gives energy to the floor, the floor radiates into the room, all of them decay, and the Fast detector shows its
-!> maximum.
+!> force injects energy into the floor, the floor radiates into the room, and the Fast detector shows the level.
 module thud_room
    use thud_band, only: band_type
-   use thud_ceiling, only: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_share, get_mass_law
+   use thud_ceiling, only: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_fraction, get_mass_law
    use thud_constants, only: pi
    use thud_energy_flow, only: add_subsystem, connect, energy_flow_type, get_loss, new_energy_flow
    use thud_error, only: error_type, input_error
@@ -21,22 +20,22 @@ module thud_room
 
    public :: check_below, check_room, few_modes, get_room_bands, get_room_fields, get_room_level, room_level_type, room_type
 
-   !> Sets of bands of a prediction.
+   !> Band sets of a prediction.
    character(len=*), parameter :: third_set = 'third', octave_set = 'octave'
 
-   !> One-third-octave bands of an octave.
+   !> Number of one-third-octave bands in an octave.
    integer, parameter :: bands_per_octave = 3
 
-   !> Reference of sound pressure, Pa.
+   !> Reference sound pressure, Pa.
    real(wp), parameter :: reference_pressure = 2.0e-5_wp
 
-   !> Attenuation of a reverberation time, 60 dB in neper of energy.
+   !> Natural logarithm of an energy decay of 60 dB.
    real(wp), parameter :: decay_of_60_db = 6*log(10.0_wp)
 
-   !> Modes of a band below which the statistical result is unreliable.
+   !> Number of modes in a band below which the statistical result is unreliable.
    real(wp), parameter :: few_modes = 5.0_wp
 
-   !> Step of a time history, s: the detector moves by 4 % of its time constant.
+   !> Time step of a history, s: 4 % of the detector's time constant.
    real(wp), parameter :: history_step = 5.0e-3_wp
 
    !> The room.
@@ -45,9 +44,9 @@ module thud_room
       real(wp) :: volume = 50.0_wp
       !> Reverberation time, s.
       real(wp) :: reverberation_time = 0.5_wp
-      !> The same for each one-third-octave band, s.
+      !> Reverberation time of each one-third-octave band, s; empty: the same for all bands.
       type(list_type) :: reverberation_times
-      !> Its air.
+      !> Air in the room.
       type(air_type) :: air
       !> Flanking walls.
       type(walls_type) :: walls
@@ -59,36 +58,36 @@ module thud_room
    type :: room_level_type
       !> The one-third-octave bands: [n_band].
       type(band_type), allocatable :: bands(:)
-      !> Power that a force of unit mean square gives to the floor, m/(N s): [n_band].
+      !> Power into the floor per mean-square force, m/(N s): [n_band].
       real(wp), allocatable :: conductance(:)
-      !> Mass of the radiating plate over its area, kg/m2.
+      !> Mass per unit area of the radiating plate, kg/m2.
       real(wp) :: surface_mass = 0.0_wp
-      !> Energy that the impact gives to the floor, J: [n_band].
+      !> Energy that the impact injects into the floor, J: [n_band].
       real(wp), allocatable :: energy(:)
       !> Radiation factor and total loss factor of the floor: [n_band].
       real(wp), allocatable :: radiation_factor(:), loss_factor(:)
       !> Reverberation time of the room, s: [n_band].
       real(wp), allocatable :: reverberation_time(:)
-      !> Modes of the floor and of the room in the band: [n_band].
+      !> Numbers of modes of the floor and of the room in the band: [n_band].
       real(wp), allocatable :: floor_modes(:), room_modes(:)
       !> Maximum Fast level in the room, dB re 20 uPa, and its time after the impact, s: [n_band].
       real(wp), allocatable :: level(:), time(:)
-      !> Expected standard deviation of that level for one position of the source and one of the microphone, dB: [n_band].
+      !> Expected standard deviation of that level for one source and one microphone position, dB: [n_band].
       real(wp), allocatable :: spread(:)
       !> A-weighted maximum level, dB (ISO 717-2 annex D).
       real(wp) :: a_weighted = 0.0_wp
-      !> The same for octaves: bands, levels and times: [n_octave].
+      !> Octave bands, their levels and times, as above: [n_octave].
       type(band_type), allocatable :: octaves(:)
       real(wp), allocatable :: octave_level(:), octave_time(:)
-      !> Instants after the impact, s: [n_time], and what the Fast detector shows in each band then, dB: [n_time, n_band].
+      !> Times after the impact, s: [n_time], and level of the Fast detector in each band, dB: [n_time, n_band].
       real(wp), allocatable :: history_time(:), history(:, :)
    end type room_level_type
 
-   !> The energies of one band, dE/dt = -A E, and what the detector sees of them.
+   !> Energies of the subsystems in one band, dE/dt = -A E, and their weights in the detector.
    type :: band_energies_type
       !> A, 1/s: [n, n].
       real(wp), allocatable :: loss(:, :)
-      !> Energies at the start, J, and the square of the sound pressure over energy, Pa2/J: [n].
+      !> Initial energies, J, and squared sound pressure per energy, Pa2/J: [n].
       real(wp), allocatable :: start(:), weight(:)
    end type band_energies_type
 
@@ -105,16 +104,16 @@ contains
          real_field('volume', room%volume, 'm3', 'volume of the room', '[1, 100000]'), &
          real_field('reverberation_time', room%reverberation_time, 's', 'reverberation time of the room', '[0.05, 20]'), &
          list_field('reverberation_times', room%reverberation_times, 's', &
-         'the same for each one-third-octave band from 50 to 630 Hz', '[0.05, 20]'), &
+         'reverberation time in each one-third-octave band from 50 to 630 Hz', '[0.05, 20]'), &
          real_field('air_density', room%air%density, 'kg/m3', 'density of the air', '[0.5, 2]'), &
          real_field('sound_speed', room%air%sound_speed, 'm/s', 'speed of sound in the air', '[200, 500]'), &
          get_wall_fields(room%walls), get_ceiling_fields(room%ceiling)]
    end function get_room_fields
 
-   !> Refuses reverberation times of other bands.
+   !> Checks the number of reverberation times.
    subroutine check_room(room, error)
       type(room_type), intent(in) :: room
-      !> Names the number of values.
+      !> Set if it is neither 0 nor that of the bands.
       type(error_type), allocatable, intent(out) :: error
       type(band_type), allocatable :: bands(:)
 
@@ -124,12 +123,12 @@ contains
          //' values; allowed: '//to_text(size(bands))//', one for each one-third-octave band from 50 to 630 Hz')
    end subroutine check_room
 
-   !> Refuses walls and a ceiling that a floor cannot have below it.
+   !> Checks that walls and ceiling fit below a floor.
    subroutine check_below(plate, room, error)
       !> The plate that radiates.
       type(plate_type), intent(in) :: plate
       type(room_type), intent(in) :: room
-      !> Names the lengths of the walls, or the depth of the air above the ceiling.
+      !> Set if the walls are too long, or the cavity above the ceiling is too deep.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: walls, height
 
@@ -148,7 +147,7 @@ contains
    subroutine get_room_bands(bands, error)
       !> The one-third-octave bands: [n_band].
       type(band_type), allocatable, intent(out) :: bands(:)
-      !> Never.
+      !> Never set.
       type(error_type), allocatable, intent(out) :: error
 
       call find_rated_bands(third_set, bands, error)
@@ -156,12 +155,12 @@ contains
 
    !> Predicts the level in the room.
    !>
-   !> The floor takes E = integral 2 |F|**2 Re Y df per band, the mean over positions. The energy is injected
-   !> instantaneously: a contact of 20 ms is short against the detector.
+   !> The floor takes the energy E = integral 2 |F|**2 Re Y df in each band, with Re Y averaged over positions. The energy
+   !> is injected instantaneously: a contact of 20 ms is short compared with the detector's time constant.
    subroutine get_room_level(plate, conductance, room, bands, force_level, prediction)
       !> The plate that radiates.
       type(plate_type), intent(in) :: plate
-      !> Real part of the mobility of the floor, the mean over positions, m/(N s): [n_band].
+      !> Real part of the mobility of the floor, averaged over positions, m/(N s): [n_band].
       real(wp), intent(in) :: conductance(:)
       type(room_type), intent(in) :: room
       !> Bands from `get_room_bands`: [n_band].
@@ -199,8 +198,8 @@ contains
       call add_history(energies, prediction)
    end subroutine get_room_level
 
-   !> Levels of the octaves: the detector is linear in the energies, those of an octave are the sums of its one-third
-   !> octaves, and the maximum of the sum is at most the sum of the maxima.
+   !> Levels of the octaves. The detector is linear in the energies, so an octave needs the sum of the energies of its
+   !> one-third-octave bands; the maximum of the sum is at most the sum of the maxima.
    subroutine add_octaves(energies, prediction)
       !> Energies of the one-third-octave bands, three for each octave: [n_band].
       type(band_energies_type), intent(in) :: energies(:)
@@ -230,7 +229,7 @@ contains
       end do
    end subroutine add_octaves
 
-   !> Level that the Fast detector shows against time, until the slowest band lies about 30 dB below its maximum.
+   !> Level of the Fast detector against time, until the slowest band lies about 30 dB below its maximum.
    pure subroutine add_history(energies, prediction)
       !> Energies of the bands: [n_band].
       type(band_energies_type), intent(in) :: energies(:)
@@ -238,7 +237,7 @@ contains
       real(wp) :: duration
       integer :: i, n
 
-      ! Half of the slower of both decays, that of the room and that of the detector.
+      ! Half of the slower 60 dB decay, that of the room or that of the detector.
       duration = maxval(prediction%time) + max(maxval(prediction%reverberation_time), fast_reverberation)/2
       n = nint(duration/history_step)
       prediction%history_time = [(i*history_step, i=1, n)]
@@ -251,17 +250,17 @@ contains
       end do
    end subroutine add_history
 
-   !> Energies of a band: floor, walls, room and the air above a ceiling, with what flows between them.
+   !> Energies of a band: floor, walls, room and ceiling cavity, with the flows between them.
    !>
-   !> Plates lose omega eta in all; they radiate rho0 c0 sigma/m'' into the room and as much to the other side. The room
-   !> loses 6 ln 10/T besides what goes back into them. Of the sound below a floor with a ceiling the stiffness of the air
-   !> above this carries a share; that air takes the rest, which the ceiling lets through by its mass (Craik and Smith 2000).
-   !> For the part of the rest that passes the ceiling both ways there is no ceiling, and that air takes from the room what
-   !> passes the ceiling and is then reflected by it: a ceiling without mass is none.
+   !> A plate loses omega eta in total; it radiates rho0 c0 sigma/m'' into the room and as much to the other side. The room
+   !> loses 6 ln 10/T plus the flow back into the plates. With a ceiling of transmission t, a fraction of the floor's
+   !> radiation reaches the room through the stiffness of the air. Of the rest, t**2 reaches the room directly and 1 - t**2
+   !> the cavity, from which sound leaves through the ceiling (Craik and Smith 2000). The cavity receives t (1 - t) of the
+   !> sound that the room sends to the ceiling. A ceiling without mass, t = 1, has no effect.
    pure function get_band_energies(plate, room, prediction, band) result(energies)
       type(plate_type), intent(in) :: plate
       type(room_type), intent(in) :: room
-      !> Reverberation times and energies: [n_band].
+      !> Prediction with reverberation times, energies and radiation factors.
       type(room_level_type), intent(in) :: prediction
       !> Index of the band.
       integer, intent(in) :: band
@@ -269,7 +268,7 @@ contains
       type(energy_flow_type) :: flow
       type(plate_type) :: plates(1 + room%walls%lengths%count)
       real(wp), dimension(size(plates)) :: radiated
-      real(wp) :: transmission, share, rest
+      real(wp) :: transmission, forced, free
       integer :: i, at_room, at_cavity
 
       plates = [plate, get_walls(room%walls)]
@@ -283,13 +282,13 @@ contains
             [2*pi*f*plates%loss_factor + radiated, decay_of_60_db/prediction%reverberation_time(band)])
          if (ceiling%mass > 0.0_wp) then
             transmission = get_mass_law(ceiling, air, f)
-            share = get_forced_share(ceiling, air, prediction%radiation_factor(band), third%lower, third%upper)
-            rest = max(1 - share, 0.0_wp)
+            forced = get_forced_fraction(ceiling, air, prediction%radiation_factor(band), third%lower, third%upper)
+            free = max(1 - forced, 0.0_wp)
             call add_subsystem(flow, get_cavity_mode_density(ceiling, air, area, f), 2*pi*f*ceiling%loss_factor)
-            call connect(flow, 1, at_cavity, radiated(1)*rest*(1 - transmission**2))
+            call connect(flow, 1, at_cavity, radiated(1)*free*(1 - transmission**2))
             call connect(flow, at_room, at_cavity, &
                air%sound_speed*area*transmission*(1 - transmission)/(4*room%volume))
-            call connect(flow, 1, at_room, radiated(1)*(share + rest*transmission**2))
+            call connect(flow, 1, at_room, radiated(1)*(forced + free*transmission**2))
          else
             call connect(flow, 1, at_room, radiated(1))
          end if

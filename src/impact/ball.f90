@@ -56,10 +56,10 @@ contains
          'ratio of specific heats of the enclosed gas', '[1, 2]')]
    end function get_ball_fields
 
-   !> Density of the wall, kg/m3.
+   !> Density of the wall.
    pure function get_density(ball) result(density)
       type(ball_type), intent(in) :: ball
-      !> Mass over the volume of the wall, kg/m3.
+      !> Mass divided by the volume of the wall, kg/m3.
       real(wp) :: density
 
       density = ball%mass/(4.0_wp/3.0_wp*pi*(ball%outer_radius**3 - (ball%outer_radius - ball%wall_thickness)**3))

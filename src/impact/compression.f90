@@ -16,13 +16,13 @@ module thud_compression
    type :: compression_options_type
       !> Maximum approach of the plates, m.
       real(wp) :: max_deflection = 0.04_wp
-      !> Points of the curve, the undeformed ball included.
+      !> Number of points of the curve, including the undeformed ball.
       integer :: points = 41
-      !> What the gas in the ball does: `vented`, `isothermal` or `adiabatic`.
+      !> State of the gas in the ball: `vented`, `isothermal` or `adiabatic`.
       character(len=name_length) :: gas = 'vented'
    end type compression_options_type
 
-   !> Force against deflection.
+   !> Force-deflection curve.
    type :: compression_type
       !> Approach of the plates, m: [n].
       real(wp), allocatable :: deflection(:)
@@ -41,12 +41,13 @@ contains
 
       fields = [ &
          real_field('max_deflection', options%max_deflection, 'm', 'maximum approach of the plates', '[1e-15, 10]'), &
-         integer_field('points', options%points, 'points of the curve, the undeformed ball included', '[2, 10000]'), &
-         choice_field('gas', options%gas, 'gas in the ball: leaves by the hole, or is sealed in', &
+         integer_field('points', options%points, &
+         'number of points of the curve, including the undeformed ball', '[2, 10000]'), &
+         choice_field('gas', options%gas, 'gas in the ball: leaves through the hole (vented), or is sealed in', &
          [character(len=10) :: 'vented', 'isothermal', 'adiabatic'])]
    end function get_compression_fields
 
-   !> Refuses a compression that the ball does not allow.
+   !> Checks that the ball allows a compression.
    subroutine check_compression(options, ball, error)
       !> The options, each inside its own range.
       type(compression_options_type), intent(in) :: options
@@ -62,7 +63,7 @@ contains
       end if
    end subroutine check_compression
 
-   !> Deflections of the points, from 0 on with equal spacing.
+   !> Deflections of the points, equally spaced from 0.
    pure function get_deflections(options) result(deflection)
       type(compression_options_type), intent(in) :: options
       !> Approach of the plates, m: [points].
@@ -72,7 +73,7 @@ contains
       deflection = [(options%max_deflection*real(i, wp)/(options%points - 1), i=0, options%points - 1)]
    end function get_deflections
 
-   !> The ball with the gas that it has in the press.
+   !> The ball, with its gas in the state that it has in the press.
    pure function get_pressed_ball(options, ball) result(pressed)
       type(compression_options_type), intent(in) :: options
       type(ball_type), intent(in) :: ball
@@ -81,7 +82,7 @@ contains
       pressed = ball
       select case (options%gas)
       case ('vented')
-         ! Without pressures there is no overpressure at any volume.
+         ! Without ambient pressure there is no overpressure at any volume.
          pressed%ambient_pressure = 0.0_wp
       case ('isothermal')
          pressed%heat_capacity_ratio = 1.0_wp

@@ -1,4 +1,4 @@
-!> The drop: from what height, in what gravity.
+!> The drop: its height, and gravity.
 module thud_drop
    use thud_field, only: field_type
    use thud_kinds, only: wp
@@ -8,9 +8,9 @@ module thud_drop
 
    public :: drop_type, get_drop_fields, get_impact_velocity
 
-   !> A free fall onto the floor; the default is the standards' drop.
+   !> A free fall onto the floor; the default is the drop of the standards.
    type :: drop_type
-      !> Height of the ball's lowest point over the floor, m.
+      !> Height of the ball's lowest point above the floor, m.
       real(wp) :: height = 1.0_wp
       !> Acceleration of free fall, m/s2.
       real(wp) :: gravity = 9.81_wp
@@ -26,7 +26,7 @@ contains
       type(field_type) :: fields(2)
 
       fields = [ &
-         real_field('height', drop%height, 'm', "height of the ball's lowest point over the floor", &
+         real_field('height', drop%height, 'm', "height of the ball's lowest point above the floor", &
          '[1e-12, 1000000]'), &
          real_field('gravity', drop%gravity, 'm/s2', 'acceleration of free fall', &
          '[1e-12, 1000]')]

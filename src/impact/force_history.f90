@@ -1,5 +1,5 @@
-!> The result of every source model: the force on a floor, sampled from first touch on.
-!> Levels, assessments and files know this type only, never the model behind it.
+!> The result of every source model: the force on a floor, sampled from first touch on. Levels, assessments and files use
+!> only this type and no source model.
 module thud_force_history
    use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
@@ -11,23 +11,23 @@ module thud_force_history
    public :: check_samples, clear_flight, continue_to_zero, force_count, force_history_type, force_names, holds_impulse
    public :: max_residual, new_force_history
 
-   !> Residual of the balances of impulse and energy above which models that integrate or sum one
-   !> equation of motion refuse their result; at the default step they have less than 1e-9.
+   !> Residual of the balances of impulse and energy above which models that integrate or sum one equation of motion return
+   !> an error; at the default step the residual is below 1e-9.
    real(wp), parameter :: max_residual = 1.0e-6_wp
 
-   !> Fraction of the impulse that samples may miss; those of eight samples of a contact miss up to 0.006.
+   !> Fraction of the impulse that samples may miss; with eight samples in a contact they miss up to 0.006.
    real(wp), parameter :: max_missing = 0.02_wp
 
-   !> Forces that levels and assessments are made of: without and with the flux of momentum.
+   !> Number of forces for levels and assessments: without and with the flux of momentum.
    integer, parameter :: force_count = 2
 
-   !> Their names.
+   !> Names of these forces.
    character(len=8), parameter :: force_names(force_count) = [character(len=8) :: 'elastic', 'floor']
 
    !> Length of the name of a force component.
    integer, parameter :: name_length = 24
 
-   !> Force of one impact and the numbers that describe it.
+   !> Force of one impact, and numbers that describe it.
    type :: force_history_type
       !> Samples per second, Hz; sample i belongs to the time (i - 1)/sample_rate after first touch.
       real(wp) :: sample_rate = 0.0_wp
@@ -39,53 +39,53 @@ module thud_force_history
       character(len=name_length), allocatable :: component_name(:)
       !> Components of the force, N: [n_sample, n_component].
       real(wp), allocatable :: component(:, :)
-      !> Force without flux of momentum, the paper's ball force, N: [n_sample].
+      !> Force without the flux of momentum (the ball force of the paper), N: [n_sample].
       real(wp), allocatable :: elastic_force(:)
-      !> Whole force on the floor, N: [n_sample].
+      !> Total force on the floor, N: [n_sample].
       real(wp), allocatable :: floor_force(:)
-      !> Displacement and velocity of a mobile floor, under the source and downwards, m and m/s: [n_sample].
+      !> Displacement, m, and velocity, m/s, of a mobile floor under the source, downwards: [n_sample].
       real(wp), allocatable :: floor_displacement(:), floor_velocity(:)
       !> Energy that the source gives to the floor, J.
       real(wp) :: floor_work = 0.0_wp
       !> Names, with units, of further quantities against time: [n_model_history].
       character(len=name_length), allocatable :: model_history_name(:)
-      !> Its values: [n_sample, n_model_history].
+      !> Values of these quantities: [n_sample, n_model_history].
       real(wp), allocatable :: model_history(:, :)
       !> Names of scalar quantities that the model chose or computed: [n_model_quantity].
       character(len=name_length), allocatable :: model_quantity_name(:)
-      !> Their SI units: [n_model_quantity].
+      !> SI units of these scalars: [n_model_quantity].
       character(len=8), allocatable :: model_quantity_unit(:)
-      !> These numbers: [n_model_quantity].
+      !> Values of these scalars: [n_model_quantity].
       real(wp), allocatable :: model_quantity(:)
       !> Velocity towards the floor at first touch, m/s.
       real(wp) :: impact_velocity = 0.0_wp
-      !> Snapshots of the deformed source, of models that take some.
+      !> Snapshots of the deformed source, if the model takes any.
       type(motion_type) :: motion
       !> Time of first touch in the record, s.
       real(wp) :: touch_time = 0.0_wp
       !> Time from first touch to release, s.
       real(wp) :: contact_time = 0.0_wp
-      !> The same between steps, of models that find it in whole steps, s; 0 where `contact_time` is exact.
+      !> Contact time between steps, if `contact_time` is a number of whole steps, s; 0 if `contact_time` is exact.
       real(wp) :: exact_contact_time = 0.0_wp
-      !> Maximum force on the floor, N; of models whose spikes no force plate records, low-passed.
+      !> Maximum force on the floor, N; low-passed if the model has spikes that no force plate records.
       real(wp) :: peak_force = 0.0_wp
       !> Maximum elastic force, N, likewise.
       real(wp) :: peak_elastic_force = 0.0_wp
       !> Maximum deflection, m.
       real(wp) :: max_deflection = 0.0_wp
-      !> Velocity at release over velocity at first touch.
+      !> Velocity at release divided by velocity at first touch.
       real(wp) :: restitution = 0.0_wp
       !> Time integral of the force on the floor, N s.
       real(wp) :: impulse = 0.0_wp
-      !> |impulse - change of momentum| over the change of momentum.
+      !> |impulse - change of momentum|, divided by the change of momentum.
       real(wp) :: impulse_residual = 0.0_wp
-      !> |energy at release + loss - energy at first touch| over the latter.
+      !> |energy at release + loss - energy at first touch|, divided by the energy at first touch.
       real(wp) :: energy_residual = 0.0_wp
    end type force_history_type
 
 contains
 
-   !> Whether samples hold the impulse of a force.
+   !> Whether samples represent the impulse of a force.
    elemental function holds_impulse(sampled, impulse) result(yes)
       !> Sum of the samples over their rate, and time integral of the force, N s.
       real(wp), intent(in) :: sampled, impulse
@@ -94,11 +94,11 @@ contains
       yes = abs(sampled - impulse) <= max_missing*impulse
    end function holds_impulse
 
-   !> Refuses samples that miss the force, as of a spike between two of them.
+   !> Checks that samples do not miss part of the force, such as a spike between two of them.
    subroutine check_samples(history, error)
       !> The history, complete.
       type(force_history_type), intent(in) :: history
-      !> Names both impulses.
+      !> Set if the impulses differ; names both.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: sampled
 
@@ -120,22 +120,22 @@ contains
       if (allocated(history%model_history)) history%model_history(last + 1:, :) = 0.0_wp
    end subroutine clear_flight
 
-   !> Finds the contact time between samples: the force is continued to zero in a straight line from the last two
-   !> samples of the first contact.
+   !> Estimates the contact time between samples: a straight line through the last two samples of the first contact
+   !> continues the force to zero.
    pure subroutine continue_to_zero(history)
-      !> The history, with its contact time; gets the exact one.
+      !> The history, with its contact time; `exact_contact_time` is set.
       type(force_history_type), intent(inout) :: history
-      real(wp) :: part
+      real(wp) :: fraction
       integer :: last
 
       last = min(size(history%floor_force), ceiling((history%touch_time + history%contact_time)*history%sample_rate) + 2)
       last = findloc(abs(history%floor_force(:last)) > 0.0_wp, .true., dim=1, back=.true.)
       if (last < 2) return
       associate (before => history%floor_force(last - 1), end => history%floor_force(last))
-         part = 1.0_wp
-         if (before > end) part = min(1.0_wp, end/(before - end))
+         fraction = 1.0_wp
+         if (before > end) fraction = min(1.0_wp, end/(before - end))
       end associate
-      history%exact_contact_time = (last - 1 + part)/history%sample_rate - history%touch_time
+      history%exact_contact_time = (last - 1 + fraction)/history%sample_rate - history%touch_time
    end subroutine continue_to_zero
 
    !> A history of zero force.

@@ -1,4 +1,4 @@
-!> Instants of the deforming ball, for pictures: positions, velocities and pressures at the nodes.
+!> Snapshots of the deforming ball, for pictures: positions, velocities and pressures at the nodes.
 module thud_motion
    use thud_kinds, only: wp
    implicit none (type, external)
@@ -10,17 +10,17 @@ module thud_motion
    type :: motion_type
       !> Number of snapshots taken.
       integer :: n_frame = 0
-      !> Times since the record began, s: [capacity].
+      !> Times since the beginning of the record, s: [capacity].
       real(wp), allocatable :: time(:)
       !> Positions of the nodes before the impact, m: [0:n_polar, 0:n_radial, 2].
       real(wp), allocatable :: start(:, :, :)
-      !> Positions, the floor at rest at height 0, m: [0:n_polar, 0:n_radial, 2, capacity].
+      !> Positions, m, relative to a floor at rest at height 0: [0:n_polar, 0:n_radial, 2, capacity].
       real(wp), allocatable :: position(:, :, :, :)
       !> Velocities, m/s: the same shape.
       real(wp), allocatable :: velocity(:, :, :, :)
       !> Pressure on the floor at the nodes of the outer surface, Pa: [0:n_polar, capacity].
       real(wp), allocatable :: contact_pressure(:, :)
-      !> Radial stress of the floor on the same nodes, positive outwards, Pa: the same shape.
+      !> Radial stress from the floor on the same nodes, positive outwards, Pa: the same shape.
       real(wp), allocatable :: contact_shear(:, :)
       !> Overpressure of the gas, Pa: [capacity].
       real(wp), allocatable :: cavity_pressure(:)
@@ -30,13 +30,13 @@ module thud_motion
 
 contains
 
-   !> Space for snapshots.
+   !> Allocates space for snapshots.
    pure function new_motion(start, capacity) result(motion)
       !> Positions of the nodes before the impact, m: [0:n_polar, 0:n_radial, 2].
       real(wp), intent(in) :: start(0:, 0:, :)
       !> Maximum number of snapshots.
       integer, intent(in) :: capacity
-      !> No snapshot yet.
+      !> The motion, without a snapshot yet.
       type(motion_type) :: motion
       integer :: n_polar, n_radial
 
@@ -48,17 +48,17 @@ contains
       allocate (motion%position(0:n_polar, 0:n_radial, 2, capacity), motion%velocity(0:n_polar, 0:n_radial, 2, capacity))
    end function new_motion
 
-   !> Adds a snapshot where there is space for one.
+   !> Adds a snapshot if there is space for it.
    pure subroutine take_snapshot(motion, time, position, velocity, contact_stress, cavity_pressure, &
       floor_displacement)
       type(motion_type), intent(inout) :: motion
-      !> Time since the record began, s.
+      !> Time since the beginning of the record, s.
       real(wp), intent(in) :: time
       !> Positions of the nodes, m: [0:n_polar, 0:n_radial, 2].
       real(wp), intent(in) :: position(0:, 0:, :)
       !> Velocities of the nodes, m/s: the same shape.
       real(wp), intent(in) :: velocity(0:, 0:, :)
-      !> Stresses of the floor on the nodes of the outer surface, outwards and upwards, Pa: [0:n_polar, 2].
+      !> Stresses from the floor on the nodes of the outer surface, outwards and upwards, Pa: [0:n_polar, 2].
       real(wp), intent(in) :: contact_stress(0:, :)
       !> Overpressure of the gas, Pa.
       real(wp), intent(in) :: cavity_pressure

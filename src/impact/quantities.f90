@@ -1,5 +1,5 @@
-!> The table of quantities: every number that a result has, with symbol, unit, meaning and how it is shown.
-!> Summary, tables, schema, and with it all of the Python package, take them from here.
+!> The table of quantities: every number of a result can have, with its symbol, unit, meaning and display format. Summary,
+!> tables and schema use this table, and so does the Python package through the schema.
 module thud_quantities
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
@@ -8,30 +8,32 @@ module thud_quantities
 
    public :: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, sample_quantity_count
 
-   !> A number that a result has.
+   !> A number that a result can have.
    type :: quantity_type
-      !> Name in files and programs, and in tables for readers.
+      !> Name in files and programs.
       character(len=24) :: name = ''
+      !> Name in tables for readers.
       character(len=24) :: title = ''
-      !> Symbol in formulas and figures, in the mathematical notation of matplotlib.
+      !> Symbol in formulas and figures, in matplotlib's math notation.
       character(len=20) :: symbol = ''
       !> SI unit, blank for pure numbers.
       character(len=8) :: unit = ''
-      !> Unit on the screen, and how many of them are one SI unit.
+      !> Unit on the screen.
       character(len=8) :: display_unit = ''
+      !> Number of display units in one SI unit.
       real(wp) :: display_scale = 1.0_wp
       !> Decimals on the screen.
       integer :: decimals = 3
-      !> What it is.
+      !> Meaning.
       character(len=72) :: meaning = ''
-      !> Results that have it: `of_sample`, `of_impact` or `of_others`.
+      !> Results with this quantity: `of_sample`, `of_impact` or `of_others`.
       integer :: results = 0
    end type quantity_type
 
-   !> Every sample of a sweep and every impact has the quantity, every impact, or some other result.
+   !> Results with the quantity: every sample of a sweep and every impact, every impact, or another result.
    integer, parameter :: of_sample = 1, of_impact = 2, of_others = 3
 
-   !> The quantities: those of samples, of impacts, in the order of `get_quantities`, and of other results.
+   !> The quantities: first those of samples, then those of impacts, in the order of `get_quantities`, then all others.
    type(quantity_type), parameter :: quantities(*) = [ &
       quantity_type('contact_time', 'contact time', 'T', 's', 'ms', 1.0e3_wp, 3, 'contact time', of_sample), &
       quantity_type('peak_force', 'peak force', 'F_{max}', 'N', 'N', 1.0_wp, 1, 'maximum force on the floor', of_sample), &
@@ -45,22 +47,22 @@ module thud_quantities
       quantity_type('impact_velocity', 'impact velocity', 'v_0', 'm/s', 'm/s', 1.0_wp, 3, &
       'velocity at first touch', of_impact), &
       quantity_type('exact_contact_time', 'exact contact time', 'T', 's', 'ms', 1.0e3_wp, 3, &
-      'contact time between steps', of_impact), &
+      'contact time, resolved between time steps', of_impact), &
       quantity_type('touch_time', 'time of first touch', 't_0', 's', 'ms', 1.0e3_wp, 3, &
       'time of first touch in the record', of_impact), &
       quantity_type('sample_rate', 'sample rate', 'f_s', 'Hz', 'kHz', 1.0e-3_wp, 3, 'samples per second', of_impact), &
       quantity_type('impulse_residual', 'impulse residual', '', '', '', 1.0_wp, 6, &
-      'relative residual of the balance of momentum', of_impact), &
+      'relative residual of the momentum balance', of_impact), &
       quantity_type('energy_residual', 'energy residual', '', '', '', 1.0_wp, 6, &
-      'relative residual of the balance of energy', of_impact), &
+      'relative residual of the energy balance', of_impact), &
       quantity_type('peak_count', 'peaks of the force', '', '', '', 1.0_wp, 0, &
       'number of peaks of the assessed force', of_others), &
       quantity_type('mass', 'mass', 'M', 'kg', 'kg', 1.0_wp, 3, 'mass of the source', of_others), &
       quantity_type('drop_height', 'drop height', 'h', 'm', 'm', 1.0_wp, 3, 'drop height', of_others), &
       quantity_type('effective_mass', 'effective mass', 'M', 'kg', 'kg', 1.0_wp, 3, &
-      'impulse over the change of velocity', of_others), &
+      'impulse divided by the change of velocity', of_others), &
       quantity_type('margin', 'margin', '', 'dB', 'dB', 1.0_wp, 2, &
-      'minimum distance of the assessed octave levels to a limit, > 0 inside', of_others), &
+      'minimum distance of the assessed octave levels to limits, > 0 inside', of_others), &
       quantity_type('floor_work', 'energy to the floor', 'W', 'J', 'mJ', 1.0e3_wp, 3, &
       'energy that the source gives to the floor', of_others), &
       quantity_type('room_rating', 'level in the room', 'L_{iA,Fmax}', 'dB', 'dB', 1.0_wp, 1, &
@@ -68,13 +70,13 @@ module thud_quantities
       quantity_type('standardized_rating', 'standardized level', "L'_{iA,Fmax,V,T}", 'dB', 'dB', 1.0_wp, 1, &
       'A-weighted maximum Fast level, standardized, re 20 uPa', of_others)]
 
-   !> Numbers of quantities that samples have, and that impacts have.
+   !> Numbers of quantities of every sample, and of every impact.
    integer, parameter :: sample_quantity_count = count(quantities%results == of_sample)
    integer, parameter :: history_quantity_count = count(quantities%results <= of_impact)
 
 contains
 
-   !> The values of the quantities.
+   !> Values of the quantities of an impact.
    function get_quantities(history) result(values)
       type(force_history_type), intent(in) :: history
       !> Values, SI units: [history_quantity_count].
@@ -86,9 +88,9 @@ contains
          history%touch_time, history%sample_rate, history%impulse_residual, history%energy_residual]
    end function get_quantities
 
-   !> A quantity of the table.
+   !> A quantity of the table by its name.
    pure function get_quantity(name) result(quantity)
-      !> Its name, which the table has.
+      !> Name of a quantity in the table.
       character(len=*), intent(in) :: name
       type(quantity_type) :: quantity
 

@@ -1,8 +1,8 @@
-!> What a source drops on: a linear passive structure, by the mobility Y of the point under the source.
+!> The structure under a source: linear and passive, described by the mobility Y of the point under the source.
 !>
-!> Y(s) = d + sum of r_k/(s - p_k), a direct part and poles with residues. Of a pair of conjugate poles one is kept, with
-!> twice its residue: the velocity is d F + Re sum r_k x_k with x_k' = p_k x_k + F. Time steps are exact for forces that
-!> are constant in a step and for impulses at its beginning.
+!> Y(s) = d + sum of r_k/(s - p_k), a direct part and poles with residues. Of a pair of conjugate poles only one is stored,
+!> with twice its residue: the velocity is d F + Re sum r_k x_k with x_k' = p_k x_k + F. Time steps are exact for forces
+!> that are constant in a step and for impulses at its beginning.
 module thud_receiver
    use thud_constants, only: pi
    use thud_kinds, only: wp
@@ -14,7 +14,7 @@ module thud_receiver
    public :: get_receiver_velocity, is_rigid, new_receiver_motion, new_receiver_step, receiver_motion_type
    public :: receiver_step_type, receiver_type
 
-   !> Products of pole and step below which series replace the closed forms.
+   !> Magnitude of pole times step below which series replace the closed forms.
    real(wp), parameter :: small = 0.05_wp
 
    !> A receiver. The default is rigid.
@@ -23,15 +23,15 @@ module thud_receiver
       real(wp) :: direct = 0.0_wp
       !> Poles, 1/s, imaginary parts not negative, real parts not positive: [n_pole].
       complex(wp), allocatable :: pole(:)
-      !> Residues, m/(N s2), those of conjugate pairs doubled: [n_pole].
+      !> Residues, m/(N s2), doubled for conjugate pairs: [n_pole].
       complex(wp), allocatable :: residue(:)
    end type receiver_type
 
-   !> Factors of one time step.
+   !> Coefficients of a time step.
    type :: receiver_step_type
       !> Length of the step, s.
       real(wp) :: interval = 0.0_wp
-      !> exp(p h), its integral over the step (s), and the integral of that (s2): [n_pole].
+      !> exp(p h), its integral over the step h (s), and the integral of this integral (s2): [n_pole].
       complex(wp), allocatable :: decay(:), gain(:), travel(:)
    end type receiver_step_type
 
@@ -47,7 +47,7 @@ contains
 
    !> Whether a receiver does not move.
    pure function is_rigid(receiver) result(rigid)
-      !> The receiver; a rigid one where it is absent.
+      !> The receiver; if absent, a rigid one.
       type(receiver_type), intent(in), optional :: receiver
       logical :: rigid
 
@@ -66,7 +66,7 @@ contains
       if (allocated(receiver%pole)) n_pole = size(receiver%pole)
    end function get_pole_count
 
-   !> Mobility of the point under the source, velocity over force.
+   !> Mobility of the point under the source: velocity divided by force.
    pure function get_mobility(receiver, frequency) result(mobility)
       type(receiver_type), intent(in) :: receiver
       !> Frequencies, Hz: [n].
@@ -80,14 +80,14 @@ contains
       mobility = receiver%direct
       if (.not. allocated(receiver%pole)) return
       do k = 1, size(receiver%pole)
-         ! Half of a doubled residue belongs to the conjugate pole; of a real pole both halves are alike.
+         ! Half of a doubled residue belongs to the conjugate pole; both halves of a real residue are equal.
          associate (pole => receiver%pole(k), residue => receiver%residue(k))
             mobility = mobility + (residue/(s - pole) + conjg(residue)/(s - conjg(pole)))/2
          end associate
       end do
    end function get_mobility
 
-   !> Real part of the mobility: the power that a force of unit mean square gives to the receiver.
+   !> Real part of the mobility: power into the receiver per mean-square force.
    pure function get_conductance(receiver, frequency) result(conductance)
       type(receiver_type), intent(in) :: receiver
       !> Frequencies, Hz: [n].
@@ -108,7 +108,7 @@ contains
       allocate (motion%amplitude(n), source=(0.0_wp, 0.0_wp))
    end function new_receiver_motion
 
-   !> Factors of steps of one length.
+   !> Coefficients of steps of one length.
    pure function new_receiver_step(receiver, interval) result(step)
       type(receiver_type), intent(in) :: receiver
       !> Length of the steps, s.
@@ -133,7 +133,7 @@ contains
       end do
    end function new_receiver_step
 
-   !> Motion a step on, under a force that is constant in it.
+   !> Advances the motion by a step with a constant force.
    pure subroutine advance_receiver(receiver, step, force, motion)
       type(receiver_type), intent(in) :: receiver
       type(receiver_step_type), intent(in) :: step
@@ -148,7 +148,7 @@ contains
       motion%amplitude = step%decay*motion%amplitude + step%gain*force
    end subroutine advance_receiver
 
-   !> Adds to the motion at the end of a step that of an impulse at its beginning.
+   !> Adds to the motion at the end of a step the effect of an impulse at its beginning.
    pure subroutine add_impulse(receiver, step, impulse, motion)
       type(receiver_type), intent(in) :: receiver
       type(receiver_step_type), intent(in) :: step
@@ -160,7 +160,7 @@ contains
       motion%amplitude = motion%amplitude + step%decay*impulse
    end subroutine add_impulse
 
-   !> Displacement at the end of a step by unit impulse at its beginning.
+   !> Displacement at the end of a step due to a unit impulse at its beginning.
    pure function get_impulse_response(receiver, step) result(response)
       type(receiver_type), intent(in) :: receiver
       type(receiver_step_type), intent(in) :: step
@@ -184,12 +184,12 @@ contains
       if (size(motion%amplitude) > 0) velocity = velocity + sum(real(receiver%residue*motion%amplitude, wp))
    end function get_receiver_velocity
 
-   !> Whether free motion may bring a receiver to a line that leaves it: each pole moves it by at most
-   !> |r x| min(t, 2/|p|) in the time t.
+   !> Whether the receiver, in free motion, can reach a line that moves away from it: each pole moves the receiver by at
+   !> most |r x| min(t, 2/|p|) in the time t.
    pure function can_strike(receiver, motion, gap, speed) result(yes)
       type(receiver_type), intent(in) :: receiver
       type(receiver_motion_type), intent(in) :: motion
-      !> Gap between both, m; velocity of the line upwards, m/s.
+      !> Gap between receiver and line, m; velocity of the line upwards, m/s.
       real(wp), intent(in) :: gap, speed
       logical :: yes
       real(wp), dimension(size(motion%amplitude)) :: rate, time
@@ -205,14 +205,14 @@ contains
             rate(k) = abs(receiver%residue(k)*motion%amplitude(k))
             time(k) = 2/abs(receiver%pole(k))
          else
-            ! A free mass goes on downwards.
+            ! A free mass keeps moving downwards.
             away = away + real(receiver%residue(k)*motion%amplitude(k), wp)
          end if
       end do
       yes = gap < 0.0_wp .or. away < 0.0_wp
       if (yes .or. away >= sum(rate)) return
-      ! The gap that is left is convex in time. It shrinks as long as the poles whose times are not over are faster than the
-      ! line: until one of the times.
+      ! The bound of the remaining gap is convex in time. It decreases as long as the poles whose times have not passed are
+      ! faster than the line; its minimum lies at one of the times.
       bracket%right = maxval(time)
       do while (bracket%is_open())
          call bracket%halve(away < sum(rate, mask=time > bracket%get_middle()))

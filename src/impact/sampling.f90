@@ -12,16 +12,16 @@ module thud_sampling
    public :: check_contact_samples, check_sampling, get_rate_limit, get_sample_count, get_sampling_fields, get_step_count
    public :: min_contact_samples, sampling_type
 
-   !> Samples of one record; more would fill the memory and no drop needs them.
+   !> Maximum number of samples of a record; more would fill the memory, and no drop needs them.
    real(wp), parameter :: max_samples = 5.0e6_wp
 
-   !> Integration steps of one record; more would run for minutes.
+   !> Maximum number of integration steps of a record; more would run for minutes.
    real(wp), parameter :: max_steps = 1.0e8_wp
 
-   !> Relative error of a number of samples by the rounding of duration and rate, which are decimal numbers, and of products.
+   !> Relative rounding error of a number of samples: of duration and rate, which are decimal numbers, and of products.
    real(wp), parameter :: rounding = 4*epsilon(1.0_wp)
 
-   !> Samples that a contact needs to be more than a few spikes.
+   !> Minimum number of samples of a contact: fewer show only a few spikes.
    real(wp), parameter :: min_contact_samples = 8.0_wp
 
    !> The sampled record; the default rate is the paper's.
@@ -45,16 +45,16 @@ contains
 
       fields = [ &
          real_field('sample_rate', sampling%sample_rate, 'Hz', 'samples per second', '[2000, 1e7]'), &
-         real_field('duration', sampling%duration, 's', 'length of the record from first touch', &
+         real_field('duration', sampling%duration, 's', 'duration of the record from first touch', &
          '[0.001, 10]'), &
          integer_field('substeps', sampling%substeps, 'integration steps per sampling interval', '[1, 10000]')]
    end function get_sampling_fields
 
-   !> Refuses a record with too many samples or steps.
+   !> Checks the numbers of samples and steps of a record.
    subroutine check_sampling(sampling, error)
       !> The sampling, each value inside its own range.
       type(sampling_type), intent(in) :: sampling
-      !> Names the keys, their product and the allowed range.
+      !> Set if there are too many; names the keys, their product and the allowed range.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: samples
 
@@ -70,12 +70,12 @@ contains
       end if
    end subroutine check_sampling
 
-   !> Refuses a contact of too few samples.
+   !> Checks the number of samples of a contact.
    subroutine check_contact_samples(sampling, contact_time, error)
       type(sampling_type), intent(in) :: sampling
       !> Contact time, s.
       real(wp), intent(in) :: contact_time
-      !> Names the rate that would do.
+      !> Set if there are too few; names the required rate.
       type(error_type), allocatable, intent(out) :: error
 
       if (contact_time*sampling%sample_rate >= min_contact_samples) return
@@ -83,8 +83,8 @@ contains
          //to_text(contact_time)//' s too few samples; allowed: from '//to_text(min_contact_samples/contact_time)//' Hz')
    end subroutine check_contact_samples
 
-   !> Limit of levels by the sampling rate: what the samples of a force that sets in with a jump or a corner fold into the
-   !> octave of 500 Hz changes its level by up to 0.2 dB at the limit, 2 dB at 2000 Hz.
+   !> Validity limit of levels due to the sampling rate. If a force begins with a jump or a corner, aliasing changes the
+   !> level of the 500 Hz octave by up to 0.2 dB at the limit, 2 dB at 2000 Hz.
    pure function get_rate_limit(sampling) result(limit)
       type(sampling_type), intent(in) :: sampling
       type(validity_limit_type) :: limit
@@ -102,21 +102,21 @@ contains
       n_sample = int(count_samples(sampling))
    end function get_sample_count
 
-   !> Whole sampling intervals in the record, each with a sample at its beginning.
+   !> Number of whole sampling intervals in the record, each with a sample at its beginning.
    pure function count_samples(sampling) result(n_sample)
       type(sampling_type), intent(in) :: sampling
-      !> Their number, which may be more than an integer holds.
+      !> The number, which may be more than an integer holds.
       real(wp) :: n_sample
 
       n_sample = aint(sampling%duration*sampling%sample_rate*(1 + rounding))
    end function count_samples
 
-   !> Integration steps of a record, or of its beginning, from which costs are estimated, also of values not yet checked.
+   !> Number of integration steps of a record, or of its beginning, for cost estimates; the sampling may be unchecked.
    pure function get_step_count(sampling, time) result(n_step)
       type(sampling_type), intent(in) :: sampling
       !> Length of the beginning, s (default: the whole record).
       real(wp), intent(in), optional :: time
-      !> The steps, not rounded; they may be more than an integer holds.
+      !> The number, not rounded; it may be more than an integer holds.
       real(wp) :: n_step
 
       n_step = sampling%duration

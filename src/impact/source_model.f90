@@ -1,8 +1,8 @@
 !> The abstract source model: options from namelist groups, and the force of one drop.
 !>
-!> A model is a module `thud_<name>` with a type `<name>_type` that extends this one; the list of names in
-!> src/CMakeLists.txt makes it known. Its options belong to the group of its name unless stated otherwise. What is said
-!> here of the arguments of a procedure holds for those of every model.
+!> A model is a type `<name>_type` that extends this one, in the module `thud_<name>`; the list of names in
+!> src/CMakeLists.txt registers it. The namelist group of its options has its name unless stated otherwise. The descriptions
+!> of arguments in this file hold for every model.
 module thud_source_model
    use thud_ball, only: ball_type
    use thud_drop, only: drop_type
@@ -18,7 +18,7 @@ module thud_source_model
 
    public :: source_model_type
 
-   !> Typical time that a source is computed for on a rigid floor, s.
+   !> Typical duration that is computed for a drop on a rigid floor, s.
    real(wp), parameter, public :: typical_contact = 0.025_wp
 
    !> A source model with its options as components.
@@ -37,13 +37,13 @@ module thud_source_model
    end type source_model_type
 
    abstract interface
-      !> Keys of the options.
+      !> Fields of the options: each connects a namelist key to a component.
       function get_fields(options) result(fields)
          import :: field_type, source_model_type
          implicit none (type, external)
          !> The options that the fields read and set.
          class(source_model_type), intent(in), target :: options
-         !> The keys: [n_field].
+         !> The fields: [n_field].
          type(field_type), allocatable :: fields(:)
       end function get_fields
 
@@ -58,43 +58,43 @@ module thud_source_model
          !> Sampling rate, length of the record, substeps.
          type(sampling_type), intent(in) :: sampling
          type(force_history_type), intent(out) :: history
-         !> The drop leads out of the model, the contact outlasts the record, or the steps are too coarse.
+         !> Set if the drop leaves the range of the model, the contact outlasts the record, or the steps are too coarse.
          type(error_type), allocatable, intent(out) :: error
-         !> What the ball drops on (default: a rigid floor); given to models only that `couples`.
+         !> The structure under the source (default: a rigid floor); only for models for which `couples` is true.
          type(receiver_type), intent(in), optional :: receiver
       end subroutine solve
    end interface
 
 contains
 
-   !> Refuses options that do not fit each other, the ball or the sampling; by default all fit.
+   !> Checks that options, ball and sampling fit each other; by default, they do.
    subroutine check(ball, options, sampling, error)
       type(ball_type), intent(in) :: ball
       !> The options, each inside its own range.
       class(source_model_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> Names group, key, value and what is allowed.
+      !> Set if they do not fit; names group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
 
    end subroutine check
 
-   !> Size of the snapshots of the deformed ball; by default there are none.
+   !> Shape of the snapshots of the deformed ball; by default there are none.
    function get_snapshot_shape(options, sampling) result(extents)
       class(source_model_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> Nodes from pole to pole, nodes through the wall, snapshots.
+      !> Number of nodes from pole to pole, of nodes through the wall, and of snapshots.
       integer :: extents(3)
 
       extents = 0
    end function get_snapshot_shape
 
-   !> Approximate time of one drop on one core, s; by default that of a model with one or two degrees of freedom.
+   !> Approximate computing time of a drop on one core, s; by default that of a model with one or two degrees of freedom.
    function get_cost(ball, options, sampling, receiver) result(cost)
       type(ball_type), intent(in) :: ball
       !> The options, checked.
       class(source_model_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> What the source drops on (default: a rigid floor).
+      !> The structure under the source (default: a rigid floor).
       type(receiver_type), intent(in), optional :: receiver
       !> The time, s.
       real(wp) :: cost
@@ -116,7 +116,7 @@ contains
       modulus = 0.0_wp
    end function get_paper_modulus
 
-   !> Validity limits of the model for a result; by default gravity, which models leave out.
+   !> Validity limits of the model for a result; by default that of neglected gravity.
    function get_validity_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
@@ -130,7 +130,7 @@ contains
       limits = [get_gravity_limit(drop, history)]
    end function get_validity_limits
 
-   !> Loss factor of the material against frequency, of models that have a material; others refuse.
+   !> Loss factor of the material against frequency; models without a material return an error.
    subroutine get_loss_factors(ball, options, frequency, loss_factor, error)
       type(ball_type), intent(in) :: ball
       class(source_model_type), intent(in) :: options
@@ -138,14 +138,14 @@ contains
       real(wp), intent(in) :: frequency(:)
       !> Loss factors: [n].
       real(wp), intent(out) :: loss_factor(:)
-      !> The model has no material, or it cannot be made.
+      !> Set if the model has no material or the material cannot be made.
       type(error_type), allocatable, intent(out) :: error
 
       loss_factor = 0.0_wp
       error = input_error('&model: name: this model has no material with a loss factor; allowed: one that has')
    end subroutine get_loss_factors
 
-   !> Whether the model can drop on a mobile floor; by default it can. The force of others is the blocked one.
+   !> Whether the model can drop on a mobile floor (default); if not, its force on a rigid floor is used.
    function couples(options) result(yes)
       class(source_model_type), intent(in) :: options
       logical :: yes
@@ -153,7 +153,7 @@ contains
       yes = .true.
    end function couples
 
-   !> Force on each of two plates in a quasi-static compression, of models that have one; others refuse.
+   !> Force on each of two plates in a quasi-static compression; models without one return an error.
    subroutine compress(ball, options, deflection, force, error)
       !> The ball, with the gas that it has in the press.
       type(ball_type), intent(in) :: ball
@@ -163,7 +163,7 @@ contains
       real(wp), intent(in) :: deflection(:)
       !> The force, N: [n].
       real(wp), intent(out) :: force(:)
-      !> The model has no static compression, or the ball cannot be pressed so far.
+      !> Set if the model has no quasi-static compression, or the ball cannot be pressed so far.
       type(error_type), allocatable, intent(out) :: error
 
       force = 0.0_wp

@@ -1,5 +1,5 @@
-!> Validity limits of a theory: a quantity, the range in which the theory holds, and why. Results outside are computed, with
-!> a warning.
+!> Validity limits of a theory: a quantity, the range in which the theory holds, and the reason. Results outside this range
+!> are computed with a warning.
 module thud_validity_limit
    use thud_ball, only: ball_type, get_density
    use thud_drop, only: drop_type
@@ -11,24 +11,24 @@ module thud_validity_limit
 
    public :: get_gravity_limit, get_limit_message, get_wall_limits, get_wave_limit, is_outside, validity_limit_type
 
-   !> Length of the message on a limit.
+   !> Length of a message about a limit.
    integer, parameter :: message_length = 240
 
-   !> A limit.
+   !> A validity limit.
    type :: validity_limit_type
-      !> Group of the keys that decide.
+      !> Namelist group of the keys that determine the quantity.
       character(len=24) :: group = ''
-      !> What is limited, a pure number or with its unit.
+      !> Name of the limited quantity, with its unit if it has one.
       character(len=72) :: quantity = ''
-      !> Its value, and the range in which the theory holds.
+      !> Value of the quantity, and range in which the theory holds.
       real(wp) :: value = 0.0_wp, lowest = -huge(1.0_wp), highest = huge(1.0_wp)
-      !> Reason, as the end of a message.
+      !> Reason for the limit, as the end of a message.
       character(len=96) :: reason = ''
    end type validity_limit_type
 
 contains
 
-   !> Whether a result lies outside.
+   !> Whether the quantity lies outside the range.
    pure function is_outside(limit) result(yes)
       type(validity_limit_type), intent(in) :: limit
       logical :: yes
@@ -37,7 +37,7 @@ contains
       yes = .not. (limit%value >= limit%lowest .and. limit%value <= limit%highest)
    end function is_outside
 
-   !> Message on a result outside the limits.
+   !> Message about a quantity outside the range.
    pure function get_limit_message(limit) result(message)
       type(validity_limit_type), intent(in) :: limit
       character(len=message_length) :: message
@@ -49,14 +49,14 @@ contains
          //trim(rounded(merge(limit%lowest, limit%highest, below)))//': '//limit%reason
    end function get_limit_message
 
-   !> A number of three digits.
+   !> A number with three digits.
    pure function rounded(value) result(text)
       real(wp), intent(in) :: value
       character(len=24) :: text
       real(wp) :: near
 
       if (.not. abs(value) < 1.0e300_wp) then
-         ! A quotient may overflow, and no message says Infinity.
+         ! A quotient may overflow; messages do not print Infinity.
          text = 'beyond 1e300'
          return
       end if
@@ -65,7 +65,7 @@ contains
       text = to_text(near)
    end function rounded
 
-   !> Limit of models that leave gravity out during the contact.
+   !> Limit of models that neglect gravity during the contact.
    pure function get_gravity_limit(drop, history) result(limit)
       type(drop_type), intent(in) :: drop
       type(force_history_type), intent(in) :: history
@@ -76,7 +76,7 @@ contains
          reason='gravity acts before first touch only')
    end function get_gravity_limit
 
-   !> Limit of the velocity at first touch by that of waves in the wall.
+   !> Limit of the velocity at first touch, as a fraction of the velocity of waves in the wall.
    pure function get_wave_limit(ball, history, highest) result(limit)
       type(ball_type), intent(in) :: ball
       type(force_history_type), intent(in) :: history
@@ -89,7 +89,7 @@ contains
          reason='it is the order of the strain of the wall')
    end function get_wave_limit
 
-   !> Limits of models of an elastic wall that stays near the sphere.
+   !> Limits of models of an elastic wall that stays close to the sphere.
    pure function get_wall_limits(ball, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(force_history_type), intent(in) :: history

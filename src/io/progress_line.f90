@@ -1,4 +1,4 @@
-!> Progress of long work as a line on the screen, where there is one.
+!> Progress of long work as a line on the screen, if there is a terminal.
 module thud_progress_line
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_kinds, only: wp
@@ -10,10 +10,10 @@ module thud_progress_line
 
    public :: begin_progress, end_progress
 
-   !> Time without a line, at the beginning and between two lines, s.
-   real(wp), parameter :: patience = 0.5_wp
+   !> Time before the first line and between two lines, s.
+   real(wp), parameter :: min_interval = 0.5_wp
 
-   !> Clock at the beginning and at the latest line, and its ticks in a second.
+   !> Clock at the beginning, clock at the latest line, and clock ticks per second.
    integer(int64) :: first = 0, latest = 0, rate = 1
 
    !> Length of a line.
@@ -33,7 +33,7 @@ contains
       call set_progress_handler(print_line)
    end subroutine begin_progress
 
-   !> Shows no progress any more, and wipes the line.
+   !> Stops showing progress, and clears the line.
    subroutine end_progress()
       integer :: status
 
@@ -44,23 +44,23 @@ contains
 
    !> Prints the line.
    subroutine print_line(done, whole, unit)
-      !> How much has been computed.
+      !> Amount of work done.
       real(wp), intent(in) :: done
-      !> Upper bound of the whole; 0 where unknown.
+      !> Upper bound of the total amount; 0 if unknown.
       real(wp), intent(in) :: whole
       character(len=*), intent(in) :: unit
       character(len=line_length) :: line
       integer(int64) :: now
-      real(wp) :: left
+      real(wp) :: remaining
       integer :: status
 
       call system_clock(now)
-      if (real(now - latest, wp) < patience*real(rate, wp)) return
+      if (real(now - latest, wp) < min_interval*real(rate, wp)) return
       latest = now
       if (whole > 0.0_wp .and. done > 0.0_wp) then
-         left = real(now - first, wp)/real(rate, wp)*(whole - done)/done
-         line = 'thud: '//fixed(done, 1)//' of at most '//fixed(whole, 1)//' '//unit//' computed, at most '//fixed(left, 0) &
-            //' s left'
+         remaining = real(now - first, wp)/real(rate, wp)*(whole - done)/done
+         line = 'thud: '//fixed(done, 1)//' of at most '//fixed(whole, 1)//' '//unit//' computed, at most ' &
+            //fixed(remaining, 0)//' s left'
          call write_text(standard_error, achar(13)//line, status)
       else
          call write_text(standard_error, achar(13)//'thud: '//fixed(done, 0)//' '//unit//' computed', status)

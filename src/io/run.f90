@@ -26,24 +26,24 @@ module thud_run
    !> Files of an impact.
    character(len=13), parameter :: file_names(3) = [character(len=13) :: 'force.csv', 'levels.csv', 'summary.nml']
 
-   !> File of further quantities of the model against time.
+   !> File of additional quantities of the model against time.
    character(len=*), parameter :: model_histories_file = 'model_histories.csv'
 
-   !> Files of a floor that moves.
+   !> Files of the drop on a mobile floor.
    character(len=16), parameter :: floor_names(2) = [character(len=16) :: 'floor_force.csv', 'floor_levels.csv']
 
-   !> File of a slow compression.
+   !> File of a quasi-static compression.
    character(len=*), parameter :: compression_file = 'compression.csv'
 
-   !> The full input, which says whose results a directory holds.
+   !> File of the full input; it identifies the case of the results.
    character(len=*), parameter :: input_file = 'effective.nml'
 
-   !> Note on a directory, which follows.
+   !> Beginning of a note; the path of the directory follows.
    character(len=*), parameter :: replaces = 'replaces the results of another input of the same name in '
 
    !> A warning or a note.
    type :: message_type
-      !> Its text, with the file that it is about.
+      !> Text, beginning with the file concerned.
       character(len=:), allocatable :: text
    end type message_type
 
@@ -67,7 +67,7 @@ contains
    !> Adds a warning or a note.
    subroutine add_message(self, path, text)
       class(outcome_type), intent(inout) :: self
-      !> The file that it is about; the message.
+      !> The file concerned; the message.
       character(len=*), intent(in) :: path, text
       type(message_type), allocatable :: messages(:)
       integer :: i
@@ -86,13 +86,15 @@ contains
       character(len=*), intent(in) :: path
       !> Directory for the results; empty for `outputs/<name of the case>`.
       character(len=*), intent(in) :: output
-      !> Files that thud has not written are replaced, too; further quantities of the model against time, too.
-      logical, intent(in) :: replace, write_all
+      !> Also replace files that thud has not written.
+      logical, intent(in) :: replace
+      !> Also write additional quantities of the model.
+      logical, intent(in) :: write_all
       type(case_type), target, intent(out) :: case
       type(results_type), intent(out) :: results
       !> Table, verdict and directory of the results.
       type(outcome_type), intent(out) :: outcome
-      !> The run failed; nothing was written.
+      !> Set if the run fails; nothing has been written then.
       type(error_type), allocatable, intent(out) :: error
 
       call load_case(path, case, error)
@@ -108,12 +110,14 @@ contains
       type(case_type), intent(in), target :: case
       !> Directory for the results; empty for `outputs/<name of the case>`.
       character(len=*), intent(in) :: output
-      !> Files that thud has not written are replaced, too; further quantities of the model against time, too.
-      logical, intent(in) :: replace, write_all
+      !> Also replace files that thud has not written.
+      logical, intent(in) :: replace
+      !> Also write additional quantities of the model.
+      logical, intent(in) :: write_all
       type(results_type), intent(out) :: results
       !> Table, verdict and directory of the results.
       type(outcome_type), intent(out) :: outcome
-      !> The run failed; nothing was written.
+      !> Set if the run fails; nothing has been written then.
       type(error_type), allocatable, intent(out) :: error
       type(text_file_type), allocatable :: files(:)
       type(text_file_type) :: input
@@ -137,11 +141,10 @@ contains
       end do
    end subroutine store_case
 
-   !> Refuses snapshots that would fill the disk.
+   !> Returns an error if snapshots would fill the disk.
    subroutine check_space(case, directory, error)
       type(case_type), intent(in) :: case
       character(len=*), intent(in) :: directory
-      !> Names the bytes that are wanted and those that are free.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: wanted, free
 
@@ -155,15 +158,15 @@ contains
          //' has space for '//fixed(free/1.0e6_wp, 1)//' MB; allowed: a longer snapshot_interval, or 0 for no snapshots')
    end subroutine check_space
 
-   !> Table, verdict and files of results.
+   !> Makes table, verdict and files from results.
    subroutine describe(case, results, write_all, files, outcome)
       type(case_type), intent(in) :: case
       type(results_type), intent(in) :: results
-      !> Channels of the histories, too.
+      !> Also write additional quantities of the model.
       logical, intent(in) :: write_all
       !> The files: [n_file].
       type(text_file_type), allocatable, intent(out) :: files(:)
-      !> Gets table and verdict.
+      !> The outcome; table and verdict are set.
       type(outcome_type), intent(inout) :: outcome
       character(len=:), allocatable :: text, summary
 
@@ -209,12 +212,12 @@ contains
       outcome%table = outcome%table//newline//get_compression_table(results%compression)
    end subroutine describe
 
-   !> Adds the files of a history of models that have further quantities or snapshots.
+   !> Adds the files with additional quantities and snapshots, if a history has them.
    subroutine add_history_files(history, prefix, write_all, files)
       type(force_history_type), intent(in) :: history
-      !> Beginning of their names.
+      !> Prefix of the file names.
       character(len=*), intent(in) :: prefix
-      !> Channels, too.
+      !> Write additional quantities of the model.
       logical, intent(in) :: write_all
       !> The files: [n_file].
       type(text_file_type), allocatable, intent(inout) :: files(:)
@@ -237,7 +240,7 @@ contains
       files(size(files))%content = content
    end subroutine add_file
 
-   !> Makes room for further files.
+   !> Extends the list by empty files.
    subroutine extend(files, count)
       !> The files: [n_file].
       type(text_file_type), allocatable, intent(inout) :: files(:)
@@ -257,9 +260,9 @@ contains
    subroutine load_case(path, case, error, unchecked)
       character(len=*), intent(in) :: path
       type(case_type), intent(out) :: case
-      !> Names file, group, key, value and allowed range.
+      !> Set if the file is not a valid case.
       type(error_type), allocatable, intent(out) :: error
-      !> Values may lie outside their ranges (default: they may not).
+      !> Skip the check of ranges and of the case as a whole (default: false).
       logical, intent(in), optional :: unchecked
       character(len=:), allocatable :: text
 

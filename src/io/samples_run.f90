@@ -1,4 +1,4 @@
-!> A run of many samples from end to end: case and table in, one row of results per sample out, a chunk at a time, so
+!> A run of many samples from end to end: reads a case and a table, and writes one row of results per sample, in chunks, so
 !> that the memory does not grow with the table.
 module thud_samples_run
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
@@ -23,16 +23,16 @@ module thud_samples_run
 
    public :: run_samples
 
-   !> Files of the results.
+   !> Files of results and of the full input.
    character(len=*), parameter :: result_file = 'samples.csv', input_file = 'samples.nml'
 
    !> Summary of many samples.
    type :: tally_type
-      !> Samples, those that were computed, and those that conform.
+      !> Numbers of samples, of computed samples, and of conforming samples.
       integer :: samples = 0, computed = 0, conforming = 0
-      !> Why the first of those failed that did.
+      !> Message of the first sample that failed.
       character(len=1024) :: failure = ''
-      !> Minimum and maximum contact time, s, and octave levels of the force of the case, dB: [octave_count + 1, 2].
+      !> Minimum and maximum of contact time, s, and octave levels of the assessed force, dB: [octave_count + 1, 2].
       real(wp) :: span(octave_count + 1, 2) = spread([huge(1.0_wp), -huge(1.0_wp)], 1, octave_count + 1)
    end type tally_type
 
@@ -40,17 +40,17 @@ contains
 
    !> Computes all samples of a table and writes their results.
    subroutine run_samples(path, table_path, threads, output, replace, outcome, error)
-      !> Path of the namelist file, which gives what the table does not.
+      !> Path of the namelist file, for all keys that are not in the table.
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: table_path
       integer, intent(in) :: threads
-      !> Directory for the results; empty for `outputs/<name of the case>_sets`.
+      !> Directory for the results; empty for `outputs/<name of the case>_samples`.
       character(len=*), intent(in) :: output
-      !> Files that thud has not written are replaced, too.
+      !> Also replace files that thud has not written.
       logical, intent(in) :: replace
       !> Table, verdict and directory of the results.
       type(outcome_type), intent(out) :: outcome
-      !> The run failed; nothing was written.
+      !> Set if the run fails; nothing has been written then.
       type(error_type), allocatable, intent(out) :: error
       type(case_type), target :: case
       type(sample_table_type) :: table
@@ -62,7 +62,7 @@ contains
 
       call load_case(path, case, error, unchecked=.true.)
       if (allocated(error)) return
-      ! Free modes and compression are no results of samples.
+      ! Samples have no free modes and no compression.
       case%has_modes = .false.
       case%has_compression = .false.
       if (.not. case%has_impact) error = input_error(path//': &model is missing; allowed: samples of a case ' &
@@ -90,7 +90,7 @@ contains
       outcome%table = outcome%table//get_defaults_line(case)
    end subroutine run_samples
 
-   !> Computes and writes chunk after chunk.
+   !> Computes and writes all samples, in chunks.
    subroutine write_samples(case, table, threads, results, tally, error)
       type(case_type), intent(in), target :: case
       !> The table, open.
@@ -98,7 +98,7 @@ contains
       integer, intent(in) :: threads
       type(result_directory_type), intent(inout) :: results
       type(tally_type), intent(out) :: tally
-      !> What went wrong before; or a value is not a number, the sampling cannot be used, the file cannot be written.
+      !> Set if an earlier step failed, a value or the sampling is invalid, or the file cannot be written.
       type(error_type), allocatable, intent(inout) :: error
       type(sweep_type) :: sweep
       type(text_file_type) :: parts(threads)
@@ -116,7 +116,7 @@ contains
          if (allocated(error) .or. n == 0) exit
          call solve_sweep(case, table%columns, values(:, :n), threads, .false., sweep, error)
          if (allocated(error)) exit
-         ! Writing numbers takes longer than computing them.
+         ! Formatting numbers takes longer than computing them.
          !$omp parallel do num_threads(threads)
          do i = 1, threads
             call get_sample_rows(table, tally%samples, values(:, :n), (i - 1)*n/threads + 1, i*n/threads, sweep, &
@@ -135,9 +135,9 @@ contains
          //to_text(tally%samples)//' samples has results, such as: '//trim(tally%failure))
    end subroutine write_samples
 
-   !> Samples that are read, computed and written at a time: about half a second of work for each thread.
+   !> Number of samples in a chunk: about half a second of work for each thread.
    pure function get_chunk_size(cost, threads) result(chunk_size)
-      !> Time that one takes, s.
+      !> Computing time of one sample, s.
       real(wp), intent(in) :: cost
       integer, intent(in) :: threads
       integer :: chunk_size
@@ -168,7 +168,7 @@ contains
       end do
    end subroutine add
 
-   !> What the screen shows.
+   !> Text for the screen.
    subroutine describe(case, table, tally, text)
       type(case_type), intent(in) :: case
       type(sample_table_type), intent(in) :: table
@@ -189,7 +189,7 @@ contains
       if (tally%computed == 0) return
       octaves = get_octaves()
       do i = 1, octave_count
-         ! Levels of different forces or methods have no common range.
+         ! A range of levels from different forces or methods would mean nothing.
          if (any(table%names == 'force') .or. any(table%names == 'method')) exit
          text = text//get_span_row('level, '//get_band_name(octaves(i))//' Hz octave', tally%span(i + 1, :), 2, 'dB')
       end do

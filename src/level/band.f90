@@ -14,7 +14,7 @@ module thud_band
       character(len=24) :: name
       !> Width in tenths of a decade: 3 for octaves, 1 for one-third octaves.
       integer :: width
-      !> Mid frequencies of the lowest and highest band: distances from 1 kHz in tenths of a decade.
+      !> Mid frequencies of the lowest and highest band, as distances from 1 kHz in tenths of a decade.
       integer :: first, last
    end type band_set_type
 
@@ -29,14 +29,14 @@ module thud_band
    !> The set that assessments use.
    character(len=24), parameter :: octave_set = band_set_names(1)
 
-   !> Choices of a case: one set, or `both` for all: [n_set + 1].
+   !> Choices for a case: one set, or `both`: [n_set + 1].
    character(len=24), parameter :: band_choices(*) = [band_set_names, [character(len=24) :: 'both']]
 
    !> One band.
    type :: band_type
       !> Name of its set.
       character(len=24) :: set = ''
-      !> Name of the band, its rounded mid frequency, Hz.
+      !> Nominal mid frequency, Hz, the name of the band.
       real(wp) :: nominal = 0.0_wp
       !> Exact mid frequency, Hz.
       real(wp) :: center = 0.0_wp
@@ -44,10 +44,10 @@ module thud_band
       real(wp) :: lower = 0.0_wp, upper = 0.0_wp
    end type band_type
 
-   !> Rounded mid frequencies in a decade, the series R10 of ISO 3.
+   !> Nominal mid frequencies in a decade, the series R10 of ISO 3.
    real(wp), parameter :: rounded(*) = [1.0_wp, 1.25_wp, 1.6_wp, 2.0_wp, 2.5_wp, 3.15_wp, 4.0_wp, 5.0_wp, 6.3_wp, 8.0_wp]
 
-   !> Numbers of a set and of a band in the table below.
+   !> Indices of a set and of a band in the table below.
    integer :: i, k
 
    !> Bands of all sets, with mid frequencies 1000 * 10^(k/10) Hz.
@@ -69,7 +69,7 @@ contains
       bands = get_bands(octave_set)
    end function get_octaves
 
-   !> Bands of a set; none where there is no set of that name.
+   !> Bands of a set; empty if no set has this name.
    pure function get_bands(name) result(bands)
       character(len=*), intent(in) :: name
       !> The bands, ascending: [n_band].
@@ -83,7 +83,7 @@ contains
       character(len=*), intent(in) :: name
       !> The bands, ascending: [n_band].
       type(band_type), allocatable, intent(out) :: bands(:)
-      !> There is no set of that name.
+      !> Set if no set has this name.
       type(error_type), allocatable, intent(out) :: error
 
       bands = get_bands(name)
@@ -113,7 +113,7 @@ contains
       name = fixed(band%nominal, get_decimals(band))
    end function get_band_name
 
-   !> Decimals of a nominal frequency.
+   !> Number of decimals of a nominal frequency.
    pure function get_decimals(band) result(decimals)
       type(band_type), intent(in) :: band
       !> 0 or 1.

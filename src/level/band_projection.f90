@@ -1,15 +1,14 @@
 !> Band energies of many records at once, by two matrix products.
 !>
-!> The energy of a record f in a band is f'Qf with the sinc kernel Q of the band (see
-!> `thud_force_exposure`). All bands lie below one frequency W, and the kernel of everything below W
-!> has few eigenvectors with eigenvalues that matter: about 2 W T for records of the length T, the
-!> discrete prolate spheroidal sequences (Slepian 1978). They commute with a tridiagonal matrix, which
-!> gives them quickly and without cancellation. A record is projected on them once for all bands; the
-!> spectrum of the projection at Gauss-Legendre nodes gives the energies. The sequences are
-!> symmetric or antisymmetric, so records are folded first, which halves the work.
+!> The energy of a record f in a band is f'Qf with the sinc kernel Q of the band (see `thud_force_exposure`). All bands lie
+!> below one frequency W. The kernel of all frequencies below W has few eigenvectors with significant eigenvalues: about
+!> 2 W T for records of length T, the discrete prolate spheroidal sequences (Slepian 1978). The kernel commutes with a
+!> tridiagonal matrix, which gives them quickly and without cancellation. A record is projected on them once for all bands;
+!> the spectrum of the projection at Gauss-Legendre nodes gives the energies. The sequences are symmetric or antisymmetric,
+!> so records are folded first, which halves the work.
 !>
-!> What the projection drops changes the root of a band's energy by at most sqrt(dropped) times the
-!> norm of the record, see `dropped`; the quadrature errs by less than `quadrature_error`.
+!> The omitted sequences change the root of a band's energy by at most sqrt(dropped) times the norm of the record, see
+!> `dropped`; the quadrature errs by less than `quadrature_error`.
 module thud_band_projection
    use thud_band, only: band_type
    use thud_constants, only: pi
@@ -22,16 +21,16 @@ module thud_band_projection
    public :: band_projection_type, get_band_energies, get_class_window, get_window_class, is_projected, &
       new_band_projection
 
-   !> Energy of the sequences that are left out, all bands together, over that of white noise in them.
+   !> Energy of the omitted sequences in all bands together, divided by that of white noise in the bands.
    real(wp), parameter :: dropped = 1.0e-22_wp
 
    !> Error of a quadrature over a band, relative to the maximum of its integrand.
    real(wp), parameter :: quadrature_error = 1.0e-17_wp
 
-   !> More sequences than ever matter beyond 2 W T: 1e-22 is reached after 12 to 20.
+   !> Number of computed sequences beyond 2 W T, more than ever matter: 1e-22 is reached after 12 to 20.
    integer, parameter :: margin = 32
 
-   !> Samples times the square of the sequences up to which these are computed within some two seconds. Beyond, they
+   !> Maximum product of the number of samples and the squared number of sequences, which takes some two seconds. More
    !> would pay only for thousands of records.
    real(wp), parameter :: max_work = 5.0e8_wp
 
@@ -49,11 +48,11 @@ module thud_band_projection
       real(wp), allocatable :: even(:, :)
       !> First halves of the antisymmetric sequences: [n_sample/2, n_odd].
       real(wp), allocatable :: odd(:, :)
-      !> Spectra of the symmetric sequences at the nodes, times the root of the weight: [n_even, n_node].
+      !> Spectra of the symmetric sequences at the nodes, times the square root of the weight: [n_even, n_node].
       real(wp), allocatable :: cosine(:, :)
       !> Spectra of the antisymmetric sequences, likewise: [n_odd, n_node].
       real(wp), allocatable :: sine(:, :)
-      !> Number of nodes up to the end of each band: [n_band].
+      !> Index of the last node of each band: [n_band].
       integer, allocatable :: last_node(:)
    end type band_projection_type
 
@@ -69,7 +68,7 @@ contains
       window = 1
       if (n_sample <= shortest_window) return
       window = floor(windows_per_octave*log(real(n_sample, wp)/shortest_window)/log(2.0_wp)) + 1
-      ! Lengths are rounded: the next window may be the one.
+      ! Lengths are rounded: the next window may be the right one.
       if (get_class_window(window) < n_sample) window = window + 1
    end function get_window_class
 
@@ -83,7 +82,7 @@ contains
       n_sample = 2*nint(shortest_window/2*2.0_wp**(real(window - 1, wp)/windows_per_octave))
    end function get_class_window
 
-   !> Whether the matrices for records of a length are soon made.
+   !> Whether the matrices for records of this length are computed quickly.
    pure function is_projected(n_sample, sample_rate, bands) result(projected)
       !> Samples of the records.
       integer, intent(in) :: n_sample
@@ -96,17 +95,17 @@ contains
       projected = n_sample*real(get_rank(n_sample, maxval(bands%upper)/sample_rate), wp)**2 <= max_work
    end function is_projected
 
-   !> Number of sequences that may matter.
+   !> Number of sequences to compute.
    pure function get_rank(n_sample, half_width) result(rank)
       integer, intent(in) :: n_sample
-      !> W over the sampling rate.
+      !> W divided by the sampling rate.
       real(wp), intent(in) :: half_width
       integer :: rank
 
       rank = min(n_sample, int(2*n_sample*half_width) + margin)
    end function get_rank
 
-   !> Matrices of a length, a rate and bands.
+   !> Matrices for a length, a sampling rate and bands.
    subroutine new_band_projection(n_sample, sample_rate, bands, projection, failed)
       !> Samples of the records, even.
       integer, intent(in) :: n_sample
@@ -114,9 +113,9 @@ contains
       real(wp), intent(in) :: sample_rate
       !> The bands: [n_band].
       type(band_type), intent(in) :: bands(:)
-      !> The matrices; without samples where they cannot be made.
+      !> The matrices; n_sample = 0 if LAPACK fails.
       type(band_projection_type), intent(out) :: projection
-      !> LAPACK does not find the sequences.
+      !> True if LAPACK does not find the sequences.
       logical, intent(out) :: failed
       real(wp), allocatable :: node(:), root_weight(:), angle(:, :)
       integer :: i
@@ -126,7 +125,7 @@ contains
       if (failed) projection%n_sample = 0
       if (failed) return
       call get_nodes(bands, real(n_sample, wp)/sample_rate, node, root_weight, projection%last_node)
-      ! Angles from the middle of the record; each half of a sequence stands for both.
+      ! Angles from the middle of the record; the factor 2 below adds the other half of a sequence.
       allocate (angle(n_sample/2, size(node)))
       do i = 1, n_sample/2
          angle(i, :) = 2*pi/sample_rate*(i - (n_sample + 1)/2.0_wp)*node
@@ -142,24 +141,24 @@ contains
    subroutine set_sequences(projection, half_width, failed)
       type(band_projection_type), intent(inout) :: projection
       real(wp), intent(in) :: half_width
-      !> LAPACK does not find them.
+      !> True if LAPACK does not find them.
       logical, intent(out) :: failed
       real(wp), dimension(projection%n_sample) :: diagonal, beside, values
       real(wp) :: work(20*projection%n_sample)
       real(wp), allocatable :: vectors(:, :)
       integer :: support(2*projection%n_sample), whole_work(10*projection%n_sample)
-      integer :: i, n, rank, found, status
+      integer :: i, n, rank, n_value, status
 
       n = projection%n_sample
       rank = get_rank(n, half_width)
       diagonal = [(((n - 1 - 2*i)/2.0_wp)**2*cos(2*pi*half_width), i=0, n - 1)]
       beside = [(real(i, wp)*(n - i)/2, i=1, n)]
       allocate (vectors(n, rank))
-      call dstevr('V', 'I', n, diagonal, beside, 0.0_wp, 0.0_wp, n - rank + 1, n, 0.0_wp, found, values, vectors, n, &
+      call dstevr('V', 'I', n, diagonal, beside, 0.0_wp, 0.0_wp, n - rank + 1, n, 0.0_wp, n_value, values, vectors, n, &
          support, work, size(work), whole_work, size(whole_work), status)
-      failed = status /= 0 .or. found /= rank
+      failed = status /= 0 .or. n_value /= rank
       if (failed) return
-      ! The maximum belongs to the first, symmetric sequence; then they alternate.
+      ! The largest eigenvalue belongs to the first sequence, which is symmetric; then the symmetry alternates.
       vectors = vectors(:, rank:1:-1)
       projection%even = (vectors(:n/2, 1::2) + vectors(n:n/2 + 1:-1, 1::2))/2
       projection%odd = (vectors(:n/2, 2::2) - vectors(n:n/2 + 1:-1, 2::2))/2
@@ -172,9 +171,9 @@ contains
       real(wp), intent(in) :: duration
       !> Frequencies, Hz: [n_node].
       real(wp), allocatable, intent(out) :: node(:)
-      !> Roots of the weights of |F|**2, both signs of the frequency together: [n_node].
+      !> Square roots of the weights of |F|**2, for both signs of the frequency together: [n_node].
       real(wp), allocatable, intent(out) :: root_weight(:)
-      !> Number of nodes up to the end of each band: [n_band].
+      !> Index of the last node of each band: [n_band].
       integer, allocatable, intent(out) :: last_node(:)
       integer :: count(size(bands))
       integer :: i
@@ -192,7 +191,7 @@ contains
       end do
    end subroutine get_nodes
 
-   !> Gauss-Legendre nodes that integrate cos(a x + b) over [-1, 1] to `quadrature_error`: |F|**2 is a
+   !> Number of Gauss-Legendre nodes that integrate cos(a x + b) over [-1, 1] to `quadrature_error`: |F|**2 is a
    !> sum of such functions. The remainder with N nodes is at most a**(2N) 2**(2N + 1) (N!)**4
    !> / ((2N + 1) ((2N)!)**3).
    elemental function get_node_count(a) result(count)
@@ -228,7 +227,7 @@ contains
       end do
    end subroutine get_spectra
 
-   !> Leaves out the last sequences, which hold no energy in the bands.
+   !> Removes the last sequences, which have no energy in the bands.
    subroutine drop_sequences(sequences, spectra)
       !> Halves of the sequences: [n_half, n_sequence].
       real(wp), allocatable, intent(inout) :: sequences(:, :)
@@ -289,7 +288,7 @@ contains
 
    end subroutine get_band_energies
 
-   !> Spectra of folded records.
+   !> Weighted spectra of folded records.
    subroutine project(n_record, folded, sequences, spectra, spectrum)
       integer, intent(in) :: n_record
       real(wp), intent(in) :: sequences(:, :)

@@ -1,12 +1,11 @@
 !> Force exposure level: the energy of a force in frequency bands, in dB
 !> (JIS A 1418-2, ISO 10140-5 annex F).
 !>
-!> The energy, 2 * integral of |F(f)|**2 df, is taken from the autocorrelation r of the record, without
-!> padding or window. With the angles m and h that the middle and the half width of the band advance
-!> per sample it is 2/(pi f_s) * (h r(0) + 2 sum over the lags k of r(k) g(k) cos(m k) sin(h k)),
-!> g(k) = 1/k. For the sum over the bins of a zero-padded transform of N samples instead of the integral
-!> g(k) = d/sin(d k), d = pi/N, and the band reaches from half a bin below its first bin to half a bin
-!> above its last one.
+!> The energy, 2 * integral of |F(f)|**2 df, is computed from the autocorrelation r of the record, without padding or
+!> window. Let m and h be the angles by which the middle and the half width of the band advance per sample. Then the energy
+!> is 2/(pi f_s) * (h r(0) + 2 sum over the lags k of r(k) g(k) cos(m k) sin(h k)) with g(k) = 1/k. For the sum over the
+!> bins of a zero-padded transform of N samples instead of the integral, g(k) = d/sin(d k) with d = pi/N, and the band
+!> extends from half a bin below its first bin to half a bin above its last bin.
 module thud_force_exposure
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use thud_band, only: band_type
@@ -21,24 +20,24 @@ module thud_force_exposure
 
    public :: get_force_exposure_levels, level_methods
 
-   !> `exact`: band energy of the record as it is; `fft`: sum over the 1 Hz bins of a 1 s record.
+   !> `exact`: energy of the band by the integral; `fft`: sum over the 1 Hz bins of a 1 s record.
    character(len=24), parameter :: level_methods(2) = [character(len=24) :: 'exact', 'fft']
 
-   !> Maximum number of samples of a record: its transform still fits into memory and its length into an integer.
+   !> Maximum number of samples of a record: its transform fits into memory and its length into an integer.
    integer, parameter :: max_samples = 100000000
 
-   !> Sum of squares below which a record counts as zero, N^2: its rounding would underflow.
+   !> Sum of squares below which a record is treated as zero, N^2: its rounding errors would underflow.
    real(wp), parameter :: min_energy = 1.0e-280_wp
 
-   !> Maximum sampling rate, Hz: one second of it still fits into memory.
+   !> Maximum sampling rate, Hz: one second of samples fits into memory.
    real(wp), parameter :: max_rate = 1.0e7_wp
 
-   !> Samples whose sines and cosines follow from those of the first of them.
+   !> Number of samples in a block, whose sines and cosines follow from those of its first sample.
    integer, parameter :: block = 32
 
 contains
 
-   !> Levels of a record in the given bands.
+   !> Force exposure levels of a record in bands.
    subroutine get_force_exposure_levels(force, sample_rate, bands, method, levels, error)
       !> Force, N, zero before and after the record: [n_sample].
       real(wp), intent(in) :: force(:)
@@ -50,7 +49,7 @@ contains
       character(len=*), intent(in) :: method
       !> 10 lg(band energy/(1 N^2 s)), dB: [n_band].
       real(wp), intent(out) :: levels(:)
-      !> The record or the rate cannot be used, the method is unknown, or an interrupt.
+      !> Set if the record or the rate cannot be used, the method is unknown, or an interrupt came.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: energy(size(bands))
       real(wp) :: resolution
@@ -58,7 +57,7 @@ contains
 
       call check_record(force, sample_rate, bands, error)
       if (allocated(error)) return
-      ! Zeros at the ends add nothing to the energy but take time.
+      ! Zeros at the ends add no energy but take time.
       first = 1
       do while (.not. abs(force(first)) > 0.0_wp)
          first = first + 1
@@ -78,12 +77,12 @@ contains
       end select
       call check_interrupt(error)
       if (allocated(error)) return
-      ! Rounding errors of a band are about this fraction of the total energy, which limits the resolution.
+      ! The rounding errors of a band are about this fraction of the total energy and limit the resolution.
       resolution = epsilon(1.0_wp)*sum(force(first:last)**2)/sample_rate
       levels = 10*log10(max(energy, resolution)/(reference_force**2*reference_time))
    end subroutine get_force_exposure_levels
 
-   !> Refuses a record that has no levels.
+   !> Checks that a record has levels.
    subroutine check_record(force, sample_rate, bands, error)
       !> Force, N: [n_sample].
       real(wp), intent(in) :: force(:)
@@ -105,7 +104,7 @@ contains
       else if (size(force) == 0 .or. size(force) > max_samples) then
          error = input_error('the force has '//to_text(size(force))//' samples; allowed: 1 to '//to_text(max_samples))
       else if (total > 2*min_energy .and. total < huge(1.0_wp)/size(force)/sample_rate**2) then
-         return  ! Most records; such a sum has no term that is not finite or too large.
+         return  ! Most records: every term of such a sum is finite and small enough.
       else if (.not. all(ieee_is_finite(force))) then
          error = input_error('the force holds a value that is not finite, first at sample ' &
             //to_text(findloc(ieee_is_finite(force), .false., dim=1))//'; allowed: finite numbers')
@@ -118,8 +117,7 @@ contains
 
    !> Energy in the bins of a zero-padded transform between the band edges, N^2 s.
    !>
-   !> The window is 1 s as in the paper (section 3), or the next whole number of seconds that
-   !> holds the record.
+   !> The window is 1 s as in the paper (section 3), or the next whole number of seconds that holds the record.
    function get_bin_energy(force, sample_rate, bands) result(energy)
       real(wp), intent(in) :: force(:)
       real(wp), intent(in) :: sample_rate
@@ -144,13 +142,13 @@ contains
       end if
    end function get_bin_energy
 
-   !> Energies of a record between band edges, N^2 s; see the head of the module.
+   !> Energies of a record between band edges, N^2 s; see the description of the module.
    function get_energy(force, sample_rate, lower, upper, spacing) result(energy)
       real(wp), intent(in) :: force(:)
       real(wp), intent(in) :: sample_rate
       !> Edges, Hz: [n_band].
       real(wp), intent(in) :: lower(:), upper(:)
-      !> Distance of the bins, Hz; 0 for the integral.
+      !> Spacing of the bins, Hz; 0 for the integral.
       real(wp), intent(in) :: spacing
       !> Energy of each band, N^2 s: [n_band].
       real(wp) :: energy(size(lower))
@@ -158,7 +156,7 @@ contains
       real(wp) :: step, middle, half_width
       integer :: i, lag
 
-      ! Zeros fill the last block.
+      ! Padded with zeros to whole blocks.
       allocate (correlation(0:block*((size(force) + block - 2)/block)), source=0.0_wp)
       call get_autocorrelation(force, correlation(:size(force) - 1))
       step = pi*spacing/sample_rate
@@ -180,34 +178,33 @@ contains
 
    !> Sum of x(k) cos(m k) sin(h k) over all samples, whose number is a multiple of `block`.
    !>
-   !> Sines and cosines are few, those of the starts of blocks and those within a block; they make all
-   !> others by the sums of angles.
+   !> Sines and cosines are computed only for the starts of blocks and within one block; sums of angles give all others.
    pure function get_wave_sum(x, m, h) result(total)
       !> Samples: [n].
       real(wp), intent(in), contiguous :: x(:)
       !> Angles per sample of cosine and sine.
       real(wp), intent(in) :: m, h
       real(wp) :: total
-      real(wp) :: part(block, 4), start_wave(4), angle(2)
+      real(wp) :: partial_sum(block, 4), start_wave(4), angle(2)
       integer :: start, i
 
-      part = 0.0_wp
+      partial_sum = 0.0_wp
       do start = 0, size(x) - 1, block
          angle = get_angle([m, h], start)
          start_wave = [cos(angle(1))*[sin(angle(2)), cos(angle(2))], -sin(angle(1))*[sin(angle(2)), cos(angle(2))]]
          do i = 1, 4
-            part(:, i) = part(:, i) + start_wave(i)*x(start + 1:start + block)
+            partial_sum(:, i) = partial_sum(:, i) + start_wave(i)*x(start + 1:start + block)
          end do
       end do
       total = 0.0_wp
       do i = 1, block
-         total = total + cos(m*i)*(part(i, 1)*cos(h*i) + part(i, 2)*sin(h*i)) &
-            + sin(m*i)*(part(i, 3)*cos(h*i) + part(i, 4)*sin(h*i))
+         total = total + cos(m*i)*(partial_sum(i, 1)*cos(h*i) + partial_sum(i, 2)*sin(h*i)) &
+            + sin(m*i)*(partial_sum(i, 3)*cos(h*i) + partial_sum(i, 4)*sin(h*i))
       end do
    end function get_wave_sum
 
-   !> Angle from -pi to pi after so many samples. Without removing whole turns first, the rounding error would
-   !> grow with the length of the record.
+   !> Angle from -pi to pi after a number of samples. Whole turns are removed first; otherwise the rounding error would grow
+   !> with the length of the record.
    elemental function get_angle(per_sample, count) result(angle)
       !> Angle per sample.
       real(wp), intent(in) :: per_sample
@@ -215,12 +212,12 @@ contains
       integer, intent(in) :: count
       real(wp) :: angle
       real(wp), parameter :: scale = 2.0_wp**24
-      real(wp) :: turns, high
+      real(wp) :: revolutions, high
 
-      turns = per_sample/(2*pi)
-      ! So few digits that the product is exact.
-      high = anint(turns*scale)/scale
-      angle = 2*pi*((high*count - anint(high*count)) + (turns - high)*count)
+      revolutions = per_sample/(2*pi)
+      ! Rounded to so few digits that the product is exact.
+      high = anint(revolutions*scale)/scale
+      angle = 2*pi*((high*count - anint(high*count)) + (revolutions - high)*count)
    end function get_angle
 
 end module thud_force_exposure

@@ -1,5 +1,5 @@
-!> Levels of heavy impacts in the room below: their standardization (ISO 16283-2) and the single numbers made of
-!> them (ISO 717-2 annex D, KS F 2863-2).
+!> Levels of heavy impacts in the room below: standardization (ISO 16283-2) and single-number ratings
+!> (ISO 717-2 annex D, KS F 2863-2).
 module thud_rating
    use thud_band, only: band_type, get_bands
    use thud_error, only: error_type, input_error
@@ -11,21 +11,22 @@ module thud_rating
    public :: class_limits, correct_for_background, fast_reverberation, find_rated_bands, get_a_weighted_level, get_class
    public :: get_inverse_a_rating, get_rounded, get_standardization, rated_set_names
 
-   !> Maximum number of bands of a rating.
+   !> Maximum number of bands in a rating.
    integer, parameter :: max_rated = 12
 
-   !> A set of bands that a rating is made of.
+   !> A set of bands that a rating uses.
    type :: rated_set_type
       !> Name of the set of bands.
       character(len=24) :: name
-      !> Rounded mid frequency of the lowest band, Hz, and number of bands.
+      !> Nominal mid frequency of the lowest band, Hz.
       real(wp) :: lowest
+      !> Number of bands.
       integer :: n_band
-      !> A-weighting as ISO 717-2 annex D rounds it, dB: the first n_band count.
+      !> A-weighting as ISO 717-2 annex D rounds it, dB; only the first n_band values are used.
       real(wp) :: a_weighting(max_rated)
    end type rated_set_type
 
-   !> All sets. One-third-octave bands are not summed into octaves first: the maximum of a sum is not the sum of maxima.
+   !> All sets. One-third-octave bands are not summed into octaves first: the maximum of a sum is not the sum of the maxima.
    type(rated_set_type), parameter :: rated_sets(*) = [ &
       rated_set_type('octave', 63.0_wp, 4, [-26.2_wp, -16.2_wp, -8.7_wp, -3.2_wp, spread(0.0_wp, 1, max_rated - 4)]), &
       rated_set_type('third', 50.0_wp, 12, [-30.3_wp, -26.2_wp, -22.4_wp, -19.1_wp, -16.2_wp, -13.2_wp, -10.8_wp, &
@@ -35,36 +36,35 @@ module thud_rating
    character(len=24), parameter :: rated_set_names(*) = rated_sets%name
 
    !> Reference volume, m3, and reverberation time, s (ISO 16283-2).
-   real(wp), parameter :: reference_volume = 50.0_wp, reference_time = 0.5_wp
+   real(wp), parameter :: reference_volume = 50.0_wp, reference_reverberation = 0.5_wp
 
-   !> Reverberation time, s, of the decay that the Fast detector's time constant, 0.125 s, has: 0.125 s * 6 ln 10.
+   !> Reverberation time of a decay with the time constant of the Fast detector, s: 0.125 s * 6 ln 10.
    real(wp), parameter :: fast_reverberation = 1.7275_wp
 
-   !> Where C is nearer to 1 than this, ln C/(C - 1) is taken from its series, to 1e-16.
+   !> If C differs from 1 by less than this, a series gives ln C/(C - 1), to 1e-16.
    real(wp), parameter :: near_one = 1.0e-5_wp
 
-   !> Maximum A-weighted levels of the classes 1 to 4, dB (KS F 2863-2).
+   !> Upper limits of the A-weighted level for the classes 1 to 4, dB (KS F 2863-2).
    real(wp), parameter :: class_limits(*) = [37.0_wp, 41.0_wp, 45.0_wp, 49.0_wp]
 
    !> Reference curve in the octaves 63 to 500 Hz, dB (KS F 2863-2).
    real(wp), parameter :: inverse_a_curve(*) = [83.0_wp, 73.0_wp, 66.0_wp, 60.0_wp]
 
-   !> Sum of the excesses over it that is allowed, dB.
+   !> Allowed sum of the excesses over the curve, dB.
    real(wp), parameter :: max_excess = 8.0_wp
 
-   !> Difference to the background, dB, below which a level is corrected, and below which the correction is that of this
-   !> difference.
+   !> Differences to the background, dB: a level is corrected below the first; the correction is constant below the second.
    real(wp), parameter :: clear_difference = 15.0_wp, min_difference = 6.0_wp
 
 contains
 
-   !> Bands that a rating is made of.
+   !> Bands that a rating uses.
    subroutine find_rated_bands(name, bands, error)
       !> One of `rated_set_names`.
       character(len=*), intent(in) :: name
       !> The bands, ascending: [n_band].
       type(band_type), allocatable, intent(out) :: bands(:)
-      !> There is no rating in bands of that name.
+      !> Set if there is no rating in bands of this name.
       type(error_type), allocatable, intent(out) :: error
       integer :: at, first
 
@@ -79,7 +79,7 @@ contains
       bands = bands(first:first + rated_sets(at)%n_band - 1)
    end subroutine find_rated_bands
 
-   !> A-weighted maximum level of the bands of a set (ISO 717-2 annex D), not rounded.
+   !> A-weighted maximum level from the bands of a set (ISO 717-2 annex D), not rounded.
    pure function get_a_weighted_level(name, level) result(total)
       !> One of `rated_set_names`.
       character(len=*), intent(in) :: name
@@ -93,21 +93,21 @@ contains
       total = 10*log10(sum(10**((level + rated_sets(at)%a_weighting(:size(level)))/10)))
    end function get_a_weighted_level
 
-   !> A single number as it is stated: a half is rounded up.
+   !> A single number as it is stated: rounded, halves upwards.
    elemental function get_rounded(level) result(rounded)
       !> The level, dB.
       real(wp), intent(in) :: level
-      !> The whole number, dB.
+      !> The integer level, dB.
       integer :: rounded
 
       rounded = floor(level + 0.5_wp)
    end function get_rounded
 
-   !> Class of an A-weighted level that is not standardized (KS F 2863-2).
+   !> Class of an A-weighted level without standardization (KS F 2863-2).
    pure function get_class(level) result(number)
       !> The level, dB.
       real(wp), intent(in) :: level
-      !> 1 to 4; 0 above the last.
+      !> 1 to 4; 0 above the limit of class 4.
       integer :: number
 
       number = findloc(get_rounded(level) <= class_limits, .true., dim=1)
@@ -121,7 +121,7 @@ contains
       integer :: rating
       integer :: shift
 
-      ! From where every excess is above its limit.
+      ! Start where every single excess is above the allowed sum.
       shift = floor(minval(level - inverse_a_curve) - max_excess) - 1
       do while (sum(max(0.0_wp, level - inverse_a_curve - shift)) > max_excess)
          shift = shift + 1
@@ -131,8 +131,8 @@ contains
 
    !> Standardized level minus measured level: 10 lg(V/V0) - 10 lg(g(C)/g(C0)) (ISO 16283-2).
    !>
-   !> g(C) is the maximum of a decay of reverberation time T as the Fast detector shows it, over that of a decay
-   !> without end: C**(-1/(C - 1)) with C = T/1.7275 s; the printed form is the same with more terms.
+   !> g(C) is the maximum that the Fast detector shows of a decay with the reverberation time T, divided by that of a steady
+   !> sound: C**(-1/(C - 1)) with C = T/1.7275 s; the standard prints the same with more terms.
    elemental function get_standardization(reverberation_time, volume) result(difference)
       !> Reverberation time, s; volume, m3.
       real(wp), intent(in) :: reverberation_time, volume
@@ -140,7 +140,7 @@ contains
       real(wp) :: difference
 
       difference = 10*log10(volume/reference_volume) &
-         - 10/log(10.0_wp)*(get_log_gain(reverberation_time) - get_log_gain(reference_time))
+         - 10/log(10.0_wp)*(get_log_gain(reverberation_time) - get_log_gain(reference_reverberation))
    end function get_standardization
 
    !> ln g = -ln C/(C - 1).
@@ -158,14 +158,14 @@ contains
       end if
    end function get_log_gain
 
-   !> Level without the background (ISO 16283-2): the energy of the background is subtracted where the level is 6 to
-   !> 15 dB above it; below, what 6 dB give is subtracted, and the result is an upper bound.
+   !> Level without the background (ISO 16283-2). From 6 to 15 dB above the background, its energy is subtracted from the
+   !> level. Nearer to the background, the correction is that for 6 dB, and the result is an upper bound.
    elemental subroutine correct_for_background(level, background, corrected, is_upper_bound)
-      !> Levels with and of the background, dB.
+      !> Level including the background, and level of the background alone, dB.
       real(wp), intent(in) :: level, background
-      !> The level without it, dB.
+      !> The level without the background, dB.
       real(wp), intent(out) :: corrected
-      !> The level is less than 6 dB above the background: the true one is at most the corrected one.
+      !> True if the level is less than 6 dB above the background: the corrected level is an upper bound.
       logical, intent(out) :: is_upper_bound
       real(wp) :: difference
 

@@ -1,5 +1,5 @@
-!> What the standards ask of heavy/soft impact sources, and the verdict on a force history
-!> (JIS A 1418-2:2019 tables A.1 and A.2, ISO 10140-5:2021 table F.1, ISO 16283-2:2020 table A.1).
+!> Requirements of the standards for heavy/soft impact sources, and the verdict on a force history (JIS A 1418-2:2019 tables
+!> A.1 and A.2, ISO 10140-5:2021 table F.1, ISO 16283-2:2020 table A.1).
 module thud_source_limits
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
    use thud_constants, only: recorded_band
@@ -13,12 +13,11 @@ module thud_source_limits
    public :: conforms, criterion_type, get_criteria, get_peak_count, get_source_limits
    public :: criterion_count, source_limits_type, source_names
 
-   !> Criteria of a verdict: the octaves, contact time, restitution, peaks, mass, drop height.
+   !> Number of criteria of a verdict: octaves, contact time, restitution, peaks, mass, drop height.
    integer, parameter :: criterion_count = octave_count + 5
 
-   !> A peak counts where the force falls by more than this fraction of its maximum on both sides.
-   !> The standards ask for a single peak without defining one; ripples of a few percent do not
-   !> make a second impact.
+   !> A peak is a maximum on both sides of which the force falls by more than this fraction of the peak force. The standards
+   !> require a single peak without defining one; ripples of a few percent are no second impact.
    real(wp), parameter :: peak_prominence = 0.1_wp
 
    !> Minimum and maximum conforming values of one source.
@@ -33,7 +32,7 @@ module thud_source_limits
       real(wp) :: restitution(2) = [0.7_wp, 0.9_wp]
       !> Mass, kg.
       real(wp) :: mass(2)
-      !> Height of drop, m.
+      !> Drop height, m.
       real(wp) :: drop_height(2)
    end type source_limits_type
 
@@ -45,7 +44,7 @@ module thud_source_limits
          upper_level=[40.0_wp, 32.5_wp, 24.5_wp, 19.0_wp, 14.5_wp], &
          mass=[2.4_wp, 2.6_wp], drop_height=[0.99_wp, 1.01_wp]), &
       ! "Bang machine", characteristic (1): 47 +- 1, 40 +- 1.5, 22 +- 1.5, 11.5 +- 2, 5.5 +- 2 dB.
-      ! Its drop height comes without a tolerance; the ball's 1 cm is used.
+      ! The standards give its drop height without a tolerance; the ball's 1 cm is used.
       source_limits_type('tyre', &
          lower_level=[46.0_wp, 38.5_wp, 20.5_wp, 9.5_wp, 3.5_wp], &
          upper_level=[48.0_wp, 41.5_wp, 23.5_wp, 13.5_wp, 7.5_wp], &
@@ -54,7 +53,7 @@ module thud_source_limits
    !> Names of the sources: [n_source].
    character(len=24), parameter :: source_names(*) = sources%name
 
-   !> One quantity, the range that it must lie in, and whether it does.
+   !> A quantity and the range in which it must lie.
    type :: criterion_type
       character(len=24) :: name = ''
       !> SI unit or dB; empty for pure numbers.
@@ -72,7 +71,7 @@ contains
       !> One of `source_names`.
       character(len=*), intent(in) :: source
       type(source_limits_type), intent(out) :: limits
-      !> The source is not known.
+      !> Set if the source is not known.
       type(error_type), allocatable, intent(out) :: error
       integer :: at
 
@@ -93,7 +92,7 @@ contains
       !> Contact time, s; coefficient of restitution.
       real(wp), intent(in) :: contact_time, restitution
       integer, intent(in) :: peak_count
-      !> Mass of the source, kg; height of drop, m.
+      !> Mass of the source, kg; drop height, m.
       real(wp), intent(in) :: mass, drop_height
       !> The criteria: [criterion_count].
       type(criterion_type) :: criteria(criterion_count)
@@ -137,14 +136,13 @@ contains
    !> Whether a criterion is met; a value that is not a number never conforms.
    elemental function conforms(criterion) result(met)
       type(criterion_type), intent(in) :: criterion
-      !> The value lies in the range, its ends included.
+      !> True if the value lies in the range, including its ends.
       logical :: met
 
       met = criterion%value >= criterion%lower .and. criterion%value <= criterion%upper
    end function conforms
 
-   !> Number of peaks of a force, as far as it is recorded: maxima with a drop on both sides, see
-   !> `peak_prominence` and `recorded_band`.
+   !> Number of peaks of a force after low-pass filtering at `recorded_band`; see `peak_prominence`.
    function get_peak_count(whole_force, sample_rate) result(peak_count)
       !> Force, N, that starts and ends at zero: [n_sample].
       real(wp), intent(in) :: whole_force(:)

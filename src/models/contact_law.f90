@@ -1,5 +1,5 @@
-!> Law of a contact: a linear and a power-law spring, damped in proportion to their force (Hunt and Crossley 1975),
-!> F = (k d + c d^n)(1 + a d'), which never pulls.
+!> Contact law: a linear and a power-law spring in parallel, damped in proportion to their force (Hunt and Crossley 1975),
+!> F = (k d + c d^n)(1 + a d'), never tensile.
 module thud_contact_law
    use thud_kinds, only: wp
    implicit none (type, external)
@@ -19,7 +19,7 @@ module thud_contact_law
 
 contains
 
-   !> Components of the force; they go on smoothly past the end of a contact, where its event is sought.
+   !> Components of the force. They stay smooth beyond the end of a contact, where the search for it evaluates them.
    pure function get_contact_force(law, deflection, velocity) result(components)
       type(contact_law_type), intent(in) :: law
       !> Deflection d, m, and its rate, m/s.

@@ -1,5 +1,5 @@
-!> A lumped source on a spring with damping that grows with the deflection (Hunt and Crossley
-!> 1975; paper, reference [6]): a baseline, also of the tyre.
+!> A lumped source on a spring with damping that grows with the deflection (Hunt and Crossley 1975; paper, reference [6]): a
+!> baseline, also for the tyre.
 module thud_hunt_crossley
    use thud_ball, only: ball_type
    use thud_contact_law, only: contact_law_type, get_contact_force
@@ -22,18 +22,18 @@ module thud_hunt_crossley
 
    public :: get_damping, hunt_crossley_type
 
-   !> Options of the model. Of stiffness and contact time one is given, of damping and
-   !> restitution at most one; 0 means not given.
+   !> Options of the model. Exactly one of stiffness and contact time is given, and at most one of damping and restitution; 0
+   !> means not given.
    type, extends(source_model_type) :: hunt_crossley_type
       !> Stiffness k, N/m^exponent.
       real(wp) :: stiffness = 0.0_wp
-      !> Wanted contact time, s.
+      !> Target contact time, s.
       real(wp) :: contact_time = 0.0_wp
-      !> Exponent n of the deflection; 3/2 is Hertz's.
+      !> Exponent n of the deflection; 3/2 for Hertz contact.
       real(wp) :: exponent = 1.5_wp
       !> Damping alpha, s/m.
       real(wp) :: damping = 0.0_wp
-      !> Wanted coefficient of restitution.
+      !> Target coefficient of restitution.
       real(wp) :: restitution = 0.0_wp
    contains
       procedure, pass(options) :: get_fields
@@ -59,16 +59,17 @@ contains
 
       fields = [ &
          real_field('stiffness', options%stiffness, '', &
-         'stiffness, N/m^exponent; 0: from contact_time', '[0, 1e15]'), &
+         'contact stiffness, N/m^exponent; 0: derived from contact_time', '[0, 1e15]'), &
          real_field('contact_time', options%contact_time, 's', &
          'target contact time; 0: derived from stiffness', '[0, 10]'), &
-         real_field('exponent', options%exponent, '', 'exponent of the deflection', '[1, 5]'), &
-         real_field('damping', options%damping, 's/m', 'damping alpha; 0: from restitution', '[0, 100]'), &
+         real_field('exponent', options%exponent, '', 'exponent of the deflection in the contact force', '[1, 5]'), &
+         real_field('damping', options%damping, 's/m', &
+         'damping coefficient alpha; 0: derived from restitution', '[0, 100]'), &
          real_field('restitution', options%restitution, '', &
-         'wanted coefficient of restitution; 0: from damping', '[0, 1]')]
+         'target coefficient of restitution; 0: derived from damping', '[0, 1]')]
    end function get_fields
 
-   !> Refuses values that are missing or contradict each other.
+   !> Returns an error if values are missing or contradict each other.
    subroutine check(ball, options, sampling, error)
       type(ball_type), intent(in) :: ball
       class(hunt_crossley_type), intent(in) :: options
@@ -105,13 +106,13 @@ contains
       rate(at_loss) = components(2)*state(at_velocity)
    end subroutine get_derivative
 
-   !> Spring and damping force of one instant.
+   !> Spring and damping force at one instant.
    pure subroutine get_components(self, state, components, elastic_force)
       class(spring_type), intent(in) :: self
       real(wp), intent(in) :: state(:)
       !> k d^n and k d^n * 3/2 alpha d', N: [2].
       real(wp), intent(out) :: components(:)
-      !> Their sum: without flux of momentum it is the whole force, N.
+      !> Sum of the components, the whole force: there is no flux of momentum, N.
       real(wp), intent(out) :: elastic_force
       real(wp) :: force(3)
 
@@ -133,7 +134,7 @@ contains
 
       damping = 0.0_wp
       if (restitution >= 1.0_wp) return
-      ! The root other than zero: the function is positive before it and falls without bound to 1/e.
+      ! The nonzero root: the function is positive below it and falls without bound towards 1/e.
       bracket%right = 1/restitution
       do while (bracket%is_open())
          call bracket%halve(balance(bracket%get_middle()) > 0.0_wp)
@@ -142,17 +143,17 @@ contains
 
    contains
 
-      !> Energy of the rebound that is missing, in units of M (v0/x)^2.
+      !> Missing energy of the rebound, in units of M (v0/x)^2.
       pure function balance(x) result(missing)
          !> 3/2 alpha v0.
          real(wp), intent(in) :: x
-         !> Zero where the balance holds.
+         !> Zero if the balance holds.
          real(wp) :: missing
 
          missing = excess(x) - excess(-restitution*x)
       end function balance
 
-      !> x - ln(1 + x), also for small x.
+      !> x - ln(1 + x), accurate also for small x.
       pure function excess(x) result(value)
          !> Argument above -1.
          real(wp), intent(in) :: x
@@ -162,7 +163,7 @@ contains
          if (abs(x) > 0.03_wp) then
             value = x - log(1 + x)
          else
-            ! Ten terms of the series leave 0.03**12.
+            ! Ten terms of the series leave an error of 0.03**12.
             value = sum([((-x)**k/k, k=2, 11)])
          end if
       end function excess
@@ -171,14 +172,14 @@ contains
 
    !> Stiffness that gives a contact time, N/m^exponent.
    !>
-   !> In units of v0 and of the length D = (M v0^2/k)^(1/(n + 1)) the equation does not contain k:
-   !> one contact in these units gives the ratio of contact time to D/v0.
+   !> In units of v0 and of the length D = (M v0^2/k)^(1/(n + 1)) the equation does not contain k: one contact in these units
+   !> gives the ratio of contact time to D/v0.
    pure function get_stiffness(contact_time, exponent, damping, mass, impact_velocity) result(stiffness)
-      !> Wanted contact time, s; exponent n of the deflection; damping alpha, s/m; mass, kg.
+      !> Target contact time, s; exponent n of the deflection; damping alpha, s/m; mass, kg.
       real(wp), intent(in) :: contact_time, exponent, damping, mass
       !> Velocity at first touch, m/s.
       real(wp), intent(in) :: impact_velocity
-      !> k, N/m^exponent; 0 where the damping is too high for a rebound.
+      !> k, N/m^exponent; 0 if the damping is too high for a rebound.
       real(wp) :: stiffness
       real(wp), parameter :: step = 1.0e-3_wp
       integer, parameter :: max_steps = 1000000
@@ -194,7 +195,7 @@ contains
       time = 0.0_wp
       do i = 1, max_steps
          call rk4_step(spring, time, state, step, next, valid)
-         ! Written so that NaN ends the march too.
+         ! Written so that NaN ends the loop too.
          if (.not. next(at_deflection) > 0.0_wp) exit
          state = next
          time = time + step

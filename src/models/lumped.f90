@@ -1,5 +1,5 @@
-!> Impact of a source of a few masses: marches from first touch until the source has left for good, samples the forces, and
-!> checks the balances of impulse and energy.
+!> Impact of a source of a few masses: integrates in time from first touch until the source has left for good, samples the
+!> forces, and checks the balances of impulse and energy.
 module thud_lumped
    use thud_contact_source, only: coarse_error, contact_source_type
    use thud_coupled_impact, only: solve_coupled
@@ -30,13 +30,13 @@ contains
       character(len=*), intent(in) :: component_name(:)
       !> Force and motion from first touch on.
       type(force_history_type), intent(out) :: history
-      !> The equation fails, the contact outlasts the record, or the steps are too coarse.
+      !> Set if the equation fails, the contact outlasts the record, or the steps are too coarse.
       type(error_type), allocatable, intent(out) :: error
-      !> What the source drops on (default: a rigid floor).
+      !> The floor under the source (default: rigid).
       type(receiver_type), intent(in), optional :: receiver
-      !> Steps in each sampling interval (default: the substeps).
+      !> Steps per sampling interval (default: the substeps).
       integer, intent(in), optional :: n_step
-      !> Names, with units, of further quantities against time: [n_model_history].
+      !> Names, with units, of additional quantities against time: [n_model_history].
       character(len=*), intent(in), optional :: model_history_name(:)
       real(wp) :: state(source%n_state)
       integer :: steps
@@ -51,24 +51,24 @@ contains
          call solve_coupled(source, drop, sampling, steps, receiver, history, state, error)
       end if
       if (allocated(error)) return
-      ! Without balances the contact time, and advice on the sampling rate, mean nothing.
+      ! Contact time and advice on the sampling rate mean nothing if a balance fails.
       call finish(source, state, history, error)
       if (.not. allocated(error)) call check_contact_samples(sampling, history%contact_time, error)
       if (.not. allocated(error)) call check_samples(history, error)
    end subroutine solve_lumped
 
-   !> Marches from first touch until the source has left a rigid floor for good.
+   !> Integrates in time from first touch until the source has left a rigid floor for good.
    subroutine march(source, drop, sampling, n_step, history, state, error)
       class(contact_source_type), intent(inout) :: source
       type(drop_type), intent(in) :: drop
       type(sampling_type), intent(in) :: sampling
-      !> Steps in each sampling interval.
+      !> Steps per sampling interval.
       integer, intent(in) :: n_step
       !> Gets samples, maxima and contact time.
       type(force_history_type), intent(inout) :: history
       !> State after the last release: [n_state].
       real(wp), intent(out) :: state(:)
-      !> The equation fails, or the contact outlasts the record.
+      !> Set if the equation fails or the contact outlasts the record.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: step
       integer :: i, j
@@ -81,7 +81,7 @@ contains
          do j = 0, n_step - 1
             call advance(source, drop, ((i - 1)*real(n_step, wp) + j)*step, step, state, history, error)
             if (allocated(error)) return
-            if (.not. source%has_left(state)) cycle
+            if (.not. source%has_separated(state)) cycle
             call clear_flight(history)
             return
          end do
@@ -92,9 +92,9 @@ contains
          //' s ends while the source is still in contact or may touch the floor again; allowed: longer than the contact')
    end subroutine march
 
-   !> Moves the state on by one step, through the events inside it; stops short where the source has left.
+   !> Advances the state by one step, through the events inside the step; stops early if the source has left.
    subroutine advance(source, drop, start_time, step, state, history, error)
-      !> The source; it changes its phase at events.
+      !> The source; changes its phase at events.
       class(contact_source_type), intent(inout) :: source
       type(drop_type), intent(in) :: drop
       !> Time at the beginning of the step since first touch, s; its length, s.
@@ -103,7 +103,7 @@ contains
       real(wp), intent(inout) :: state(:)
       !> Gets maxima, and the time of each release.
       type(force_history_type), intent(inout) :: history
-      !> The state leaves the domain of the equation.
+      !> Set if the state leaves the domain of the equation.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: new_state(size(state))
       real(wp) :: time, length
@@ -126,21 +126,21 @@ contains
          time = time + length
          state = new_state
          call source%pass_event(time, state, history)
-         if (source%has_left(state)) return
+         if (source%has_separated(state)) return
       end do
       state = new_state
-      ! A single mass has its maxima at the turning point and at samples.
+      ! The maxima of a single mass are taken at the turning point and at samples.
       if (source%n_mass > 1) call source%record_peaks(state, history)
    end subroutine advance
 
-   !> Scalars of the impact from the state after the last release, and the check of the balances.
+   !> Sets the scalars of the impact from the state after the last release, and checks the balances.
    subroutine finish(source, state, history, error)
       class(contact_source_type), intent(in) :: source
       !> State after the last release: [n_state].
       real(wp), intent(in) :: state(:)
       !> The history; its samples are complete.
       type(force_history_type), intent(inout) :: history
-      !> A balance does not close.
+      !> Set if a balance does not close.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: center(2)
       real(wp) :: energy, momentum

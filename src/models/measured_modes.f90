@@ -1,6 +1,6 @@
-!> Source described by measured modes of the ball standing on the floor (after Park et al. 2010;
-!> paper, sections 1 and 4.1): each mode is an oscillator on the floor started with the impact
-!> velocity, and the contact lasts until the sum of their forces first returns to zero.
+!> Source described by measured modes of the ball standing on the floor (after Park et al. 2010; paper, sections 1 and 4.1):
+!> each mode is an oscillator on the floor that starts with the impact velocity, and the contact lasts until the sum of the
+!> modal forces first returns to zero.
 module thud_measured_modes
    use thud_ball, only: ball_type
    use thud_constants, only: pi
@@ -24,7 +24,7 @@ module thud_measured_modes
    !> Relative error of the sum of effective masses that printed digits explain.
    real(wp), parameter :: mass_tolerance = 1.0e-3_wp
 
-   !> Checks per shortest period that find the first zero of the force.
+   !> Evaluations per shortest period in the search for the first zero of the force.
    integer, parameter :: checks_per_period = 16
 
    !> Options of the model: one entry per mode in each list.
@@ -34,7 +34,7 @@ module thud_measured_modes
       type(list_type) :: damping_ratio
       !> Effective masses, kg.
       type(list_type) :: effective_mass
-      !> The masses need not add up to that of the ball.
+      !> Whether the sum of the masses may differ from the mass of the ball.
       logical :: allow_mass_mismatch = .false.
    contains
       procedure, pass(options) :: get_fields
@@ -71,7 +71,7 @@ contains
          'effective masses need not add up to the mass of the ball')]
    end function get_fields
 
-   !> Refuses lists that do not fit each other or the ball.
+   !> Returns an error if lists do not fit each other or the ball.
    subroutine check(ball, options, sampling, error)
       type(ball_type), intent(in) :: ball
       class(measured_modes_type), intent(in) :: options
@@ -134,7 +134,7 @@ contains
             //fixed(1.0e3_wp*time, 1)//' ms of contact; allowed: longer than the contact')
          return
       end if
-      ! Dashpots start with a jump; a sample of a jump is the mean of its two sides.
+      ! Dashpots make the force jump at first touch: the first sample is the mean of both sides.
       history%component(1, 1) = history%component(1, 1)/2
       history%elastic_force = history%component(:, 1)
       history%floor_force = history%component(:, 1)
@@ -143,7 +143,7 @@ contains
       if (.not. allocated(error)) call check_samples(history, error)
    end subroutine solve
 
-   !> Refuses a history whose ball does not turn, whose balances do not close, or of too few samples.
+   !> Returns an error if the ball does not turn back, balances do not close, or samples are too few.
    subroutine check_history(history, sampling, error)
       type(force_history_type), intent(in) :: history
       type(sampling_type), intent(in) :: sampling
@@ -161,7 +161,7 @@ contains
       end if
    end subroutine check_history
 
-   !> Modes of a ball on a rigid floor say nothing of another floor.
+   !> Modes of a ball on a rigid floor do not apply to a mobile floor.
    function couples(options) result(yes)
       class(measured_modes_type), intent(in) :: options
       logical :: yes
@@ -182,7 +182,7 @@ contains
       cost = 1.0e-3_wp + min(sampling%duration, typical_contact)*rate*options%frequency%count*3.0e-8_wp
    end function get_cost
 
-   !> One mode from its measured numbers.
+   !> One mode from its measured values.
    elemental function new_mode(frequency, damping_ratio, mass) result(mode)
       !> Natural frequency, Hz.
       real(wp), intent(in) :: frequency
@@ -197,8 +197,7 @@ contains
       mode%omega_damped = mode%omega*sqrt(1 - damping_ratio**2)
    end function new_mode
 
-   !> Sum of all modes at one time: d_n = (v0/w_d) exp(-zeta w t) sin(w_d t),
-   !> F = sum M_n (w^2 d_n + 2 zeta w d_n').
+   !> Sum of all modes at one time: d_n = (v0/w_d) exp(-zeta w t) sin(w_d t), F = sum M_n (w^2 d_n + 2 zeta w d_n').
    pure subroutine get_motion(modes, impact_velocity, time, deflection, velocity, force, power, stored)
       !> The modes: [n_mode].
       type(mode_type), intent(in) :: modes(:)
@@ -223,12 +222,12 @@ contains
       end associate
    end subroutine get_motion
 
-   !> Time at which the force first falls to zero, to rounding, by bisection.
+   !> Time at which the force first falls to zero, by bisection to rounding.
    pure function release_time(modes, impact_velocity, before, after) result(time)
       type(mode_type), intent(in) :: modes(:)
       !> Velocity at first touch, m/s.
       real(wp), intent(in) :: impact_velocity
-      !> A time at which the force is positive, s; the next sample, at which it is not, s.
+      !> A time with positive force, s; a later one without, s.
       real(wp), intent(in) :: before, after
       !> Time of release, s.
       real(wp) :: time
@@ -243,22 +242,22 @@ contains
       time = bracket%get_middle()
    end function release_time
 
-   !> Scalars of the impact. The equation of each mode makes the impulse the change of momentum;
-   !> quadrature of the force checks it.
+   !> Scalars of the impact. By the equations of motion of the modes, the impulse is the change of momentum; quadrature of
+   !> the force checks it.
    subroutine finish(modes, contact_time, history, error)
       type(mode_type), intent(in) :: modes(:)
       !> Time of release, s.
       real(wp), intent(in) :: contact_time
       !> The history; its samples are complete.
       type(force_history_type), intent(inout) :: history
-      !> An interrupt.
+      !> Set after an interrupt.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: deflection, velocity, force, impulse, loss, energy, power, stored, weight
       integer :: i, n_interval
 
       history%peak_force = maxval(history%floor_force)
       history%max_deflection = maxval(history%deflection)
-      ! Simpson's rule with 64 intervals in the shortest period.
+      ! Simpson's rule with at least 64 intervals in the shortest period.
       n_interval = max(4096, 2*ceiling(32*contact_time*maxval(modes%omega)/(2*pi)))
       impulse = 0.0_wp
       loss = 0.0_wp

@@ -1,4 +1,4 @@
-!> A source of a single mass: its state, and what it records.
+!> A source of a single mass: its state and its record.
 module thud_single_mass
    use thud_contact_source, only: contact_source_type
    use thud_force_history, only: force_history_type
@@ -8,11 +8,10 @@ module thud_single_mass
 
    public :: at_deflection, at_impulse, at_loss, at_velocity, single_mass_type
 
-   !> Indices of the quantities in the state: deflection (m), velocity (m/s), impulse given to the floor (N s), energy lost
-   !> (J).
+   !> Indices in the state: deflection (m), velocity (m/s), impulse on the floor (N s), energy lost (J).
    integer, parameter :: at_deflection = 1, at_velocity = 2, at_impulse = 3, at_loss = 4
 
-   !> Equation of motion of the source; its state is laid out as above.
+   !> Equation of motion of the source, for this state.
    type, abstract, extends(contact_source_type) :: single_mass_type
    contains
       procedure(get_components_interface), deferred :: get_components
@@ -37,7 +36,7 @@ module thud_single_mass
 
 contains
 
-   !> Writes motion and forces of one instant into the history.
+   !> Writes motion and forces of one sample into the history.
    pure subroutine record_sample(self, state, i, history)
       class(single_mass_type), intent(in) :: self
       real(wp), intent(in) :: state(:)
@@ -50,12 +49,12 @@ contains
       call self%get_components(state, history%component(i, :), history%elastic_force(i))
       history%peak_elastic_force = max(history%peak_elastic_force, history%elastic_force(i))
       history%peak_force = max(history%peak_force, history%peak_elastic_force, sum(history%component(i, :)))
-      ! A component that starts with a jump at first touch: a sample of a jump is the mean of its two sides.
+      ! A component may jump at first touch: the first sample is the mean of both sides.
       if (i == 1) history%component(i, :) = history%component(i, :)/2
       history%floor_force(i) = sum(history%component(i, :))
    end subroutine record_sample
 
-   !> Raises the maxima of deflection and elastic force.
+   !> Updates the maxima of deflection and force.
    pure subroutine record_peaks(self, state, history)
       class(single_mass_type), intent(in) :: self
       real(wp), intent(in) :: state(:)

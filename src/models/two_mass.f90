@@ -1,6 +1,6 @@
-!> A tyre as two masses: the belt on its contact patch, and the rim on the belt. The patch carries inflation pressure
-!> times contact area and the carcass, F = (p w d + c d (d/d0)^(n - 1))(1 + a d'), and is never pulled; rim and belt are
-!> joined by the sidewall, a linear spring with viscous damping (residual stiffness and rigid ring of tyre dynamics).
+!> A tyre as two masses, rim and belt. The belt stands on the contact patch, whose force is inflation pressure times contact
+!> area plus the force of the carcass, both damped and never tensile: F = (p w d + c d (d/d0)^(n - 1))(1 + a d'). A sidewall,
+!> a linear spring with viscous damping, joins rim and belt (in tyre dynamics: residual stiffness and rigid ring).
 module thud_two_mass
    use thud_ball, only: ball_type
    use thud_constants, only: pi
@@ -22,19 +22,20 @@ module thud_two_mass
 
    public :: two_mass_type
 
-   !> Indices in the state: displacement (m) and velocity (m/s) of belt and rim towards the floor since first touch, impulse
-   !> given to the floor (N s), energy lost (J), gap between belt and floor (m).
+   !> Indices in the state: displacement since first touch (m) and velocity (m/s) of belt and rim towards the floor, relative
+   !> to a mobile one; impulse on the floor (N s); energy lost (J); gap between belt and floor (m), which falls to zero at
+   !> touch.
    integer, parameter :: at_belt = 1, at_belt_velocity = 2, at_rim = 3, at_rim_velocity = 4, at_impulse = 5, at_loss = 6, &
       at_gap = 7, n_state = 7
 
-   !> Angle by which the fastest motion advances in a step, rad, on a rigid floor and on one that moves: Runge and
-   !> Kutta's steps lose angle**6/72 of its energy each, those of Radau IIA angle**6/3600: 4e-11 and 3e-9 in a radian.
+   !> Angle by which the fastest motion advances in a step, rad. On a rigid floor (Runge-Kutta) a step loses angle**6/72 of
+   !> the energy, 4e-11 per radian of motion; on a mobile floor (Radau IIA) angle**6/3600, 3e-9 per radian.
    real(wp), parameter :: step_angle = 0.02_wp, coupled_angle = 0.1_wp
 
-   !> Steps of one record; more would take longer than finite elements, and a tyre needs 1e4.
+   !> Maximum number of steps of one record; more would take longer than finite elements, and a tyre needs 1e4.
    real(wp), parameter :: max_steps = 2.0e7_wp
 
-   !> Deflection d0 at which the stiffness of the carcass is given, m.
+   !> Deflection d0 at which the carcass stiffness is given, m.
    real(wp), parameter :: carcass_deflection = 0.02_wp
 
    !> Options of the model; the defaults are the standards' tyre, see docs/lumped_models.md.
@@ -43,15 +44,15 @@ module thud_two_mass
       real(wp) :: belt_mass = 2.0_wp
       !> Inflation pressure p, Pa.
       real(wp) :: inflation_pressure = 2.4e5_wp
-      !> Width w of the contact, its area over the deflection, m.
+      !> Contact width w: contact area divided by deflection, m.
       real(wp) :: contact_width = 0.40_wp
-      !> Stiffness c of the carcass, force over deflection at `carcass_deflection`, N/m.
+      !> Carcass stiffness c: force of the carcass divided by deflection at `carcass_deflection`, N/m.
       real(wp) :: carcass_stiffness = 9.0e4_wp
-      !> Exponent n of the carcass.
+      !> Exponent n of the carcass force.
       real(wp) :: carcass_exponent = 2.5_wp
       !> Damping a of the contact, s/m.
       real(wp) :: contact_damping = 0.06_wp
-      !> Natural frequency of the belt on the sidewall, the rim held, Hz.
+      !> Natural frequency of the belt on the sidewall with the rim fixed, Hz.
       real(wp) :: belt_frequency = 85.0_wp
       !> Damping ratio of the same motion.
       real(wp) :: belt_damping = 0.2_wp
@@ -65,7 +66,7 @@ module thud_two_mass
    type, extends(contact_source_type) :: tyre_type
       !> Masses of belt and rim, kg.
       real(wp) :: belt_mass, rim_mass
-      !> Contact: the inflated patch p w, and the carcass.
+      !> Contact: the inflated patch, of stiffness p w, and the carcass.
       type(contact_law_type) :: law
       !> Stiffness, N/m, and damping, N s/m, of the sidewall.
       real(wp) :: sidewall_stiffness, sidewall_damping
@@ -75,7 +76,7 @@ module thud_two_mass
       procedure :: record_peaks
       procedure :: get_event
       procedure :: pass_event
-      procedure :: has_left
+      procedure :: has_separated
       procedure :: get_center
       procedure :: get_inner_energy
       procedure :: get_amplitude
@@ -92,19 +93,24 @@ contains
          real_field('belt_mass', options%belt_mass, 'kg', 'mass of belt and tread, less than the mass of the source', &
          '(0, 1000000)'), &
          real_field('inflation_pressure', options%inflation_pressure, 'Pa', 'inflation pressure', '[0, 1e8]'), &
-         real_field('contact_width', options%contact_width, 'm', 'contact area over deflection of the patch', '[0, 100]'), &
+         real_field('contact_width', options%contact_width, 'm', &
+         'contact area divided by deflection of the contact patch', &
+         '[0, 100]'), &
          real_field('carcass_stiffness', options%carcass_stiffness, 'N/m', &
-         'force of the carcass over its deflection at 20 mm', '[0, 1e12]'), &
-         real_field('carcass_exponent', options%carcass_exponent, '', 'exponent of the deflection of the carcass', &
-         '[1.5, 5]'), real_field('contact_damping', options%contact_damping, 's/m', &
-         'damping of the contact over its elastic force and velocity', '[0, 100]'), &
+         'force of the carcass divided by its deflection, at 20 mm', '[0, 1e12]'), &
+         real_field('carcass_exponent', options%carcass_exponent, '', &
+         'exponent of the deflection in the force of the carcass', '[1.5, 5]'), &
+         real_field('contact_damping', options%contact_damping, 's/m', &
+         'damping force of the contact divided by elastic force and velocity', '[0, 100]'), &
          real_field('belt_frequency', options%belt_frequency, 'Hz', &
-         'natural frequency of the belt on the sidewall, the rim held', '(0, 1000000]'), &
-         real_field('belt_damping', options%belt_damping, '', 'damping ratio of the same motion', '[0, 10]')]
+         'natural frequency of the belt on the sidewall with fixed rim', '(0, 1000000]'), &
+         real_field('belt_damping', options%belt_damping, '', &
+         'damping ratio of the belt on the sidewall with fixed rim', '[0, 10]')]
    end function get_fields
 
-   !> Refuses a belt that leaves nothing for the rim, and a patch without stiffness.
+   !> Returns an error if the belt leaves no mass for the rim, or if the patch has no stiffness.
    subroutine check(ball, options, sampling, error)
+      !> The source, here the tyre.
       type(ball_type), intent(in) :: ball
       class(two_mass_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
@@ -138,6 +144,7 @@ contains
       if (allocated(error)) return
       call solve_lumped(tyre, drop, sampling, [character(len=14) :: 'pressure_force', 'carcass_force', 'damping_force'], &
          history, error, receiver, n_step, [character(len=19) :: 'belt_displacement_m', 'rim_displacement_m'])
+      ! Without flux of momentum the elastic force is the whole force.
       history%peak_elastic_force = history%peak_force
    end subroutine solve
 
@@ -159,17 +166,17 @@ contains
          sidewall_damping=2*options%belt_damping*options%belt_mass*omega)
    end function new_tyre
 
-   !> Chooses the steps in each sampling interval by the fastest motion.
+   !> Chooses the steps per sampling interval from the fastest rate of the motion.
    subroutine choose_steps(tyre, impact_velocity, angle, sampling, n_step, error)
       type(tyre_type), intent(in) :: tyre
       !> Velocity at first touch, m/s.
       real(wp), intent(in) :: impact_velocity
-      !> Angle of the fastest motion in a step, rad.
+      !> Angle by which the fastest motion advances in a step, rad.
       real(wp), intent(in) :: angle
       type(sampling_type), intent(in) :: sampling
-      !> Steps in each sampling interval.
+      !> Steps per sampling interval.
       integer, intent(out) :: n_step
-      !> The record would take too many.
+      !> Set if the record would take too many steps.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: steps, total
 
@@ -182,7 +189,7 @@ contains
          //to_text(max_steps))
    end subroutine choose_steps
 
-   !> Bound of the fastest rate of the motion, rad/s: of its frequencies by the trace, and of its decay.
+   !> Upper bound of the fastest rate of the motion: of its natural frequencies (by the trace) and of its decay rates.
    pure function get_fastest_rate(tyre, impact_velocity) result(rate)
       type(tyre_type), intent(in) :: tyre
       real(wp), intent(in) :: impact_velocity
@@ -190,15 +197,16 @@ contains
       real(wp) :: rate
       real(wp) :: energy, deflection, power
 
-      associate (n => tyre%law%exponent, c => tyre%law%factor, k => tyre%law%stiffness)
-         ! The patch can at most store all of the energy.
+      associate (n => tyre%law%exponent, factor => tyre%law%factor, k => tyre%law%stiffness)
+         ! Largest deflection: the patch stores all of the energy.
          energy = tyre%mass/2*impact_velocity**2
          deflection = huge(1.0_wp)
          if (k > 0.0_wp) deflection = sqrt(2*energy/k)
-         if (c > 0.0_wp) deflection = min(deflection, ((n + 1)*energy/c)**(1/(n + 1)))
+         if (factor > 0.0_wp) deflection = min(deflection, ((n + 1)*energy/factor)**(1/(n + 1)))
          power = deflection**(n - 1)
-         rate = max(sqrt((k + n*c*power)/tyre%belt_mass + tyre%sidewall_stiffness*(1/tyre%belt_mass + 1/tyre%rim_mass)), &
-            tyre%law%damping*(k + c*power)*deflection/tyre%belt_mass &
+         rate = max(sqrt((k + n*factor*power)/tyre%belt_mass &
+            + tyre%sidewall_stiffness*(1/tyre%belt_mass + 1/tyre%rim_mass)), &
+            tyre%law%damping*(k + factor*power)*deflection/tyre%belt_mass &
             + tyre%sidewall_damping*(1/tyre%belt_mass + 1/tyre%rim_mass))
       end associate
    end function get_fastest_rate
@@ -228,7 +236,7 @@ contains
       end associate
    end subroutine get_derivative
 
-   !> Components of the force on the floor: pressure times area, carcass, damping, N.
+   !> Components of the force on the floor: inflation pressure, carcass, damping, N.
    pure function get_components(tyre, state) result(components)
       class(tyre_type), intent(in) :: tyre
       real(wp), intent(in) :: state(:)
@@ -238,7 +246,7 @@ contains
       if (tyre%touching) components = get_contact_force(tyre%law, state(at_belt), state(at_belt_velocity))
    end function get_components
 
-   !> Raises the maxima of force and deflection.
+   !> Updates the maxima of force and deflection.
    pure subroutine record_peaks(self, state, history)
       class(tyre_type), intent(in) :: self
       real(wp), intent(in) :: state(:)
@@ -250,7 +258,7 @@ contains
       history%max_deflection = max(history%max_deflection, center(1))
    end subroutine record_peaks
 
-   !> Component of the state that falls to zero where the belt leaves or touches the floor.
+   !> Component of the state that falls to zero when the belt leaves or touches the floor.
    pure function get_event(self) result(component)
       class(tyre_type), intent(in) :: self
       integer :: component
@@ -280,7 +288,7 @@ contains
          /(self%belt_mass + self%rim_mass)
    end function get_center
 
-   !> Energy of the motion of belt and rim against each other, and of the sidewall, J.
+   !> Energy of the relative motion of belt and rim, and of the sidewall, J.
    pure function get_inner_energy(self, state) result(energy)
       class(tyre_type), intent(in) :: self
       real(wp), intent(in) :: state(:)
@@ -291,7 +299,7 @@ contains
          + self%sidewall_stiffness/2*(state(at_rim) - state(at_belt))**2
    end function get_inner_energy
 
-   !> How far the belt sinks below the center of mass in flight if it gets all of the inner energy, m.
+   !> Maximum displacement of the belt below the center of mass in flight, with all inner energy in the sidewall, m.
    pure function get_amplitude(self, state) result(amplitude)
       class(tyre_type), intent(in) :: self
       real(wp), intent(in) :: state(:)
@@ -300,16 +308,16 @@ contains
       amplitude = self%rim_mass/(self%belt_mass + self%rim_mass)*sqrt(2*self%get_inner_energy(state)/self%sidewall_stiffness)
    end function get_amplitude
 
-   !> Whether no motion of the belt brings it back to a rigid floor.
-   pure function has_left(self, state) result(left)
+   !> Whether the belt can no longer come back to a rigid floor.
+   pure function has_separated(self, state) result(separated)
       class(tyre_type), intent(in) :: self
       real(wp), intent(in) :: state(:)
-      logical :: left
+      logical :: separated
 
-      left = .not. self%touching .and. all(self%get_center(state) + [self%get_amplitude(state), 0.0_wp] < 0.0_wp)
-   end function has_left
+      separated = .not. self%touching .and. all(self%get_center(state) + [self%get_amplitude(state), 0.0_wp] < 0.0_wp)
+   end function has_separated
 
-   !> Writes motion and forces of one instant into the history.
+   !> Writes motion and forces of one sample into the history.
    pure subroutine record_sample(self, state, i, history)
       class(tyre_type), intent(in) :: self
       real(wp), intent(in) :: state(:)

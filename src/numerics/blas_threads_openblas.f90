@@ -1,5 +1,5 @@
-!> Threads of OpenBLAS. The matrices here are small: its threads would cost more than they bring,
-!> and with several calling threads they would crowd the processor.
+!> Number of threads of OpenBLAS. The matrices here are small: more threads would cost more than they save, and with several
+!> calling threads they would overload the processor.
 module thud_blas_threads
    use, intrinsic :: iso_c_binding, only: c_int
    implicit none (type, external)
@@ -7,8 +7,9 @@ module thud_blas_threads
 
    public :: restore_blas_threads, use_one_blas_thread
 
-   !> Number of callers that use one thread now, and the number of threads before the first of them.
+   !> Number of callers that use one thread now.
    integer :: n_work = 0
+   !> Number of threads before the first of them.
    integer(c_int) :: count_before = 1_c_int
 
    interface
@@ -27,7 +28,7 @@ module thud_blas_threads
 
 contains
 
-   !> Makes OpenBLAS work in the calling thread, for the whole process, until `restore_blas_threads`.
+   !> Limits OpenBLAS to the calling thread, in the whole process, until `restore_blas_threads`.
    subroutine use_one_blas_thread()
       !$omp critical (blas_threads)
       if (n_work == 0) then
@@ -38,7 +39,7 @@ contains
       !$omp end critical (blas_threads)
    end subroutine use_one_blas_thread
 
-   !> Ends what `use_one_blas_thread` has begun: the last to end gives the process its threads back.
+   !> Ends `use_one_blas_thread`; after the last caller, the process has its former number of threads.
    subroutine restore_blas_threads()
       !$omp critical (blas_threads)
       n_work = n_work - 1

@@ -7,11 +7,11 @@ module thud_blas_threads
 
 contains
 
-   !> Nothing to be done.
+   !> Does nothing.
    subroutine use_one_blas_thread()
    end subroutine use_one_blas_thread
 
-   !> Nothing to be done.
+   !> Does nothing.
    subroutine restore_blas_threads()
    end subroutine restore_blas_threads
 

@@ -1,6 +1,5 @@
-!> Arrays that begin where the lines of the cache do: the processor takes twice as long for a vector
-!> that lies across two lines (all of an ensemble's march takes 1.3 times as long), and `allocate`
-!> promises less.
+!> Arrays that begin at a cache line. The processor takes twice as long for a vector that lies across two lines (the time
+!> integration of an ensemble takes 1.3 times as long), and `allocate` does not guarantee this alignment.
 module thud_cache_line
    use, intrinsic :: iso_c_binding, only: c_intptr_t, c_loc
    use thud_kinds, only: wp
@@ -9,12 +8,12 @@ module thud_cache_line
 
    public :: get_aligned_start, line_length
 
-   !> Numbers in a line of the cache.
+   !> Real numbers in a cache line.
    integer, parameter :: line_length = 8
 
 contains
 
-   !> First element of a buffer at the beginning of a line; `line_length` elements may be skipped.
+   !> First element of a buffer at the beginning of a cache line; up to `line_length` elements are skipped.
    function get_aligned_start(buffer) result(first)
       !> The beginning of the buffer: [line_length].
       real(wp), intent(in), target :: buffer(line_length)

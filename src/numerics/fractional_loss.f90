@@ -1,6 +1,6 @@
-!> The fractional law of Kelvin and Voigt: a spring beside a spring-pot, G(i omega) = G0 + c (i omega)**order.
+!> The fractional Kelvin-Voigt law: a spring parallel to a spring-pot, G(i omega) = G0 + c (i omega)**order.
 !>
-!> Order 1 is the viscosity of Kelvin and Voigt; near 0 the loss factor hardly depends on frequency.
+!> Order 1 is the classical Kelvin-Voigt viscosity; near order 0 the loss factor hardly depends on frequency.
 module thud_fractional_loss
    use thud_constants, only: pi
    use thud_kinds, only: wp
@@ -9,21 +9,21 @@ module thud_fractional_loss
 
    public :: fractional_loss_type, get_modulus, new_fractional_loss
 
-   !> The law; moduli over the storage modulus at the frequency of the loss factor.
+   !> The damping law; moduli are divided by the storage modulus at the frequency of the loss factor.
    type :: fractional_loss_type
       !> Order of the derivative.
       real(wp) :: order
       !> Modulus of the spring, G0.
       real(wp) :: spring
-      !> Absolute modulus of the spring-pot at `omega`.
-      real(wp) :: pot
+      !> Magnitude of the modulus of the spring-pot at `omega`.
+      real(wp) :: springpot
       !> Angular frequency of the loss factor, rad/s.
       real(wp) :: omega
    end type fractional_loss_type
 
 contains
 
-   !> The law that has a loss factor at a frequency.
+   !> The damping law with a given loss factor at a given frequency.
    pure function new_fractional_loss(order, loss_factor, frequency) result(law)
       real(wp), intent(in) :: order, loss_factor
       !> The frequency, Hz.
@@ -31,19 +31,19 @@ contains
       type(fractional_loss_type) :: law
 
       law%order = order
-      law%pot = loss_factor/sin(pi/2*order)
-      law%spring = 1 - law%pot*cos(pi/2*order)
+      law%springpot = loss_factor/sin(pi/2*order)
+      law%spring = 1 - law%springpot*cos(pi/2*order)
       law%omega = 2*pi*frequency
    end function new_fractional_loss
 
-   !> Complex modulus over the storage modulus at the frequency of the loss factor.
+   !> Complex modulus, divided by the storage modulus at the frequency of the loss factor.
    pure elemental function get_modulus(law, omega) result(modulus)
       type(fractional_loss_type), intent(in) :: law
       !> Angular frequency, rad/s.
       real(wp), intent(in) :: omega
       complex(wp) :: modulus
 
-      modulus = law%spring + law%pot*(omega/law%omega)**law%order*exp(cmplx(0.0_wp, pi/2*law%order, wp))
+      modulus = law%spring + law%springpot*(omega/law%omega)**law%order*exp(cmplx(0.0_wp, pi/2*law%order, wp))
    end function get_modulus
 
 end module thud_fractional_loss

@@ -128,7 +128,7 @@ module thud_lapack
          real(wp), intent(inout) :: ab(ldab, *), b(ldb, *)
       end subroutine dgbsv
 
-      !> Factors of a small matrix, by partial pivoting.
+      !> LU factors of a small matrix, with partial pivoting.
       pure subroutine dgetf2(m, n, a, lda, ipiv, info)
          import :: wp
          implicit none (type, external)
@@ -138,7 +138,7 @@ module thud_lapack
          integer, intent(out) :: info
       end subroutine dgetf2
 
-      !> Solution with these factors.
+      !> Solution with the factors of `dgetf2`.
       pure subroutine dgetrs(trans, n, nrhs, a, lda, ipiv, b, ldb, info)
          import :: wp
          implicit none (type, external)

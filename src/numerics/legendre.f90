@@ -38,12 +38,12 @@ contains
 
    !> Legendre functions of the second kind, 2 Q_n(z) = integral over [-1, 1] of P_n(x)/(z - x).
    !>
-   !> By their recursion upwards, in which errors grow as |P_n(z)|. Sums over coefficients of a smooth function do not
-   !> suffer: these fall as fast.
+   !> The upward recursion amplifies errors like |P_n(z)|. Sums with the coefficients of a smooth function are not affected,
+   !> because these coefficients decrease as fast.
    pure subroutine get_second_legendre(z, second)
-      !> Argument in the upper half of the plane, on [-1, 1] taken as above it.
+      !> Argument in the upper half plane; on [-1, 1] the value just above is returned.
       complex(wp), intent(in) :: z
-      !> Q_0(z) and so on: [0:degree].
+      !> Q_0(z), Q_1(z), ...: [0:degree].
       complex(wp), intent(out) :: second(0:)
       integer :: n
 

@@ -6,8 +6,9 @@ module thud_matrix_exponential
 
    public :: get_exponential
 
-   !> Norm up to which the series is summed, and terms that it then takes: 0.5**17/17! is below 1e-19.
+   !> Maximum norm of a matrix whose series is summed.
    real(wp), parameter :: summed_norm = 0.5_wp
+   !> Number of terms of the series: 0.5**17/17! is below 1e-19.
    integer, parameter :: n_term = 16
 
 contains

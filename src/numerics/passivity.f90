@@ -9,36 +9,36 @@ module thud_passivity
 
    public :: find_violations, make_passive, solve_dual
 
-   !> Rounds of the correction; each adds the worst frequencies of the previous round.
+   !> Maximum number of rounds of the correction; each round adds the worst frequencies of the previous one.
    integer, parameter :: n_round = 30
 
    !> Maximum number of sweeps of Hildreth's method.
    integer, parameter :: max_sweeps = 2000
 
-   !> Margin of the corrected real part over the mean magnitude: above rounding.
+   !> Minimum of the corrected real part, divided by the mean magnitude: above rounding.
    real(wp), parameter :: margin = 1.0e-9_wp
 
-   !> Ridge of the normal equations over their unit diagonal: close poles make them singular.
+   !> Ridge added to the unit diagonal of the normal equations, which close poles make singular.
    real(wp), parameter :: ridge = 1.0e-12_wp
 
-   !> Sections of the search for a minimum; each leaves 0.618 of the interval.
+   !> Number of golden sections in the search for a minimum; each leaves 0.618 of the interval.
    integer, parameter :: n_section = 60
 
 contains
 
-   !> Frequencies of the negative minima of the real part, one in each interval where it is negative.
+   !> Frequencies of the negative minima of the real part, one for each interval in which it is negative.
    !>
-   !> With the real state space A, b, c, d the real part vanishes at the squares of frequencies that are eigenvalues of
-   !> A (b c/d - A) (half-size test; Gustavsen and Semlyen, IEEE Trans. Power Delivery 24, 2009): between two of them it has
-   !> one sign.
+   !> In the real state space A, b, c, d, the squares of the frequencies at which the real part vanishes are eigenvalues of
+   !> A (b c/d - A) (half-size test; Gustavsen and Semlyen, IEEE Trans. Power Delivery 24, 2009). Between two such
+   !> frequencies the sign of the real part does not change.
    subroutine find_violations(pole, residue, direct, omega, failed)
-      !> Poles, 1/s, and residues, those of pairs doubled: [n].
+      !> Poles, 1/s, and residues, doubled for pairs: [n].
       complex(wp), intent(in) :: pole(:), residue(:)
       !> Constant part, above 0.
       real(wp), intent(in) :: direct
       !> The angular frequencies, rad/s: [n_violation].
       real(wp), allocatable, intent(out) :: omega(:)
-      !> LAPACK found no eigenvalues.
+      !> True if LAPACK finds no eigenvalues.
       logical, intent(out) :: failed
       real(wp), allocatable :: state(:, :), input(:), output(:), border(:)
       complex(wp), allocatable :: square(:)
@@ -55,7 +55,7 @@ contains
       call get_eigenvalues(state, square, failed)
       allocate (omega(0))
       if (failed) return
-      ! Candidates that are no zeros do not matter; zeros that rounding has moved off the real axis must not be missed.
+      ! Candidates that are no zeros do no harm; zeros that rounding has moved off the real axis must not be missed.
       border = scale*[0.0_wp, sorted(pack(sqrt(abs(square)), square%re > 0.0_wp))]
       border = [border, 2*max(border(size(border)), scale)]
       do j = 1, size(border) - 1
@@ -65,18 +65,18 @@ contains
       end do
    end subroutine find_violations
 
-   !> Changes residues and constant part by as little as possible, by weighted squares at some frequencies, so that the
-   !> real part is nowhere negative.
+   !> Changes residues and constant part as little as possible, in weighted squares at given frequencies, so that the real
+   !> part is nowhere negative.
    subroutine make_passive(frequency, weight, pole, residue, direct, failed)
       !> Angular frequencies, rad/s, and weights of the change there: [n_frequency].
       real(wp), intent(in) :: frequency(:), weight(:)
       !> Poles, 1/s: [n].
       complex(wp), intent(in) :: pole(:)
-      !> Residues, those of pairs doubled: [n].
+      !> Residues, doubled for pairs: [n].
       complex(wp), intent(inout) :: residue(:)
       !> Constant part.
       real(wp), intent(inout) :: direct
-      !> LAPACK found no eigenvalues, or an interrupt came.
+      !> True if LAPACK finds no eigenvalues, violations remain, or an interrupt came.
       logical, intent(out) :: failed
       real(wp), allocatable :: normal(:, :), omega(:), held(:), x(:), length(:)
       complex(wp), allocatable :: basis(:, :)
@@ -106,7 +106,7 @@ contains
          residue = residue + get_residues(pole, x(:n - 1))
          direct = direct + x(n)
       end do
-      ! What is left is within rounding of the corrections; a larger constant part ends it.
+      ! The remaining violations are within the rounding of the corrections; a larger constant part ends them.
       do i = 1, n_round
          direct = max(direct, minimum)
          call find_violations(pole, residue, direct, omega, failed)
@@ -117,15 +117,15 @@ contains
       failed = .true.
    end subroutine make_passive
 
-   !> The smallest change x of the coefficients, by x' N x, that raises the real part to `minimum` at some frequencies.
+   !> Smallest change x of the coefficients, measured by x' N x, that raises the real part to `minimum` at some frequencies.
    function get_correction(pole, residue, direct, omega, normal, length, minimum) result(x)
-      !> Poles, 1/s, and residues: [n].
+      !> Poles, 1/s, and residues, doubled for pairs: [n].
       complex(wp), intent(in) :: pole(:), residue(:)
       !> Constant part.
       real(wp), intent(in) :: direct
       !> The angular frequencies, rad/s: [n_held].
       real(wp), intent(in) :: omega(:)
-      !> N for coefficients times the lengths: [n_x, n_x].
+      !> N for coefficients multiplied by the lengths: [n_x, n_x]; the lengths: [n_x].
       real(wp), intent(in) :: normal(:, :), length(:)
       !> Minimum of the real part.
       real(wp), intent(in) :: minimum
@@ -133,13 +133,13 @@ contains
       real(wp) :: x(size(length))
       complex(wp), allocatable :: basis(:, :)
       real(wp) :: factor(size(length), size(length)), rows(size(length), size(omega)), solved(size(length), size(omega))
-      real(wp) :: gram(size(omega), size(omega)), missing(size(omega)), force(size(omega))
+      real(wp) :: gram(size(omega), size(omega)), deficit(size(omega)), multiplier(size(omega))
       integer :: i, n_sweep, info
 
       call get_basis(pole, cmplx(0.0_wp, omega, wp), basis)
       do i = 1, size(omega)
          rows(:, i) = real(basis(i, :))/length
-         missing(i) = minimum - get_real_part(pole, residue, direct, omega(i))
+         deficit(i) = minimum - get_real_part(pole, residue, direct, omega(i))
       end do
       factor = normal
       solved = rows
@@ -147,67 +147,67 @@ contains
       x = 0.0_wp
       if (info /= 0) return
       gram = matmul(transpose(rows), solved)
-      call solve_dual(gram, missing, force, n_sweep)
-      x = matmul(solved, force)/length
+      call solve_dual(gram, deficit, multiplier, n_sweep)
+      x = matmul(solved, multiplier)/length
    end function get_correction
 
-   !> The forces of constraints, each not negative, that raise every constraint by at least what it lacks, and by
-   !> just that where its force is positive: Hildreth's method.
-   subroutine solve_dual(gram, missing, force, n_sweep)
-      !> Lift of each constraint by the unit force of each, symmetric: [n, n].
+   !> Multipliers of constraints, none of them negative, that raise every constraint by at least its deficit, and by exactly
+   !> that if its multiplier is positive: Hildreth's method.
+   subroutine solve_dual(gram, deficit, multiplier, n_sweep)
+      !> Change of each constraint by the unit multiplier of each, symmetric: [n, n].
       real(wp), intent(in), contiguous :: gram(:, :)
-      !> What the constraints miss: [n].
-      real(wp), intent(in) :: missing(:)
-      !> The forces: [n].
-      real(wp), intent(out) :: force(:)
-      !> Number of sweeps; the last one changed nothing, unless it is `max_sweeps` or an interrupt came.
+      !> Deficits of the constraints: [n].
+      real(wp), intent(in) :: deficit(:)
+      !> The multipliers: [n].
+      real(wp), intent(out) :: multiplier(:)
+      !> Number of sweeps. The last sweep changed nothing, unless it is `max_sweeps` or an interrupt came.
       integer, intent(out) :: n_sweep
-      real(wp) :: before(size(force))
+      real(wp) :: before(size(multiplier))
       integer :: i
 
-      force = 0.0_wp
+      multiplier = 0.0_wp
       do n_sweep = 1, max_sweeps
-         before = force
-         do i = 1, size(force)
-            force(i) = max(0.0_wp, force(i) + (missing(i) - dot_product(gram(:, i), force))/gram(i, i))
+         before = multiplier
+         do i = 1, size(multiplier)
+            multiplier(i) = max(0.0_wp, multiplier(i) + (deficit(i) - dot_product(gram(:, i), multiplier))/gram(i, i))
          end do
-         if (is_interrupted() .or. maxval(abs(force - before)) <= 0.0_wp) return
+         if (is_interrupted() .or. maxval(abs(multiplier - before)) <= 0.0_wp) return
       end do
       n_sweep = max_sweeps
    end subroutine solve_dual
 
-   !> Angular frequency between two others of the minimum of the real part: golden sections.
+   !> Angular frequency of the minimum of the real part in an interval, by golden sections.
    pure function get_minimum(pole, residue, direct, lower, upper) result(omega)
       complex(wp), intent(in) :: pole(:), residue(:)
-      !> Constant part; the ends, rad/s.
+      !> Constant part; ends of the interval, rad/s.
       real(wp), intent(in) :: direct, lower, upper
       real(wp) :: omega
       real(wp), parameter :: golden = (sqrt(5.0_wp) - 1)/2
-      real(wp) :: low, high, left, right
+      real(wp) :: low, high, lower_trial, upper_trial
       integer :: i
 
       low = lower
       high = upper
       do i = 1, n_section
-         left = high - golden*(high - low)
-         right = low + golden*(high - low)
-         if (get_real_part(pole, residue, direct, left) < get_real_part(pole, residue, direct, right)) then
-            high = right
+         lower_trial = high - golden*(high - low)
+         upper_trial = low + golden*(high - low)
+         if (get_real_part(pole, residue, direct, lower_trial) < get_real_part(pole, residue, direct, upper_trial)) then
+            high = upper_trial
          else
-            low = left
+            low = lower_trial
          end if
       end do
       omega = (low + high)/2
    end function get_minimum
 
    !> Real part at a frequency.
-   pure function get_real_part(pole, residue, direct, omega) result(part)
+   pure function get_real_part(pole, residue, direct, omega) result(real_part)
       complex(wp), intent(in) :: pole(:), residue(:)
       !> Constant part; angular frequency, rad/s.
       real(wp), intent(in) :: direct, omega
-      real(wp) :: part
+      real(wp) :: real_part
 
-      part = real(get_response(pole, residue, direct, omega))
+      real_part = real(get_response(pole, residue, direct, omega))
    end function get_real_part
 
    !> Value at a frequency.
@@ -221,11 +221,11 @@ contains
       end associate
    end function get_response
 
-   !> Numbers in rising order.
+   !> Numbers in ascending order.
    pure function sorted(values) result(rising)
       !> The numbers: [n].
       real(wp), intent(in) :: values(:)
-      !> The same: [n].
+      !> The sorted numbers: [n].
       real(wp) :: rising(size(values))
       real(wp) :: value
       integer :: i, j

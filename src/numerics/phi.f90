@@ -7,23 +7,23 @@ module thud_phi
 
    public :: get_phi, max_phi
 
-   !> Index of the last function that is offered.
+   !> Highest index n.
    integer, parameter :: max_phi = 8
 
-   !> Terms of the series of phi_n below |z| = 1: 1/18! is left.
+   !> Number of terms of the series of phi_n for |z| < 1: the remainder is about 1/18!.
    integer, parameter :: n_term = 18
 
-   !> Runs through the next constant.
+   !> Index in the next constant.
    integer :: number
-   !> Reciprocals of the factorials, from that of 0 on.
+   !> Reciprocal factorials, from 1/0! on.
    real(wp), parameter :: inverse_factorial(0:max_phi + n_term) = &
       [(1/gamma(real(number + 1, wp)), number=0, max_phi + n_term)]
 
 contains
 
-   !> The functions from phi_0 on.
+   !> The functions phi_0 to phi_highest.
    pure function get_phi(z, highest) result(phi)
-      !> Argument, its real part not large.
+      !> Argument whose real part is not large.
       complex(wp), intent(in) :: z
       !> Index of the last function, up to `max_phi`.
       integer, intent(in) :: highest
@@ -33,7 +33,7 @@ contains
       integer :: k, n
 
       if (real(z, wp)**2 + aimag(z)**2 < 1.0_wp) then
-         ! The recursion divides by z, which is stable downwards only.
+         ! Upwards, the recursion divides by z, which is unstable for small |z|.
          phi(highest) = inverse_factorial(highest + n_term)
          do k = highest + n_term - 1, highest, -1
             phi(highest) = inverse_factorial(k) + phi(highest)*z

@@ -7,14 +7,12 @@
 !>    t = exponent log2(base) = n + r,                              |r| <= 1/2
 !>    base**exponent = 2**n (1 + r ln 2 + ... + (r ln 2)**13/13!)
 !>
-!> Bound of the relative error, with u = 2**(-53). Both series are Taylor's; what they leave out is
-!> less than s**20/(21 (1 - s**2)) = 2.3e-17 < 0.3 u of the logarithm and
-!> (ln(2)/2)**14/14! exp(ln(2)/2) = 6e-18 < 0.1 u of the power. m - 1 is exact, so s is wrong by 2 u
-!> (sum, quotient), the series in s**2 by 2.2 u (rounded coefficients, the last sum; the rest is
-!> scaled down by s**2), their product by one more: 5.5 u. Adding k and multiplying by the exponent
-!> cost u each: t is wrong by 7.5 u |t|, the power by ln 2 times that. n and r are exact. The last
-!> series has positive terms for r > 0 and errs by 3 u for either sign, its scaling is exact. In
-!> all (5.2 |t| + 3) u, stated as `power_error`.
+!> Bound of the relative error, with u = 2**(-53). Both series are Taylor series; their remainders are less than
+!> s**20/(21 (1 - s**2)) = 2.3e-17 < 0.3 u of the logarithm and (ln(2)/2)**14/14! exp(ln(2)/2) = 6e-18 < 0.1 u of the power.
+!> m - 1 is exact, so s errs by 2 u (sum, quotient), the series in s**2 by 2.2 u (rounded coefficients, the last sum; the
+!> rest is scaled down by s**2), their product by one more: 5.5 u. Adding k and multiplying by the exponent add u each: t
+!> errs by 7.5 u |t|, the power by ln 2 times that. n and r are exact. The last series has positive terms for r > 0 and errs
+!> by 3 u for either sign; its scaling is exact. The sum is (5.2 |t| + 3) u, stated as `power_error`.
 module thud_power
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_kinds, only: wp
@@ -26,7 +24,7 @@ module thud_power
    !> Natural logarithm of 2.
    real(wp), parameter :: ln2 = log(2.0_wp)
 
-   !> Highest powers of the series of the logarithm, in s**2, and of the power of 2.
+   !> Highest degrees of the series of the logarithm, in s**2, and of the power of 2.
    integer, parameter :: log_degree = 9, exp_degree = 13
 
    !> Coefficients of the series of the logarithm in s**2, 2/(ln 2 (2j + 1)): [0:log_degree].
@@ -41,27 +39,26 @@ module thud_power
    !> Bits of sqrt(1/2), rounded.
    integer(int64), parameter :: root_bits = int(z'3FE6A09E667F3BCD', int64)
 
-   !> Bits of the mantissa of a number.
+   !> Number of mantissa bits of a real number.
    integer, parameter :: mantissa = 52
 
-   !> Added to the exponent of a number to keep it positive.
+   !> Offset of the exponent k that keeps it positive.
    integer, parameter :: offset = 1024
 
-   !> A number whose last bit counts ones: adding it makes a whole number of less than 2**51 readable.
+   !> A number whose last bit has the value 1: its mantissa converts integers below 2**51 to real numbers.
    real(wp), parameter :: counter = 2.0_wp**mantissa
 
-   !> The same for whole numbers of either sign, and rounding to them.
+   !> The same for integers of either sign, and for rounding to them.
    real(wp), parameter :: rounder = 1.5_wp*2.0_wp**mantissa
 
-   !> The power of a number that is not positive.
+   !> Result for a base that is not positive.
    real(wp), parameter :: not_a_number = transfer(int(z'7FF8000000000000', int64), 1.0_wp)
 
 contains
 
-   !> Powers base**exponent; NaN where the base is not positive. Limited by the throughput of the
-   !> multiply-add units.
+   !> Powers base**exponent; NaN if the base is not positive. Limited by the throughput of the multiply-add units.
    pure subroutine vector_power(n, base, exponent, power)
-      !> Numbers in the arrays; a multiple of the vector length sends all through the same code.
+      !> Length of the arrays; if it is a multiple of the vector length, all elements pass through the same code.
       integer, intent(in) :: n
       !> The bases, normal numbers: [n].
       real(wp), intent(in) :: base(n)
@@ -93,7 +90,7 @@ contains
       end do
    end subroutine vector_power
 
-   !> Bound of the relative error of `vector_power`, see above.
+   !> Bound of the relative error of `vector_power`, derived above.
    elemental function power_error(base, exponent) result(bound)
       real(wp), intent(in) :: base, exponent
       !> Maximum relative error.

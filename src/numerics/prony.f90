@@ -1,5 +1,5 @@
-!> Prony series: a long-term modulus of 1 and Maxwell branches beside it, each with its modulus
-!> over the long-term modulus and its relaxation time.
+!> Prony series: a long-term modulus of 1 in parallel with Maxwell branches, each with its relative modulus (divided by the
+!> long-term modulus) and its relaxation time.
 module thud_prony
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
@@ -12,89 +12,89 @@ module thud_prony
 
    public :: check_fractional_loss, fit_constant_loss, fit_fractional_loss, get_loss_ratio, get_storage_ratio
 
-   !> Band of the series of a fractional law, Hz.
+   !> Band in which a series fits a fractional law, Hz.
    real(wp), parameter, public :: series_from = 5.0_wp, series_to = 3000.0_wp
 
-   !> Branches of a fractional law, and how far the outer ones stand outside the band: the nearest spacing
-   !> that spreads the error evenly. Beside a spring and a viscosity, which stand for all times beyond, they
-   !> keep the complex modulus within 0.8 % for any order (4 branches: 2.2 %, 6: 0.5 %).
+   !> Number of branches for a fractional law. With a spring and a viscosity for all times beyond, they keep the complex
+   !> modulus within 0.8 % for any order (4 branches: 2.2 %, 6: 0.5 %).
    integer, parameter :: n_fractional = 5
+   !> Factor by which the outer branches lie outside the band: the nearest spacing that spreads the error evenly.
    real(wp), parameter :: outside = 1.26_wp
 
-   !> Band over which the loss factor is to be constant, Hz.
+   !> Band in which the loss factor is constant, Hz.
    real(wp), parameter :: lowest = 10.0_wp, highest = 1000.0_wp
 
-   !> Branches of the fit, two a decade; the outer ones stand half a decade outside the band. They keep
-   !> a loss factor up to 0.5 constant within 0.3 %.
+   !> Number of branches for a constant loss factor, two per decade; the outer ones lie half a decade outside the band. They
+   !> keep a loss factor up to 0.5 constant within 0.3 %.
    integer, parameter :: n_branch = 7
 
-   !> Frequencies of the fit.
+   !> Number of frequencies of a fit.
    integer, parameter :: n_frequency = 100
 
 contains
 
-   !> Storage modulus over the long-term modulus.
-   pure function get_storage_ratio(share, time, omega) result(ratio)
-      !> Moduli of the branches over the long-term modulus: [n_branch].
-      real(wp), intent(in) :: share(:)
+   !> Storage modulus divided by the long-term modulus.
+   pure function get_storage_ratio(relative_modulus, time, omega) result(ratio)
+      !> Relative moduli of the branches: [n_branch].
+      real(wp), intent(in) :: relative_modulus(:)
       !> Their relaxation times, s: [n_branch].
       real(wp), intent(in) :: time(:)
       !> Angular frequency, rad/s.
       real(wp), intent(in) :: omega
       real(wp) :: ratio
 
-      ratio = 1 + sum(share*(omega*time)**2/(1 + (omega*time)**2))
+      ratio = 1 + sum(relative_modulus*(omega*time)**2/(1 + (omega*time)**2))
    end function get_storage_ratio
 
-   !> Loss modulus over the long-term modulus.
-   pure function get_loss_ratio(share, time, omega) result(ratio)
-      !> Moduli of the branches over the long-term modulus: [n_branch].
-      real(wp), intent(in) :: share(:)
+   !> Loss modulus divided by the long-term modulus.
+   pure function get_loss_ratio(relative_modulus, time, omega) result(ratio)
+      !> Relative moduli of the branches: [n_branch].
+      real(wp), intent(in) :: relative_modulus(:)
       !> Their relaxation times, s: [n_branch].
       real(wp), intent(in) :: time(:)
       !> Angular frequency, rad/s.
       real(wp), intent(in) :: omega
       real(wp) :: ratio
 
-      ratio = sum(share*omega*time/(1 + (omega*time)**2))
+      ratio = sum(relative_modulus*omega*time/(1 + (omega*time)**2))
    end function get_loss_ratio
 
    !> Series whose loss factor is constant from 10 to 1000 Hz.
    !>
-   !> Loss modulus = loss factor times storage modulus is linear in the moduli of the branches: least
-   !> squares over frequencies at equal steps of their logarithm.
-   subroutine fit_constant_loss(loss_factor, share, time, failed)
+   !> The condition loss modulus = loss factor times storage modulus is linear in the moduli of the branches: least squares
+   !> over logarithmically spaced frequencies.
+   subroutine fit_constant_loss(loss_factor, relative_modulus, time, failed)
       real(wp), intent(in) :: loss_factor
-      !> Moduli of the branches over the long-term modulus: [n_branch].
-      real(wp), allocatable, intent(out) :: share(:)
+      !> Relative moduli of the branches: [n_branch].
+      real(wp), allocatable, intent(out) :: relative_modulus(:)
       !> Their relaxation times, s: [n_branch].
       real(wp), allocatable, intent(out) :: time(:)
-      !> A modulus would have to be negative: the loss factor is above about 0.9.
+      !> True if a modulus would be negative: the loss factor is above about 0.9.
       logical, intent(out) :: failed
       real(wp) :: omega
-      real(wp) :: matrix(n_frequency, n_branch), right(n_frequency), work(64*n_branch), turn(n_branch)
+      real(wp) :: matrix(n_frequency, n_branch), right(n_frequency), work(64*n_branch), omega_tau(n_branch)
       integer :: i, info
 
-      allocate (share(n_branch))
+      allocate (relative_modulus(n_branch))
       allocate (time, source=[(1/(2*pi*lowest*(highest/lowest)**((i - 2)/real(n_branch - 3, wp))), i=1, n_branch)])
       do i = 1, n_frequency
          omega = 2*pi*lowest*(highest/lowest)**((i - 1)/real(n_frequency - 1, wp))
-         turn = omega*time
-         ! Each line over the storage modulus that a constant loss factor has, so that all weigh the same.
-         matrix(i, :) = (turn - loss_factor*turn**2)/(1 + turn**2)
+         omega_tau = omega*time
+         ! Division by the storage modulus at constant loss factor gives all equations the same weight.
+         matrix(i, :) = (omega_tau - loss_factor*omega_tau**2)/(1 + omega_tau**2)
          right(i) = loss_factor
          matrix(i, :) = matrix(i, :)*omega**(-2/pi*atan(loss_factor))
          right(i) = right(i)*omega**(-2/pi*atan(loss_factor))
       end do
       call dgels('N', n_frequency, n_branch, 1, matrix, n_frequency, right, n_frequency, work, size(work), info)
-      share = right(:n_branch)
-      failed = info /= 0 .or. minval(share) < 0.0_wp
+      relative_modulus = right(:n_branch)
+      failed = info /= 0 .or. minval(relative_modulus) < 0.0_wp
    end subroutine fit_constant_loss
 
-   !> Refuses a fractional law without a series: a loss factor that the spring-pot alone does not reach (the
-   !> spring would have to be negative), or one outside the band.
+   !> Checks that a fractional law has a series. It has none if its loss factor is not below that of the spring-pot alone
+   !> (the spring would be negative), or if the frequency of the loss factor lies outside the band.
    subroutine check_fractional_loss(group, order, loss_factor, frequency, error)
-      !> Group of the keys, for the message.
+      !> Namelist group, for the message.
       character(len=*), intent(in) :: group
       real(wp), intent(in) :: order, loss_factor
       !> Frequency of the loss factor, Hz.
@@ -105,7 +105,7 @@ contains
          error = input_error('&'//group//': loss_frequency = '//to_text(frequency) &
             //' Hz is not allowed with a fractional law; allowed: '//to_text(series_from)//' to '//to_text(series_to))
       else if (loss_factor >= tan(pi/2*order)) then
-         ! The tangent of order 1 is infinite, in floating point too large.
+         ! For order 1 the tangent is infinite; in floating point it is very large.
          error = input_error('&'//group//': loss_factor = '//to_text(loss_factor)//' is more than a material of ' &
             //'fractional_order = '//to_text(order)//' can have; allowed: below '//to_text(tan(pi/2*order)))
       end if
@@ -113,15 +113,15 @@ contains
 
    !> Series of a fractional law from 5 to 3000 Hz: a spring, branches and a viscosity in parallel.
    !>
-   !> Least squares of the complex power law over frequencies at equal steps of their logarithm, relative
-   !> to its absolute value. The spring of the law makes the relative error of the whole smaller, never larger.
-   subroutine fit_fractional_loss(law, share, time, viscosity)
+   !> Least squares of the complex power law over logarithmically spaced frequencies, relative to its magnitude. The spring
+   !> of the law only reduces the relative error of the whole.
+   subroutine fit_fractional_loss(law, relative_modulus, time, viscosity)
       type(fractional_loss_type), intent(in) :: law
-      !> Moduli of the branches over the long-term modulus: [n_branch].
-      real(wp), allocatable, intent(out) :: share(:)
+      !> Relative moduli of the branches: [n_branch].
+      real(wp), allocatable, intent(out) :: relative_modulus(:)
       !> Their relaxation times, s: [n_branch].
       real(wp), allocatable, intent(out) :: time(:)
-      !> Viscosity over the long-term modulus, s.
+      !> Viscosity divided by the long-term modulus, s.
       real(wp), intent(out) :: viscosity
       integer, parameter :: n_term = n_fractional + 2
       real(wp), parameter :: rounding = 1.0e-12_wp
@@ -146,11 +146,11 @@ contains
       end do
       ! The columns are independent, and the moduli are positive for any order (see the tests).
       call dgels('N', size(right), n_term, 1, matrix, size(right), right, size(right), work, size(work), info)
-      right = max(right, 0.0_wp)*law%pot*(last/law%omega)**law%order
+      right = max(right, 0.0_wp)*law%springpot*(last/law%omega)**law%order
       spring = law%spring + right(1)
-      ! The spring-pot of order 1 is a viscosity: no branches but rounding.
+      ! The spring-pot of order 1 is a viscosity: its branches are rounding errors.
       time = pack(time, right(2:n_term - 1) > rounding*sum(right(:n_term)))
-      share = pack(right(2:n_term - 1), right(2:n_term - 1) > rounding*sum(right(:n_term)))/spring
+      relative_modulus = pack(right(2:n_term - 1), right(2:n_term - 1) > rounding*sum(right(:n_term)))/spring
       viscosity = right(n_term)/(last*spring)
    end subroutine fit_fractional_loss
 

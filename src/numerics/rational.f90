@@ -1,6 +1,6 @@
 !> Rational functions of frequency, d + sum of r_k/(s - p_k), with real coefficients: their real state space and zeros.
 !>
-!> Of a pair of conjugate poles the one with positive imaginary part is kept, with twice its residue.
+!> Of a pair of conjugate poles only the pole with positive imaginary part is stored, with twice its residue.
 module thud_rational
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use thud_kinds, only: wp
@@ -12,7 +12,7 @@ module thud_rational
 
 contains
 
-   !> Number of poles, both of a pair counted.
+   !> Number of poles; a conjugate pair has two.
    pure function get_order(pole) result(order)
       !> Poles: [n].
       complex(wp), intent(in) :: pole(:)
@@ -21,8 +21,8 @@ contains
       order = size(pole) + count(pole%im > 0.0_wp)
    end function get_order
 
-   !> Functions of which the rational function is the sum with real coefficients: 1/(s - p), of a pair
-   !> 1/(s - p) + 1/(s - p*) and i/(s - p) - i/(s - p*), and at last 1.
+   !> Basis functions of a rational function with real coefficients: 1/(s - p) for a real pole, 1/(s - p) + 1/(s - p*) and
+   !> i/(s - p) - i/(s - p*) for a pair, and finally 1.
    pure subroutine get_basis(pole, s, basis)
       !> Poles: [n].
       complex(wp), intent(in) :: pole(:)
@@ -46,13 +46,13 @@ contains
       basis(:, j + 1) = 1.0_wp
    end subroutine get_basis
 
-   !> Residues of real coefficients.
+   !> Residues from the coefficients of the basis.
    pure function get_residues(pole, coefficient) result(residue)
       !> Poles: [n].
       complex(wp), intent(in) :: pole(:)
       !> Coefficients of the basis: [order].
       real(wp), intent(in) :: coefficient(:)
-      !> Residues, those of pairs doubled: [n].
+      !> Residues, doubled for pairs: [n].
       complex(wp) :: residue(size(pole))
       integer :: j, k
 
@@ -66,9 +66,9 @@ contains
       end do
    end function get_residues
 
-   !> Real coefficients of residues.
+   !> Coefficients of the basis from residues.
    pure function get_coefficients(pole, residue) result(coefficient)
-      !> Poles, and residues, those of pairs doubled: [n].
+      !> Poles, and residues, doubled for pairs: [n].
       complex(wp), intent(in) :: pole(:), residue(:)
       !> Coefficients of the basis: [order].
       real(wp), allocatable :: coefficient(:)
@@ -85,7 +85,7 @@ contains
       end do
    end function get_coefficients
 
-   !> Real matrix A of x' = A x + b u with the poles as eigenvalues.
+   !> Real matrix A of the state space x' = A x + b u; its eigenvalues are the poles.
    pure function get_state_matrix(pole) result(matrix)
       !> Poles: [n].
       complex(wp), intent(in) :: pole(:)
@@ -107,7 +107,7 @@ contains
       end do
    end function get_state_matrix
 
-   !> Its input b, with which the coefficients of the basis are the output.
+   !> Input vector b of this state space; its output vector has the coefficients of the basis.
    pure function get_state_input(pole) result(input)
       !> Poles: [n].
       complex(wp), intent(in) :: pole(:)
@@ -132,17 +132,17 @@ contains
       real(wp), intent(in) :: matrix(:, :)
       !> The eigenvalues: [n].
       complex(wp), intent(out) :: eigenvalue(:)
-      !> The matrix is not finite, or LAPACK did not find them.
+      !> True if the matrix is not finite or LAPACK does not find the eigenvalues.
       logical, intent(out) :: failed
       real(wp) :: copy(size(matrix, 1), size(matrix, 1)), wr(size(matrix, 1)), wi(size(matrix, 1))
-      real(wp) :: left(1, 1), right(1, 1), work(16*size(matrix, 1))
+      real(wp) :: left_vector(1, 1), right_vector(1, 1), work(16*size(matrix, 1))
       integer :: info
 
       eigenvalue = 0.0_wp
       failed = .not. all(ieee_is_finite(matrix))
       if (failed) return
       copy = matrix
-      call dgeev('N', 'N', size(wr), copy, size(wr), wr, wi, left, 1, right, 1, work, size(work), info)
+      call dgeev('N', 'N', size(wr), copy, size(wr), wr, wi, left_vector, 1, right_vector, 1, work, size(work), info)
       eigenvalue = cmplx(wr, wi, wp)
       failed = info /= 0
    end subroutine get_eigenvalues

@@ -2,7 +2,8 @@
 !> and the location of events inside a step.
 module thud_rk4
    use thud_kinds, only: wp
-   use thud_zero_search, only: advance_search, bisection_type, is_found, new_zero_search, update_bracket, zero_search_type
+   use thud_zero_search, only: advance_search, bisection_type, is_converged, new_zero_search, update_bracket, &
+      zero_search_type
    implicit none (type, external)
    private
 
@@ -26,15 +27,15 @@ module thud_rk4
          real(wp), intent(in) :: state(:)
          !> Its derivative: [n_state].
          real(wp), intent(out) :: rate(:)
-         !> False where the state has left the domain of the equations.
+         !> False if the state has left the domain of the equations.
          logical, intent(out) :: valid
       end subroutine derivative_interface
    end interface
 
 contains
 
-   !> One step; also for part of a step, which makes it its own dense output: the result as a
-   !> function of `step` follows the solution with a local error of order step**5.
+   !> One step. Shorter steps from the same state are the dense output: as a function of `step`, the result follows the
+   !> solution with a local error of order step**5.
    pure subroutine rk4_step(ode, time, state, step, new_state, valid)
       class(ode_type), intent(in) :: ode
       !> Time at the beginning of the step.
@@ -43,9 +44,9 @@ contains
       real(wp), intent(in) :: state(:)
       !> Length of the step.
       real(wp), intent(in) :: step
-      !> State at the end: [n_state]; that of the beginning where the step is not valid.
+      !> State at the end; the state at the beginning if the step is not valid: [n_state].
       real(wp), intent(out) :: new_state(:)
-      !> False where a stage has left the domain of the equations.
+      !> False if a stage has left the domain of the equations.
       logical, intent(out) :: valid
       real(wp), dimension(size(state)) :: k1, k2, k3, k4
 
@@ -61,10 +62,9 @@ contains
       new_state = state + step/6*(k1 + 2*(k2 + k3) + k4)
    end subroutine rk4_step
 
-   !> Length of the step at whose end one component of the state falls to zero, to rounding.
+   !> Length of the step at whose end one component of the state falls to zero, exact to rounding.
    !>
-   !> The component is positive at (or just after) the beginning and not positive after the full
-   !> step.
+   !> The component is positive at (or just after) the beginning and not positive after the full step.
    pure function locate_zero(ode, time, state, step, component) result(length)
       class(ode_type), intent(in) :: ode
       !> Time at the beginning of the step.
@@ -72,13 +72,13 @@ contains
       !> State at the beginning: [n_state].
       real(wp), intent(in) :: state(:)
       real(wp), intent(in) :: step
-      !> Component that becomes zero.
+      !> Index of the component.
       integer, intent(in) :: component
       real(wp) :: length
       type(zero_search_type) :: search
 
       search = new_zero_search(state(component), step, component_after(step))
-      do while (.not. is_found(search))
+      do while (.not. is_converged(search))
          call advance_search(search)
          call update_bracket(search, component_after(search%trial))
       end do
@@ -86,21 +86,21 @@ contains
 
    contains
 
-      !> The component after part of the step.
-      pure function component_after(part) result(component_value)
-         !> Length of the part.
-         real(wp), intent(in) :: part
+      !> The component after a shorter step.
+      pure function component_after(length) result(component_value)
+         !> Length of the shorter step.
+         real(wp), intent(in) :: length
          real(wp) :: component_value
          real(wp) :: new_state(size(state))
          logical :: valid
 
-         call rk4_step(ode, time, state, part, new_state, valid)
+         call rk4_step(ode, time, state, length, new_state, valid)
          component_value = new_state(component)
       end function component_after
 
    end function locate_zero
 
-   !> Longest step that stays in the domain of the equations, to rounding, by bisection.
+   !> Longest step that stays in the domain of the equations, by bisection to rounding.
    pure function longest_valid(ode, time, state, step) result(length)
       class(ode_type), intent(in) :: ode
       !> Time at the beginning of the step.
@@ -109,7 +109,7 @@ contains
       real(wp), intent(in) :: state(:)
       !> Length of a step that leaves the domain.
       real(wp), intent(in) :: step
-      !> Length of the longest step that does not.
+      !> Length of the longest step that stays in the domain.
       real(wp) :: length
       type(bisection_type) :: bracket
       real(wp) :: new_state(size(state))

@@ -1,6 +1,6 @@
 !> Fourier transforms of sampled records, on FFTW.
 !>
-!> To make a plan takes longer than to transform a record of a contact, so plans are kept by length.
+!> Making a plan takes longer than transforming the record of a contact, so plans are kept by length.
 module thud_transform
    use, intrinsic :: iso_c_binding
    use thud_kinds, only: wp
@@ -11,26 +11,27 @@ module thud_transform
 
    include 'fftw3.f03'
 
-   !> Lengths whose plans are kept, or as many as threads have used at once.
+   !> Number of lengths whose plans are kept; more only if more threads use plans at the same time.
    integer, parameter :: kept_count = 16
 
-   !> Maximum length of a transform whose plans are kept: longer ones take much memory.
+   !> Maximum length of a transform whose plans are kept: longer plans take much memory.
    integer, parameter :: max_kept_length = 2**18
 
    !> Plans for one length. They fit all arrays that the compiler allocates: FFTW needs alignment to 16 bytes.
    type :: plans_type
-      !> Samples, 0 without plans.
+      !> Number of samples; 0 means no plans.
       integer :: length = 0
-      !> Threads that use the plans now.
+      !> Number of threads that use the plans now.
       integer :: users = 0
-      !> Index of the last use, ascending.
+      !> Value of `use_count` at the last use.
       integer(c_int64_t) :: last_use = 0
-      !> From a record to its transform, and back to the record times the length.
+      !> Plans from a record to its transform, and back to the record multiplied by its length.
       type(c_ptr) :: forward = c_null_ptr, back = c_null_ptr
    end type plans_type
 
-   !> The plans that are kept, and the number of the latest use; only for the critical section `thud_fftw_planner`.
+   !> The kept plans; accessed only in the critical section `thud_fftw_planner`, like `use_count`.
    type(plans_type), allocatable :: kept(:)
+   !> Number of uses of plans so far.
    integer(c_int64_t) :: use_count = 0
 
 contains
@@ -46,7 +47,7 @@ contains
       type(plans_type) :: plans
       integer :: length
 
-      ! Twice the length, so that the circular correlation does not fold.
+      ! Twice the length, so that the circular correlation does not wrap around.
       length = 2
       do while (length < 2*size(record))
          length = 2*length
@@ -57,13 +58,13 @@ contains
       autocorrelation = signal(:size(record))/length
    end subroutine get_autocorrelation
 
-   !> Low-pass component of a record.
+   !> Low-pass filtered record.
    subroutine get_low_pass(record, sample_rate, edge, low)
       !> Samples: [n].
       real(wp), intent(in) :: record(:)
-      !> Samples per second, Hz; the frequency, Hz.
+      !> Samples per second, Hz; highest frequency that passes, Hz.
       real(wp), intent(in) :: sample_rate, edge
-      !> Its samples: [n].
+      !> The filtered samples: [n].
       real(wp), intent(out) :: low(:)
       real(wp), allocatable :: signal(:)
       complex(wp), allocatable :: spectrum(:)
@@ -71,7 +72,7 @@ contains
       integer :: length
 
       if (size(record) == 0) return
-      ! Zeros on both sides, so that oscillations before the record do not wrap around its end.
+      ! Zeros after the record, so that oscillations before it do not wrap around to its end.
       length = 2*size(record)
       call transform_padded(record, length, signal, spectrum, plans)
       spectrum(int(min(length*(edge/sample_rate), length/2.0_wp)) + 2:) = (0.0_wp, 0.0_wp)
@@ -114,20 +115,20 @@ contains
       call fftw_execute_dft_r2c(plans%forward, signal, spectrum)
    end subroutine transform_padded
 
-   !> Record of a transform, times its length.
+   !> Record from its transform, multiplied by its length.
    subroutine transform_back(spectrum, signal, plans)
-      !> The transform; it is used up: [n/2 + 1].
+      !> The transform; overwritten: [n/2 + 1].
       complex(wp), intent(inout) :: spectrum(:)
       !> The record: [n].
       real(wp), intent(inout) :: signal(:)
-      !> Plans from `transform_padded`; released.
+      !> Plans from `transform_padded`; released here.
       type(plans_type), intent(inout) :: plans
 
       call fftw_execute_dft_c2r(plans%back, spectrum, signal)
       call release(plans)
    end subroutine transform_back
 
-   !> Plans for arrays, kept or new ones. FFTW's planner is not thread-safe.
+   !> Takes plans for arrays, kept or new ones. FFTW's planner is not thread-safe.
    subroutine take_plans(signal, spectrum, plans)
       !> Array of the record: [n].
       real(wp), intent(inout) :: signal(:)

@@ -1,5 +1,5 @@
-!> Relaxed vector fitting (Gustavsen and Semlyen, IEEE Trans. Power Delivery 14, 1999; Gustavsen, 21, 2006): a stable
-!> rational function with real coefficients through values at frequencies.
+!> Relaxed vector fitting (Gustavsen and Semlyen, IEEE Trans. Power Delivery 14, 1999; Gustavsen, 21, 2006): fits a stable
+!> rational function with real coefficients to values at frequencies.
 module thud_vector_fit
    use thud_interrupt, only: is_interrupted
    use thud_kinds, only: wp
@@ -10,47 +10,48 @@ module thud_vector_fit
 
    public :: fit_rational
 
-   !> Maximum number of relocations of the poles; with good values some five are needed.
+   !> Maximum number of relocations of the poles; good data need about five.
    integer, parameter :: max_relocations = 40
 
-   !> Relocations without a gain after which the poles stay, and the minimum gain.
+   !> Number of relocations without a gain after which the search ends.
    integer, parameter :: stagnation_limit = 6
+   !> Minimum relative decrease of the misfit that is a gain.
    real(wp), parameter :: gain = 1.0e-3_wp
 
-   !> Weighted relative error, root of the mean square, below which only rounding is left to fit.
+   !> Weighted relative root-mean-square error below which only rounding is left to fit.
    real(wp), parameter :: exact = 1.0e-13_wp
 
-   !> Damping ratio of the first poles (Gustavsen and Semlyen).
+   !> Damping ratio of the initial poles (Gustavsen and Semlyen).
    real(wp), parameter :: first_damping = 0.01_wp
 
-   !> Minimum damping ratio: a pole on the axis would never decay.
+   !> Minimum damping ratio: a pole on the imaginary axis would never decay.
    real(wp), parameter :: min_damping = 1.0e-8_wp
 
-   !> Minimum of the constant of the weight function (Gustavsen 2006).
+   !> Minimum magnitude of the constant term of the weight function (Gustavsen 2006).
    real(wp), parameter :: min_constant = 1.0e-8_wp
 
 contains
 
    !> Fits d + sum of r_k/(s - p_k).
    !>
-   !> Each relocation makes the zeros of a fitted weight function the new poles; those in the right half plane are reflected.
-   !> The first poles lie at equal steps of the frequency or of its logarithm; the better of both fits is taken.
+   !> In each relocation, the zeros of a fitted weight function become the new poles; those in the right half plane are
+   !> reflected. The initial poles are spaced evenly in frequency or in its logarithm; the better of both fits is returned.
    subroutine fit_rational(omega, response, weight, order, pole, residue, direct, misfit, failed)
-      !> Angular frequencies, rad/s, rising, above 0: [n_frequency].
+      !> Angular frequencies, rad/s, ascending, above 0: [n_frequency].
       real(wp), intent(in) :: omega(:)
       !> Values to fit: [n_frequency].
       complex(wp), intent(in) :: response(:)
       !> Weights of their errors: [n_frequency].
       real(wp), intent(in) :: weight(:)
-      !> Number of poles, both of a pair counted; at most n_frequency - 1.
+      !> Number of poles, at most n_frequency - 1; a conjugate pair has two.
       integer, intent(in) :: order
-      !> Poles, 1/s, of pairs one, and residues, those of pairs doubled: [n].
+      !> Poles, 1/s, one of each pair, and residues, doubled for pairs: [n].
       complex(wp), allocatable, intent(out) :: pole(:), residue(:)
       !> Constant part.
       real(wp), intent(out) :: direct
-      !> Weighted error over the weighted values, root of the mean square.
+      !> Root-mean-square weighted error, relative to the weighted values.
       real(wp), intent(out) :: misfit
-      !> LAPACK finds no solution, or an interrupt ended the search.
+      !> True if LAPACK finds no solution or an interrupt ended the search.
       logical, intent(out) :: failed
       complex(wp), allocatable :: candidate(:)
       real(wp), allocatable :: coefficient(:), best(:)
@@ -88,12 +89,12 @@ contains
       pole = pole*scale
    end subroutine fit_rational
 
-   !> Lightly damped poles over the band, whose last frequency is 1.
+   !> Lightly damped poles across the band; frequencies are divided by the last one.
    pure function get_first_poles(lowest, order, logarithmic) result(pole)
-      !> The first frequency over the last.
+      !> The first frequency.
       real(wp), intent(in) :: lowest
       integer, intent(in) :: order
-      !> At equal steps of the logarithm.
+      !> True for even spacing of the logarithm.
       logical, intent(in) :: logarithmic
       !> The poles: [n].
       complex(wp), allocatable :: pole(:)
@@ -111,16 +112,16 @@ contains
       if (mod(order, 2) == 1) pole(pairs + 1) = -sqrt(lowest)
    end function get_first_poles
 
-   !> Relocates poles to the zeros of sigma = c.basis + d, where sigma f = rational function with the present poles, and the
-   !> real parts of sigma have the mean 1 (relaxed non-triviality, Gustavsen 2006 eq. 8).
+   !> Relocates poles to the zeros of sigma = c.basis + d. The product sigma f is fitted by a rational function with the
+   !> present poles, and the real part of sigma has the mean 1 (relaxed non-triviality, Gustavsen 2006 eq. 8).
    subroutine relocate_poles(s, response, weight, pole, failed)
-      !> Complex frequencies, the last at i, and values: [n_frequency].
+      !> Complex frequencies, the last scaled to i, and values: [n_frequency].
       complex(wp), intent(in) :: s(:), response(:)
       !> Weights: [n_frequency].
       real(wp), intent(in) :: weight(:)
       !> The poles: [n].
       complex(wp), allocatable, intent(inout) :: pole(:)
-      !> LAPACK finds no solution.
+      !> True if LAPACK finds no solution.
       logical, intent(out) :: failed
       complex(wp), allocatable :: basis(:, :), zero(:)
       real(wp), allocatable :: matrix(:, :), right(:), column(:)
@@ -156,7 +157,7 @@ contains
       pole%re = -max(abs(pole%re), min_damping*abs(pole))
    end subroutine relocate_poles
 
-   !> Coefficients of the basis with given poles.
+   !> Fits the coefficients of the basis for given poles.
    subroutine fit_residues(s, response, weight, pole, coefficient, misfit)
       !> Complex frequencies and values: [n_frequency].
       complex(wp), intent(in) :: s(:), response(:)
@@ -165,7 +166,7 @@ contains
       complex(wp), intent(in) :: pole(:)
       !> The coefficients, the constant part last: [order + 1].
       real(wp), allocatable, intent(out) :: coefficient(:)
-      !> Weighted error over the weighted values, root of the mean square; huge where there is no solution.
+      !> Root-mean-square weighted error, relative to the weighted values; huge if there is no solution.
       real(wp), intent(out) :: misfit
       complex(wp), allocatable :: basis(:, :)
       real(wp), allocatable :: matrix(:, :), right(:)
@@ -184,13 +185,13 @@ contains
       if (failed) misfit = huge(misfit)
    end subroutine fit_residues
 
-   !> Least squares with columns of unit length.
+   !> Least-squares solution; the columns are scaled to unit length.
    subroutine solve_least_squares(matrix, right, failed)
       !> The matrix, overwritten: [n_row, n_column].
       real(wp), intent(inout) :: matrix(:, :)
       !> Right-hand side; its first n_column values become the solution: [n_row].
       real(wp), intent(inout) :: right(:)
-      !> There is no solution.
+      !> True if there is no solution.
       logical, intent(out) :: failed
       real(wp) :: length(size(matrix, 2)), work(64*size(matrix, 2) + size(matrix, 1))
       integer :: info, j
@@ -205,7 +206,7 @@ contains
       failed = info /= 0
    end subroutine solve_least_squares
 
-   !> Real and imaginary parts one after the other.
+   !> Real parts, then imaginary parts.
    pure function halves(values) result(parts)
       !> Complex values: [n].
       complex(wp), intent(in) :: values(:)

@@ -5,14 +5,14 @@ module thud_zero_search
    implicit none (type, external)
    private
 
-   public :: advance_search, bisection_type, is_found, new_zero_search, update_bracket, zero_search_type
+   public :: advance_search, bisection_type, is_converged, new_zero_search, update_bracket, zero_search_type
 
-   !> Trials after which a search ends.
+   !> Maximum number of trials of a search.
    integer, parameter :: max_trials = 200
 
    !> A bracket: the function is positive at the left end and not positive at the right end.
    type :: zero_search_type
-      !> Its ends.
+      !> Ends of the bracket.
       real(wp) :: left = 0.0_wp, right = 0.0_wp
       !> Next trial point.
       real(wp) :: trial = 0.0_wp
@@ -20,13 +20,13 @@ module thud_zero_search
       real(wp), private :: left_value = 0.0_wp, right_value = 0.0_wp
       !> Which end moved last.
       logical, private :: left_moved_last = .false., right_moved_last = .false.
-      !> Trials so far.
+      !> Number of trials so far.
       integer, private :: n_trial = 0
    end type zero_search_type
 
    !> Bisection of a bracket to neighboring numbers: `do while (bracket%is_open())`, then `halve` it.
    type :: bisection_type
-      !> Its ends.
+      !> Ends of the bracket.
       real(wp) :: left = 0.0_wp, right = 0.0_wp
    contains
       procedure :: get_middle
@@ -36,13 +36,13 @@ module thud_zero_search
 
 contains
 
-   !> A bracket from 0, at or just after which the function is positive, to the end of a step.
+   !> A bracket from 0 to the end of a step; the function is positive at 0 or just after it.
    pure function new_zero_search(start_value, step, end_value) result(search)
       !> Function value at 0.
       real(wp), intent(in) :: start_value
       !> Length of the step.
       real(wp), intent(in) :: step
-      !> Function value at its end, not positive.
+      !> Function value at the end of the step, not positive.
       real(wp), intent(in) :: end_value
       type(zero_search_type) :: search
 
@@ -51,13 +51,13 @@ contains
       search%right_value = end_value
    end function new_zero_search
 
-   !> Whether the zero is known to rounding; it lies at `right`.
-   pure function is_found(search) result(found)
+   !> Whether the zero is located to rounding; it lies at `right`.
+   pure function is_converged(search) result(converged)
       type(zero_search_type), intent(in) :: search
-      logical :: found
+      logical :: converged
 
-      found = search%n_trial == max_trials .or. search%right - search%left <= 2*spacing(search%right)
-   end function is_found
+      converged = search%n_trial == max_trials .or. search%right - search%left <= 2*spacing(search%right)
+   end function is_converged
 
    !> Proposes the next trial point.
    pure subroutine advance_search(search)
@@ -96,7 +96,7 @@ contains
       middle = (self%left + self%right)/2
    end function get_middle
 
-   !> Whether there is a number between the ends.
+   !> Whether there is a floating-point number between the ends.
    pure function is_open(self) result(open)
       class(bisection_type), intent(in) :: self
       logical :: open
@@ -107,7 +107,7 @@ contains
    !> Keeps one half of a bracket.
    pure subroutine halve(self, keep_right)
       class(bisection_type), intent(inout) :: self
-      !> The half to the right of the middle.
+      !> Whether to keep the right half.
       logical, intent(in) :: keep_right
 
       if (keep_right) then

@@ -1,4 +1,4 @@
-!> The drop on a rigid floor, computed once for samples that differ in floor and room only.
+!> The drop on a rigid floor, computed only once for samples that differ only in floor and room.
 module thud_blocked_drop
    use thud_case, only: case_type
    use thud_compute, only: compute_impact, impact_type, scope_type
@@ -11,26 +11,26 @@ module thud_blocked_drop
 
    public :: blocked_type, solve_blocked
 
-   !> The latest drop on a rigid floor, reused while only floor and room differ.
+   !> The latest drop on a rigid floor, reused for samples that differ only in floor and room.
    type :: blocked_type
-      !> All numbers that it depends on; not allocated before the first: [n_number].
+      !> All numbers that the drop depends on; not allocated before the first drop: [n_number].
       real(wp), allocatable :: cache_key(:)
       type(impact_type) :: impact
-      !> The drop failed.
+      !> Set if the drop failed.
       type(error_type), allocatable :: error
    end type blocked_type
 
 contains
 
-   !> The drop on a rigid floor, unless the one before was the same.
+   !> Computes the drop on a rigid floor, unless it equals the latest one.
    subroutine solve_blocked(case, fields, scope, blocked, error)
       !> The case, checked.
       type(case_type), intent(in) :: case
-      !> The keys that it uses: [n_field].
+      !> The keys that the case uses: [n_field].
       type(field_type), intent(in) :: fields(:)
       type(scope_type), intent(in) :: scope
       type(blocked_type), intent(inout) :: blocked
-      !> The drop failed.
+      !> Set if the drop fails.
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: cache_key(:)
       logical :: same
@@ -46,12 +46,12 @@ contains
       if (allocated(blocked%error)) error = blocked%error
    end subroutine solve_blocked
 
-   !> All numbers of the keys that the drop on a rigid floor depends on.
+   !> All numbers that the drop on a rigid floor depends on.
    function get_cache_key(fields, scope) result(cache_key)
       !> The keys that the case uses: [n_field].
       type(field_type), intent(in) :: fields(:)
       type(scope_type), intent(in) :: scope
-      !> The numbers, of lists with their count: [n_number].
+      !> The numbers; those of a list follow their count: [n_number].
       real(wp), allocatable :: cache_key(:)
       integer :: i
 

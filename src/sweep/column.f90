@@ -1,4 +1,4 @@
-!> Columns of a table of samples: the keys in which they differ.
+!> Columns of a table of samples: the keys in which the samples differ.
 module thud_column
    use thud_case, only: case_type, get_active_fields
    use thud_error, only: error_type, input_error
@@ -10,28 +10,28 @@ module thud_column
 
    public :: column_type, find_columns
 
-   !> Groups in whose keys samples may not differ.
+   !> Groups whose keys must be the same for all samples.
    character(len=key_length), parameter :: common_groups(*) = [character(len=key_length) :: &
       'case', 'model', 'modes', 'compression', 'output', 'floor']
 
    !> A key in which samples differ.
    type :: column_type
-      !> Its index among the keys that the case uses.
+      !> Index among the keys that the case uses.
       integer :: field = 0
-      !> Which entry of a list; 0 for keys that are no lists.
+      !> Index of the list entry; 0 if the key is not a list.
       integer :: entry = 0
    end type column_type
 
 contains
 
-   !> Keys by their names, entries of lists as `frequency(2)`, those of a group as `plate.thickness`.
+   !> Finds keys by name; `frequency(2)` is an entry of a list, `plate.thickness` a key of a certain group.
    subroutine find_columns(case, names, columns, error)
       type(case_type), intent(in), target :: case
       !> The names: [n_column].
       character(len=*), intent(in) :: names(:)
       !> The keys: [n_column].
       type(column_type), allocatable, intent(out) :: columns(:)
-      !> A name is unknown, given twice, or no entry of its list.
+      !> Set if a name is unknown or given twice, or the list has no such entry.
       type(error_type), allocatable, intent(out) :: error
       type(field_type), allocatable :: fields(:)
       type(list_type), pointer :: list
@@ -41,13 +41,13 @@ contains
       integer :: i, j
 
       allocate (fields, source=get_active_fields(case))
-      ! All samples have levels in the same bands.
+      ! All samples must have levels in the same bands.
       possible = [(.not. any(common_groups == fields(i)%group) .and. fields(i)%owner /= 'modes' &
          .and. fields(i)%key /= 'bands', i=1, size(fields))]
       allocate (columns(size(names)))
       do i = 1, size(names)
          call split_name(names(i), group, key, columns(i)%entry, known)
-         ! Of keys of one name the first is meant, that of the source, unless a group is named.
+         ! Without a group, the name means the first of the keys with this name, which belongs to the source.
          columns(i)%field = findloc(possible .and. fields%key == key .and. (group == '' .or. fields%group == group), &
             .true., dim=1)
          nullify (list)
@@ -76,11 +76,11 @@ contains
    !> Group, key and entry of a name such as `frequency(2)` or `plate.thickness`.
    pure subroutine split_name(name, group, key, entry, valid)
       character(len=*), intent(in) :: name
-      !> The group, empty where none is named.
+      !> The group, empty if the name has none; the key.
       character(len=:), allocatable, intent(out) :: group, key
-      !> The entry; 0 where none is named.
+      !> Index of the entry; 0 if the name has none.
       integer, intent(out) :: entry
-      !> The name is a key, or a key with a number in brackets.
+      !> The name is a key, perhaps with a number in brackets.
       logical, intent(out) :: valid
       integer :: bracket, dot, last
 

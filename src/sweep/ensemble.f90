@@ -1,8 +1,8 @@
-!> Many drops of the shell model: blocks of them are shared among threads, and levels of a block are computed while its
-!> forces are in cache.
+!> Many drops of the shell model: threads share blocks of parameter sets, and the levels of a block are computed while
+!> its forces are in cache.
 !>
-!> Every number of a set comes from its own column of arrays of fixed shape, or, for levels of a long contact, from
-!> its own record: it does not depend on the number of threads, on the other sets or on its index.
+!> The results of a set do not depend on the number of threads, the other sets or its index: they come from the set's
+!> own column in arrays of fixed shape or, for levels of a long contact, from its own record.
 module thud_ensemble
    use thud_band, only: band_type, get_octaves, octave_count
    use thud_band_projection, only: band_projection_type, get_band_energies, get_class_window, get_window_class, &
@@ -17,7 +17,7 @@ module thud_ensemble
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
    use thud_sampling, only: check_sampling, get_sample_count, sampling_type
-   use thud_shell_sets, only: block_size, get_blocks, set_outcome_type, set_type, solve_block
+   use thud_shell_samples, only: block_size, get_blocks, sample_outcome_type, sample_type, solve_block
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type
    use thud_text, only: to_text
@@ -26,25 +26,25 @@ module thud_ensemble
 
    public :: are_alike, new_projections, projections_type, solve_ensemble
 
-   !> Matrices of the levels, one per window length, made when first needed.
+   !> Matrices that give the levels, one per window length, computed when first needed.
    type :: projections_type
       !> Samples per second, Hz.
       real(wp) :: sample_rate = 0.0_wp
-      !> The bands, octaves first: [n_band].
+      !> Bands of the levels, octaves first: [n_band].
       type(band_type), allocatable :: bands(:)
       !> The matrices: [n_window].
       type(band_projection_type), allocatable :: window(:)
    end type projections_type
 
-   !> Arrays of one thread.
+   !> Workspace of one thread.
    type :: workspace_type
-      !> Forces, with space for their alignment: [2 block_size n_row + line_length].
+      !> Forces, N, with space for alignment: [2 block_size n_row + line_length].
       real(wp), allocatable :: force(:)
-      !> Folded forces: [2 block_size n_row].
+      !> Folded forces, N: [2 block_size n_row].
       real(wp), allocatable :: folded(:)
-      !> Index of the last sample that is not zero.
-      integer :: last_sample = 0
-      !> Criteria of the standards, one set's values at a time.
+      !> Index of the last force sample that is not zero.
+      integer :: n_written = 0
+      !> Criteria, with the values of one set at a time.
       type(criterion_type) :: criteria(criterion_count)
       !> Error that stops the thread.
       type(error_type), allocatable :: error
@@ -52,62 +52,61 @@ module thud_ensemble
 
 contains
 
-   !> No matrices yet.
-   pure function new_projections(sample_rate, bands, n_sample) result(projections)
+   !> The projections, still without matrices.
+   pure function new_projections(sample_rate, bands, n_time) result(projections)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
-      !> The bands other than the octaves: [n_more].
+      !> Bands in addition to the octaves: [n_more].
       type(band_type), intent(in) :: bands(:)
-      !> Samples of the longest record.
-      integer, intent(in) :: n_sample
-      !> All windows, still empty.
+      !> Number of samples of the longest record.
+      integer, intent(in) :: n_time
       type(projections_type) :: projections
 
       projections%sample_rate = sample_rate
       allocate (projections%bands(octave_count + size(bands)))
       projections%bands(:octave_count) = get_octaves()
       projections%bands(octave_count + 1:) = bands
-      allocate (projections%window(get_window_class(n_sample)))
+      allocate (projections%window(get_window_class(n_time)))
    end function new_projections
 
-   !> Whether matrices of one serve for the other: same rate, bands and longest window.
-   pure function are_alike(one, other) result(alike)
-      type(projections_type), intent(in) :: one
+   !> Whether two sets of matrices are interchangeable: same rate, bands and longest window.
+   pure function are_alike(first, other) result(alike)
+      type(projections_type), intent(in) :: first
       !> The other, which may be empty.
       type(projections_type), intent(in) :: other
       logical :: alike
 
       alike = .false.
       if (.not. allocated(other%window)) return
-      alike = size(one%window) == size(other%window) .and. size(one%bands) == size(other%bands)
+      alike = size(first%window) == size(other%window) .and. size(first%bands) == size(other%bands)
       if (.not. alike) return
-      alike = abs(one%sample_rate - other%sample_rate) <= 0.0_wp .and. all(one%bands%set == other%bands%set)
+      alike = abs(first%sample_rate - other%sample_rate) <= 0.0_wp .and. all(first%bands%set == other%bands%set)
    end function are_alike
 
-   !> Quantities, levels and verdicts of all sets.
-   subroutine solve_ensemble(sets, sampling, source, threads, with_levels, projections, computed, quantity, levels, met, &
+   !> Computes quantities, levels and verdicts of all sets.
+   subroutine solve_ensemble(samples, sampling, source, threads, with_levels, projections, computed, quantity, levels, met, &
       forces, error)
-      !> The sets: [n_set].
-      type(set_type), intent(in) :: sets(:)
+      !> The samples: [n_sample].
+      type(sample_type), intent(in) :: samples(:)
       type(sampling_type), intent(in) :: sampling
       !> Source whose limits apply.
       character(len=*), intent(in) :: source
       integer, intent(in) :: threads
-      !> Compute levels and verdicts; without them they are NaN and not conforming.
+      !> Compute levels and verdicts; otherwise levels are NaN and no set conforms.
       logical, intent(in) :: with_levels
       !> Matrices of the levels for this sampling rate.
       type(projections_type), intent(inout) :: projections
-      !> Whether the batch has computed a set: [n_set].
+      !> The set has been computed: [n_set].
       logical, intent(out) :: computed(:)
-      !> The first of the table of quantities, NaN where not computed: [sample_quantity_count, n_set].
+      !> The quantities of samples, SI units, NaN if not computed: [sample_quantity_count, n_set].
       real(wp), intent(out) :: quantity(:, :)
-      !> Force exposure levels, dB, NaN where not computed: [n_band, force_count, n_set].
+      !> Force exposure levels, dB, NaN if not computed: [n_band, force_count, n_set].
       real(wp), intent(out) :: levels(:, :, :)
-      !> The source conforms by each force: [force_count, n_set].
+      !> The source conforms, by each force: [force_count, n_set].
       logical, intent(out) :: met(:, :)
-      !> Forces, N, NaN where not computed; of no size where they are not wanted: [n_sample, force_count, n_set].
+      !> Forces, N, NaN if not computed; of size 0 if not wanted: [n_sample, force_count, n_set].
       real(wp), intent(out) :: forces(:, :, :)
-      !> The sampling cannot be used, its records do not fit into memory, the source is not known, or an interrupt.
+      !> Set if the sampling is invalid, its records do not fit into memory, the source is unknown, or after an interrupt.
       type(error_type), allocatable, intent(out) :: error
       type(source_limits_type) :: limits
       integer, allocatable :: order(:), first(:)
@@ -119,7 +118,7 @@ contains
       call check_sampling(sampling, error)
       if (.not. allocated(error)) call get_source_limits(source, limits, error)
       if (allocated(error)) return
-      call get_blocks(sets, computed, order, first)
+      call get_blocks(samples, computed, order, first)
       call use_one_blas_thread()
       !$omp parallel num_threads(threads)
       call run_blocks()
@@ -128,7 +127,7 @@ contains
 
    contains
 
-      !> The blocks of one thread, in its own workspace.
+      !> Computes the blocks of one thread, in its own workspace.
       subroutine run_blocks()
          type(workspace_type) :: workspace
          integer :: block
@@ -145,42 +144,43 @@ contains
          !$omp end critical (thud_ensemble_error)
       end subroutine run_blocks
 
-      !> One block, from its sets to its verdicts.
-      subroutine run_block(workspace, members)
+      !> Computes one block, from sets to verdicts.
+      subroutine run_block(workspace, indices)
          type(workspace_type), intent(inout) :: workspace
-         !> Indices of the sets: [n_member].
-         integer, intent(in) :: members(:)
-         type(set_outcome_type) :: found(size(members))
-         real(wp) :: found_levels(size(levels, 1), force_count, size(members))
-         logical :: found_met(force_count, size(members))
+         !> Indices of the samples: [n_in_block].
+         integer, intent(in) :: indices(:)
+         type(sample_outcome_type) :: outcomes(size(indices))
+         real(wp) :: block_levels(size(levels, 1), force_count, size(indices))
+         logical :: block_met(force_count, size(indices))
          integer :: i, j
 
-         call solve_workspace(workspace, sets(members), sampling, with_levels, projections, found, found_levels, found_met)
-         do i = 1, size(members)
-            computed(members(i)) = found(i)%computed
-            levels(:, :, members(i)) = found_levels(:, :, i)
-            met(:, members(i)) = found_met(:, i)
-            if (.not. found(i)%computed) cycle
-            associate (set => found(i))
-               quantity(:, members(i)) = [set%contact_time, set%peak_force, set%peak_elastic_force, set%max_deflection, &
-                  set%restitution, set%impulse]
+         call solve_workspace(workspace, samples(indices), sampling, with_levels, projections, outcomes, block_levels, &
+            block_met)
+         do i = 1, size(indices)
+            computed(indices(i)) = outcomes(i)%computed
+            levels(:, :, indices(i)) = block_levels(:, :, i)
+            met(:, indices(i)) = block_met(:, i)
+            if (.not. outcomes(i)%computed) cycle
+            associate (outcome => outcomes(i))
+               quantity(:, indices(i)) = [outcome%contact_time, outcome%peak_force, outcome%peak_elastic_force, &
+                  outcome%max_deflection, outcome%restitution, outcome%impulse]
             end associate
             do j = 1, merge(force_count, 0, size(forces) > 0)
-               forces(:, j, members(i)) = get_record(workspace, i, j, sampling)
+               forces(:, j, indices(i)) = get_record(workspace, i, j, sampling)
             end do
          end do
       end subroutine run_block
 
    end subroutine solve_ensemble
 
-   !> Arrays of a thread. Memory beyond the longest contact is never touched.
+   !> Allocates a workspace. Its memory beyond the longest contact is never touched.
    subroutine set_workspace(workspace, sampling, limits, n_row)
-      !> The arrays, or an error where there is no memory for them.
+      !> The workspace, with `error` set if memory is lacking.
       type(workspace_type), intent(out) :: workspace
-      !> The sampling, for the error.
+      !> The sampling, for the error message.
       type(sampling_type), intent(in) :: sampling
       type(source_limits_type), intent(in) :: limits
-      !> Samples of the longest window.
+      !> Number of samples of the longest window.
       integer, intent(in) :: n_row
       character(len=128) :: message
       integer :: status
@@ -189,71 +189,70 @@ contains
       if (status == 0) allocate (workspace%folded(force_count*block_size*n_row), stat=status, errmsg=message)
       if (status /= 0) workspace%error = input_error('&sampling: duration = '//to_text(sampling%duration) &
          //' s at sample_rate = '//to_text(sampling%sample_rate)//' Hz gives the forces of '//to_text(block_size) &
-         //' sets no space in memory; allowed: shorter records, or fewer threads')
+         //' samples no space in memory; allowed: shorter records, or fewer threads')
       workspace%criteria = get_criteria(limits, spread(0.0_wp, 1, octave_count), 0.0_wp, 0.0_wp, 1, 0.0_wp, 0.0_wp)
    end subroutine set_workspace
 
    !> Outcomes, levels and verdicts of one block.
-   subroutine solve_workspace(workspace, sets, sampling, with_levels, projections, outcomes, levels, met)
+   subroutine solve_workspace(workspace, samples, sampling, with_levels, projections, outcomes, levels, met)
       type(workspace_type), intent(inout), target :: workspace
-      !> The sets: [n_set].
-      type(set_type), intent(in) :: sets(:)
+      !> The samples: [n_sample].
+      type(sample_type), intent(in) :: samples(:)
       type(sampling_type), intent(in) :: sampling
       !> Compute levels and verdicts.
       logical, intent(in) :: with_levels
-      !> Matrices of the levels.
       type(projections_type), intent(inout) :: projections
-      !> The outcomes: [n_set].
-      type(set_outcome_type), intent(out) :: outcomes(:)
-      !> Levels, dB: [n_band, force_count, n_set].
+      !> The outcomes: [n_sample].
+      type(sample_outcome_type), intent(out) :: outcomes(:)
+      !> Levels, dB: [n_band, force_count, n_sample].
       real(wp), intent(out) :: levels(:, :, :)
-      !> The source conforms: [force_count, n_set].
+      !> The source conforms, by each force: [force_count, n_set].
       logical, intent(out) :: met(:, :)
       real(wp), pointer, contiguous :: force(:, :)
-      integer :: class(size(sets))
-      integer :: i, j, last_sample, window
+      integer :: class(size(samples))
+      integer :: i, j, n_written, window
 
       force => get_force(workspace)
-      call solve_block(sets, sampling, force(:, :get_sample_count(sampling)), last_sample, outcomes)
+      call solve_block(samples, sampling, force(:, :get_sample_count(sampling)), n_written, outcomes)
       levels = not_a_number
       met = .false.
-      workspace%last_sample = last_sample
+      workspace%n_written = n_written
       if (.not. with_levels) return
       class = 0
-      do i = 1, size(sets)
+      do i = 1, size(samples)
          if (.not. outcomes(i)%computed) cycle
          class(i) = get_window_class(min(int(outcomes(i)%contact_time*sampling%sample_rate) + 1, size(force, 2)))
       end do
-      force(:, last_sample + 1:get_class_window(max(1, maxval(class)))) = 0.0_wp
-      ! The window is the set's own, so that its levels do not depend on its neighbours.
+      force(:, n_written + 1:get_class_window(max(1, maxval(class)))) = 0.0_wp
+      ! Each set has its own window, so that its levels do not depend on the other sets of the block.
       do window = minval(class, mask=class > 0), maxval(class)
          if (.not. any(class == window)) cycle
          if (is_projected(get_class_window(window), projections%sample_rate, projections%bands)) then
             call project(workspace, force, window, class == window, projections, levels)
          else
-            call take_single_levels(workspace, force, window, class == window, projections, levels)
+            call get_single_levels(workspace, force, window, class == window, projections, levels)
          end if
          if (allocated(workspace%error)) return
-         do i = 1, size(sets)
+         do i = 1, size(samples)
             if (class(i) /= window) cycle
             do j = 1, force_count
-               met(j, i) = is_conforming(workspace%criteria, sets(i), outcomes(i), levels(:, j, i), force(:, :last_sample), &
-                  i + (j - 1)*block_size, sampling)
+               met(j, i) = is_conforming(workspace%criteria, samples(i), outcomes(i), levels(:, j, i), &
+                  force(:, :n_written), i + (j - 1)*block_size, sampling)
             end do
          end do
       end do
    end subroutine solve_workspace
 
-   !> Levels of the sets of one window, all at once.
+   !> Levels of all sets with the same window, by matrix products.
    subroutine project(workspace, force, window, chosen, projections, levels)
       type(workspace_type), intent(inout) :: workspace
       !> Forces, N: [force_count block_size, n_row].
       real(wp), intent(in), contiguous :: force(:, :)
       integer, intent(in) :: window
-      !> Whether a set has this window: [n_set].
+      !> The set has this window: [n_set].
       logical, intent(in) :: chosen(:)
       type(projections_type), intent(inout) :: projections
-      !> Levels, dB; those of the chosen sets are set: [n_band, force_count, n_set].
+      !> Levels, dB; only those of chosen sets are set: [n_band, force_count, n_set].
       real(wp), intent(inout) :: levels(:, :, :)
       real(wp) :: energy(force_count*block_size, size(projections%bands)), square_sum(force_count*block_size)
       integer :: i, j, row
@@ -271,8 +270,8 @@ contains
       end do
    end subroutine project
 
-   !> The same record by record, as of single drops; it fails only if it is interrupted.
-   subroutine take_single_levels(workspace, force, window, chosen, projections, levels)
+   !> The levels of `project`, record by record as for single drops; fails only after an interrupt.
+   subroutine get_single_levels(workspace, force, window, chosen, projections, levels)
       type(workspace_type), intent(inout) :: workspace
       !> As in `project`.
       real(wp), intent(in) :: force(:, :)
@@ -290,12 +289,12 @@ contains
             if (allocated(workspace%error)) return
          end do
       end do
-   end subroutine take_single_levels
+   end subroutine get_single_levels
 
-   !> The forces of the block in a workspace: [force_count block_size, n_row].
+   !> The forces of the block in a workspace, as an array.
    function get_force(workspace) result(force)
       type(workspace_type), intent(in), target :: workspace
-      !> Elastic forces, then floor forces, N.
+      !> Elastic forces, then forces on the floor, N: [force_count block_size, n_row].
       real(wp), pointer, contiguous :: force(:, :)
       integer :: first
 
@@ -304,11 +303,11 @@ contains
          workspace%force(first:first + size(workspace%folded) - 1)
    end function get_force
 
-   !> Makes the matrices of a window unless they are there.
+   !> Computes the matrices of a window unless they exist.
    subroutine require_window(projections, window, error)
       type(projections_type), intent(inout) :: projections
       integer, intent(in) :: window
-      !> They cannot be made.
+      !> Set if the matrices cannot be computed.
       type(error_type), allocatable, intent(inout) :: error
       logical :: failed
 
@@ -321,24 +320,24 @@ contains
          //to_text(get_class_window(window))//' samples cannot be made; allowed: other rates')
    end subroutine require_window
 
-   !> Whether a set meets all criteria. Peaks are counted last: that takes longer than all the rest.
-   function is_conforming(criteria, set, outcome, levels, force, row, sampling) result(met)
+   !> Whether a set meets all criteria. Peaks are counted last, as this takes longer than all other criteria.
+   function is_conforming(criteria, sample, outcome, levels, force, row, sampling) result(met)
       !> The criteria; their values are overwritten: [criterion_count].
       type(criterion_type), intent(inout) :: criteria(:)
-      type(set_type), intent(in) :: set
-      type(set_outcome_type), intent(in) :: outcome
+      type(sample_type), intent(in) :: sample
+      type(sample_outcome_type), intent(in) :: outcome
       !> Levels, dB, octaves first: [n_band].
       real(wp), intent(in) :: levels(:)
-      !> Forces, N, zero after that: [force_count block_size, n_sample].
+      !> Forces, N, without the zeros at the end: [force_count block_size, n_sample].
       real(wp), intent(in) :: force(:, :)
-      !> Row of the force of this set.
+      !> Row of the force of this sample.
       integer, intent(in) :: row
       type(sampling_type), intent(in) :: sampling
       logical :: met
       real(wp) :: record(get_sample_count(sampling))
 
-      criteria%value = [levels(:octave_count), outcome%contact_time, outcome%restitution, 1.0_wp, set%ball%mass, &
-         set%drop%height]
+      criteria%value = [levels(:octave_count), outcome%contact_time, outcome%restitution, 1.0_wp, sample%ball%mass, &
+         sample%drop%height]
       met = all(conforms(criteria))
       if (.not. met) return
       record = 0.0_wp
@@ -347,18 +346,19 @@ contains
       met = all(conforms(criteria))
    end function is_conforming
 
-   !> One force of one set, N: [n_time].
+   !> One force of one set.
    function get_record(workspace, i, j, sampling) result(record)
       type(workspace_type), intent(in), target :: workspace
-      !> Index of the set in the block, and of the force in `force_names`.
+      !> Index of the sample in the block, and of the force in `force_names`.
       integer, intent(in) :: i, j
       type(sampling_type), intent(in) :: sampling
+      !> The force, N: [n_time].
       real(wp) :: record(get_sample_count(sampling))
       real(wp), pointer, contiguous :: force(:, :)
 
       force => get_force(workspace)
       record = 0.0_wp
-      record(:workspace%last_sample) = force(i + (j - 1)*block_size, :workspace%last_sample)
+      record(:workspace%n_written) = force(i + (j - 1)*block_size, :workspace%n_written)
    end function get_record
 
 end module thud_ensemble

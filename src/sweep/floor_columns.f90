@@ -15,17 +15,17 @@ module thud_floor_columns
 
    public :: column_name_length, get_floor_columns, get_floor_values
 
-   !> Length of the name of a column.
+   !> Maximum length of the name of a column.
    integer, parameter :: column_name_length = 32
 
 contains
 
-   !> Names of the columns of a case.
+   !> Names of the floor and room columns of a case.
    function get_floor_columns(case, bands) result(names)
       type(case_type), intent(in) :: case
       !> Bands of the levels: [n_band].
       type(band_type), intent(in) :: bands(:)
-      !> The names, with units; none where the case has no floor: [n_column].
+      !> The names, with units; none if the case has no floor: [n_column].
       character(len=column_name_length), allocatable :: names(:)
       type(band_type), allocatable :: room_bands(:)
       type(error_type), allocatable :: error
@@ -39,12 +39,12 @@ contains
          'standardized_rating_dB']
    end function get_floor_columns
 
-   !> Names of levels in bands.
+   !> Names of the columns of levels.
    function get_level_names(prefix, bands) result(names)
       character(len=*), intent(in) :: prefix
       !> The bands: [n_band].
       type(band_type), intent(in) :: bands(:)
-      !> The names, with set, frequency and unit: [n_band].
+      !> The names, with band set, frequency and unit: [n_band].
       character(len=column_name_length) :: names(size(bands))
       integer :: i
 
@@ -53,14 +53,14 @@ contains
       end do
    end function get_level_names
 
-   !> Values of the columns.
+   !> Values of the columns for one sample.
    subroutine get_floor_values(case, n_band, levels, impact, on_floor, floor, room, values)
       type(case_type), intent(in) :: case
       !> Number of bands of the levels.
       integer, intent(in) :: n_band
-      !> Levels were computed; without them all but the energy is NaN.
+      !> Levels have been computed; otherwise all values except the energy are NaN.
       logical, intent(in) :: levels
-      !> The drop on a rigid floor, used if there is none on the floor.
+      !> The drop on a rigid floor, used if `on_floor` is not allocated.
       type(impact_type), intent(in) :: impact
       type(force_history_type), intent(in), allocatable :: on_floor
       type(floor_result_type), intent(in) :: floor

@@ -1,10 +1,10 @@
-!> Many samples of a case, drops that differ in the values of some keys: quantities, levels and verdict of each.
+!> Many samples of a case, drops that differ in the values of some keys: quantities, levels and verdict of each sample.
 !>
 !> Samples of the shell model are computed in batches (`thud_ensemble`), all others one by one; threads share
-!> them. No number of a sample depends on the threads, on the other samples or on its index among them.
+!> the work. The results of a sample do not depend on the number of threads, the other samples or its index.
 module thud_sweep
    use thud_band, only: band_type, get_level_bands, octave_count
-   use thud_batch_sets, only: fill_sets, suits_batch
+   use thud_batch_samples, only: fill_samples, suits_batch
    use thud_blocked_drop, only: blocked_type, solve_blocked
    use thud_case, only: case_type, check_case, get_active_fields
    use thud_column, only: column_type
@@ -21,7 +21,7 @@ module thud_sweep
    use thud_quantities, only: get_quantities, sample_quantity_count
    use thud_room, only: room_level_type
    use thud_sampling, only: check_sampling, get_sample_count, get_step_count
-   use thud_shell_sets, only: set_type
+   use thud_shell_samples, only: sample_type
    use thud_source_limits, only: conforms, get_source_limits, source_limits_type
    use thud_source_model, only: typical_contact
    use thud_text, only: to_text
@@ -30,52 +30,52 @@ module thud_sweep
 
    public :: acquire_sweep, new_sweep, release_sweep, solve_sweep, sweep_type
 
-   !> Approximate time of one step in a batch, s.
+   !> Approximate computing time of one step of a sample in a batch, s.
    real(wp), parameter :: batch_cost = 1.5e-8_wp
 
-   !> Why a sample has no results.
+   !> The reason why a sample has no results.
    type :: reason_type
-      !> A message; not allocated where it has results.
+      !> A message; not allocated if the sample has results.
       character(len=:), allocatable :: text
    end type reason_type
 
-   !> Results of many samples: NaN and not conforming where there are none.
+   !> Results of many samples; a sample without results has NaN and does not conform.
    type :: sweep_type
       !> Bands of the levels, octaves first: [n_band].
       type(band_type), allocatable :: bands(:)
       !> Index of the first band that the case asks for.
       integer :: first_band = 1
-      !> Approximate time of one sample on one core, s.
+      !> Approximate computing time of one sample on one core, s.
       real(wp) :: cost = 0.0_wp
       !> Levels and verdicts are wanted.
       logical :: levels = .true.
-      !> Matrices of the levels, kept from call to call.
+      !> Matrices of the levels, reused by later calls.
       type(projections_type) :: projections
-      !> 0, or the code of the error: [n_sample].
+      !> 0, or the error code: [n_sample].
       integer, allocatable :: status(:)
       !> Messages of the errors: [n_sample].
       type(reason_type), allocatable :: reason(:)
-      !> The first of the table of quantities: [sample_quantity_count, n_sample].
+      !> The quantities of samples, SI units: [sample_quantity_count, n_sample].
       real(wp), allocatable :: quantity(:, :)
       !> Levels, dB: [n_band, force_count, n_sample].
       real(wp), allocatable :: level(:, :, :)
-      !> The source conforms by each force: [force_count, n_sample].
+      !> The source conforms, by each force: [force_count, n_sample].
       logical, allocatable :: conforms(:, :)
-      !> Minimum distance of an octave level of the assessed force to its limits, dB, positive inside: [n_sample].
+      !> Minimum distance of the octave levels of the assessed force to their limits, dB, > 0 inside: [n_sample].
       real(wp), allocatable :: margin(:)
-      !> The source conforms by the assessed force: [n_sample].
+      !> The source conforms, by the assessed force: [n_sample].
       logical, allocatable :: verdict(:)
-      !> Names, with units, of what cases with a floor have in addition: [n_column].
+      !> Names, with units, of the additional columns of cases with a floor: [n_column].
       character(len=column_name_length), allocatable :: floor_column(:)
-      !> Their values: [n_column, n_sample].
+      !> Values of these columns: [n_column, n_sample].
       real(wp), allocatable :: floor_value(:, :)
-      !> The latest drop on a rigid floor, kept from call to call.
+      !> The latest drop on a rigid floor, reused by later calls.
       type(blocked_type) :: blocked
-      !> Forces, N, of no size where they are not wanted: [n_time, force_count, n_sample].
+      !> Forces, N; of size 0 if not wanted: [n_time, force_count, n_sample].
       real(wp), allocatable :: force(:, :, :)
    end type sweep_type
 
-   !> What an earlier call has prepared for the next one; one thread at a time owns it.
+   !> Results of an earlier call, for reuse; `acquire_sweep` moves them to one thread at a time.
    type(sweep_type), allocatable :: kept
 
 contains
@@ -87,7 +87,7 @@ contains
       type(column_type), intent(in) :: columns(:)
       !> Levels and verdicts are wanted.
       logical, intent(in) :: levels
-      !> What is kept from an earlier call is used again where it fits.
+      !> Results of an earlier call, reused if they fit, or an empty sweep.
       type(sweep_type), intent(inout) :: sweep
       type(projections_type) :: wanted
 
@@ -101,9 +101,9 @@ contains
       if (.not. are_alike(wanted, sweep%projections)) sweep%projections = wanted
    end subroutine new_sweep
 
-   !> Takes what an earlier call has left, or an empty one.
+   !> Takes the reusable results of an earlier call.
    subroutine acquire_sweep(sweep)
-      !> The results of an earlier call, or none.
+      !> Results of an earlier call, or an empty sweep.
       type(sweep_type), allocatable, intent(out) :: sweep
 
       !$omp critical (thud_sweep)
@@ -112,9 +112,9 @@ contains
       if (.not. allocated(sweep)) allocate (sweep)
    end subroutine acquire_sweep
 
-   !> Keeps what the next call can use.
+   !> Stores the reusable results for a later call.
    subroutine release_sweep(sweep)
-      !> The results, which are released.
+      !> The results, not allocated afterwards.
       type(sweep_type), allocatable, intent(inout) :: sweep
 
       call clear(sweep)
@@ -123,7 +123,7 @@ contains
       !$omp end critical (thud_sweep)
    end subroutine release_sweep
 
-   !> Releases the results of samples.
+   !> Deallocates the results of samples.
    subroutine clear(sweep)
       type(sweep_type), intent(inout) :: sweep
 
@@ -134,17 +134,17 @@ contains
 
    !> Computes samples.
    subroutine solve_sweep(case, columns, values, threads, forces, sweep, error)
-      !> The case; values of the samples may make valid what is not in it.
+      !> The case; it may be invalid if the values of the samples make it valid.
       type(case_type), intent(in), target :: case
       !> Keys in which the samples differ: [n_column].
       type(column_type), intent(in) :: columns(:)
-      !> Their values, as `get_number` of the keys gives them: [n_column, n_sample].
+      !> Values of the keys, as `get_number` returns them: [n_column, n_sample].
       real(wp), intent(in) :: values(:, :)
       integer, intent(in) :: threads
       !> Forces are wanted too.
       logical, intent(in) :: forces
       type(sweep_type), intent(inout) :: sweep
-      !> As of `check_samples`, there is no space in memory, or an interrupt.
+      !> Set if `check_samples` fails, there is not enough memory, or after an interrupt.
       type(error_type), allocatable, intent(out) :: error
       integer, allocatable :: remaining(:)
       integer :: i
@@ -157,7 +157,7 @@ contains
       if (suits_batch(case, columns)) then
          call solve_batch(case, columns, values, threads, sweep, error)
          if (allocated(error)) return
-         ! The single solver gives the reasons.
+         ! The single solver repeats failed samples, for their error messages.
          remaining = pack(remaining, sweep%status /= 0)
       end if
       !$omp parallel num_threads(threads) if (size(remaining) > 1)
@@ -167,23 +167,23 @@ contains
 
    contains
 
-      !> The samples of one thread, one after the other.
+      !> Computes the samples of one thread, one by one.
       subroutine solve_remaining()
-         type(case_type), target :: own
+         type(case_type), target :: thread_case
          type(blocked_type) :: blocked
          type(field_type), allocatable :: fields(:)
          integer :: i
 
-         own = case
-         allocate (fields, source=get_active_fields(own))
-         ! Free modes and compression are no results of samples.
-         own%has_modes = .false.
-         own%has_compression = .false.
+         thread_case = case
+         allocate (fields, source=get_active_fields(thread_case))
+         ! Samples have no free modes and no compression.
+         thread_case%has_modes = .false.
+         thread_case%has_compression = .false.
          blocked = sweep%blocked
          !$omp do schedule(dynamic)
          do i = 1, size(remaining)
-            if (.not. is_interrupted()) call solve_sample(own, fields, columns, values(:, remaining(i)), remaining(i), &
-               blocked, sweep)
+            if (.not. is_interrupted()) call solve_sample(thread_case, fields, columns, values(:, remaining(i)), &
+               remaining(i), blocked, sweep)
          end do
          !$omp end do
          !$omp single
@@ -193,15 +193,15 @@ contains
 
    end subroutine solve_sweep
 
-   !> Refuses samples that cannot be computed together.
+   !> Returns an error if samples cannot be computed together.
    subroutine check_samples(case, columns, forces, error)
       type(case_type), intent(in), target :: case
       !> Keys in which the samples differ: [n_column].
       type(column_type), intent(in) :: columns(:)
       !> Forces are wanted.
       logical, intent(in) :: forces
-      !> The case has no impact, a key of all samples has a value out of range, or forces are wanted of records of
-      !> different length.
+      !> Set if the case has no impact, a key common to all samples is out of range, or forces are wanted but records may
+      !> have different lengths.
       type(error_type), allocatable, intent(out) :: error
       type(field_type), allocatable :: fields(:)
       integer :: i
@@ -224,13 +224,13 @@ contains
       end if
    end subroutine check_samples
 
-   !> Space for the results of a number of samples.
+   !> Allocates the results of samples.
    subroutine set_size(sweep, n_sample, n_time, error)
       type(sweep_type), intent(inout) :: sweep
       integer, intent(in) :: n_sample
-      !> Length of the forces that are wanted.
+      !> Length of the forces; 0 if they are not wanted.
       integer, intent(in) :: n_time
-      !> There is no space in memory.
+      !> Set if there is not enough memory.
       type(error_type), allocatable, intent(out) :: error
       character(len=128) :: message
       integer :: status
@@ -251,19 +251,19 @@ contains
       sweep%floor_value = not_a_number
    end subroutine set_size
 
-   !> One sample by the single solver.
+   !> Computes one sample by the single solver.
    subroutine solve_sample(case, fields, columns, values, sample, blocked, sweep)
       !> The case; the keys of the columns are overwritten.
       type(case_type), intent(inout), target :: case
-      !> Its keys: [n_field].
+      !> Keys of the case: [n_field].
       type(field_type), intent(in) :: fields(:)
       !> Keys in which the samples differ: [n_column].
       type(column_type), intent(in) :: columns(:)
-      !> Values of this one: [n_column].
+      !> Values of the keys for this sample: [n_column].
       real(wp), intent(in) :: values(:)
       !> Index of the sample.
       integer, intent(in) :: sample
-      !> The drop on a rigid floor of an earlier sample, or of this one.
+      !> The drop on a rigid floor of an earlier sample; afterwards of this one.
       type(blocked_type), intent(inout) :: blocked
       type(sweep_type), intent(inout) :: sweep
       type(scope_type) :: scope
@@ -306,11 +306,11 @@ contains
       call set_verdict(case, sample, sweep)
    end subroutine solve_sample
 
-   !> Margin and verdict by the assessed force.
+   !> Sets margin and verdict of a sample, by the assessed force.
    subroutine set_verdict(case, sample, sweep)
       !> The case of the sample.
       type(case_type), intent(in) :: case
-      !> Index of the sample, whose levels are known.
+      !> Index of the sample; its levels must have been computed.
       integer, intent(in) :: sample
       type(sweep_type), intent(inout) :: sweep
       type(source_limits_type) :: limits
@@ -325,28 +325,28 @@ contains
       end associate
    end subroutine set_verdict
 
-   !> Samples of the shell model in batches.
+   !> Computes samples of the shell model in batches.
    subroutine solve_batch(case, columns, values, threads, sweep, error)
       type(case_type), intent(in), target :: case
       !> Keys in which the samples differ: [n_column].
       type(column_type), intent(in) :: columns(:)
-      !> Their values: [n_column, n_sample].
+      !> Values of the keys: [n_column, n_sample].
       real(wp), intent(in) :: values(:, :)
       integer, intent(in) :: threads
       type(sweep_type), intent(inout) :: sweep
-      !> There is no space in memory.
+      !> Set if the batch cannot be computed.
       type(error_type), allocatable, intent(out) :: error
-      type(set_type), allocatable :: sets(:)
+      type(sample_type), allocatable :: samples(:)
       logical, allocatable :: computed(:)
       integer :: i
 
-      allocate (sets(size(values, 2)), computed(size(values, 2)))
-      call fill_sets(case, columns, values, sets)
-      call solve_ensemble(sets, case%sampling, trim(case%source), threads, sweep%levels, sweep%projections, computed, &
+      allocate (samples(size(values, 2)), computed(size(values, 2)))
+      call fill_samples(case, columns, values, samples)
+      call solve_ensemble(samples, case%sampling, trim(case%source), threads, sweep%levels, sweep%projections, computed, &
          sweep%quantity, sweep%level, sweep%conforms, sweep%force, error)
       if (allocated(error)) return
       sweep%status = merge(0, 1, computed)
-      do i = 1, size(sets)
+      do i = 1, size(samples)
          if (sweep%levels .and. computed(i)) call set_verdict(case, i, sweep)
       end do
    end subroutine solve_batch

@@ -7,22 +7,21 @@ module thud_interrupt
 
    public :: check_interrupt, is_interrupted, latest_signal
 
-   !> Number of the signal to end the work, 0 for none; defined in system.c.
+   !> Number of the signal that asks to end the work, 0 for none; defined in system.c.
    integer(c_int), volatile, bind(c, name='thud_latest_signal') :: latest_signal
 
 contains
 
-   !> Whether the work is to end; threads in a parallel region then skip the rest.
+   !> Whether the work is to end; threads in a parallel region then skip their remaining work.
    function is_interrupted() result(yes)
-      !> It is.
       logical :: yes
 
       yes = latest_signal /= 0_c_int
    end function is_interrupted
 
-   !> Refuses to go on after an interrupt.
+   !> Returns an error after an interrupt.
    subroutine check_interrupt(error)
-      !> What went wrong before, or the interrupt.
+      !> Set after an interrupt, unless it is set already.
       type(error_type), allocatable, intent(inout) :: error
 
       if (is_interrupted() .and. .not. allocated(error)) error = error_type(signal_base + latest_signal, &

@@ -1,4 +1,4 @@
-!> Check of the memory that large work needs, before it begins.
+!> Checks before large work begins that there is enough memory.
 module thud_memory
    use, intrinsic :: iso_c_binding, only: c_double, c_int
    use thud_error, only: error_type, numerical_error
@@ -21,15 +21,14 @@ module thud_memory
 
 contains
 
-   !> Refuses work that needs more memory than there is.
+   !> Returns an error if work needs more memory than is available.
    subroutine require_memory(bytes, purpose, allowed, error, mostly_unused)
-      !> What is kept at a time, bytes.
+      !> Memory needed at a time, bytes.
       real(wp), intent(in) :: bytes
-      !> What keeps it, in the plural; what needs less.
+      !> What needs the memory, in the plural; what would need less.
       character(len=*), intent(in) :: purpose, allowed
-      !> Names the bytes.
       type(error_type), allocatable, intent(out) :: error
-      !> Little of it will be written to, so that addresses are enough (default: all of it will).
+      !> Little of the memory is written to, so that addresses are enough (default: false).
       logical, intent(in), optional :: mostly_unused
       integer(c_int) :: behind
 

@@ -1,4 +1,4 @@
-// The calls of the operating system that Fortran lacks, with the system's own headers.
+// Operating system calls that Fortran lacks, with the system's own headers.
 // Functions return 0, or the number of the error, unless stated otherwise.
 #define _GNU_SOURCE
 #include <dirent.h>
@@ -18,7 +18,7 @@
 #include <time.h>
 #include <unistd.h>
 
-// Number of the signal to end the work, 0 for none; long loops check it through the module thud_interrupt.
+// Number of the signal that asks to end the work, 0 for none; long loops check it through the module thud_interrupt.
 volatile sig_atomic_t thud_latest_signal = 0;
 
 static volatile sig_atomic_t deferred = 0;
@@ -30,25 +30,25 @@ static void interrupt(int number)
    static time_t first;
    struct timespec now;
 
-   // The clock of the day may be set back meanwhile.
+   // The clock of the day may be set back between two signals.
    clock_gettime(CLOCK_MONOTONIC, &now);
    if (deferred && !thud_latest_signal) {
       thud_latest_signal = number;
       first = now.tv_sec;
       return;
    }
-   // Some callers send a signal to the process and to its group.
+   // Some callers send a signal both to the process and to its group.
    if (deferred && now.tv_sec <= first + 1) return;
 
-   // The terminal has shown ^C, perhaps after a line of progress.
+   // On a terminal, begin a new line after ^C and a progress line.
    const char *text = isatty(STDERR_FILENO) ? interruption : interruption + 1;
 
    if (write(STDERR_FILENO, text, strlen(text)) < 0) _exit(128 + number);
    _exit(128 + number);
 }
 
-// Prepares the process of the executable: a write to a full file or a closed pipe is an error and not the end, no
-// file gets the number of a closed screen, and SIGINT or SIGTERM ends the process with a message.
+// Prepares the process of the executable: writing to a full file or a closed pipe is an error and not a signal, no
+// file gets the descriptor of a closed standard stream, SIGINT and SIGTERM end the process with a message.
 void thud_prepare_process(void)
 {
    struct sigaction action = {.sa_handler = SIG_IGN}, before;
@@ -58,20 +58,20 @@ void thud_prepare_process(void)
    sigaction(SIGPIPE, &action, NULL);
    sigaction(SIGXFSZ, &action, NULL);
    action.sa_handler = interrupt;
-   // Without SA_RESTART, so that a kept one ends the wait for a lock.
+   // Without SA_RESTART, so that a deferred signal ends the wait for a lock.
    for (int i = 0; i < 2; i++)
       if (sigaction(ending_signals[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)
          sigaction(ending_signals[i], &action, NULL);
 }
 
-// Ends the process at once. Threads of OpenBLAS that wait for memory would hold up the usual end.
+// Ends the process immediately. Threads of OpenBLAS that wait for memory would delay a usual exit.
 void thud_end_process(int code)
 {
    _exit(code);
 }
 
-// 1 where addresses for that many bytes can be had now, and where asked for the memory behind them, as far as the
-// system tells.
+// 1 if addresses for that many bytes are available and, if `behind` is set, also the memory behind them as far as the
+// system reports it.
 int thud_has_memory(double bytes, int behind)
 {
    size_t wanted = bytes < 1e18 ? (size_t)bytes : (size_t)1e18;
@@ -83,7 +83,7 @@ int thud_has_memory(double bytes, int behind)
    if (block == MAP_FAILED) return 0;
    munmap(block, wanted);
    if (!behind) return 1;
-   // Linux promises more than it has, and then ends a process that writes to it.
+   // Linux promises more memory than it has, and ends a process that then writes to it.
    file = fopen("/proc/meminfo", "re");
    if (!file) return 1;
    while (fgets(line, sizeof line, file)) {
@@ -94,7 +94,7 @@ int thud_has_memory(double bytes, int behind)
    return free < 0.0 || bytes <= free;
 }
 
-// Handlers of the process that `record_signal` calls first, and the library's calls that are running.
+// Handlers of the process, which `record_signal` calls too, and the number of running calls of the library.
 static struct sigaction handlers[2];
 static volatile sig_atomic_t running = 0;
 static pthread_mutex_t calls = PTHREAD_MUTEX_INITIALIZER;
@@ -105,7 +105,7 @@ static void record_signal(int number, siginfo_t *information, void *context)
    const struct sigaction *handler = &handlers[number == SIGTERM];
 
    if (running) thud_latest_signal = number;
-   // Another library may have saved this handler and call it from its own.
+   // Another library may have saved this handler and call it from its own handler.
    if (nested) return;
    nested = 1;
    if (handler->sa_flags & SA_SIGINFO) handler->sa_sigaction(number, information, context);
@@ -113,7 +113,7 @@ static void record_signal(int number, siginfo_t *information, void *context)
    nested = 0;
 }
 
-// A fork is waiting for the running calls, and the time that it waits, ms.
+// Whether a fork waits for the running calls, and the maximum time that it waits, ms.
 static volatile sig_atomic_t forking = 0;
 enum { max_fork_wait = 1000 };
 
@@ -124,8 +124,8 @@ static void pause_calls(void)
    pthread_mutex_lock(&calls);
 }
 
-// A call in another thread may be within OpenBLAS, whose lock a forked process would find locked for ever. Calls that
-// take longer than this are rare.
+// A call in another thread may be within OpenBLAS, whose lock would stay locked forever in a forked process. Calls
+// longer than `max_fork_wait` are rare.
 static void wait_for_calls(void)
 {
    pthread_mutex_lock(&calls);
@@ -139,7 +139,7 @@ static void resume_calls(void)
    pthread_mutex_unlock(&calls);
 }
 
-// A forked process has none of the threads that were at work.
+// A forked process has none of the threads of the running calls.
 static void reset_after_fork(void)
 {
    pthread_mutex_init(&calls, NULL);
@@ -153,7 +153,7 @@ static void register_fork_handlers(void)
    pthread_atfork(wait_for_calls, resume_calls, reset_after_fork);
 }
 
-// From now on a signal that the process handles ends the running calls, too.
+// Marks a call as running; signals that the process handles then also interrupt it.
 void thud_begin_call(void)
 {
    static pthread_once_t once = PTHREAD_ONCE_INIT;
@@ -174,13 +174,13 @@ void thud_begin_call(void)
    pthread_mutex_unlock(&calls);
 }
 
-// Ends the running calls.
+// Interrupts the running calls.
 void thud_end_calls(void)
 {
    if (running) thud_latest_signal = SIGINT;
 }
 
-// A call has ended.
+// Marks the end of a call.
 void thud_end_call(void)
 {
    pthread_mutex_lock(&calls);
@@ -188,32 +188,32 @@ void thud_end_call(void)
    pthread_mutex_unlock(&calls);
 }
 
-// From now on an interrupt is kept for `thud_write`.
+// From now on an interrupt is deferred: it only stops `thud_write`.
 void thud_keep_interrupts(void)
 {
    deferred = 1;
 }
 
-// From now on an interrupt ends the process; what it says then depends on whether there are results.
+// From now on an interrupt ends the process; the message depends on whether the results have been written.
 void thud_pass_interrupts(int written)
 {
    if (written) interruption = "\nthud: interrupted; the results are written\n";
    deferred = 0;
 }
 
-// Message of an error, at most `length` bytes with the zero at its end.
+// Message of an error, at most `length` bytes including the final zero.
 void thud_get_error_text(int number, char *text, size_t length)
 {
    snprintf(text, length, "%s", strerror(number));
 }
 
-// A descriptor to read from; negative where there is none.
+// A descriptor for reading; negative after an error.
 int thud_open(const char *path)
 {
    return open(path, O_RDONLY | O_CLOEXEC);
 }
 
-// Bytes that were read; 0 at the end, negative after an error or a signal that ends the work.
+// Number of bytes read; 0 at the end, negative after an error or a signal that ends the work.
 ssize_t thud_read(int descriptor, char *bytes, size_t length)
 {
    ssize_t count;
@@ -223,15 +223,15 @@ ssize_t thud_read(int descriptor, char *bytes, size_t length)
    return count;
 }
 
-// A descriptor of a regular file, or minus the number of the error. To open a pipe could block, and a link leads to a
-// file of somebody else.
+// A descriptor of a regular file, or minus the number of the error. Opening a pipe could block, and a link may lead to
+// a file of another user.
 static int open_regular(const char *path, int flags)
 {
-   struct stat found;
+   struct stat info;
    int descriptor = open(path, flags | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666);
 
    if (descriptor < 0) return -errno;
-   if (fstat(descriptor, &found) == 0 && S_ISREG(found.st_mode)) return descriptor;
+   if (fstat(descriptor, &info) == 0 && S_ISREG(info.st_mode)) return descriptor;
    close(descriptor);
    return -EEXIST;
 }
@@ -242,16 +242,16 @@ int thud_create(const char *path)
    return open_regular(path, O_WRONLY | O_CREAT | O_TRUNC);
 }
 
-// The same to write at the end of a file, which is made where it is missing.
+// The same for writing at the end of a file, which is created if missing.
 int thud_open_end(const char *path)
 {
    return open_regular(path, O_WRONLY | O_CREAT | O_APPEND);
 }
 
-// CRC-32 of bytes that follow those with the checksum `before`, as in zlib.
+// CRC-32 as in zlib, continued over further bytes from the checksum `before`.
 uint32_t thud_checksum(uint32_t before, const unsigned char *bytes, size_t length)
 {
-   // Remainders of four bits each.
+   // Remainders for four bits.
    static const uint32_t remainder[16] = {
       0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4, 0x4db26158, 0x5005713c,
       0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c, 0x9b64c2b0, 0x86d3d2d4, 0xa00ae278, 0xbdbdf21c};
@@ -265,7 +265,7 @@ uint32_t thud_checksum(uint32_t before, const unsigned char *bytes, size_t lengt
    return ~rest;
 }
 
-// The checksum of a regular file; negative where it is something else or cannot be read.
+// The checksum of a regular file; negative for anything else or if it cannot be read.
 int64_t thud_get_file_checksum(const char *path)
 {
    unsigned char bytes[1 << 16];
@@ -280,7 +280,7 @@ int64_t thud_get_file_checksum(const char *path)
    return count < 0 ? -1 : (int64_t)checksum;
 }
 
-// Writes all of a text; -1 after an interrupt that was kept.
+// Writes a whole text; returns -1 after a deferred interrupt.
 int thud_write(int descriptor, const char *bytes, size_t length)
 {
    while (length > 0) {
@@ -295,19 +295,19 @@ int thud_write(int descriptor, const char *bytes, size_t length)
    return 0;
 }
 
-// Whether the number of an error of writing says that nobody reads: the pipe or the descriptor is closed.
+// Whether the error of a write means that the pipe or the descriptor is closed.
 int thud_is_closed(int status)
 {
    return status == EPIPE || status == EBADF;
 }
 
-// Closes a file; some disks are found to be full only then.
+// Closes a file; some systems report a full disk only then.
 int thud_close(int descriptor)
 {
    return close(descriptor) == 0 ? 0 : errno;
 }
 
-// Brings all files of a directory to the disk, at once where the system can: one by one takes ten times as long.
+// Flushes all files of a directory to the disk, together if the system can: one by one takes ten times as long.
 int thud_flush(const char *path)
 {
    int descriptor = open(path, O_RDONLY | O_CLOEXEC), error = 0;
@@ -322,9 +322,9 @@ int thud_flush(const char *path)
    return error;
 }
 
-// Waits for the lock on a directory and takes it, by a descriptor; makes the directory where that is asked for.
-// Minus the number of the error where this user cannot write there, or of EINTR after a signal that ends the work.
-// File systems without locks go without.
+// Waits for the lock on a directory and returns the descriptor that holds it; `make` creates a missing directory.
+// Minus the number of the error if this user cannot write there, -EINTR after a signal that ends the work.
+// File systems without locks are used without a lock.
 int thud_lock_directory(const char *path, int make)
 {
    for (;;) {
@@ -354,10 +354,10 @@ int thud_lock_directory(const char *path, int make)
    }
 }
 
-// The path without links, of `length` bytes at most; makes the directories above.
+// Absolute path without links, at most `length` bytes; creates missing parent directories.
 int thud_resolve(const char *path, char *resolved, size_t length)
 {
-   char above[PATH_MAX], *found, *end;
+   char above[PATH_MAX], *real_path, *end;
    const char *name = strrchr(path, '/') ? strrchr(path, '/') + 1 : path;
    size_t used = (size_t)snprintf(above, sizeof above, "%s", path);
 
@@ -366,20 +366,20 @@ int thud_resolve(const char *path, char *resolved, size_t length)
       *end = 0;
       if (mkdir(above, 0777) != 0) continue;
    }
-   found = realpath(path, NULL);
-   if (found) {
-      used = (size_t)snprintf(resolved, length, "%s", found);
+   real_path = realpath(path, NULL);
+   if (real_path) {
+      used = (size_t)snprintf(resolved, length, "%s", real_path);
    } else {
       above[name - path] = 0;
-      found = errno == ENOENT ? realpath(*above ? above : ".", NULL) : NULL;
-      if (!found) return errno;
-      used = (size_t)snprintf(resolved, length, "%s/%s", found[1] ? found : "", name);
+      real_path = errno == ENOENT ? realpath(*above ? above : ".", NULL) : NULL;
+      if (!real_path) return errno;
+      used = (size_t)snprintf(resolved, length, "%s/%s", real_path[1] ? real_path : "", name);
    }
-   free(found);
+   free(real_path);
    return used < length ? 0 : ENAMETOOLONG;
 }
 
-// 1 where `thud_exchange` has a chance: the target is missing, or on the same mount and not the working directory.
+// 1 if `thud_exchange` may succeed: the target is missing, or on the same mount and not the working directory.
 int thud_can_exchange(const char *path, const char *target)
 {
    struct stat here, there;
@@ -389,7 +389,7 @@ int thud_can_exchange(const char *path, const char *target)
    if (stat(".", &here) == 0 && here.st_dev == there.st_dev && here.st_ino == there.st_ino) return 0;
    snprintf(from, sizeof from, "%s/..missing", path);
    snprintf(to, sizeof to, "%s/..missing", target);
-   // There is no such file; where the mounts differ, that is the error.
+   // The file does not exist: rename always fails, on different mounts with EXDEV.
    return rename(from, to) != 0 && errno != EXDEV;
 }
 
@@ -409,7 +409,7 @@ int thud_exchange(const char *path, const char *target)
 #endif
 }
 
-// 1 where two paths lead to the same file.
+// 1 if two paths lead to the same file.
 int thud_is_same_file(const char *path, const char *other)
 {
    struct stat here, there;
@@ -417,16 +417,16 @@ int thud_is_same_file(const char *path, const char *other)
    return stat(path, &here) == 0 && stat(other, &there) == 0 && here.st_dev == there.st_dev && here.st_ino == there.st_ino;
 }
 
-// 1 for a regular file and no link, 0 where there is nothing of a name, -1 for anything else.
+// 1 for a regular file that is not a link, 0 if nothing exists at the path, -1 for anything else.
 int thud_look_up(const char *path)
 {
-   struct stat found;
+   struct stat info;
 
-   if (lstat(path, &found) != 0) return errno == ENOENT || errno == ENOTDIR ? 0 : -1;
-   return S_ISREG(found.st_mode) ? 1 : -1;
+   if (lstat(path, &info) != 0) return errno == ENOENT || errno == ENOTDIR ? 0 : -1;
+   return S_ISREG(info.st_mode) ? 1 : -1;
 }
 
-// Length of the next name in an open directory, `.` and `..` left out; 0 at the end.
+// Length of the next name in an open directory, except `.` and `..`; 0 at the end.
 size_t thud_next_name(DIR *directory, char *name, size_t length)
 {
    struct dirent *entry;
@@ -438,28 +438,27 @@ size_t thud_next_name(DIR *directory, char *name, size_t length)
    return strlen(name);
 }
 
-// Bytes of a file, 0 where it is not a regular one; negative where there is none.
+// Bytes of a file: 0 if it is not regular, negative if there is none.
 int64_t thud_get_file_size(const char *path)
 {
-   struct stat found;
+   struct stat info;
 
-   if (stat(path, &found) != 0) return -1;
-   return S_ISREG(found.st_mode) ? (int64_t)found.st_size : 0;
+   if (stat(path, &info) != 0) return -1;
+   return S_ISREG(info.st_mode) ? (int64_t)info.st_size : 0;
 }
 
-// Bytes that this user may write to the disk of a directory, or of the next one above that is there; negative where
-// unknown.
+// Bytes that this user may write to the disk of a directory, or of its nearest existing parent; negative if unknown.
 double thud_get_free_bytes(const char *path)
 {
    struct statvfs disk;
-   char place[PATH_MAX], *end;
+   char directory[PATH_MAX], *end;
 
-   snprintf(place, sizeof place, "%s", path);
-   while (statvfs(place, &disk) != 0) {
-      if (strcmp(place, ".") == 0 || strcmp(place, "/") == 0) return -1.0;
-      end = strrchr(place, '/');
-      if (end) end[end == place] = 0;
-      else strcpy(place, ".");
+   snprintf(directory, sizeof directory, "%s", path);
+   while (statvfs(directory, &disk) != 0) {
+      if (strcmp(directory, ".") == 0 || strcmp(directory, "/") == 0) return -1.0;
+      end = strrchr(directory, '/');
+      if (end) end[end == directory] = 0;
+      else strcpy(directory, ".");
    }
    return (double)disk.f_frsize * (double)disk.f_bavail;
 }

@@ -1,4 +1,4 @@
-!> The calls of the operating system that Fortran lacks; `system.c` holds them.
+!> Operating system calls that Fortran lacks; implemented in `system.c`.
 module thud_system
    use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_int, c_int32_t, c_int64_t, c_intptr_t, &
       c_null_char, c_ptr, c_size_t
@@ -14,7 +14,7 @@ module thud_system
    public :: link_file, list_directory, lock_directory, open_descriptor, open_end
    public :: pass_interrupts, prepare_process, read_bytes, remove_file, rename_file, resolve_path, write_text
 
-   !> Descriptors of the process.
+   !> Standard descriptors of the process.
    integer, parameter :: standard_output = 1, standard_error = 2
 
    !> Maximum length of the name of a file, and of a path.
@@ -71,20 +71,20 @@ module thud_system
    procedure(number_call), bind(c, name='isatty') :: c_isatty
    procedure(number_call), bind(c, name='thud_is_closed') :: c_is_closed
 
-   !> Turns signals of full and closed outputs into errors, and SIGINT and SIGTERM into a message.
+   !> Turns signals of full and closed outputs into errors; SIGINT and SIGTERM then end the process with a message.
    procedure(plain_call), bind(c, name='thud_prepare_process') :: prepare_process
-   !> Keeps an interrupt from now on; it then stops `write_text`.
+   !> From now on an interrupt does not end the process; it stops `write_text`.
    procedure(plain_call), bind(c, name='thud_keep_interrupts') :: keep_interrupts
-   !> Lets signals that the process handles set `latest_signal`, too, and forks wait for the call. Every call of Python
-   !> begins with it but those that compute nothing: `collect`, `get_progress` and `end_calls`.
+   !> Marks a call as running: signals that the process handles also set `latest_signal`, and forks wait for the call.
+   !> Every call from Python that computes begins with it (not `collect`, `get_progress` and `end_calls`).
    procedure(plain_call), bind(c, name='thud_begin_call') :: begin_call
-   !> Ends what `begin_call` has begun.
+   !> Marks the end of a call.
    procedure(plain_call), bind(c, name='thud_end_call') :: end_call
-   !> Ends all calls that are running.
+   !> Interrupts all running calls.
    procedure(plain_call), bind(c, name='thud_end_calls') :: end_calls
 
    interface
-      !> Ends the process at once; nothing must be left to be written.
+      !> Ends the process immediately; buffered output would be lost.
       subroutine end_process(code) bind(c, name='thud_end_process')
          import :: c_int
          implicit none (type, external)
@@ -92,11 +92,11 @@ module thud_system
          integer(c_int), value :: code
       end subroutine end_process
 
-      !> Lets an interrupt end the process from now on.
+      !> From now on an interrupt ends the process.
       subroutine pass_interrupts(written) bind(c, name='thud_pass_interrupts')
          import :: c_int
          implicit none (type, external)
-         !> 1 where there are results by now, else 0.
+         !> 1 if the results have been written, else 0.
          integer(c_int), value :: written
       end subroutine pass_interrupts
 
@@ -185,7 +185,7 @@ module thud_system
 
 contains
 
-   !> The system's message of an error.
+   !> The system's message for an error number.
    function get_system_message(status) result(text)
       integer, intent(in) :: status
       character(len=:), allocatable :: text
@@ -199,16 +199,15 @@ contains
    function is_terminal(descriptor) result(yes)
       !> `standard_output` or `standard_error`.
       integer, intent(in) :: descriptor
-      !> The descriptor is a terminal.
       logical :: yes
 
       yes = c_isatty(int(descriptor, c_int)) == 1
    end function is_terminal
 
-   !> Opens a file, pipe or device to be read.
+   !> Opens a file, pipe or device for reading.
    function open_descriptor(path) result(descriptor)
       character(len=*), intent(in) :: path
-      !> The descriptor; negative where it cannot be opened.
+      !> The descriptor; negative if the file cannot be opened.
       integer :: descriptor
 
       descriptor = int(c_open(path//c_null_char))
@@ -217,29 +216,28 @@ contains
    !> Reads the available bytes, up to the length of the buffer.
    subroutine read_bytes(descriptor, buffer, count)
       integer, intent(in) :: descriptor
-      !> The bytes.
       character(len=*), intent(out) :: buffer
-      !> Their number; 0 at the end, negative where they cannot be read.
+      !> Number of bytes read; 0 at the end, negative after an error.
       integer, intent(out) :: count
 
       count = int(c_read(int(descriptor, c_int), buffer, len(buffer, c_size_t)))
    end subroutine read_bytes
 
-   !> Closes a descriptor; a lock that it holds is free then.
+   !> Closes a descriptor and releases its lock.
    subroutine close_descriptor(descriptor, status)
-      !> The descriptor; negative where it is closed.
+      !> The descriptor; negative if closed, as it is afterwards.
       integer, intent(inout) :: descriptor
       !> 0, or the number of the error.
       integer, intent(out), optional :: status
-      integer :: found
+      integer :: result_status
 
-      found = 0
-      if (descriptor >= 0) found = int(c_close(int(descriptor, c_int)))
+      result_status = 0
+      if (descriptor >= 0) result_status = int(c_close(int(descriptor, c_int)))
       descriptor = -1
-      if (present(status)) status = found
+      if (present(status)) status = result_status
    end subroutine close_descriptor
 
-   !> Makes a file, or empties it.
+   !> Creates a file, or empties it.
    subroutine create_file(path, descriptor, status)
       character(len=*), intent(in) :: path
       integer, intent(out) :: descriptor
@@ -250,7 +248,7 @@ contains
       status = max(-descriptor, 0)
    end subroutine create_file
 
-   !> Opens a file at its end, or makes it.
+   !> Opens a file to write at its end, or creates it.
    subroutine open_end(path, descriptor, status)
       character(len=*), intent(in) :: path
       integer, intent(out) :: descriptor
@@ -261,16 +259,16 @@ contains
       status = max(-descriptor, 0)
    end subroutine open_end
 
-   !> Goes on with the checksum of a text, CRC-32 as in zlib.
+   !> Adds a text to a checksum, CRC-32 as in zlib.
    subroutine add_to_checksum(text, checksum)
       character(len=*), intent(in) :: text
-      !> That of what stands before the text, 0 at its beginning.
+      !> Checksum of the preceding text, 0 at the beginning; afterwards with the text.
       integer(int32), intent(inout) :: checksum
 
       checksum = int(c_checksum(int(checksum, c_int32_t), text, len(text, c_size_t)), int32)
    end subroutine add_to_checksum
 
-   !> Writes all of a text to a file or to the screen.
+   !> Writes a whole text to a file or to the screen.
    subroutine write_text(descriptor, text, status)
       integer, intent(in) :: descriptor
       character(len=*), intent(in) :: text
@@ -280,16 +278,16 @@ contains
       status = int(c_write(int(descriptor, c_int), text, len(text, c_size_t)))
    end subroutine write_text
 
-   !> Whether a text was not written because nobody reads it: the pipe or the descriptor is closed.
+   !> Whether a write failed because the pipe or the descriptor is closed.
    function is_closed(status) result(closed)
-      !> That of `write_text`.
+      !> Status from `write_text`.
       integer, intent(in) :: status
       logical :: closed
 
       closed = c_is_closed(int(status, c_int)) /= 0
    end function is_closed
 
-   !> Brings all files of a directory to the disk.
+   !> Flushes all files of a directory to the disk.
    subroutine flush_directory(path, status)
       character(len=*), intent(in) :: path
       !> 0, or the number of the error.
@@ -298,7 +296,7 @@ contains
       status = int(c_flush(path//c_null_char))
    end subroutine flush_directory
 
-   !> Whether a directory of that name is there.
+   !> Whether a directory exists.
    function directory_exists(path) result(there)
       character(len=*), intent(in) :: path
       !> It exists and can be read.
@@ -313,7 +311,7 @@ contains
    !> Names in a directory.
    subroutine list_directory(path, names)
       character(len=*), intent(in) :: path
-      !> The names, none where it cannot be read: [n_name].
+      !> The names; none if the directory cannot be read: [n_name].
       character(len=name_length), allocatable, intent(out) :: names(:)
       character(len=name_length + 1) :: name
       type(c_ptr) :: directory
@@ -329,7 +327,7 @@ contains
             if (n == size(names)) names = [names, names]
             n = n + 1
             names(n) = name(:length)
-            ! A blank at the end is part of the name, which C ends here.
+            ! A zero byte keeps a blank at the end of the name.
             if (name(length:length) == ' ') names(n)(min(length + 1, name_length):) = c_null_char
          end do
          if (c_closedir(directory) /= 0) n = 0
@@ -337,13 +335,13 @@ contains
       names = names(:n)
    end subroutine list_directory
 
-   !> The path without links; the directories above are made.
+   !> Resolves links in a path; creates missing parent directories.
    subroutine resolve_path(path, resolved, done)
       !> Path of a directory, which may be missing.
       character(len=*), intent(in) :: path
-      !> The same from the root on.
+      !> Absolute path without links.
       character(len=:), allocatable, intent(out) :: resolved
-      !> There can be such a directory.
+      !> The path could be resolved.
       logical, intent(out) :: done
       character(len=path_length) :: buffer
       integer :: stop
@@ -353,40 +351,40 @@ contains
       if (done) resolved = buffer(:index(buffer, c_null_char) - 1)
    end subroutine resolve_path
 
-   !> Waits for the lock on a directory and takes it, until its descriptor is closed.
+   !> Waits for the lock on a directory and holds it until the descriptor is closed.
    subroutine lock_directory(path, make, descriptor)
       character(len=*), intent(in) :: path
-      !> To make it where it is missing.
+      !> Create a missing directory.
       logical, intent(in) :: make
-      !> The descriptor; negative where there is no such directory, or where this user cannot write to it.
+      !> The descriptor; negative if the directory is missing or this user cannot write to it.
       integer, intent(out) :: descriptor
 
       descriptor = int(c_lock_directory(path//c_null_char, merge(1_c_int, 0_c_int, make)))
    end subroutine lock_directory
 
-   !> Whether `exchange_directories` has a chance.
+   !> Whether `exchange_directories` may succeed.
    function can_exchange(path, other) result(yes)
       character(len=*), intent(in) :: path
-      !> Path of another one.
+      !> Path of the other.
       character(len=*), intent(in) :: other
-      !> The other is missing, or on the same mount and not the working directory.
+      !> True if the other is missing, or on the same mount and not the working directory.
       logical :: yes
 
       yes = c_can_exchange(path//c_null_char, other//c_null_char) == 1
    end function can_exchange
 
-   !> Exchanges the names of two directories in one step; owner and permissions stay with the second name.
+   !> Exchanges two directories in one step; the first gets owner and permissions of the second.
    subroutine exchange_directories(path, other, done)
       character(len=*), intent(in) :: path
-      !> Path of another one.
+      !> Path of the other.
       character(len=*), intent(in) :: other
-      !> They are exchanged.
+      !> The directories have been exchanged.
       logical, intent(out) :: done
 
       done = c_exchange(path//c_null_char, other//c_null_char) == 0
    end subroutine exchange_directories
 
-   !> Gives a file another name; a file that has that name is replaced in the same instant.
+   !> Renames a file; an existing file of the new name is replaced in the same step.
    subroutine rename_file(old_path, new_path, done)
       character(len=*), intent(in) :: old_path
       !> New path in the same file system.
@@ -397,7 +395,7 @@ contains
       done = c_rename(old_path//c_null_char, new_path//c_null_char) == 0
    end subroutine rename_file
 
-   !> Gives a file a second name, unless something else has it.
+   !> Gives a file a second name, unless that name exists.
    subroutine link_file(path, new_path, done)
       character(len=*), intent(in) :: path
       !> New path in the same file system.
@@ -408,10 +406,10 @@ contains
       done = c_link(path//c_null_char, new_path//c_null_char) == 0
    end subroutine link_file
 
-   !> Removes a file or an empty directory if it is there.
+   !> Removes a file or an empty directory, if it exists.
    subroutine remove_file(path, done)
       character(len=*), intent(in) :: path
-      !> There was something, and it is gone.
+      !> Something has been removed.
       logical, intent(out), optional :: done
       integer(c_int) :: status
 
@@ -422,7 +420,7 @@ contains
    !> Size of a file.
    subroutine get_file_size(path, bytes)
       character(len=*), intent(in) :: path
-      !> Its bytes, 0 where it is not a regular file; negative where there is none.
+      !> Size, bytes: 0 if the file is not regular, negative if there is none.
       integer(int64), intent(out) :: bytes
 
       bytes = int(c_get_file_size(path//c_null_char), int64)
@@ -431,13 +429,13 @@ contains
    !> Checksum of a file, CRC-32 as in zlib.
    subroutine get_file_checksum(path, checksum)
       character(len=*), intent(in) :: path
-      !> The checksum; negative where it is no regular file or cannot be read.
+      !> The checksum; negative if the file is not regular or cannot be read.
       integer(int64), intent(out) :: checksum
 
       checksum = int(c_get_file_checksum(path//c_null_char), int64)
    end subroutine get_file_checksum
 
-   !> Whether there is nothing of a name.
+   !> Whether nothing exists at a path.
    function is_missing(path) result(yes)
       character(len=*), intent(in) :: path
       logical :: yes
@@ -445,7 +443,7 @@ contains
       yes = c_look_up(path//c_null_char) == 0
    end function is_missing
 
-   !> Whether a path is that of a regular file and no link; to open anything else could block.
+   !> Whether a path leads to a regular file that is not a link; opening anything else could block.
    function is_regular_file(path) result(yes)
       character(len=*), intent(in) :: path
       logical :: yes
@@ -453,21 +451,20 @@ contains
       yes = c_look_up(path//c_null_char) == 1
    end function is_regular_file
 
-   !> Whether two paths lead to the same file, by links too.
+   !> Whether two paths lead to the same file, perhaps by links.
    function is_same_file(path, other) result(yes)
       character(len=*), intent(in) :: path
-      !> Path of another one.
+      !> Path of the other.
       character(len=*), intent(in) :: other
-      !> They do.
       logical :: yes
 
       yes = c_is_same_file(path//c_null_char, other//c_null_char) == 1
    end function is_same_file
 
-   !> Free space on the disk of a directory, or of the next one above that is there.
+   !> Free space on the disk of a directory, or of its nearest existing parent.
    function get_free_bytes(path) result(bytes)
       character(len=*), intent(in) :: path
-      !> Bytes that this user may write; huge where unknown.
+      !> Bytes that this user may write; huge if unknown.
       real(wp) :: bytes
 
       bytes = real(c_get_free_bytes(path//c_null_char), wp)

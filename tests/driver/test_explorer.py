@@ -605,7 +605,7 @@ def test_page_that_leaves_while_it_waits_ends_its_work(path: str) -> None:
 
 
 def test_body_that_rests_is_ended(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server, "PATIENCE", 0.05)
+    monkeypatch.setattr(server, "BODY_TIMEOUT", 0.05)
 
     async def rest() -> dict[str, Any]:
         await asyncio.sleep(60)

@@ -16,7 +16,7 @@ import pytest
 
 from thud.explorer import jobs as module
 from thud.explorer.jobs import Jobs
-from thud.explorer.server import LONGEST
+from thud.explorer.server import TIME_LIMIT
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator
@@ -47,7 +47,7 @@ def test_process_that_was_stopped_ends_with_its_page() -> None:
 
     async def stop_and_leave() -> None:
         async with anyio.create_task_group() as group:
-            group.start_soon(listen, Jobs(1, LONGEST))
+            group.start_soon(listen, Jobs(1, TIME_LIMIT))
             while not workers():  # noqa: ASYNC110 - another process is no event
                 await anyio.sleep(0.05)
             (pid,) = workers()
@@ -75,7 +75,7 @@ async def reports_of(jobs: Jobs) -> list[dict[str, Any]]:
 
 
 def test_process_that_stops_while_it_sends_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_work", send_half)
+    monkeypatch.setattr(module, "_do_tasks", send_half)
     last = anyio.run(reports_of, Jobs(1, 0.5))[-1]
     assert list(last) == ["error"]
     assert "0.5 s" in last["error"]
@@ -100,7 +100,7 @@ def test_lost_server_of_forks_is_a_sentence_and_begins_again(
             assert (await reports_of(jobs))[-1]["error"]
         assert "answer" in (await reports_of(jobs))[-1]
 
-    anyio.run(lose, Jobs(1, LONGEST))
+    anyio.run(lose, Jobs(1, TIME_LIMIT))
 
 
 def test_reports_are_ended_by_another_task() -> None:
@@ -115,7 +115,7 @@ def test_reports_are_ended_by_another_task() -> None:
         with anyio.fail_after(60):
             assert "answer" in (await reports_of(jobs))[-1]
 
-    anyio.run(end_elsewhere, Jobs(1, LONGEST))
+    anyio.run(end_elsewhere, Jobs(1, TIME_LIMIT))
 
 
 @pytest.mark.slow
@@ -139,7 +139,7 @@ def test_kept_process_works_again_until_it_is_late() -> None:
         assert not workers()
 
     late = {"answer": None}
-    anyio.run(work, Jobs(1, 5.0, late=late, kept=True))
+    anyio.run(work, Jobs(1, 5.0, late=late, reuse=True))
 
 
 def test_works_have_places_and_those_that_wait_end() -> None:
@@ -163,7 +163,7 @@ def test_works_have_places_and_those_that_wait_end() -> None:
         with anyio.fail_after(60):
             assert "answer" in (await reports_of(jobs))[-1]
 
-    anyio.run(crowd, Jobs(2, LONGEST))
+    anyio.run(crowd, Jobs(2, TIME_LIMIT))
 
 
 def test_answer_that_nobody_reads_keeps_no_place() -> None:
@@ -175,4 +175,4 @@ def test_answer_that_nobody_reads_keeps_no_place() -> None:
             assert "answer" in (await reports_of(jobs))[-1]
         await reports.aclose()
 
-    anyio.run(rest, Jobs(1, LONGEST))
+    anyio.run(rest, Jobs(1, TIME_LIMIT))

@@ -68,7 +68,7 @@ def test_idle_and_slow_connections_hinder_nobody(server: Served) -> None:
 
 
 # Busy machines are slow.
-PATIENT = "from thud.explorer import server; server.LONGEST_QUICK = 60.0"
+PATIENT = "from thud.explorer import server; server.QUICK_TIME_LIMIT = 60.0"
 
 
 @pytest.mark.parametrize("server", [PATIENT], indirect=True)

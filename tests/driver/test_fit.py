@@ -14,7 +14,7 @@ from scipy import stats
 import thud
 from thud.case.keys import with_values
 from thud.studies.fitting import misfit, search
-from thud.studies.fitting.inference import infer, pair_sentences, statement, worst_directions
+from thud.studies.fitting.inference import identifiability, infer, pair_messages, worst_directions
 from thud.studies.fitting.ranges import Range, bound_parameters, get_ranges
 
 if TYPE_CHECKING:
@@ -183,7 +183,7 @@ def test_correlations_are_shown_to_the_digit_that_differs_from_1() -> None:
     sizes = np.array(
         [[1, 0.9987, 0.95, 0.2], [0, 1, -0.99996, 0.899], [0, 0, 1, 0.901], [0, 0, 0, 1]]
     )
-    found = pair_sentences("abcd", np.where(sizes, sizes, sizes.T), 0.9)
+    found = pair_messages("abcd", np.where(sizes, sizes, sizes.T), 0.9)
     # The strongest first; above 0.998 no model tells them apart.
     assert found == [
         "b and c cannot be separated: correlation −0.99996",
@@ -194,9 +194,9 @@ def test_correlations_are_shown_to_the_digit_that_differs_from_1() -> None:
 
 
 def test_directions_are_compared_where_there_are_two() -> None:
-    assert statement(["a"], np.eye(1), np.eye(1), 1) == []
+    assert identifiability(["a"], np.eye(1), np.eye(1), 1) == []
     # Of standard errors of 6 and 2 %, the first along the first parameter.
-    (told,) = statement(["a", "b"], np.diag([0.06, 0.02]) ** 2, np.eye(2), 2)
+    (told,) = identifiability(["a", "b"], np.diag([0.06, 0.02]) ** 2, np.eye(2), 2)
     assert re.search(r"least determined: a, standard error 6 %; .* 3 times as uncertain", told)
 
 

@@ -15,7 +15,7 @@ from scipy import stats
 import thud
 from thud import cli
 from thud.studies.fit import KIND
-from thud.studies.fitting.inference import UNLIKELY, pair_sentences
+from thud.studies.fitting.inference import UNLIKELY, pair_messages
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -161,11 +161,11 @@ def test_heights_do_not_tell_modulus_from_wall(drops: list[Record]) -> None:
 def test_pairs_that_cannot_be_told_apart_are_named() -> None:
     correlation = np.array([[1, -0.9993, 0.2], [-0.9993, 1, 0.93], [0.2, 0.93, 1]])
     names = ["loss_factor", "fractional_order", "youngs_modulus"]
-    first, second = pair_sentences(names, correlation, 0.9)
+    first, second = pair_messages(names, correlation, 0.9)
     assert re.search(naming("loss_factor", "fractional_order", "−0.9993"), first)
     assert re.search(naming("fractional_order", "youngs_modulus", 0.93), second)
     infinite = np.full((3, 3), np.nan)
-    assert pair_sentences(names, infinite, 0.9) == []
+    assert pair_messages(names, infinite, 0.9) == []
 
 
 def test_fit_says_what_is_hard_to_tell_apart() -> None:

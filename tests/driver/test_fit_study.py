@@ -75,7 +75,7 @@ def test_studies_of_the_repository(
 
 def test_units_are_those_of_the_file() -> None:
     study = thud.read_study("study.toml", "fit")
-    assert [p.given for p in study.parameters] == [{"start": 1.4e6, "unit": "MPa"}]
+    assert [p.table for p in study.parameters] == [{"start": 1.4e6, "unit": "MPa"}]
     fit = KIND.run(study)
     # The table of the record has times of its own.
     assert fit.time_shift == pytest.approx(0.2, abs=1e-6)

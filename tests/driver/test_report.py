@@ -33,7 +33,7 @@ from thud.recordings.read_recording import read_recording
 from thud.recordings.recording import Recording
 from thud.report.contents import read_date, report_data
 from thud.report.fonts import missing_characters
-from thud.report.notes import group_sentences, shorten
+from thud.report.notes import group_messages, shorten
 from thud.report.page import _range
 from thud.report.write import write_report
 
@@ -480,7 +480,7 @@ def test_sentences_that_differ_in_numbers_are_one() -> None:
         ("b", "-3.5 N at 50 Hz (IEC 61260-1)"),
         ("b", "x"),
     ]
-    assert group_sentences(said, 9, "drops") == [
+    assert group_messages(said, 9, "drops") == [
         "-3.5 to 12 N at 50 Hz (IEC 61260-1) (2 of 9 drops)",
         "x (b)",
     ]

@@ -196,7 +196,7 @@ def test_shift_is_that_of_williams_landel_and_ferry() -> None:
     assert Temperature(20.0, coefficient=-0.01).shift(at).tolist() == [1] * 6
     assert law.keys == ("youngs_modulus", "loss_factor")
     assert Temperature(20.0, coefficient=-0.01).keys == ("youngs_modulus",)
-    assert law.given == {"reference": 20, "c1": 8, "c2": 100}
+    assert law.table == {"reference": 20, "c1": 8, "c2": 100}
 
 
 def test_modulus_of_a_case_changes_with_its_coefficient() -> None:
@@ -227,7 +227,7 @@ def test_bounds_of_the_law_of_temperature(given: dict[str, float] | None, words:
         return
     found = read_temperature(given, case, varying)
     assert found is not None
-    assert found.given == given
+    assert found.table == given
     with pytest.raises(thud.InputError, match=naming("[temperature]", "parameter")):
         read_temperature(given, case, ())
     assert read_temperature(None, case, ()) is None

@@ -132,7 +132,7 @@ class Drop(Group):
     Attributes
     ----------
     height : float
-        Height of the ball's lowest point over the floor, m; 1e-12 <= height <= 1e+06.
+        Height of the ball's lowest point above the floor, m; 1e-12 <= height <= 1e+06.
     gravity : float
         Acceleration of free fall, m/s2; 1e-12 <= gravity <= 1000.
     """
@@ -150,7 +150,7 @@ class Sampling(Group):
     sample_rate : float
         Samples per second, Hz; 2000 <= sample_rate <= 1e+07.
     duration : float
-        Length of the record from first touch, s; 0.001 <= duration <= 10.
+        Duration of the record from first touch, s; 0.001 <= duration <= 10.
     substeps : int
         Integration steps per sampling interval; 1 <= substeps <= 10000.
     """
@@ -167,11 +167,11 @@ class Levels(Group):
     Attributes
     ----------
     method : str
-        Method of the levels; "exact", "fft".
+        Method of computing the levels; "exact", "fft".
     bands : str
         Bands of levels.csv; "octave", "third", "both".
     force : str
-        Assessed force: levels, peak force and verdict are of it; "floor", "elastic".
+        Assessed force, for which levels, peak force and verdict are reported; "floor", "elastic".
     """
 
     method: LevelsMethod = "exact"
@@ -201,9 +201,9 @@ class Modes(Group):
     count : int
         Number of elastic free modes; 1 <= count <= 100.
     radial_elements : int
-        Elements through the wall; 1 <= radial_elements <= 64; group ``&mesh``.
+        Number of elements through the wall; 1 <= radial_elements <= 64; group ``&mesh``.
     polar_elements : int
-        Elements from pole to pole; 8 <= polar_elements <= 1024; group ``&mesh``.
+        Number of elements from pole to pole; 8 <= polar_elements <= 1024; group ``&mesh``.
     """
 
     count: int = 6
@@ -220,9 +220,10 @@ class Compression(Group):
     max_deflection : float
         Maximum approach of the plates, m; 1e-15 <= max_deflection <= 10.
     points : int
-        Points of the curve, the undeformed ball included; 2 <= points <= 10000.
+        Number of points of the curve, including the undeformed ball; 2 <= points <= 10000.
     gas : str
-        Gas in the ball: leaves by the hole, or is sealed in; "vented", "isothermal", "adiabatic".
+        Gas in the ball: leaves through the hole (vented), or is sealed in; "vented", "isothermal",
+        "adiabatic".
     """
 
     max_deflection: float = 0.04
@@ -241,8 +242,8 @@ class Room(Group):
     reverberation_time : float
         Reverberation time of the room, s; 0.05 <= reverberation_time <= 20.
     reverberation_times : sequence of float
-        The same for each one-third-octave band from 50 to 630 Hz, s; 0.05 <= reverberation_times
-        <= 20.
+        Reverberation time in each one-third-octave band from 50 to 630 Hz, s; 0.05 <=
+        reverberation_times <= 20.
     air_density : float
         Density of the air, kg/m3; 0.5 <= air_density <= 2.
     sound_speed : float
@@ -261,15 +262,15 @@ class Room(Group):
     wall_loss_factor : float
         Internal loss factor of the walls; 0 <= wall_loss_factor <= 1.
     wall_junction : str
-        Junction of floor and walls: rigid cross or t, or one of a given index; "cross", "t",
-        "index".
+        Junction of floor and walls: rigid cross or T, or described by junction_index; "cross",
+        "t", "index".
     junction_index : float
-        Vibration reduction index from floor to wall, of the junction index, dB; -10 <=
+        Vibration reduction index from floor to wall, for wall_junction index, dB; -10 <=
         junction_index <= 80.
     ceiling_mass : float
-        Mass of a suspended ceiling over its area; 0: none, kg/m2; 0 <= ceiling_mass <= 200.
+        Mass per unit area of a suspended ceiling; 0: none, kg/m2; 0 <= ceiling_mass <= 200.
     ceiling_depth : float
-        Depth of the air above the ceiling, m; 0.01 <= ceiling_depth <= 2.
+        Depth of the air cavity above the ceiling, m; 0.01 <= ceiling_depth <= 2.
     ceiling_loss_factor : float
         Loss factor of the ceiling cavity; 0.001 <= ceiling_loss_factor <= 1.
     """
@@ -299,8 +300,8 @@ class HollowSphere(Group):
     Attributes
     ----------
     momentum_flux : str
-        Momentum of wall that enters or leaves the flat cap; "momentum_balance", "retarding",
-        "conservative", "none".
+        Term for the momentum of wall that enters or leaves the flat cap; "momentum_balance",
+        "retarding", "conservative", "none".
     """
 
     name: ClassVar[ModelName] = "hollow_sphere"
@@ -314,27 +315,27 @@ class ModalBall(Group):
     Attributes
     ----------
     harmonics : int
-        Highest harmonic whose modes oscillate; 2 <= harmonics <= 200.
+        Highest harmonic with oscillating modes; 2 <= harmonics <= 200.
     radial_modes : int
-        Modes of each harmonic that oscillate; 1 <= radial_modes <= 20.
+        Number of oscillating modes per harmonic; 1 <= radial_modes <= 20.
     static_harmonics : int
-        Highest harmonic whose static flexibility counts; 4 <= static_harmonics <= 400.
+        Highest harmonic whose static flexibility is included; 4 <= static_harmonics <= 400.
     rings : int
-        Rings of the surface, from the lowest point to 60 degrees; 2 <= rings <=
+        Number of rings on the surface, from the lowest point to 60 degrees; 2 <= rings <=
         static_harmonics/3.
     damping_law : str
-        Loss factor against frequency; "constant", "rising", "fractional".
+        Damping law: loss factor as a function of frequency; "constant", "rising", "fractional".
     loss_factor : float
         Loss factor, twice the damping ratio; 0 <= loss_factor <= 1.9.
     loss_frequency : float
-        Frequency of a loss factor that is not constant; of fractional also of the modulus, Hz; 0.1
-        <= loss_frequency <= 100000.
+        Frequency at which loss_factor (rising, fractional) and the modulus (fractional) apply, Hz;
+        0.1 <= loss_frequency <= 100000.
     fractional_order : float
-        Order of the derivative, of fractional; 1: rising; 0 < fractional_order <= 1.
+        Order of the derivative, for fractional; 1: as rising; 0 < fractional_order <= 1.
     cavity_gas : bool
-        The gas in the cavity resists changes of its volume.
+        The gas in the cavity resists volume changes.
     contact_gravity : bool
-        Gravity acts during the contact too.
+        Gravity acts also during the contact.
     floor_friction : str
         Friction of the floor: none or infinite (sticking); "none", "stick".
     static_families : sequence of int
@@ -363,45 +364,47 @@ class FiniteElement(Group):
     Attributes
     ----------
     bounces : int
-        Contacts to be followed; 1 <= bounces <= 100.
+        Number of contacts to compute; 1 <= bounces <= 100.
     flight_before : float
-        Free flight before first touch, s; 0 <= flight_before <= 1.
+        Duration of free flight before first touch, s; 0 <= flight_before <= 1.
     flight_after : float
-        Free flight after the last contact, s; 0 <= flight_after <= 10.
+        Duration of free flight after the last contact, s; 0 <= flight_after <= 10.
     step_safety : float
-        Time step over stability limit; 0.01 <= step_safety <= 0.98.
+        Time step divided by the stability limit; 0.01 <= step_safety <= 0.98.
     radial_elements : int
-        Elements through the wall; 1 <= radial_elements <= 64; group ``&mesh``.
+        Number of elements through the wall; 1 <= radial_elements <= 64; group ``&mesh``.
     polar_elements : int
-        Elements from pole to pole; 8 <= polar_elements <= 1024; group ``&mesh``.
+        Number of elements from pole to pole; 8 <= polar_elements <= 1024; group ``&mesh``.
     law : str
         Law of elasticity; "neo_hookean", "mooney_rivlin"; group ``&material``.
     mooney_share : float
-        Second-invariant fraction of the shear modulus, of mooney_rivlin; 0 <= mooney_share <= 1;
+        Second-invariant fraction of the shear modulus, for mooney_rivlin; 0 <= mooney_share <= 1;
         group ``&material``.
     bulk_ratio : float
-        Maximum bulk modulus over shear modulus; less where Poisson's ratio says so; 2 <=
+        Maximum ratio of bulk to shear modulus; lower if Poisson's ratio implies a lower one; 2 <=
         bulk_ratio <= 100000; group ``&material``.
     viscosity : str
         Law of viscosity; "none", "kelvin_voigt", "fractional", "constant_loss", "prony"; group
         ``&material``.
     loss_factor : float
-        Loss factor at loss_frequency, of kelvin_voigt, fractional; over 10 to 1000 Hz, of
-        constant_loss; 0 < loss_factor <= 1; group ``&material``.
+        Loss factor: at loss_frequency (kelvin_voigt, fractional), or from 10 to 1000 Hz
+        (constant_loss); 0 < loss_factor <= 1; group ``&material``.
     loss_frequency : float
-        Where the ball's modulus is the storage modulus, Hz; 1 <= loss_frequency <= 10000; group
-        ``&material``.
+        Frequency at which the ball's modulus is the storage modulus, Hz; 1 <= loss_frequency <=
+        10000; group ``&material``.
     fractional_order : float
-        Order of the derivative, of fractional; 1: kelvin_voigt; 0 < fractional_order <= 1; group
-        ``&material``.
+        Order of the derivative, for fractional; 1: as kelvin_voigt; 0 < fractional_order <= 1;
+        group ``&material``.
     prony_share : sequence of float
-        Moduli over the long-term modulus, of prony; 0 <= prony_share <= 1000; group ``&material``.
+        Moduli of the branches divided by the long-term modulus, for prony; 0 <= prony_share <=
+        1000; group ``&material``.
     prony_time : sequence of float
-        Relaxation times, of prony, s; 0 < prony_time <= 1000; group ``&material``.
+        Relaxation times of the branches, for prony, s; 0 < prony_time <= 1000; group
+        ``&material``.
     friction : float
         Coefficient of friction between ball and floor; 0 <= friction <= 100; group ``&contact``.
     layer_stiffness : float
-        Stiffness per area of a thin layer on the floor; 0: none, the floor is hard, N/m3; 0 <=
+        Stiffness per area of a thin layer on the floor; 0: hard floor without a layer, N/m3; 0 <=
         layer_stiffness <= 1e+13; group ``&contact``.
     snapshot_interval : float
         Time between snapshots of the deformed ball; 0: none, s; 0 <= snapshot_interval <= 10;
@@ -459,15 +462,15 @@ class HuntCrossley(Group):
     Attributes
     ----------
     stiffness : float
-        Stiffness, N/m^exponent; 0: from contact_time; 0 <= stiffness <= 1e+15.
+        Contact stiffness, N/m^exponent; 0: derived from contact_time; 0 <= stiffness <= 1e+15.
     contact_time : float
         Target contact time; 0: derived from stiffness, s; 0 <= contact_time <= 10.
     exponent : float
-        Exponent of the deflection; 1 <= exponent <= 5.
+        Exponent of the deflection in the contact force; 1 <= exponent <= 5.
     damping : float
-        Damping alpha; 0: from restitution, s/m; 0 <= damping <= 100.
+        Damping coefficient alpha; 0: derived from restitution, s/m; 0 <= damping <= 100.
     restitution : float
-        Wanted coefficient of restitution; 0: from damping; 0 <= restitution <= 1.
+        Target coefficient of restitution; 0: derived from damping; 0 <= restitution <= 1.
     """
 
     name: ClassVar[ModelName] = "hunt_crossley"
@@ -489,19 +492,20 @@ class TwoMass(Group):
     inflation_pressure : float
         Inflation pressure, Pa; 0 <= inflation_pressure <= 1e+08.
     contact_width : float
-        Contact area over deflection of the patch, m; 0 <= contact_width <= 100.
+        Contact area divided by deflection of the contact patch, m; 0 <= contact_width <= 100.
     carcass_stiffness : float
-        Force of the carcass over its deflection at 20 mm, N/m; 0 <= carcass_stiffness <= 1e+12.
+        Force of the carcass divided by its deflection, at 20 mm, N/m; 0 <= carcass_stiffness <=
+        1e+12.
     carcass_exponent : float
-        Exponent of the deflection of the carcass; 1.5 <= carcass_exponent <= 5.
+        Exponent of the deflection in the force of the carcass; 1.5 <= carcass_exponent <= 5.
     contact_damping : float
-        Damping of the contact over its elastic force and velocity, s/m; 0 <= contact_damping <=
-        100.
+        Damping force of the contact divided by elastic force and velocity, s/m; 0 <=
+        contact_damping <= 100.
     belt_frequency : float
-        Natural frequency of the belt on the sidewall, the rim held, Hz; 0 < belt_frequency <=
+        Natural frequency of the belt on the sidewall with fixed rim, Hz; 0 < belt_frequency <=
         1e+06.
     belt_damping : float
-        Damping ratio of the same motion; 0 <= belt_damping <= 10.
+        Damping ratio of the belt on the sidewall with fixed rim; 0 <= belt_damping <= 10.
     """
 
     name: ClassVar[ModelName] = "two_mass"
@@ -529,7 +533,7 @@ class InfinitePlate(Group):
     Attributes
     ----------
     resistance : float
-        Force over velocity, N s/m; 1 <= resistance <= 1e+15.
+        Driving-point resistance: force divided by velocity, N s/m; 1 <= resistance <= 1e+15.
     """
 
     name: ClassVar[FloorName] = "infinite_plate"
@@ -543,11 +547,11 @@ class Oscillator(Group):
     Attributes
     ----------
     mass : float
-        Mass that moves under the source, kg; 0.001 <= mass <= 1e+12.
+        Moving mass under the source, kg; 0.001 <= mass <= 1e+12.
     stiffness : float
-        Stiffness of its support, N/m; 0 <= stiffness <= 1e+15.
+        Stiffness of the support, N/m; 0 <= stiffness <= 1e+15.
     damping : float
-        Damping of its support, N s/m; 0 <= damping <= 1e+12.
+        Damping coefficient of the support, N s/m; 0 <= damping <= 1e+12.
     """
 
     name: ClassVar[FloorName] = "oscillator"
@@ -573,26 +577,26 @@ class Plate(Group):
     wave_speed : float
         Speed of longitudinal waves in the floor, m/s; 100 <= wave_speed <= 10000.
     stiffness_ratio : float
-        Bending stiffness along the width over that along the length; 0.0001 <= stiffness_ratio <=
-        10000.
+        Ratio of the bending stiffness along the width to that along the length; 0.0001 <=
+        stiffness_ratio <= 10000.
     torsion_ratio : float
-        Twisting stiffness over the geometric mean of both bending stiffnesses; 0 <= torsion_ratio
-        <= 1.
+        Ratio of the twisting stiffness to the geometric mean of both bending stiffnesses; 0 <=
+        torsion_ratio <= 1.
     loss_factor : float
         Internal loss factor of the floor; 0 <= loss_factor <= 1.
     edges : str
         Losses at the edges of the floor; "laboratory", "absorption".
     edge_absorption : float
-        Sum of lengths times absorption coefficients of the edges, of absorption, m; 0 <=
-        edge_absorption <= 1000.
+        Sum of edge lengths times absorption coefficients, for absorption, m; 0 <= edge_absorption
+        <= 1000.
     source_x : float
         Relative source position along the length; 0 < source_x < 1.
     source_y : float
         Relative source position along the width; 0 < source_y < 1.
     point_x : sequence of float
-        Positions of further points along the length, m; 0 <= point_x <= 1000.
+        Positions along the length of points whose velocity is computed, m; 0 <= point_x <= 1000.
     point_y : sequence of float
-        Their positions along the width, m; 0 <= point_y <= 1000.
+        Positions of these points along the width, m; 0 <= point_y <= 1000.
     """
 
     name: ClassVar[FloorName] = "plate"
@@ -629,18 +633,18 @@ class FloatingFloor(Group):
     wave_speed : float
         Speed of longitudinal waves in the floor, m/s; 100 <= wave_speed <= 10000.
     stiffness_ratio : float
-        Bending stiffness along the width over that along the length; 0.0001 <= stiffness_ratio <=
-        10000.
+        Ratio of the bending stiffness along the width to that along the length; 0.0001 <=
+        stiffness_ratio <= 10000.
     torsion_ratio : float
-        Twisting stiffness over the geometric mean of both bending stiffnesses; 0 <= torsion_ratio
-        <= 1.
+        Ratio of the twisting stiffness to the geometric mean of both bending stiffnesses; 0 <=
+        torsion_ratio <= 1.
     loss_factor : float
         Internal loss factor of the floor; 0 <= loss_factor <= 1.
     edges : str
         Losses at the edges of the floor; "laboratory", "absorption".
     edge_absorption : float
-        Sum of lengths times absorption coefficients of the edges, of absorption, m; 0 <=
-        edge_absorption <= 1000.
+        Sum of edge lengths times absorption coefficients, for absorption, m; 0 <= edge_absorption
+        <= 1000.
     screed_thickness : float
         Thickness of the floating plate, m; 0.003 <= screed_thickness <= 0.5.
     screed_density : float
@@ -650,7 +654,7 @@ class FloatingFloor(Group):
     screed_loss_factor : float
         Loss factor of the floating plate; 0 <= screed_loss_factor <= 1.
     layer_stiffness : float
-        Dynamic stiffness of the resilient layer over area (ISO 9052-1), N/m3; 10000 <=
+        Dynamic stiffness of the resilient layer per unit area (ISO 9052-1), N/m3; 10000 <=
         layer_stiffness <= 1e+12.
     layer_loss_factor : float
         Loss factor of the resilient layer; 0 <= layer_loss_factor <= 1.
@@ -659,9 +663,9 @@ class FloatingFloor(Group):
     source_y : float
         Relative source position along the width; 0 < source_y < 1.
     point_x : sequence of float
-        Positions of further points along the length, m; 0 <= point_x <= 1000.
+        Positions along the length of points whose velocity is computed, m; 0 <= point_x <= 1000.
     point_y : sequence of float
-        Their positions along the width, m; 0 <= point_y <= 1000.
+        Positions of these points along the width, m; 0 <= point_y <= 1000.
     """
 
     name: ClassVar[FloorName] = "floating_floor"
@@ -704,7 +708,7 @@ class JoistFloor(Group):
     sheathing_modulus : float
         Modulus of elasticity of the sheathing in bending, Pa; 1e+07 <= sheathing_modulus <= 1e+12.
     spacing : float
-        Distance between the axes of two joists, m; joist_width < spacing < width.
+        Distance between the axes of adjacent joists, m; joist_width < spacing < width.
     joist_width : float
         Width of a joist, m; 0.005 <= joist_width <= 1.
     joist_height : float
@@ -714,10 +718,10 @@ class JoistFloor(Group):
     joist_modulus : float
         Modulus of elasticity of the joists, Pa; 1e+07 <= joist_modulus <= 1e+12.
     connection : float
-        Composite action of sheathing and joists, from 0, loose, to 1, glued (EN 1995-1-1 annex B);
-        0 <= connection <= 1.
+        Composite action of sheathing and joists, 0 (loose) to 1 (glued), EN 1995-1-1 annex B; 0 <=
+        connection <= 1.
     loss_factor : float
-        Loss factor of the floor and its edges, without radiation; 0 < loss_factor <= 1.
+        Loss factor of the floor including its edges, without radiation; 0 < loss_factor <= 1.
     source_x : float
         Relative source position along the length; 0 < source_x < 1.
     source_y : float
@@ -725,9 +729,9 @@ class JoistFloor(Group):
     source_on : str
         Impact location: sheathing between joists, or a joist; "sheathing", "joist".
     point_x : sequence of float
-        Positions of further points along the length, m; 0 <= point_x <= 1000.
+        Positions along the length of points whose velocity is computed, m; 0 <= point_x <= 1000.
     point_y : sequence of float
-        Their positions along the width, m; 0 <= point_y <= 1000.
+        Positions of these points along the width, m; 0 <= point_y <= 1000.
     """
 
     name: ClassVar[FloorName] = "joist_floor"
@@ -757,20 +761,21 @@ class MeasuredMobility(Group):
     Attributes
     ----------
     direct : float
-        Mobility at high frequencies, m/(N s); 0 <= direct <= 1000.
+        Limit of the mobility at high frequencies, m/(N s); 0 <= direct <= 1000.
     pole_frequency : sequence of float
-        Magnitudes of the poles over 2 pi, Hz; 1e-06 <= pole_frequency <= 1e+07.
+        Magnitudes of the poles divided by 2 pi, Hz; 1e-06 <= pole_frequency <= 1e+07.
     damping_ratio : sequence of float
-        Damping ratios of the poles, 1 of a real pole; 1e-12 <= damping_ratio <= 1.
+        Damping ratios of the poles; 1 for a real pole; 1e-12 <= damping_ratio <= 1.
     residue_real : sequence of float
-        Real parts of the residues, of a pair of poles doubled, m/(N s2); -1e+12 <= residue_real <=
-        1e+12.
+        Real parts of the residues, doubled for a pair of poles, m/(N s2); -1e+12 <= residue_real
+        <= 1e+12.
     residue_imaginary : sequence of float
-        Imaginary parts of the residues, m/(N s2); -1e+12 <= residue_imaginary <= 1e+12.
+        Imaginary parts of the residues, doubled for a pair of poles, m/(N s2); -1e+12 <=
+        residue_imaginary <= 1e+12.
     lowest_frequency : float
-        First frequency of the measurement, Hz; 0 < lowest_frequency < highest_frequency.
+        Lowest frequency of the measurement, Hz; 0 < lowest_frequency < highest_frequency.
     highest_frequency : float
-        Last frequency of the measurement, Hz; 0 < highest_frequency <= 1e+07.
+        Highest frequency of the measurement, Hz; 0 < highest_frequency <= 1e+07.
     """
 
     name: ClassVar[FloorName] = "measured_mobility"
@@ -846,15 +851,15 @@ class ImpactQuantities:
     impact_velocity : float
         Velocity at first touch, m/s.
     exact_contact_time : float
-        Contact time between steps, s.
+        Contact time, resolved between time steps, s.
     touch_time : float
         Time of first touch in the record, s.
     sample_rate : float
         Samples per second, Hz.
     impulse_residual : float
-        Relative residual of the balance of momentum.
+        Relative residual of the momentum balance.
     energy_residual : float
-        Relative residual of the balance of energy.
+        Relative residual of the energy balance.
     """
 
     contact_time: float
@@ -907,16 +912,16 @@ QUANTITIES = {
     "restitution": Quantity("restitution", "restitution", "e", "", "", 1.0, 4, "coefficient of restitution"),
     "impulse": Quantity("impulse", "impulse", "I", "N s", "N s", 1.0, 3, "time integral of the force on the floor"),
     "impact_velocity": Quantity("impact_velocity", "impact velocity", "v_0", "m/s", "m/s", 1.0, 3, "velocity at first touch"),
-    "exact_contact_time": Quantity("exact_contact_time", "exact contact time", "T", "s", "ms", 1000.0, 3, "contact time between steps"),
+    "exact_contact_time": Quantity("exact_contact_time", "exact contact time", "T", "s", "ms", 1000.0, 3, "contact time, resolved between time steps"),
     "touch_time": Quantity("touch_time", "time of first touch", "t_0", "s", "ms", 1000.0, 3, "time of first touch in the record"),
     "sample_rate": Quantity("sample_rate", "sample rate", "f_s", "Hz", "kHz", 0.001, 3, "samples per second"),
-    "impulse_residual": Quantity("impulse_residual", "impulse residual", "", "", "", 1.0, 6, "relative residual of the balance of momentum"),
-    "energy_residual": Quantity("energy_residual", "energy residual", "", "", "", 1.0, 6, "relative residual of the balance of energy"),
+    "impulse_residual": Quantity("impulse_residual", "impulse residual", "", "", "", 1.0, 6, "relative residual of the momentum balance"),
+    "energy_residual": Quantity("energy_residual", "energy residual", "", "", "", 1.0, 6, "relative residual of the energy balance"),
     "peak_count": Quantity("peak_count", "peaks of the force", "", "", "", 1.0, 0, "number of peaks of the assessed force"),
     "mass": Quantity("mass", "mass", "M", "kg", "kg", 1.0, 3, "mass of the source"),
     "drop_height": Quantity("drop_height", "drop height", "h", "m", "m", 1.0, 3, "drop height"),
-    "effective_mass": Quantity("effective_mass", "effective mass", "M", "kg", "kg", 1.0, 3, "impulse over the change of velocity"),
-    "margin": Quantity("margin", "margin", "", "dB", "dB", 1.0, 2, "minimum distance of the assessed octave levels to a limit, > 0 inside"),
+    "effective_mass": Quantity("effective_mass", "effective mass", "M", "kg", "kg", 1.0, 3, "impulse divided by the change of velocity"),
+    "margin": Quantity("margin", "margin", "", "dB", "dB", 1.0, 2, "minimum distance of the assessed octave levels to limits, > 0 inside"),
     "floor_work": Quantity("floor_work", "energy to the floor", "W", "J", "mJ", 1000.0, 3, "energy that the source gives to the floor"),
     "room_rating": Quantity("room_rating", "level in the room", "L_{iA,Fmax}", "dB", "dB", 1.0, 1, "A-weighted maximum Fast level in the room, re 20 uPa"),
     "standardized_rating": Quantity("standardized_rating", "standardized level", "L'_{iA,Fmax,V,T}", "dB", "dB", 1.0, 1, "A-weighted maximum Fast level, standardized, re 20 uPa"),
@@ -949,7 +954,7 @@ CLASS_LIMITS = (37.0, 41.0, 45.0, 49.0)
 
 # Every key, in the order of an input file.
 KEYS = (
-    Key("", "case", "name", "text", "", "name of the case, also of its output directory"),
+    Key("", "case", "name", "text", "", "name of the case and of its output directory"),
     Key("", "ball", "outer_radius", "real", "m", "outer radius", (), 0.0, 10.0),
     Key("", "ball", "wall_thickness", "real", "m", "wall thickness, less than the outer radius", (), 0.0, "outer_radius"),
     Key("", "ball", "mass", "real", "kg", "mass", (), 1e-12, 1000000.0),
@@ -959,135 +964,135 @@ KEYS = (
     Key("", "ball", "ambient_pressure", "real", "Pa", "pressure of the air around the ball", (), 0.0, 100000000.0),
     Key("", "ball", "heat_capacity_ratio", "real", "", "ratio of specific heats of the enclosed gas", (), 1.0, 2.0),
     Key("modes", "modes", "count", "whole", "", "number of elastic free modes", (), 1.0, 100.0, True),
-    Key("modes", "mesh", "radial_elements", "whole", "", "elements through the wall", (), 1.0, 64.0, True),
-    Key("modes", "mesh", "polar_elements", "whole", "", "elements from pole to pole", (), 8.0, 1024.0, True),
+    Key("modes", "mesh", "radial_elements", "whole", "", "number of elements through the wall", (), 1.0, 64.0, True),
+    Key("modes", "mesh", "polar_elements", "whole", "", "number of elements from pole to pole", (), 8.0, 1024.0, True),
     Key("compression", "compression", "max_deflection", "real", "m", "maximum approach of the plates", (), 1e-15, 10.0),
-    Key("compression", "compression", "points", "whole", "", "points of the curve, the undeformed ball included", (), 2.0, 10000.0, True),
-    Key("compression", "compression", "gas", "choice", "", "gas in the ball: leaves by the hole, or is sealed in", ('vented', 'isothermal', 'adiabatic')),
-    Key("", "drop", "height", "real", "m", "height of the ball's lowest point over the floor", (), 1e-12, 1000000.0),
+    Key("compression", "compression", "points", "whole", "", "number of points of the curve, including the undeformed ball", (), 2.0, 10000.0, True),
+    Key("compression", "compression", "gas", "choice", "", "gas in the ball: leaves through the hole (vented), or is sealed in", ('vented', 'isothermal', 'adiabatic')),
+    Key("", "drop", "height", "real", "m", "height of the ball's lowest point above the floor", (), 1e-12, 1000000.0),
     Key("", "drop", "gravity", "real", "m/s2", "acceleration of free fall", (), 1e-12, 1000.0),
     Key("", "model", "name", "choice", "", "source model", ('hollow_sphere', 'modal_ball', 'finite_element', 'measured_modes', 'hunt_crossley', 'two_mass')),
-    Key("hollow_sphere", "hollow_sphere", "momentum_flux", "choice", "", "momentum of wall that enters or leaves the flat cap", ('momentum_balance', 'retarding', 'conservative', 'none')),
-    Key("modal_ball", "modal_ball", "harmonics", "whole", "", "highest harmonic whose modes oscillate", (), 2.0, 200.0, True),
-    Key("modal_ball", "modal_ball", "radial_modes", "whole", "", "modes of each harmonic that oscillate", (), 1.0, 20.0, True),
-    Key("modal_ball", "modal_ball", "static_harmonics", "whole", "", "highest harmonic whose static flexibility counts", (), 4.0, 400.0, True),
-    Key("modal_ball", "modal_ball", "rings", "whole", "", "rings of the surface, from the lowest point to 60 degrees", (), 2.0, "static_harmonics/3", True),
-    Key("modal_ball", "modal_ball", "damping_law", "choice", "", "loss factor against frequency", ('constant', 'rising', 'fractional')),
+    Key("hollow_sphere", "hollow_sphere", "momentum_flux", "choice", "", "term for the momentum of wall that enters or leaves the flat cap", ('momentum_balance', 'retarding', 'conservative', 'none')),
+    Key("modal_ball", "modal_ball", "harmonics", "whole", "", "highest harmonic with oscillating modes", (), 2.0, 200.0, True),
+    Key("modal_ball", "modal_ball", "radial_modes", "whole", "", "number of oscillating modes per harmonic", (), 1.0, 20.0, True),
+    Key("modal_ball", "modal_ball", "static_harmonics", "whole", "", "highest harmonic whose static flexibility is included", (), 4.0, 400.0, True),
+    Key("modal_ball", "modal_ball", "rings", "whole", "", "number of rings on the surface, from the lowest point to 60 degrees", (), 2.0, "static_harmonics/3", True),
+    Key("modal_ball", "modal_ball", "damping_law", "choice", "", "damping law: loss factor as a function of frequency", ('constant', 'rising', 'fractional')),
     Key("modal_ball", "modal_ball", "loss_factor", "real", "", "loss factor, twice the damping ratio", (), 0.0, 1.9),
-    Key("modal_ball", "modal_ball", "loss_frequency", "real", "Hz", "frequency of a loss factor that is not constant; of fractional also of the modulus", (), 0.1, 100000.0),
-    Key("modal_ball", "modal_ball", "fractional_order", "real", "", "order of the derivative, of fractional; 1: rising", (), 0.0, 1.0),
-    Key("modal_ball", "modal_ball", "cavity_gas", "flag", "", "the gas in the cavity resists changes of its volume"),
-    Key("modal_ball", "modal_ball", "contact_gravity", "flag", "", "gravity acts during the contact too"),
+    Key("modal_ball", "modal_ball", "loss_frequency", "real", "Hz", "frequency at which loss_factor (rising, fractional) and the modulus (fractional) apply", (), 0.1, 100000.0),
+    Key("modal_ball", "modal_ball", "fractional_order", "real", "", "order of the derivative, for fractional; 1: as rising", (), 0.0, 1.0),
+    Key("modal_ball", "modal_ball", "cavity_gas", "flag", "", "the gas in the cavity resists volume changes"),
+    Key("modal_ball", "modal_ball", "contact_gravity", "flag", "", "gravity acts also during the contact"),
     Key("modal_ball", "modal_ball", "floor_friction", "choice", "", "friction of the floor: none or infinite (sticking)", ('none', 'stick')),
     Key("modal_ball", "modal_ball", "static_families", "list", "", "harmonics treated as quasi-static", (), 0.0, "harmonics", True),
-    Key("finite_element", "finite_element", "bounces", "whole", "", "contacts to be followed", (), 1.0, 100.0, True),
-    Key("finite_element", "finite_element", "flight_before", "real", "s", "free flight before first touch", (), 0.0, 1.0),
-    Key("finite_element", "finite_element", "flight_after", "real", "s", "free flight after the last contact", (), 0.0, 10.0),
-    Key("finite_element", "finite_element", "step_safety", "real", "", "time step over stability limit", (), 0.01, 0.98),
-    Key("finite_element", "mesh", "radial_elements", "whole", "", "elements through the wall", (), 1.0, 64.0, True),
-    Key("finite_element", "mesh", "polar_elements", "whole", "", "elements from pole to pole", (), 8.0, 1024.0, True),
+    Key("finite_element", "finite_element", "bounces", "whole", "", "number of contacts to compute", (), 1.0, 100.0, True),
+    Key("finite_element", "finite_element", "flight_before", "real", "s", "duration of free flight before first touch", (), 0.0, 1.0),
+    Key("finite_element", "finite_element", "flight_after", "real", "s", "duration of free flight after the last contact", (), 0.0, 10.0),
+    Key("finite_element", "finite_element", "step_safety", "real", "", "time step divided by the stability limit", (), 0.01, 0.98),
+    Key("finite_element", "mesh", "radial_elements", "whole", "", "number of elements through the wall", (), 1.0, 64.0, True),
+    Key("finite_element", "mesh", "polar_elements", "whole", "", "number of elements from pole to pole", (), 8.0, 1024.0, True),
     Key("finite_element", "material", "law", "choice", "", "law of elasticity", ('neo_hookean', 'mooney_rivlin')),
-    Key("finite_element", "material", "mooney_share", "real", "", "second-invariant fraction of the shear modulus, of mooney_rivlin", (), 0.0, 1.0),
-    Key("finite_element", "material", "bulk_ratio", "real", "", "maximum bulk modulus over shear modulus; less where Poisson's ratio says so", (), 2.0, 100000.0),
+    Key("finite_element", "material", "mooney_share", "real", "", "second-invariant fraction of the shear modulus, for mooney_rivlin", (), 0.0, 1.0),
+    Key("finite_element", "material", "bulk_ratio", "real", "", "maximum ratio of bulk to shear modulus; lower if Poisson's ratio implies a lower one", (), 2.0, 100000.0),
     Key("finite_element", "material", "viscosity", "choice", "", "law of viscosity", ('none', 'kelvin_voigt', 'fractional', 'constant_loss', 'prony')),
-    Key("finite_element", "material", "loss_factor", "real", "", "loss factor at loss_frequency, of kelvin_voigt, fractional; over 10 to 1000 Hz, of constant_loss", (), 0.0, 1.0),
-    Key("finite_element", "material", "loss_frequency", "real", "Hz", "where the ball's modulus is the storage modulus", (), 1.0, 10000.0),
-    Key("finite_element", "material", "fractional_order", "real", "", "order of the derivative, of fractional; 1: kelvin_voigt", (), 0.0, 1.0),
-    Key("finite_element", "material", "prony_share", "list", "", "moduli over the long-term modulus, of prony", (), 0.0, 1000.0),
-    Key("finite_element", "material", "prony_time", "list", "s", "relaxation times, of prony", (), 0.0, 1000.0),
+    Key("finite_element", "material", "loss_factor", "real", "", "loss factor: at loss_frequency (kelvin_voigt, fractional), or from 10 to 1000 Hz (constant_loss)", (), 0.0, 1.0),
+    Key("finite_element", "material", "loss_frequency", "real", "Hz", "frequency at which the ball's modulus is the storage modulus", (), 1.0, 10000.0),
+    Key("finite_element", "material", "fractional_order", "real", "", "order of the derivative, for fractional; 1: as kelvin_voigt", (), 0.0, 1.0),
+    Key("finite_element", "material", "prony_share", "list", "", "moduli of the branches divided by the long-term modulus, for prony", (), 0.0, 1000.0),
+    Key("finite_element", "material", "prony_time", "list", "s", "relaxation times of the branches, for prony", (), 0.0, 1000.0),
     Key("finite_element", "contact", "friction", "real", "", "coefficient of friction between ball and floor", (), 0.0, 100.0),
-    Key("finite_element", "contact", "layer_stiffness", "real", "N/m3", "stiffness per area of a thin layer on the floor; 0: none, the floor is hard", (), 0.0, 10000000000000.0),
+    Key("finite_element", "contact", "layer_stiffness", "real", "N/m3", "stiffness per area of a thin layer on the floor; 0: hard floor without a layer", (), 0.0, 10000000000000.0),
     Key("finite_element", "output", "snapshot_interval", "real", "s", "time between snapshots of the deformed ball; 0: none", (), 0.0, 10.0),
     Key("measured_modes", "measured_modes", "frequency", "list", "Hz", "natural frequencies of the ball on the floor", (), 0.001, 1000000.0),
     Key("measured_modes", "measured_modes", "damping_ratio", "list", "", "damping ratios, one per mode", (), 0.0, 1.0),
     Key("measured_modes", "measured_modes", "effective_mass", "list", "kg", "effective masses, one per mode", (), 1e-12, 1000000.0),
     Key("measured_modes", "measured_modes", "allow_mass_mismatch", "flag", "", "effective masses need not add up to the mass of the ball"),
-    Key("hunt_crossley", "hunt_crossley", "stiffness", "real", "", "stiffness, N/m^exponent; 0: from contact_time", (), 0.0, 1000000000000000.0),
+    Key("hunt_crossley", "hunt_crossley", "stiffness", "real", "", "contact stiffness, N/m^exponent; 0: derived from contact_time", (), 0.0, 1000000000000000.0),
     Key("hunt_crossley", "hunt_crossley", "contact_time", "real", "s", "target contact time; 0: derived from stiffness", (), 0.0, 10.0),
-    Key("hunt_crossley", "hunt_crossley", "exponent", "real", "", "exponent of the deflection", (), 1.0, 5.0),
-    Key("hunt_crossley", "hunt_crossley", "damping", "real", "s/m", "damping alpha; 0: from restitution", (), 0.0, 100.0),
-    Key("hunt_crossley", "hunt_crossley", "restitution", "real", "", "wanted coefficient of restitution; 0: from damping", (), 0.0, 1.0),
+    Key("hunt_crossley", "hunt_crossley", "exponent", "real", "", "exponent of the deflection in the contact force", (), 1.0, 5.0),
+    Key("hunt_crossley", "hunt_crossley", "damping", "real", "s/m", "damping coefficient alpha; 0: derived from restitution", (), 0.0, 100.0),
+    Key("hunt_crossley", "hunt_crossley", "restitution", "real", "", "target coefficient of restitution; 0: derived from damping", (), 0.0, 1.0),
     Key("two_mass", "two_mass", "belt_mass", "real", "kg", "mass of belt and tread, less than the mass of the source", (), 0.0, 1000000.0),
     Key("two_mass", "two_mass", "inflation_pressure", "real", "Pa", "inflation pressure", (), 0.0, 100000000.0),
-    Key("two_mass", "two_mass", "contact_width", "real", "m", "contact area over deflection of the patch", (), 0.0, 100.0),
-    Key("two_mass", "two_mass", "carcass_stiffness", "real", "N/m", "force of the carcass over its deflection at 20 mm", (), 0.0, 1000000000000.0),
-    Key("two_mass", "two_mass", "carcass_exponent", "real", "", "exponent of the deflection of the carcass", (), 1.5, 5.0),
-    Key("two_mass", "two_mass", "contact_damping", "real", "s/m", "damping of the contact over its elastic force and velocity", (), 0.0, 100.0),
-    Key("two_mass", "two_mass", "belt_frequency", "real", "Hz", "natural frequency of the belt on the sidewall, the rim held", (), 0.0, 1000000.0),
-    Key("two_mass", "two_mass", "belt_damping", "real", "", "damping ratio of the same motion", (), 0.0, 10.0),
+    Key("two_mass", "two_mass", "contact_width", "real", "m", "contact area divided by deflection of the contact patch", (), 0.0, 100.0),
+    Key("two_mass", "two_mass", "carcass_stiffness", "real", "N/m", "force of the carcass divided by its deflection, at 20 mm", (), 0.0, 1000000000000.0),
+    Key("two_mass", "two_mass", "carcass_exponent", "real", "", "exponent of the deflection in the force of the carcass", (), 1.5, 5.0),
+    Key("two_mass", "two_mass", "contact_damping", "real", "s/m", "damping force of the contact divided by elastic force and velocity", (), 0.0, 100.0),
+    Key("two_mass", "two_mass", "belt_frequency", "real", "Hz", "natural frequency of the belt on the sidewall with fixed rim", (), 0.0, 1000000.0),
+    Key("two_mass", "two_mass", "belt_damping", "real", "", "damping ratio of the belt on the sidewall with fixed rim", (), 0.0, 10.0),
     Key("", "sampling", "sample_rate", "real", "Hz", "samples per second", (), 2000.0, 10000000.0),
-    Key("", "sampling", "duration", "real", "s", "length of the record from first touch", (), 0.001, 10.0),
+    Key("", "sampling", "duration", "real", "s", "duration of the record from first touch", (), 0.001, 10.0),
     Key("", "sampling", "substeps", "whole", "", "integration steps per sampling interval", (), 1.0, 10000.0, True),
-    Key("", "levels", "method", "choice", "", "method of the levels", ('exact', 'fft')),
+    Key("", "levels", "method", "choice", "", "method of computing the levels", ('exact', 'fft')),
     Key("", "levels", "bands", "choice", "", "bands of levels.csv", ('octave', 'third', 'both')),
-    Key("", "levels", "force", "choice", "", "assessed force: levels, peak force and verdict are of it", ('floor', 'elastic')),
+    Key("", "levels", "force", "choice", "", "assessed force, for which levels, peak force and verdict are reported", ('floor', 'elastic')),
     Key("", "limits", "source", "choice", "", "source whose limits apply", ('rubber_ball', 'tyre')),
     Key("floor", "floor", "name", "choice", "", "floor under the source", ('rigid', 'infinite_plate', 'oscillator', 'plate', 'floating_floor', 'joist_floor', 'measured_mobility')),
-    Key("infinite_plate", "infinite_plate", "resistance", "real", "N s/m", "force over velocity", (), 1.0, 1000000000000000.0),
-    Key("oscillator", "oscillator", "mass", "real", "kg", "mass that moves under the source", (), 0.001, 1000000000000.0),
-    Key("oscillator", "oscillator", "stiffness", "real", "N/m", "stiffness of its support", (), 0.0, 1000000000000000.0),
-    Key("oscillator", "oscillator", "damping", "real", "N s/m", "damping of its support", (), 0.0, 1000000000000.0),
+    Key("infinite_plate", "infinite_plate", "resistance", "real", "N s/m", "driving-point resistance: force divided by velocity", (), 1.0, 1000000000000000.0),
+    Key("oscillator", "oscillator", "mass", "real", "kg", "moving mass under the source", (), 0.001, 1000000000000.0),
+    Key("oscillator", "oscillator", "stiffness", "real", "N/m", "stiffness of the support", (), 0.0, 1000000000000000.0),
+    Key("oscillator", "oscillator", "damping", "real", "N s/m", "damping coefficient of the support", (), 0.0, 1000000000000.0),
     Key("plate", "plate", "length", "real", "m", "length of the floor", (), 0.5, 100.0),
     Key("plate", "plate", "width", "real", "m", "width of the floor", (), 0.5, 100.0),
     Key("plate", "plate", "thickness", "real", "m", "thickness of the floor", (), 0.001, 2.0),
     Key("plate", "plate", "density", "real", "kg/m3", "density of the floor", (), 10.0, 20000.0),
     Key("plate", "plate", "wave_speed", "real", "m/s", "speed of longitudinal waves in the floor", (), 100.0, 10000.0),
-    Key("plate", "plate", "stiffness_ratio", "real", "", "bending stiffness along the width over that along the length", (), 0.0001, 10000.0),
-    Key("plate", "plate", "torsion_ratio", "real", "", "twisting stiffness over the geometric mean of both bending stiffnesses", (), 0.0, 1.0),
+    Key("plate", "plate", "stiffness_ratio", "real", "", "ratio of the bending stiffness along the width to that along the length", (), 0.0001, 10000.0),
+    Key("plate", "plate", "torsion_ratio", "real", "", "ratio of the twisting stiffness to the geometric mean of both bending stiffnesses", (), 0.0, 1.0),
     Key("plate", "plate", "loss_factor", "real", "", "internal loss factor of the floor", (), 0.0, 1.0),
     Key("plate", "plate", "edges", "choice", "", "losses at the edges of the floor", ('laboratory', 'absorption')),
-    Key("plate", "plate", "edge_absorption", "real", "m", "sum of lengths times absorption coefficients of the edges, of absorption", (), 0.0, 1000.0),
+    Key("plate", "plate", "edge_absorption", "real", "m", "sum of edge lengths times absorption coefficients, for absorption", (), 0.0, 1000.0),
     Key("plate", "plate", "source_x", "real", "", "relative source position along the length", (), 0.0, 1.0),
     Key("plate", "plate", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
-    Key("plate", "plate", "point_x", "list", "m", "positions of further points along the length", (), 0.0, 1000.0),
-    Key("plate", "plate", "point_y", "list", "m", "their positions along the width", (), 0.0, 1000.0),
+    Key("plate", "plate", "point_x", "list", "m", "positions along the length of points whose velocity is computed", (), 0.0, 1000.0),
+    Key("plate", "plate", "point_y", "list", "m", "positions of these points along the width", (), 0.0, 1000.0),
     Key("floating_floor", "floating_floor", "length", "real", "m", "length of the floor", (), 0.5, 100.0),
     Key("floating_floor", "floating_floor", "width", "real", "m", "width of the floor", (), 0.5, 100.0),
     Key("floating_floor", "floating_floor", "thickness", "real", "m", "thickness of the floor", (), 0.001, 2.0),
     Key("floating_floor", "floating_floor", "density", "real", "kg/m3", "density of the floor", (), 10.0, 20000.0),
     Key("floating_floor", "floating_floor", "wave_speed", "real", "m/s", "speed of longitudinal waves in the floor", (), 100.0, 10000.0),
-    Key("floating_floor", "floating_floor", "stiffness_ratio", "real", "", "bending stiffness along the width over that along the length", (), 0.0001, 10000.0),
-    Key("floating_floor", "floating_floor", "torsion_ratio", "real", "", "twisting stiffness over the geometric mean of both bending stiffnesses", (), 0.0, 1.0),
+    Key("floating_floor", "floating_floor", "stiffness_ratio", "real", "", "ratio of the bending stiffness along the width to that along the length", (), 0.0001, 10000.0),
+    Key("floating_floor", "floating_floor", "torsion_ratio", "real", "", "ratio of the twisting stiffness to the geometric mean of both bending stiffnesses", (), 0.0, 1.0),
     Key("floating_floor", "floating_floor", "loss_factor", "real", "", "internal loss factor of the floor", (), 0.0, 1.0),
     Key("floating_floor", "floating_floor", "edges", "choice", "", "losses at the edges of the floor", ('laboratory', 'absorption')),
-    Key("floating_floor", "floating_floor", "edge_absorption", "real", "m", "sum of lengths times absorption coefficients of the edges, of absorption", (), 0.0, 1000.0),
+    Key("floating_floor", "floating_floor", "edge_absorption", "real", "m", "sum of edge lengths times absorption coefficients, for absorption", (), 0.0, 1000.0),
     Key("floating_floor", "floating_floor", "screed_thickness", "real", "m", "thickness of the floating plate", (), 0.003, 0.5),
     Key("floating_floor", "floating_floor", "screed_density", "real", "kg/m3", "density of the floating plate", (), 10.0, 20000.0),
     Key("floating_floor", "floating_floor", "screed_wave_speed", "real", "m/s", "speed of longitudinal waves in the floating plate", (), 100.0, 10000.0),
     Key("floating_floor", "floating_floor", "screed_loss_factor", "real", "", "loss factor of the floating plate", (), 0.0, 1.0),
-    Key("floating_floor", "floating_floor", "layer_stiffness", "real", "N/m3", "dynamic stiffness of the resilient layer over area (ISO 9052-1)", (), 10000.0, 1000000000000.0),
+    Key("floating_floor", "floating_floor", "layer_stiffness", "real", "N/m3", "dynamic stiffness of the resilient layer per unit area (ISO 9052-1)", (), 10000.0, 1000000000000.0),
     Key("floating_floor", "floating_floor", "layer_loss_factor", "real", "", "loss factor of the resilient layer", (), 0.0, 1.0),
     Key("floating_floor", "floating_floor", "source_x", "real", "", "relative source position along the length", (), 0.0, 1.0),
     Key("floating_floor", "floating_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
-    Key("floating_floor", "floating_floor", "point_x", "list", "m", "positions of further points along the length", (), 0.0, 1000.0),
-    Key("floating_floor", "floating_floor", "point_y", "list", "m", "their positions along the width", (), 0.0, 1000.0),
+    Key("floating_floor", "floating_floor", "point_x", "list", "m", "positions along the length of points whose velocity is computed", (), 0.0, 1000.0),
+    Key("floating_floor", "floating_floor", "point_y", "list", "m", "positions of these points along the width", (), 0.0, 1000.0),
     Key("joist_floor", "joist_floor", "length", "real", "m", "span of the joists", (), 0.5, 100.0),
     Key("joist_floor", "joist_floor", "width", "real", "m", "width of the floor across the joists", (), 0.5, 100.0),
     Key("joist_floor", "joist_floor", "sheathing_thickness", "real", "m", "thickness of the sheathing", (), 0.003, 0.3),
     Key("joist_floor", "joist_floor", "sheathing_density", "real", "kg/m3", "density of the sheathing", (), 10.0, 20000.0),
     Key("joist_floor", "joist_floor", "sheathing_modulus", "real", "Pa", "modulus of elasticity of the sheathing in bending", (), 10000000.0, 1000000000000.0),
-    Key("joist_floor", "joist_floor", "spacing", "real", "m", "distance between the axes of two joists", (), "joist_width", "width"),
+    Key("joist_floor", "joist_floor", "spacing", "real", "m", "distance between the axes of adjacent joists", (), "joist_width", "width"),
     Key("joist_floor", "joist_floor", "joist_width", "real", "m", "width of a joist", (), 0.005, 1.0),
     Key("joist_floor", "joist_floor", "joist_height", "real", "m", "height of a joist", (), 0.01, 2.0),
     Key("joist_floor", "joist_floor", "joist_density", "real", "kg/m3", "density of the joists", (), 10.0, 20000.0),
     Key("joist_floor", "joist_floor", "joist_modulus", "real", "Pa", "modulus of elasticity of the joists", (), 10000000.0, 1000000000000.0),
-    Key("joist_floor", "joist_floor", "connection", "real", "", "composite action of sheathing and joists, from 0, loose, to 1, glued (EN 1995-1-1 annex B)", (), 0.0, 1.0),
-    Key("joist_floor", "joist_floor", "loss_factor", "real", "", "loss factor of the floor and its edges, without radiation", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "connection", "real", "", "composite action of sheathing and joists, 0 (loose) to 1 (glued), EN 1995-1-1 annex B", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "loss_factor", "real", "", "loss factor of the floor including its edges, without radiation", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_x", "real", "", "relative source position along the length", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_on", "choice", "", "impact location: sheathing between joists, or a joist", ('sheathing', 'joist')),
-    Key("joist_floor", "joist_floor", "point_x", "list", "m", "positions of further points along the length", (), 0.0, 1000.0),
-    Key("joist_floor", "joist_floor", "point_y", "list", "m", "their positions along the width", (), 0.0, 1000.0),
-    Key("measured_mobility", "measured_mobility", "direct", "real", "m/(N s)", "mobility at high frequencies", (), 0.0, 1000.0),
-    Key("measured_mobility", "measured_mobility", "pole_frequency", "list", "Hz", "magnitudes of the poles over 2 pi", (), 1e-06, 10000000.0),
-    Key("measured_mobility", "measured_mobility", "damping_ratio", "list", "", "damping ratios of the poles, 1 of a real pole", (), 1e-12, 1.0),
-    Key("measured_mobility", "measured_mobility", "residue_real", "list", "m/(N s2)", "real parts of the residues, of a pair of poles doubled", (), -1000000000000.0, 1000000000000.0),
-    Key("measured_mobility", "measured_mobility", "residue_imaginary", "list", "m/(N s2)", "imaginary parts of the residues", (), -1000000000000.0, 1000000000000.0),
-    Key("measured_mobility", "measured_mobility", "lowest_frequency", "real", "Hz", "first frequency of the measurement", (), 0.0, "highest_frequency"),
-    Key("measured_mobility", "measured_mobility", "highest_frequency", "real", "Hz", "last frequency of the measurement", (), 0.0, 10000000.0),
+    Key("joist_floor", "joist_floor", "point_x", "list", "m", "positions along the length of points whose velocity is computed", (), 0.0, 1000.0),
+    Key("joist_floor", "joist_floor", "point_y", "list", "m", "positions of these points along the width", (), 0.0, 1000.0),
+    Key("measured_mobility", "measured_mobility", "direct", "real", "m/(N s)", "limit of the mobility at high frequencies", (), 0.0, 1000.0),
+    Key("measured_mobility", "measured_mobility", "pole_frequency", "list", "Hz", "magnitudes of the poles divided by 2 pi", (), 1e-06, 10000000.0),
+    Key("measured_mobility", "measured_mobility", "damping_ratio", "list", "", "damping ratios of the poles; 1 for a real pole", (), 1e-12, 1.0),
+    Key("measured_mobility", "measured_mobility", "residue_real", "list", "m/(N s2)", "real parts of the residues, doubled for a pair of poles", (), -1000000000000.0, 1000000000000.0),
+    Key("measured_mobility", "measured_mobility", "residue_imaginary", "list", "m/(N s2)", "imaginary parts of the residues, doubled for a pair of poles", (), -1000000000000.0, 1000000000000.0),
+    Key("measured_mobility", "measured_mobility", "lowest_frequency", "real", "Hz", "lowest frequency of the measurement", (), 0.0, "highest_frequency"),
+    Key("measured_mobility", "measured_mobility", "highest_frequency", "real", "Hz", "highest frequency of the measurement", (), 0.0, 10000000.0),
     Key("room", "room", "volume", "real", "m3", "volume of the room", (), 1.0, 100000.0),
     Key("room", "room", "reverberation_time", "real", "s", "reverberation time of the room", (), 0.05, 20.0),
-    Key("room", "room", "reverberation_times", "list", "s", "the same for each one-third-octave band from 50 to 630 Hz", (), 0.05, 20.0),
+    Key("room", "room", "reverberation_times", "list", "s", "reverberation time in each one-third-octave band from 50 to 630 Hz", (), 0.05, 20.0),
     Key("room", "room", "air_density", "real", "kg/m3", "density of the air", (), 0.5, 2.0),
     Key("room", "room", "sound_speed", "real", "m/s", "speed of sound in the air", (), 200.0, 500.0),
     Key("room", "room", "wall_lengths", "list", "m", "lengths of the flanking walls along the floor (default: no walls)", (), 0.1, 100.0),
@@ -1096,9 +1101,9 @@ KEYS = (
     Key("room", "room", "wall_density", "real", "kg/m3", "density of the walls", (), 10.0, 20000.0),
     Key("room", "room", "wall_wave_speed", "real", "m/s", "speed of longitudinal waves in the walls", (), 100.0, 10000.0),
     Key("room", "room", "wall_loss_factor", "real", "", "internal loss factor of the walls", (), 0.0, 1.0),
-    Key("room", "room", "wall_junction", "choice", "", "junction of floor and walls: rigid cross or t, or one of a given index", ('cross', 't', 'index')),
-    Key("room", "room", "junction_index", "real", "dB", "vibration reduction index from floor to wall, of the junction index", (), -10.0, 80.0),
-    Key("room", "room", "ceiling_mass", "real", "kg/m2", "mass of a suspended ceiling over its area; 0: none", (), 0.0, 200.0),
-    Key("room", "room", "ceiling_depth", "real", "m", "depth of the air above the ceiling", (), 0.01, 2.0),
+    Key("room", "room", "wall_junction", "choice", "", "junction of floor and walls: rigid cross or T, or described by junction_index", ('cross', 't', 'index')),
+    Key("room", "room", "junction_index", "real", "dB", "vibration reduction index from floor to wall, for wall_junction index", (), -10.0, 80.0),
+    Key("room", "room", "ceiling_mass", "real", "kg/m2", "mass per unit area of a suspended ceiling; 0: none", (), 0.0, 200.0),
+    Key("room", "room", "ceiling_depth", "real", "m", "depth of the air cavity above the ceiling", (), 0.01, 2.0),
     Key("room", "room", "ceiling_loss_factor", "real", "", "loss factor of the ceiling cavity", (), 0.001, 1.0),
 )

@@ -43,11 +43,11 @@ def ask(question: str, /, **request: str | bytes | float | NDArray[np.float64]) 
     """
     routine = api.ask_alone if question in _ALONE else api.ask
     packed = _packed(request)
-    while (left := routine(question, *packed))[0] > _INTERRUPTED:
-        api.collect(*left[1:])
+    while (answer := routine(question, *packed))[0] > _INTERRUPTED:
+        api.collect(*answer[1:])
         if threading.current_thread() is not threading.main_thread():
             raise KeyboardInterrupt
-    return _collect(*left)
+    return _collect(*answer)
 
 
 def _packed(

@@ -23,9 +23,9 @@ LARGEST = 10**300
 LARGEST_SEED = 2**32 - 1
 
 
-def refuse(what: str, allowed: str, cause: Exception | None = None) -> NoReturn:
+def refuse(problem: str, allowed: str, cause: Exception | None = None) -> NoReturn:
     """Raise InputError: what is wrong, and what is allowed."""
-    message = f"{what}; allowed: {allowed}"
+    message = f"{problem}; allowed: {allowed}"
     raise InputError(message) from cause
 
 
@@ -131,11 +131,11 @@ def shown(value: object) -> str:
 
 
 def require_words(
-    place: str, words: Iterable[str], known: Iterable[str], also: Iterable[str] = ()
+    label: str, words: Iterable[str], known: Iterable[str], also: Iterable[str] = ()
 ) -> None:
     """Raise InputError for an unknown word; the suggestion may be one of other words too."""
     allowed = list(known)
     for word in words:
         if word not in allowed:
             hint = suggestion(word, [*allowed, *also])
-            refuse(f"{place}: {shown(word)} is not known{hint}", ", ".join(allowed))
+            refuse(f"{label}: {shown(word)} is not known{hint}", ", ".join(allowed))

@@ -51,9 +51,9 @@ def uninterrupted() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    held: list[int] = []
+    pending: list[int] = []
     usual = {
-        number: signal.signal(number, lambda number, _: held.append(number))
+        number: signal.signal(number, lambda number, _: pending.append(number))
         for number in (signal.SIGINT, signal.SIGTERM)
     }
     try:
@@ -61,8 +61,8 @@ def uninterrupted() -> Iterator[None]:
     finally:
         for number, handler in usual.items():
             signal.signal(number, handler)
-        if held:
-            signal.raise_signal(held[0])
+        if pending:
+            signal.raise_signal(pending[0])
 
 
 def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
@@ -166,8 +166,8 @@ class Results:
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         with nullcontext() if self.is_locked else locked(self.folder):
-            held = {content_of(self.folder / name) for name in ("effective.nml", "samples.nml")}
-            if marker not in {None, *held}:
+            inputs = {content_of(self.folder / name) for name in ("effective.nml", "samples.nml")}
+            if marker not in {None, *inputs}:
                 refuse(f"{self.folder} now holds results of another input", "run the case again")
             listed = self._listed()
             new = {n: Entry((checksum(c),), self.command) for n, c in contents.items()}
@@ -268,15 +268,15 @@ def read_input(path: Path) -> bytes:
     return path.read_bytes()
 
 
-def _require_own(found: os.stat_result, part: Path) -> None:
-    _require_regular(found, part)
+def _require_own(status: os.stat_result, part: Path) -> None:
+    _require_regular(status, part)
     # Writing would also change the file of the other name.
-    if found.st_nlink > 1:
+    if status.st_nlink > 1:
         raise OSError(errno.EEXIST, f"{part.name} is a link", str(part))
 
 
-def _require_regular(found: os.stat_result, path: Path) -> None:
-    if not stat.S_ISREG(found.st_mode):
+def _require_regular(status: os.stat_result, path: Path) -> None:
+    if not stat.S_ISREG(status.st_mode):
         raise OSError(errno.EINVAL, f"{path.name} is no regular file", str(path))
 
 
@@ -316,9 +316,9 @@ def read_manifest(folder: Path) -> dict[str, Entry]:
 
 def _manifest(listed: Mapping[str, Entry]) -> bytes:
     lines = [
-        f"{name}\t{one}\t{entry.command}".rstrip("\t")
+        f"{name}\t{digest}\t{entry.command}".rstrip("\t")
         for name, entry in sorted(listed.items())
-        for one in entry.checksums
+        for digest in entry.checksums
     ]
     return "\n".join([HEAD, *lines, ""]).encode("utf-8", "surrogateescape")
 

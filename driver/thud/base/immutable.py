@@ -116,20 +116,20 @@ def _fields(of: object) -> list[object]:
     return [getattr(of, field.name) for field in fields(of) if field.compare]  # type: ignore[arg-type]
 
 
-def _equal(one: Any, other: Any) -> bool:  # noqa: ANN401 - values of any kind
+def _equal(value: Any, other: Any) -> bool:  # noqa: ANN401 - values of any kind
     """Return whether two values are equal, NaN to NaN."""
-    if np.isscalar(one) and np.isscalar(other):
-        return bool(one == other) or bool(one != one and other != other)  # noqa: PLR0124 - NaN
-    if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
-        has_nan = one.dtype.kind in "fc" and other.dtype.kind in "fc"
-        return np.array_equal(one, other, equal_nan=has_nan)
-    if type(one) is not type(other):
+    if np.isscalar(value) and np.isscalar(other):
+        return bool(value == other) or bool(value != value and other != other)  # noqa: PLR0124 - NaN
+    if isinstance(value, np.ndarray) and isinstance(other, np.ndarray):
+        has_nan = value.dtype.kind in "fc" and other.dtype.kind in "fc"
+        return np.array_equal(value, other, equal_nan=has_nan)
+    if type(value) is not type(other):
         return False
-    if isinstance(one, dict):
-        return one.keys() == other.keys() and all(_equal(one[key], other[key]) for key in one)
-    if isinstance(one, tuple):
-        return len(one) == len(other) and all(map(_equal, one, other))
-    return bool(one.equals(other) if hasattr(one, "equals") else one == other)
+    if isinstance(value, dict):
+        return value.keys() == other.keys() and all(_equal(value[key], other[key]) for key in value)
+    if isinstance(value, tuple):
+        return len(value) == len(other) and all(map(_equal, value, other))
+    return bool(value.equals(other) if hasattr(value, "equals") else value == other)
 
 
 def _hashed(value: object) -> object:

@@ -71,20 +71,20 @@ def _names(group: type[Group]) -> list[str]:
     return [option.name for option in fields(group)]  # type: ignore[arg-type]
 
 
-def require_keywords(place: str, given: Collection[str], known: Collection[str]) -> None:
+def require_keywords(label: str, keywords: Collection[str], allowed: Collection[str]) -> None:
     """Raise InputError for an unknown keyword; name the classes that have it."""
-    unknown = [word for word in given if word not in known]
+    unknown = [word for word in keywords if word not in allowed]
     if not unknown:
         return
     for word in unknown:
-        if owners := [one.__name__ for one in Group.__subclasses__() if word in _names(one)]:
+        if owners := [group.__name__ for group in Group.__subclasses__() if word in _names(group)]:
             refuse(
-                f"{place}: {word!r} is a key of {' and '.join(owners)}",
-                " or ".join(f"{one}({word}=...)" for one in owners),
+                f"{label}: {word!r} is a key of {' and '.join(owners)}",
+                " or ".join(f"{group}({word}=...)" for group in owners),
             )
     groups = Group.__subclasses__()
-    also = [word for one in groups for word in (one.__name__.lower(), *_names(one))]
-    require_words(place, given, known, also)
+    also = [word for group in groups for word in (group.__name__.lower(), *_names(group))]
+    require_words(label, keywords, allowed, also)
 
 
 def check_keywords(function: Callable[P, R]) -> Callable[P, R]:

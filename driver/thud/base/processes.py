@@ -24,12 +24,12 @@ def process_pool(
     """Open a pool of processes that call `prepare` first; an interrupt ends their work."""
     # Forked processes would inherit locks of threads that they do not have.
     context = get_context("spawn")
-    end, held = context.Pipe(duplex=False)
-    with end, held, ProcessPoolExecutor(width, context, _start, (end, prepare)) as processes:
+    end, release = context.Pipe(duplex=False)
+    with end, release, ProcessPoolExecutor(width, context, _start, (end, prepare)) as processes:
         try:
             yield processes
         except KeyboardInterrupt:
-            held.close()
+            release.close()
             raise
 
 

@@ -39,16 +39,16 @@ DISPLAY_UNITS = {
 }
 
 
-def power_of(unit: object, key_unit: str, place: str) -> int:
+def power_of(unit: object, key_unit: str, label: str) -> int:
     """Return the power of ten that converts a unit to that of a key.
 
-    Raise InputError where the unit does not fit; `place` names it in the message.
+    Raise InputError where the unit does not fit; `label` names it in the message.
     """
     # Other units have no multiples.
     multiples = MULTIPLES.get(key_unit, {key_unit: 0})
     if not isinstance(unit, str) or unit not in multiples:
         hint = suggestion(unit, multiples)
-        refuse(f"{place}: unit {shown(unit)} does not fit{hint}", ", ".join(multiples))
+        refuse(f"{label}: unit {shown(unit)} does not fit{hint}", ", ".join(multiples))
     return multiples[unit]
 
 

@@ -66,8 +66,8 @@ def new_model(model: str | ModelOptions, options: Mapping[str, object]) -> Model
     """Return the options of a model by its name; raise InputError where one is not known."""
     if isinstance(model, ModelOptions):
         if options:
-            what = f"model is an object of {type(model).__name__} beside {', '.join(options)}"
-            refuse(what, "options in the object, or beside the name of a model")
+            problem = f"model is an object of {type(model).__name__} beside {', '.join(options)}"
+            refuse(problem, "options in the object, or beside the name of a model")
         return model
     require_choice("&model: name", model, MODELS)
     require_keywords(f"&{model}", options, [option.name for option in fields(MODELS[model])])
@@ -165,7 +165,7 @@ class Case(Group, Displayed):
         if self.floor:
             groups["floor"] = {"name": self.floor.name}
             groups |= {self.floor.name: options} if (options := vars(self.floor)) else {}
-        groups |= {group: vars(given) for group in FURTHER if (given := getattr(self, group))}
+        groups |= {group: vars(present) for group in FURTHER if (present := getattr(self, group))}
         namelist = f90nml.Namelist()
         for group, options in groups.items():
             plain = {key: _plain(group, key, value) for key, value in options.items()}
@@ -192,9 +192,9 @@ class Case(Group, Displayed):
             name = content.get("model", {}).get("name", next(iter(MODELS)))
             options = {}
             for option in fields(MODELS[name]):
-                given = content.get(group_of(name, option), {})
-                if option.name in given:
-                    options[option.name] = given[option.name]
+                entries = content.get(group_of(name, option), {})
+                if option.name in entries:
+                    options[option.name] = entries[option.name]
             model = MODELS[name](**_with_lists(options))
         floor = None
         if "floor" in content:

@@ -81,7 +81,7 @@ def find_key(name: str, owners: tuple[str, ...]) -> tuple[Key, int | None]:
     key = known.get(match[1]) if match else None
     if match is None or key is None or (match[2] and key.kind != "list"):
         hint = suggestion(str(name).partition("(")[0], known)
-        groups = ", ".join(dict.fromkeys(f"&{one.group}" for one in known.values()))
+        groups = ", ".join(dict.fromkeys(f"&{entry.group}" for entry in known.values()))
         refuse(
             f"{shown(name)} is not a key of {' and '.join(owners)}{hint}",
             f"keys of {groups}, density and temperature (`thud --keys` lists them)",

@@ -22,7 +22,7 @@ from thud.cli.command import (
     exit_code,
     message_of,
     output,
-    shown_at_once,
+    print_at_once,
 )
 from thud.cli.explore_command import EXPLORE
 from thud.cli.floor_commands import FLOOR, MOBILITY, RATE
@@ -123,23 +123,23 @@ COMMANDS = {
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command with arguments, by default those of this process; return the exit code."""
-    kept = Command._field_defaults["kept"]
+    after_interrupt = Command._field_defaults["after_interrupt"]
     try:
         options = _parse(arguments)
         if isinstance(options, int):
             code = options
         else:
             command = COMMANDS[options.name]
-            kept = command.kept
+            after_interrupt = command.after_interrupt
             folder = getattr(options, "output", None)
             if folder is not None and not folder.strip():
                 message = "--output has no value; allowed: a directory"
                 raise InputError(message)
-            with shown_at_once():
+            with print_at_once():
                 code = command.function(options)
         sys.stdout.flush()
     except KeyboardInterrupt as interrupt:
-        print(f"thud-driver: interrupted; {kept}", file=sys.stderr)
+        print(f"thud-driver: interrupted; {after_interrupt}", file=sys.stderr)
         return INTERRUPTED + next(iter(interrupt.args), signal.SIGINT)
     except (ThudError, OSError) as error:
         if isinstance(error, OSError) and error.filename is None:
@@ -165,11 +165,11 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace | int:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Parser that names the word that was probably meant, and tells of a full or closed output."""
+    """Parser that suggests the word probably meant, and raises if the output is full or closed."""
 
     def error(self, message: str) -> NoReturn:
-        found = re.search(r"(?:invalid choice: '|unrecognized arguments: )([\w-]+)", message)
-        super().error(message + (suggestion(found[1], _words()) if found else ""))
+        match = re.search(r"(?:invalid choice: '|unrecognized arguments: )([\w-]+)", message)
+        super().error(message + (suggestion(match[1], _words()) if match else ""))
 
     def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
         print(message, end="", file=file or sys.stderr)
@@ -177,9 +177,10 @@ class _Parser(argparse.ArgumentParser):
 
 def _words() -> list[str]:
     """Return commands, their options, and the choices of these."""
-    given = [one for command in COMMANDS.values() for one in command.arguments]
-    options = [name for names, _ in given for name in names if name.startswith("--")]
-    return [*COMMANDS, *options, *(word for _, more in given for word in more.get("choices", ()))]
+    arguments = [entry for command in COMMANDS.values() for entry in command.arguments]
+    options = [name for names, _ in arguments for name in names if name.startswith("--")]
+    choices = [choice for _, settings in arguments for choice in settings.get("choices", ())]
+    return [*COMMANDS, *options, *choices]
 
 
 def new_parser() -> argparse.ArgumentParser:
@@ -193,7 +194,7 @@ def new_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"thud {version()}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="name")
     for name, command in COMMANDS.items():
-        one = commands.add_parser(name, help=command.help)
+        subparser = commands.add_parser(name, help=command.help)
         for names, settings in command.arguments:
-            one.add_argument(*names, **settings)
+            subparser.add_argument(*names, **settings)
     return parser

@@ -126,11 +126,11 @@ def compare_cases(options: argparse.Namespace) -> int:
 
     results = results_of(options, "comparison", options.cases)
     results.require(f"comparison{ending}" for ending in PAGE)
-    found = comparison.read_all(options.cases)
+    items = comparison.read_all(options.cases)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PlausibilityWarning)
         page = comparison.compare(
-            found,
+            items,
             options.force,
             options.source,
             progress=not options.quiet and sys.stderr.isatty(),
@@ -192,7 +192,7 @@ def _read_source(path: str, config: str | None) -> ImpactResult:
     from thud.recordings.formats import FORMATS
     from thud.recordings.read_recording import read_recording
 
-    endings = {ending for one in FORMATS for ending in one.suffixes}
+    endings = {ending for file_format in FORMATS for ending in file_format.suffixes}
     if os.path.splitext(path)[1].lower() in endings:  # noqa: PTH122 - may hold a zero byte
         return read_recording(path, config=config)
     if config is not None:
@@ -204,7 +204,10 @@ EXPORT = Command(
     "write the blocked force of a case or a recording for other programs",
     (
         argument("source", metavar="CASE.nml|RECORDING", help="namelist file, or recording"),
-        *(argument(f"--{kind}", action="store_true", help=what) for kind, what in KINDS.items()),
+        *(
+            argument(f"--{kind}", action="store_true", help=meaning)
+            for kind, meaning in KINDS.items()
+        ),
         *output("the files (default: outputs/export)"),
         argument("--rate", type=float, metavar="HZ", help="resample to this rate"),
         argument("--drop", type=int, default=1, help="drop of a recording (default: 1)"),

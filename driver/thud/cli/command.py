@@ -28,13 +28,13 @@ Argument = tuple[tuple[str, ...], dict[str, Any]]
 
 
 class Command(NamedTuple):
-    """A row of the table of commands; `kept` is the message on results after an interrupt."""
+    """A command; `after_interrupt` says what an interrupt leaves of its results."""
 
     help: str
     arguments: tuple[Argument, ...]
     # Returns the exit code.
     function: Callable[[argparse.Namespace], int]
-    kept: str = "finished results are kept"
+    after_interrupt: str = "finished results are kept"
 
 
 def argument(*names: str, **settings: object) -> Argument:
@@ -86,16 +86,16 @@ def print_notes(warnings: Iterable[object]) -> None:
 
 
 @contextmanager
-def shown_at_once() -> Iterator[None]:
-    """Print warnings of reports and locks as warnings, at once: the work may go on."""
+def print_at_once() -> Iterator[None]:
+    """Print warnings of reports and locks at once, while the work goes on."""
     usual = warnings.showwarning
     kinds = ReportWarning, LockWarning
 
-    def show(warning: Any, kind: type[Warning], *place: Any) -> None:  # noqa: ANN401 - of any warning
+    def show(warning: Any, kind: type[Warning], *origin: Any) -> None:  # noqa: ANN401 - of any warning
         if issubclass(kind, kinds):
             print_notes([warning])
         else:
-            usual(warning, kind, *place)
+            usual(warning, kind, *origin)
 
     with warnings.catch_warnings():
         for kind in kinds:

@@ -42,7 +42,7 @@ def measure(options: argparse.Namespace) -> int:
     files.require(recording_files.file_names(figures=figures))
     folder = files.folder
     # Drops stay until the results are written.
-    with Checkpoint(folder) as kept:
+    with Checkpoint(folder) as checkpoint:
         recording = read_recording(
             options.drops,
             height=options.height,
@@ -60,7 +60,7 @@ def measure(options: argparse.Namespace) -> int:
             config=options.config,
             progress=not options.quiet and sys.stderr.isatty(),
             workers=len(os.sched_getaffinity(0)) if options.workers is None else options.workers,
-            checkpoint=kept,
+            checkpoint=checkpoint,
         )
         verdict = recording.assess()
         recording_files.save(recording, files, figures=figures)
@@ -72,10 +72,10 @@ def measure(options: argparse.Namespace) -> int:
         print()
         print(format_rows(recording_files.table(recording)))
         print()
-        for step in (*recording_files.sentences(recording, "steps"), *recording.level_steps):
+        for step in (*recording_files.messages(recording, "steps"), *recording.level_steps):
             print(f"  {step}")
         print(f"  {recording_files.verdict_text(recording)}")
-    messages = recording_files.sentences(recording, "warnings")
+    messages = recording_files.messages(recording, "warnings")
     print_notes((*recording.own_warnings, *recording.outliers, *messages))
     if not options.quiet:
         print(f"Results: {folder}")

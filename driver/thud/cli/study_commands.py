@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 _STUDY = argument("study", metavar="STUDY.toml", help="study file")
 _SAMPLES = (
-    argument("--yes", action="store_true", help="start without limit to the number of samples"),
+    argument("--yes", action="store_true", help="allow any number of samples"),
     argument(
         "--backend",
         choices=("threads", "processes", "dask"),
@@ -33,7 +33,7 @@ _SAMPLES = (
 
 
 def study_commands() -> dict[str, Command]:
-    """Return the commands of all kinds of studies."""
+    """Return the command of each kind of study."""
     return {
         name: Command(
             entry.help,
@@ -49,7 +49,9 @@ def study_commands() -> dict[str, Command]:
                 QUIET,
             ),
             run_study,
-            Command._field_defaults["kept"] if entry.has_samples else "nothing is written",
+            Command._field_defaults["after_interrupt"]
+            if entry.has_samples
+            else "nothing is written",
         )
         for name, entry in KINDS.items()
     }

@@ -63,7 +63,7 @@ class Comparison(Displayed, Page):
 
     @property
     def warnings(self) -> list[str]:
-        """What is possible but not plausible, or doubtful, with the names of the impacts."""
+        """Warnings of all impacts, each after the name of its impact."""
         return [f"{name}: {warning}" for name, i in self.impacts.items() for warning in i.warnings]
 
     def __repr__(self) -> str:
@@ -201,30 +201,30 @@ def compare(
     named = _named(impacts)
     solved: dict[str, ImpactResult] = {}
     run_times = {}
-    for name, given in tqdm(named.items(), unit="case", disable=not progress, leave=False):
-        if isinstance(given, Case):
+    for name, item in tqdm(named.items(), unit="case", disable=not progress, leave=False):
+        if isinstance(item, Case):
             start = time.perf_counter()
             try:
-                solved[name] = compute(given)
+                solved[name] = compute(item)
             except ThudError as error:
                 message = f"{name}: {error}"
                 raise type(error)(message) from error
             run_times[name] = time.perf_counter() - start
         else:
-            solved[name] = given
+            solved[name] = item
     _require_same_drop(solved)
-    found = Comparison(solved, run_times, force, common_source(solved, source))
-    for warning in found.warnings:
+    result = Comparison(solved, run_times, force, common_source(solved, source))
+    for warning in result.warnings:
         warnings.warn(warning, PlausibilityWarning, stacklevel=2)
-    return found
+    return result
 
 
 def _require_same_drop(impacts: Mapping[str, ImpactResult]) -> None:
     """Raise InputError where drops differ; measured heights differ within their tolerance."""
     known = {n: i for n, i in impacts.items() if not math.isnan(i.impact_velocity)}
-    for one, other in combinations(known.values(), 2):
-        tolerance = max(one.velocity_tolerance, other.velocity_tolerance)
-        slow, fast = sorted((one.impact_velocity, other.impact_velocity))
+    for first, second in combinations(known.values(), 2):
+        tolerance = max(first.velocity_tolerance, second.velocity_tolerance)
+        slow, fast = sorted((first.impact_velocity, second.impact_velocity))
         if fast <= slow * (1 + tolerance):
             continue
         listed = ", ".join(f"{n} falls with {i.impact_velocity:.4g} m/s" for n, i in known.items())
@@ -246,16 +246,16 @@ def _named(impacts: object) -> dict[str, Case | ImpactResult]:
         row = [impacts] if isinstance(impacts, Case | ImpactResult) else impacts
         if not isinstance(row, Iterable) or isinstance(row, str | bytes | os.PathLike):
             refuse_value("impacts", row, allowed)
-        pairs = [(getattr(given, "name", type(given).__name__.lower()), given) for given in row]
+        pairs = [(getattr(item, "name", type(item).__name__.lower()), item) for item in row]
     if not pairs:
         refuse("impacts is empty", allowed)
     named: dict[str, Case | ImpactResult] = {}
-    for name, given in pairs:
+    for name, item in pairs:
         require_kind("name", name, str)
-        require_kind(name, given, Case | ImpactResult)
+        require_kind(name, item, Case | ImpactResult)
         # Cases from Python often share their name.
         names = chain([name], (f"{name} ({n})" for n in count(2)))
-        named[next(free for free in names if free not in named)] = given
+        named[next(free for free in names if free not in named)] = item
     return named
 
 
@@ -267,19 +267,19 @@ def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Impact
     InputError
         Names the file; also raised where two have the same name.
     """
-    found: dict[str, Case | ImpactResult] = {}
+    items: dict[str, Case | ImpactResult] = {}
     for path in map(Path, paths):
-        given: Case | ImpactResult
+        item: Case | ImpactResult
         if path.suffix.lower() in NAMELISTS:
-            given = read_case(path)
+            item = read_case(path)
         else:
             # SciPy takes its time.
             from thud.recordings.read_recording import read_recording
 
-            given = read_recording(path)
-        name = given.name
-        if name in found:
+            item = read_recording(path)
+        name = item.name
+        if name in items:
             message = f"{path}: {name!r} also names another input; allowed: different names"
             raise InputError(message)
-        found[name] = given
-    return found
+        items[name] = item
+    return items

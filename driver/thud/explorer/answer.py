@@ -109,8 +109,8 @@ def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answe
         recording = read_recording(path, **settings)
         drop = recording.drop_force()
         times, force = drop.time, drop.force
-        kept = (times >= 0) & (times <= MARGIN * recording.contact_time)
-        curve = 1e3 * times[kept], 1e-3 * force[kept]
+        contact = (times >= 0) & (times <= MARGIN * recording.contact_time)
+        curve = 1e3 * times[contact], 1e-3 * force[contact]
         answer = _answer(recording, *curve)
     except ThudError as error:
         # The user does not know the copy.
@@ -134,7 +134,7 @@ def _answer(source: ImpactResult, times: NDArray[np.float64], force: NDArray[np.
             "frequency": _plain(get_bands().nominal),
             "level": _plain(source.levels()),
         },
-        "criteria": [_criterion(one) for one in verdict.criteria],
+        "criteria": [_criterion(criterion) for criterion in verdict.criteria],
         "conforms": bool(verdict.conforms),
         "verdict": verdict.result,
         "numbers": _numbers(source),
@@ -246,8 +246,8 @@ def _curve(times: NDArray[np.float64], values: NDArray[np.float64]) -> Answer:
 def _some(indices: NDArray[np.intp], count: int) -> NDArray[np.intp]:
     """Return at most so many of some indices, evenly, the first and the last among them."""
     chosen = np.linspace(0, len(indices) - 1, min(len(indices), count)).astype(int)
-    kept: NDArray[np.intp] = indices[np.unique(chosen)]
-    return kept
+    result: NDArray[np.intp] = indices[np.unique(chosen)]
+    return result
 
 
 def _plain(values: Iterable[float]) -> list[float | None]:

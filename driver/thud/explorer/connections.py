@@ -1,4 +1,4 @@
-"""The connections of the server: how many, how long they may be silent, and what is logged."""
+"""The connections of the server: their number, their time limits, and what is logged."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ if TYPE_CHECKING:
 
     from starlette.applications import Starlette
 
-# Time in which a connection has to send the head of its next request, or to read of its answer, s.
+# Time limit to send the head of the next request, and to read on in an answer, s.
 HEAD_TIME = 10
-# Time in which messages of one kind are logged once, s.
-SILENCE = 60.0
+# Messages of one kind are logged once in this time, s.
+LOG_INTERVAL = 60.0
 
 
 def _max_connections() -> int:
-    """Return the number of connections at a time.
+    """Return the maximum number of connections at a time.
 
-    As many again may be accepted before those that are too many are closed, and works need files.
+    As many again may be open before the surplus is closed, and tasks open files, too.
     """
     files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     return 500 if files == resource.RLIM_INFINITY else min(500, files // 4)
@@ -41,16 +41,9 @@ MAX_CONNECTIONS = _max_connections()
 
 
 def run_server(application: Starlette, listener: socket.socket, folder: Path) -> None:
-    """Serve until a signal.
+    """Serve an application on a listening socket until a signal.
 
-    Parameters
-    ----------
-    application
-        What answers.
-    listener
-        Socket that is listened on.
-    folder
-        Directory of temporary files, removed where a second signal ends the process.
+    A second signal ends the process; the folder of temporary files is removed then.
     """
     config = Config(
         application,
@@ -67,7 +60,7 @@ def run_server(application: Starlette, listener: socket.socket, folder: Path) ->
 
 
 class _Server(Server):
-    """A server that a second signal ends at once, whatever it is doing."""
+    """A server that a second signal ends at once."""
 
     def __init__(self, config: Config, folder: Path) -> None:
         super().__init__(config)
@@ -84,9 +77,9 @@ class _Server(Server):
 
 
 class _Connection(H11Protocol):
-    """A connection that has to send each head, and to read each answer, in time.
+    """A connection with time limits for the head of each request and for reading each answer.
 
-    Where there are too many, the one that has waited for a head the longest makes room.
+    If there are too many, the one that has been idle the longest is closed.
     """
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
@@ -97,11 +90,12 @@ class _Connection(H11Protocol):
         )
         if len(self.connections) > MAX_CONNECTIONS:
             waiting = {
-                one: end.when()
-                for one in self.connections
-                if isinstance(one, _Connection) and (end := one.timeout_keep_alive_task)
+                connection: end.when()
+                for connection in self.connections
+                if isinstance(connection, _Connection)
+                and (end := connection.timeout_keep_alive_task)
             }
-            oldest = min(waiting, key=lambda one: waiting[one])
+            oldest = min(waiting, key=lambda connection: waiting[connection])
             self.connections.discard(oldest)
             oldest.transport.abort()
 
@@ -124,7 +118,7 @@ class _Connection(H11Protocol):
 
 
 class _Throttle(logging.Filter):
-    """Lets messages of one kind pass once in a while, and none of works that the end has ended."""
+    """Filter that passes messages of one kind once in a while, and none of cancelled tasks."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -135,7 +129,7 @@ class _Throttle(logging.Filter):
             return False
         kind = str(record.msg).partition("\n")[0]
         now = time.monotonic()
-        if now < self._latest.get(kind, -SILENCE) + SILENCE:
+        if now < self._latest.get(kind, -LOG_INTERVAL) + LOG_INTERVAL:
             return False
         self._latest[kind] = now
         return True

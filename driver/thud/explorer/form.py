@@ -56,8 +56,8 @@ def _options(part: str, name: str, kind: type[Group]) -> dict[str, Any]:
 
 def _group(part: str, name: str, values: Group, keys: Iterable[Key]) -> dict[str, Any]:
     """Return a group of fields."""
-    found = [_field(key, getattr(values, key.name)) for key in keys if key.group not in LEFT_OUT]
-    return {"part": part, "name": name, "title": _title(name), "fields": found}
+    shown = [_field(key, getattr(values, key.name)) for key in keys if key.group not in LEFT_OUT]
+    return {"part": part, "name": name, "title": _title(name), "fields": shown}
 
 
 def _field(key: Key, default: object) -> dict[str, Any]:
@@ -116,7 +116,7 @@ def _end(end: float | str, power: int) -> str:
     if isinstance(end, str):
         return humanize(end)
     number = f"{scaled(end, -power):g}"
-    return re.sub(r"1e\+0?(\d+)", lambda found: "10" + found[1].translate(_RAISED), number)
+    return re.sub(r"1e\+0?(\d+)", lambda match: "10" + match[1].translate(_RAISED), number)
 
 
 def _slider(

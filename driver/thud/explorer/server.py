@@ -1,4 +1,4 @@
-"""The server of the page: plain requests, answered by other processes, at once or by reports."""
+"""The server of the page: processes compute the answers, sent at once or as reports."""
 
 from __future__ import annotations
 
@@ -35,18 +35,18 @@ if TYPE_CHECKING:
 
     Endpoint = Callable[[Request], Awaitable[Response]]
 
-# Largest bodies of a case and of a recording, bytes.
+# Maximum size of a case and of a recording, bytes.
 MAX_CASE = 100_000
 MAX_RECORDING = 200_000_000
 # Header that carries the token.
 TOKEN = "x-thud-token"  # noqa: S105 - its name
-# Longest silence while a body is sent, s.
-PATIENCE = 20.0
-# Longest time of a work, s, and of one that is expected to be quick, which then begins again.
-LONGEST = 300.0
-LONGEST_QUICK = 1.0
+# Maximum silence while a body is sent, s.
+BODY_TIMEOUT = 20.0
+# Time limit of a task, s, and of one that is expected to be quick, which then begins again.
+TIME_LIMIT = 300.0
+QUICK_TIME_LIMIT = 1.0
 # Files of the page, by name.
-FILES = {one.name: one for one in (resources.files("thud.explorer") / "page").iterdir()}
+FILES = {file.name: file for file in (resources.files("thud.explorer") / "page").iterdir()}
 TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css"}
 # The page loads nothing from elsewhere.
 POLICY = (
@@ -75,7 +75,8 @@ def new_application(
     hosts
         Names under which the server may be asked.
     width
-        Slow works, and copies of recordings, at a time; of quick works twice as many.
+        Maximum number of slow tasks, and of copies of recordings, at a time; of quick tasks twice
+        as many.
 
     Raises
     ------
@@ -84,8 +85,8 @@ def new_application(
     """
     if not token:
         refuse("the token is empty", "one that nobody can guess")
-    slow = Jobs(width, LONGEST)
-    quick = Jobs(2 * width, LONGEST_QUICK, late={"answer": None}, kept=True)
+    slow = Jobs(width, TIME_LIMIT)
+    quick = Jobs(2 * width, QUICK_TIME_LIMIT, late={"answer": None}, reuse=True)
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncGenerator[None, None]:
@@ -145,36 +146,36 @@ async def _solve(request: Request) -> Response:
 
 
 async def _measure(request: Request) -> Response:
-    asked = dict(request.query_params)
+    query = dict(request.query_params)
     settings: dict[str, Any] = {
-        key: _number(key, asked[key]) for key in ("height", "mass") if key in asked
+        key: _number(key, query[key]) for key in ("height", "mass") if key in query
     }
-    settings |= {key: asked[key] for key in ("calibration", "unit") if key in asked}
-    if "channel" in asked:
-        settings["channel"] = channel_of(asked["channel"])
-    name = asked.get("name", "recording.wav")
+    settings |= {key: query[key] for key in ("calibration", "unit") if key in query}
+    if "channel" in query:
+        settings["channel"] = channel_of(query["channel"])
+    name = query.get("name", "recording.wav")
     ending = "".join(c for c in Path(name).suffix if c.isascii() and c.isalnum())[:8]
     state = request.app.state
-    async with AsyncExitStack() as needs:
-        await needs.enter_async_context(state.copies)
-        path = Path(needs.enter_context(TemporaryDirectory()), f"recording.{ending}")
+    async with AsyncExitStack() as stack:
+        await stack.enter_async_context(state.copies)
+        path = Path(stack.enter_context(TemporaryDirectory()), f"recording.{ending}")
         async with await anyio.open_file(path, "wb") as copy:
             async for part in _body(request, MAX_RECORDING):
                 await copy.write(part)
         reports = state.slow.run("recording", str(path), name, settings)
-        return _Reports(reports, needs.pop_all())
+        return _Reports(reports, stack.pop_all())
 
 
 async def _download(request: Request) -> Response:
-    if (what := request.path_params["what"]) not in DOWNLOADS:
+    if (name := request.path_params["what"]) not in DOWNLOADS:
         raise HTTPException(404, "there is no such file")
-    reports = request.app.state.slow.run("download", what, await _values(request))
+    reports = request.app.state.slow.run("download", name, await _values(request))
     content = await _answer(request, reports)
-    return Response(content, media_type=DOWNLOADS[what][1], headers=HEADERS)
+    return Response(content, media_type=DOWNLOADS[name][1], headers=HEADERS)
 
 
-async def _answer(request: Request, reports: AsyncGenerator[dict[str, Any], None]) -> Any:  # noqa: ANN401 - as the work has it
-    """Return the answer at the end of reports; they end when the page leaves."""
+async def _answer(request: Request, reports: AsyncGenerator[dict[str, Any], None]) -> Any:  # noqa: ANN401 - of any task
+    """Return the answer at the end of reports; stop them if the page disconnects."""
     report: dict[str, Any] = {}
 
     async def await_leave() -> None:
@@ -195,16 +196,16 @@ async def _answer(request: Request, reports: AsyncGenerator[dict[str, Any], None
 
 
 def _guarded(endpoint: Endpoint) -> Endpoint:
-    """Refuse requests of other pages, and those without the token."""
+    """Return an endpoint that refuses requests of other pages, and those without the token."""
 
     async def answer(request: Request) -> Response:
         own = f"{request.url.scheme}://{request.headers.get('host')}"
         if request.headers.get("origin") not in {None, own}:
             raise HTTPException(403, "the request comes from another page")
-        given = request.headers.get(TOKEN, "").encode()
-        if not secrets.compare_digest(given, request.app.state.token.encode()):
-            wanted = "open the full address shown in the terminal: it holds the token"
-            raise HTTPException(403, wanted)
+        token = request.headers.get(TOKEN, "").encode()
+        if not secrets.compare_digest(token, request.app.state.token.encode()):
+            message = "open the full address shown in the terminal: it holds the token"
+            raise HTTPException(403, message)
         return await endpoint(request)
 
     return answer
@@ -215,23 +216,23 @@ async def _refuse(request: Request, error: Exception) -> Response:  # noqa: ARG0
 
 
 async def _forget(request: Request, error: Exception) -> Response:  # noqa: ARG001 - what is given
-    """Answer a page that left while it sent: nobody reads it, and it is no fault."""
+    """Answer a page that disconnected while it sent: nobody reads it, and nothing is wrong."""
     return Response(status_code=400)
 
 
 class _Reports(StreamingResponse):
-    """Reports as lines; they and what they need end with the response, even one never begun."""
+    """Reports as lines; the response ends them and their resources, even if never begun."""
 
     def __init__(
-        self, reports: AsyncGenerator[dict[str, Any], None], needs: AsyncExitStack
+        self, reports: AsyncGenerator[dict[str, Any], None], stack: AsyncExitStack
     ) -> None:
-        needs.push_async_callback(reports.aclose)
-        self._needs = needs
+        stack.push_async_callback(reports.aclose)
+        self._stack = stack
         lines = (json.dumps(report, allow_nan=False) + "\n" async for report in reports)
         super().__init__(lines, media_type="application/x-ndjson", headers=HEADERS)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        async with self._needs:
+        async with self._stack:
             await super().__call__(scope, receive, send)
 
 
@@ -243,17 +244,17 @@ def _number(key: str, text: str) -> float:
 
 
 async def _body(request: Request, largest: int) -> AsyncIterator[bytes]:
-    """Yield the parts of a body; it is read no further than it may be long."""
+    """Yield the parts of a body; refuse one that is too long without reading the rest."""
     length = 0
     parts = request.stream()
     while True:
         try:
-            with anyio.fail_after(PATIENCE):
+            with anyio.fail_after(BODY_TIMEOUT):
                 part = await anext(parts)
         except StopAsyncIteration:
             return
         except TimeoutError:
-            message = f"no data came for {PATIENCE:g} s; allowed: less"
+            message = f"no data came for {BODY_TIMEOUT:g} s; allowed: less"
             raise HTTPException(408, message) from None
         length += len(part)
         if length > largest:

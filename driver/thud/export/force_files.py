@@ -123,38 +123,38 @@ def blocked_force(
         Where the drop or the rate are not possible.
     """
     require_kind("source", source, ImpactResult)
-    found = BlockedForce(**vars(source.drop_force(drop)))
-    return found if rate is None else _resampled(found, rate)
+    force = BlockedForce(**vars(source.drop_force(drop)))
+    return force if rate is None else _resampled(force, rate)
 
 
-def _resampled(given: BlockedForce, rate: float) -> BlockedForce:
+def _resampled(original: BlockedForce, rate: float) -> BlockedForce:
     """Return a force at another rate, what is above half of the lower one removed."""
     from scipy.signal import resample_poly
 
     require_number("rate", rate)
     if not RATES[0] <= rate <= RATES[1]:
         refuse_value("rate", rate, f"{RATES[0]:g} to {RATES[1]:g} Hz")
-    ratio = Fraction(rate / given.sample_rate).limit_denominator(LARGEST_RATIO)
+    ratio = Fraction(rate / original.sample_rate).limit_denominator(LARGEST_RATIO)
     up, down = ratio.numerator, ratio.denominator
-    if up > LARGEST_RATIO or abs(given.sample_rate * up / down - rate) > 1e-9 * rate:
+    if up > LARGEST_RATIO or abs(original.sample_rate * up / down - rate) > 1e-9 * rate:
         refuse(
-            f"rate = {rate:g} Hz is no ratio of small whole numbers to {given.sample_rate:g} Hz",
+            f"rate = {rate:g} Hz is no ratio of small whole numbers to {original.sample_rate:g} Hz",
             f"ratios of whole numbers up to {LARGEST_RATIO}",
         )
     # The filter spreads the force beyond its ends.
     room = math.ceil(REACH * max(1.0, down / up)) + 1
-    force = resample_poly(np.pad(given.force, room), up, down)
-    start = given.start - room / given.sample_rate
-    result = replace(given, force=force, sample_rate=rate, start=start)
-    (frequency, old), (grid, new) = given.spectrum(), result.spectrum()
+    force = resample_poly(np.pad(original.force, room), up, down)
+    start = original.start - room / original.sample_rate
+    result = replace(original, force=force, sample_rate=rate, start=start)
+    (frequency, old), (grid, new) = original.spectrum(), result.spectrum()
     band = np.arange(1, min(RECORDED_BAND, frequency[-1], grid[-1]))
     old, new = (np.interp(band, f, s) for f, s in ((frequency, old), (grid, new)))
     error = float(np.abs(new - old).max() / np.abs(old).max())
     note = (
-        f"Resampled from {given.sample_rate:g} Hz, band-limited; to {RECORDED_BAND:g} Hz the "
+        f"Resampled from {original.sample_rate:g} Hz, band-limited; to {RECORDED_BAND:g} Hz the "
         f"spectrum has changed by up to {error:.1e} of its maximum"
     )
-    return replace(result, notes=(*given.notes, note))
+    return replace(result, notes=(*original.notes, note))
 
 
 def wav_files(force: BlockedForce, path: str) -> dict[str, bytes]:

@@ -40,30 +40,21 @@ class FloorComparison(Displayed, Page):
     @property
     def warnings(self) -> list[str]:
         """Caveats of the numbers, with the names of the floors."""
-        result = self.predictions.items()
-        return [f"{name}: {warning}" for name, one in result for warning in one.warnings]
+        return [
+            f"{name}: {warning}"
+            for name, prediction in self.predictions.items()
+            for warning in prediction.warnings
+        ]
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text; columns are the floors."""
-        result = self.predictions.values()
         octaves = [f"{f:g} Hz octave, dB" for f in get_bands("octave").nominal[1:]]
-        return [
-            ("", *self.predictions),
-            ("floor", *(one.floor.name.replace("_", " ") for one in result)),
-            ("force", *(one.force for one in result)),
-            ("L_iA,Fmax, dB", *(str(one.rating.rounded) for one in result)),
-            ("standardized, dB", *(str(one.standardized_rating.rounded) for one in result)),
-            *(
-                (title, *(f"{one.octave_level[i]:.1f}" for one in result))
-                for i, title in enumerate(octaves)
-            ),
-            (
-                "class (KS F 2863-2)",
-                *(CLASSES[one.octave_rating.korean_class or 0] for one in result),
-            ),
-            ("energy, 50 to 630 Hz, mJ", *(f"{1e3 * one.energy.sum():.3g}" for one in result)),
-            ("tapping machine, L_n,w (C_I), dB", *(_tapping(one) for one in result)),
-        ]
+        titles = (
+            "", "floor", "force", "L_iA,Fmax, dB", "standardized, dB", *octaves,
+            "class (KS F 2863-2)", "energy, 50 to 630 Hz, mJ", "tapping machine, L_n,w (C_I), dB",
+        )  # fmt: skip
+        columns = (_column(*item) for item in self.predictions.items())
+        return list(zip(titles, *columns, strict=True))
 
     def figure(self) -> Figure:
         """Return the page as a matplotlib figure."""
@@ -85,7 +76,8 @@ class FloorComparison(Displayed, Page):
 
     def __repr__(self) -> str:
         """Return the names of the floors and their levels."""
-        result = (f"{name} {one.rating.rounded} dB" for name, one in self.predictions.items())
+        items = self.predictions.items()
+        result = (f"{name} {prediction.rating.rounded} dB" for name, prediction in items)
         return f"<FloorComparison: {', '.join(result)}>"
 
 
@@ -108,27 +100,42 @@ def compare_floors(
     """
     require_mapping("cases", cases, "cases or predictions")
     result: dict[str, RoomPrediction] = {}
-    for name, given in tqdm(cases.items(), unit="floor", disable=not progress, leave=False):
+    for name, entry in tqdm(cases.items(), unit="floor", disable=not progress, leave=False):
         require_kind("name", name, str)
-        require_kind(name, given, Case | RoomPrediction)
-        if isinstance(given, RoomPrediction):
-            result[name] = given
+        require_kind(name, entry, Case | RoomPrediction)
+        if isinstance(entry, RoomPrediction):
+            result[name] = entry
             continue
-        if given.model is None or given.floor is None or given.room is None:
+        if entry.model is None or entry.floor is None or entry.room is None:
             refuse(
                 f"{name}: the case has no level in a room", "a case with &model, &floor and &room"
             )
         try:
-            result[name] = predict_level(compute(given))
+            result[name] = predict_level(compute(entry))
         except ThudError as error:
             message = f"{name}: {error}"
             raise type(error)(message) from error
     return FloorComparison(result)
 
 
-def _tapping(one: RoomPrediction) -> str:
+def _column(name: str, prediction: RoomPrediction) -> tuple[str, ...]:
+    """Return the texts of one floor in `FloorComparison.rows`."""
+    return (
+        name,
+        prediction.floor.name.replace("_", " "),
+        prediction.force,
+        str(prediction.rating.rounded),
+        str(prediction.standardized_rating.rounded),
+        *(f"{level:.1f}" for level in prediction.octave_level),
+        CLASSES[prediction.octave_rating.korean_class or 0],
+        f"{1e3 * prediction.energy.sum():.3g}",
+        _tapping(prediction),
+    )
+
+
+def _tapping(prediction: RoomPrediction) -> str:
     """Return the reference level of the tapping machine, of the floors that have one."""
-    if not has_tapping_level(one.floor):
+    if not has_tapping_level(prediction.floor):
         return ""
-    result = tapping_level(one.floor, one.room)
+    result = tapping_level(prediction.floor, prediction.room)
     return f"{result.weighted} ({result.adaptation})"

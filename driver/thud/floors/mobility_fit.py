@@ -357,18 +357,22 @@ def _read_universal(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity
         file = library("pyuff", "universal").UFF(str(path))
         kinds = [int(kind) for kind in file.get_set_types()]
         sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]  # noqa: PLR2004
-    responses = [one for one in sets if one.get("func_type") == _FREQUENCY_RESPONSE]
+    responses = [record for record in sets if record.get("func_type") == _FREQUENCY_RESPONSE]
     if len(responses) != 1:
         refuse(f"{path}: holds {len(responses)} frequency responses", "one")
-    (one,) = responses
-    response = one["ordinate_spec_data_type"]
-    force = one["orddenom_spec_data_type"]
+    (record,) = responses
+    response = record["ordinate_spec_data_type"]
+    force = record["orddenom_spec_data_type"]
     if response not in _RESPONSES or force not in {_EXCITATION_FORCE, _REACTION_FORCE}:
         refuse(
             f"{path}: a response of type {response} over one of type {force}",
             "displacement, velocity or acceleration (8, 11, 12) over force (13)",
         )
     # Directions of response and reference count with their signs.
-    sign = 1 if one["rsp_dir"] * one["ref_dir"] >= 0 else -1
+    sign = 1 if record["rsp_dir"] * record["ref_dir"] >= 0 else -1
     known: Quantity = _RESPONSES[response]  # type: ignore[assignment]
-    return np.asarray(one["x"], dtype=float), sign * np.asarray(one["data"], dtype=complex), known
+    return (
+        np.asarray(record["x"], dtype=float),
+        sign * np.asarray(record["data"], dtype=complex),
+        known,
+    )

@@ -311,15 +311,15 @@ def _room_modes(size: tuple[float, float, float], speed: float) -> tuple[Array, 
 
 def _grid(counts: list[int]) -> Array:
     """Return all combinations of whole numbers from 0 to below the given ones."""
-    grid = np.meshgrid(*(np.arange(float(one)) for one in counts), indexing="ij")
+    grid = np.meshgrid(*(np.arange(float(count)) for count in counts), indexing="ij")
     return np.stack(grid, -1).reshape(-1, len(counts))
 
 
-def _require_modes(what: str, count: int) -> None:
+def _require_modes(label: str, count: int) -> None:
     if count > MAX_MODES:
         message = (
-            f"{what} about {count} modes below {MAX_FREQUENCY:g} Hz; allowed: at most {MAX_MODES}; "
-            "there the statistical prediction holds"
+            f"{label} about {count} modes below {MAX_FREQUENCY:g} Hz; allowed: at most "
+            f"{MAX_MODES}; there the statistical prediction holds"
         )
         raise ModeCountError(message)
 
@@ -373,11 +373,11 @@ def fast_levels(pressure: Array) -> Array:
     The pressure, Pa, has 1024 samples a second and shape (n_record, n_sample); it is filtered into
     the one-third-octave bands 25 to 160 Hz by filters of class 1.
     """
-    kept = math.exp(-1 / (SAMPLE_RATE * TIME_CONSTANT))
+    decay_factor = math.exp(-1 / (SAMPLE_RATE * TIME_CONSTANT))
     levels = []
     for sections in band_filters("third", SAMPLE_RATE)[:N_BAND]:
         square = sosfilt(sections, pressure, axis=-1) ** 2
-        shown = lfilter([1 - kept], [1, -kept], square, axis=-1)
+        shown = lfilter([1 - decay_factor], [1, -decay_factor], square, axis=-1)
         levels.append(10 * np.log10(np.maximum(shown, 1e-30) / REFERENCE_PRESSURE**2))
     return np.array(levels)
 
@@ -390,16 +390,16 @@ def _times(prediction: RoomPrediction, frequency: Array) -> Array:
 
 
 def _positions(
-    name: str, given: int | ArrayLike, size: tuple[float, ...], generator: np.random.Generator
+    name: str, value: int | ArrayLike, size: tuple[float, ...], generator: np.random.Generator
 ) -> Array:
     """Return positions, m, shape (n, len(size)), drawn or checked."""
     sides = np.array(size)
-    if isinstance(given, int | np.integer | float | str):
-        require_whole(name, given, 1, MAX_POSITIONS)
+    if isinstance(value, int | np.integer | float | str):
+        require_whole(name, value, 1, MAX_POSITIONS)
         border = np.minimum(BORDER, sides / 4)
-        random: Array = border + generator.random((int(given), len(size))) * (sides - 2 * border)
+        random: Array = border + generator.random((int(value), len(size))) * (sides - 2 * border)
         return random
-    positions = require_real(name, require_array(name, given, dimensions=(2,)))
+    positions = require_real(name, require_array(name, value, dimensions=(2,)))
     if positions.shape[1] != len(size) or not 1 <= len(positions) <= MAX_POSITIONS:
         refuse(
             f"{name} have the shape {positions.shape}",

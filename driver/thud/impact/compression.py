@@ -118,6 +118,6 @@ def compress(
     return new_curve(case, ask("compression", case=case_text(case)))
 
 
-def new_curve(case: Case, found: Bundle) -> CompressionCurve:
+def new_curve(case: Case, answer: Bundle) -> CompressionCurve:
     """Return the curve in a bundle of the library."""
-    return CompressionCurve(case, **found["compression"])
+    return CompressionCurve(case, **answer["compression"])

@@ -28,12 +28,12 @@ def compute(case: Case) -> Impact:
     return new_impact(case, ask("solve", case=case_text(plain)))
 
 
-def new_impact(case: Case, found: Bundle) -> Impact:
+def new_impact(case: Case, answer: Bundle) -> Impact:
     """Return the impact in a bundle of the library."""
-    warnings = tuple(map(text, found.get("warnings", {}).values()))
-    common = history(case, found, warnings)
+    warnings = tuple(map(text, answer.get("warnings", {}).values()))
+    common = history(case, answer, warnings)
     return Impact(
         **common,
-        on_floor=new_floor_impact(case, found, common["floor_force"]),
-        room_level=new_room_level(found),
+        on_floor=new_floor_impact(case, answer, common["floor_force"]),
+        room_level=new_room_level(answer),
     )

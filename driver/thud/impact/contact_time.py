@@ -62,5 +62,5 @@ def average_within(
     np.cumsum((values[1:] + values[:-1]) * (step / 2), axis=0, out=area[1:])
     low = np.maximum(at - width / 2, time[0])
     high = np.minimum(at + width / 2, time[-1])
-    columns = [np.interp(high, time, one) - np.interp(low, time, one) for one in area.T]
+    columns = [np.interp(high, time, column) - np.interp(low, time, column) for column in area.T]
     return np.asarray(np.stack(columns, axis=1) / (high - low)[:, None], dtype=np.float64)

@@ -62,11 +62,11 @@ def impact_dataset(impact: Impact, histories: Mapping[str, NDArray[np.float64]])
     variables["conforms"] = ((), conforms, attributes(SAMPLE_RESULTS["conforms"]))
     coordinates = {"time": _time(impact.time), **band_coordinates(BANDWIDTHS)}
     warnings = {"warnings": "\n".join(impact.warnings)}
-    found = xr.Dataset(
+    dataset = xr.Dataset(
         variables, coordinates, origin(impact.case) | impact.model_quantities | warnings
     )
     # The arrays of the impact are read-only.
-    return found.copy(deep=True)
+    return dataset.copy(deep=True)
 
 
 def recording_dataset(recording: ImpactResult) -> xr.Dataset:

@@ -140,9 +140,9 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     if not hasattr(parameters, "keys"):
         refuse_value("parameters", parameters, "arrays by their keys")
     # Without parameters there is one drop, that of the case.
-    given = dict(parameters) or {"height": base.drop.height}
+    varied = dict(parameters) or {"height": base.drop.height}
     try:
-        columns, numbers = _columns(given, base)
+        columns, numbers = _columns(varied, base)
     except MemoryError as error:
         refuse("the parameters do not fit in memory", "fewer samples", error)
     shared = {
@@ -203,34 +203,34 @@ def _floor_results(values: NDArray[np.float64], case: Case) -> dict[str, Any]:
     """Return what cases with a floor have in addition, by name; see `Ensemble`."""
     if not case.floor:
         return {}
-    wanted = case.levels.bands
-    kinds = [bands for bands in BANDWIDTHS if wanted in {bands, "both"}]
+    requested = case.levels.bands
+    kinds = [bands for bands in BANDWIDTHS if requested in {bands, "both"}]
     ends = np.cumsum([len(get_bands(bands).nominal) for bands in kinds])
-    *levels, rest = np.split(values, ends, axis=1)
-    found: dict[str, Any] = {
+    *levels, others = np.split(values, ends, axis=1)
+    results: dict[str, Any] = {
         "contact_levels": dict(zip(kinds, levels, strict=True)),
-        "floor_work": rest[:, 0],
+        "floor_work": others[:, 0],
     }
     if case.room:
-        room = rest[:, 1:]
-        found |= {ROOM_LEVEL: room[:, :-2]}
-        found |= {"room_rating": room[:, -2], RATING: room[:, -1]}
-    return found
+        room = others[:, 1:]
+        results |= {ROOM_LEVEL: room[:, :-2]}
+        results |= {"room_rating": room[:, -2], RATING: room[:, -1]}
+    return results
 
 
 def _by_bands(
-    level: NDArray[np.float64], wanted: LevelsBands
+    level: NDArray[np.float64], requested: LevelsBands
 ) -> dict[tuple[LevelsForce, BandSet], NDArray[np.float64]]:
     """Return levels by force and bands: octaves first, then other requested bands."""
-    found = {}
+    result = {}
     start = 0
     for bands in BANDWIDTHS:
-        if bands in {BANDWIDTHS[0], wanted} or wanted == "both":
+        if bands in {BANDWIDTHS[0], requested} or requested == "both":
             stop = start + len(get_bands(bands).nominal)
             for i, force in enumerate(FORCES):
-                found[force, bands] = level[:, i, start:stop]
+                result[force, bands] = level[:, i, start:stop]
             start = stop
-    return found
+    return result
 
 
 def _compute(  # noqa: PLR0913 - those of the library
@@ -243,23 +243,23 @@ def _compute(  # noqa: PLR0913 - those of the library
     forces: bool,
 ) -> dict[str, NDArray[Any]]:
     """Return the results of some samples, the samples first."""
-    found = ask(
+    answer = ask(
         "samples", case=content, **_named(keys), values=numbers.T, threads=threads, levels=levels,
         forces=forces,
     )  # fmt: skip
-    status = found["status"].astype(np.int32)
+    status = answer["status"].astype(np.int32)
     reason = np.full(len(numbers), "", dtype=object)
-    reason[status != 0] = text(found["reasons"]).split("\n")[:-1]
+    reason[status != 0] = text(answer["reasons"]).split("\n")[:-1]
     return {
         "status": status,
         "reason": reason,
-        "quantity": found["quantity"].T,
-        "level": found["level"].T,
-        "conforms": found["conforms"].T != 0,
-        "margin": found["margin"],
-        "verdict": found["verdict"] != 0,
-        "floor_value": found["floor_value"].T,
-        "force": found["force"].T,
+        "quantity": answer["quantity"].T,
+        "level": answer["level"].T,
+        "conforms": answer["conforms"].T != 0,
+        "margin": answer["margin"],
+        "verdict": answer["verdict"] != 0,
+        "floor_value": answer["floor_value"].T,
+        "force": answer["force"].T,
     }
 
 
@@ -288,15 +288,15 @@ def _columns(
     for key in keys:
         if key not in KEYS:
             refuse(f"{key.name!r} is a parameter of studies", "keys of the input")
-    given = [require_array(name, values, (0, 1)) for name, values in parameters.items()]
-    numbers = [_numbers(key, array) for key, array in zip(keys, given, strict=True)]
+    inputs = [require_array(name, values, (0, 1)) for name, values in parameters.items()]
+    numbers = [_numbers(key, array) for key, array in zip(keys, inputs, strict=True)]
     try:
-        arrays = np.broadcast_arrays(*map(np.atleast_1d, given))
-        found = np.stack(np.broadcast_arrays(*map(np.atleast_1d, numbers)), axis=1)
+        arrays = np.broadcast_arrays(*map(np.atleast_1d, inputs))
+        table = np.stack(np.broadcast_arrays(*map(np.atleast_1d, numbers)), axis=1)
     except ValueError as error:
-        shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(parameters, given, strict=True))
+        shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(parameters, inputs, strict=True))
         refuse(f"the arrays differ in length: {shapes}", "one length, or scalars", error)
-    return {name: a.copy() for name, a in zip(parameters, arrays, strict=True)}, found
+    return {name: a.copy() for name, a in zip(parameters, arrays, strict=True)}, table
 
 
 def _numbers(key: Key, array: NDArray[Any]) -> NDArray[np.float64]:

@@ -101,11 +101,11 @@ class FloorImpact(Impact):
 
     def injected_energy(self, bands: BandSet = "octave") -> FloorEnergy:
         """Return the energy that goes into the floor in bands, in two ways."""
-        found = ask(
+        answer = ask(
             "floor_energy", case=case_text(Case(floor=self.floor)), bands=bands,
             force=self.floor_force, velocity=self.floor_velocity, sample_rate=self.sample_rate,
         )  # fmt: skip
-        return FloorEnergy(**found)
+        return FloorEnergy(**answer)
 
     def mobility(
         self, frequency: ArrayLike, point: tuple[float, float] | None = None
@@ -118,11 +118,11 @@ class FloorImpact(Impact):
 
         Raise InputError where the floor has no such point.
         """
-        found = ask(
+        answer = ask(
             "point_velocity", case=case_text(Case(floor=self.floor)), force=self.floor_force,
             sample_rate=self.sample_rate, point=np.array(require_pair("point", (x, y))),
         )  # fmt: skip
-        velocity: NDArray[np.float64] = found["velocity"]
+        velocity: NDArray[np.float64] = answer["velocity"]
         return velocity
 
     def rows(self) -> list[tuple[str, ...]]:
@@ -160,11 +160,11 @@ class FloorImpact(Impact):
 
 
 def new_floor_impact(
-    case: Case, found: Bundle, blocked_force: NDArray[np.float64]
+    case: Case, answer: Bundle, blocked_force: NDArray[np.float64]
 ) -> FloorImpact | None:
     """Return the impact on a floor that moves in a bundle of the library; None without one."""
     prefix = "on_floor."
-    moving = {key[len(prefix) :]: found[key] for key in found if key.startswith(prefix)}
+    moving = {key[len(prefix) :]: answer[key] for key in answer if key.startswith(prefix)}
     if not moving:
         return None
     common = history(case, moving, ())

@@ -117,9 +117,9 @@ def free_modes(
     return modes
 
 
-def new_modes(ball: Ball, found: Bundle) -> FreeModes:
+def new_modes(ball: Ball, answer: Bundle) -> FreeModes:
     """Return the free modes in a bundle of the library."""
-    modes = found["modes"]
+    modes = answer["modes"]
     return FreeModes(
         ball,
         modes["frequency"],
@@ -128,7 +128,7 @@ def new_modes(ball: Ball, found: Bundle) -> FreeModes:
         modes["rigid_frequency"],
         np.stack((modes["r"], modes["z"]), axis=-1),
         np.moveaxis(modes["shape"], (-1, 0), (0, -1)),
-        tuple(map(text, found.get("warnings", {}).values())),
+        tuple(map(text, answer.get("warnings", {}).values())),
     )
 
 
@@ -149,12 +149,12 @@ def loss_factors(model: FiniteElement, frequency: ArrayLike) -> NDArray[np.float
     """
     require_kind("model", model, FiniteElement)
     try:
-        wanted = np.ascontiguousarray(frequency, dtype=np.float64)
+        frequencies = np.ascontiguousarray(frequency, dtype=np.float64)
     except (TypeError, ValueError):
-        wanted = np.array([])
-    if wanted.ndim != 1 or not wanted.size or not np.all(wanted > 0):
+        frequencies = np.array([])
+    if frequencies.ndim != 1 or not frequencies.size or not np.all(frequencies > 0):
         message = "frequency is not allowed; allowed: a list of frequencies above 0, Hz"
         raise InputError(message)
-    found = ask("loss_factors", case=case_text(Case(model=model)), frequency=wanted)
-    result: NDArray[np.float64] = found["loss_factors"]
+    answer = ask("loss_factors", case=case_text(Case(model=model)), frequency=frequencies)
+    result: NDArray[np.float64] = answer["loss_factors"]
     return result

@@ -283,17 +283,17 @@ class Impact(ImpactQuantities, Displayed):
         return {}
 
 
-def history(case: Case, found: Bundle, warnings: tuple[str, ...]) -> dict[str, Any]:
+def history(case: Case, answer: Bundle, warnings: tuple[str, ...]) -> dict[str, Any]:
     """Return what every history in a bundle has."""
-    samples, quantities = found["samples"], found["quantities"]
+    samples, quantities = answer["samples"], answer["quantities"]
     return {
         "case": case,
         "time": np.arange(len(samples["deflection"])) / quantities["sample_rate"],
         **samples,
-        "components": found["components"],
-        "model_histories": found.get("model_histories", {}),
-        "model_quantities": found.get("model_quantities", {}),
+        "components": answer["components"],
+        "model_histories": answer.get("model_histories", {}),
+        "model_quantities": answer.get("model_quantities", {}),
         "warnings": warnings,
-        "motion": new_motion(**found["motion"]) if "motion" in found else None,
+        "motion": new_motion(**answer["motion"]) if "motion" in answer else None,
         **quantities,
     }

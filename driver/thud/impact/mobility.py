@@ -27,7 +27,7 @@ def mobility(
     frequency : array_like, shape (n,)
         Frequencies, Hz.
     point
-        Place along length and width, m, of floors with sides; None: under the source.
+        Position along length and width, m, of floors with sides; None: under the source.
 
     Returns
     -------
@@ -49,10 +49,7 @@ def mobility(
     values = require_real("frequency", require_array("frequency", frequency, dimensions=(0, 1)))
     if not np.isfinite(values).all():
         refuse("frequency has a value that is not finite", "finite numbers, Hz")
-    place = (0.0, 0.0) if point is None else point
-    x, y = require_pair("point", place)
-    text = case_text(Case(floor=floor))
-    asked = np.ascontiguousarray(np.atleast_1d(values))
-    points = {} if point is None else {"point": np.array((x, y))}
-    found = ask("mobility", case=text, frequency=asked, **points)
-    return np.asarray(found["real"] + 1j * found["imaginary"])
+    frequencies = np.ascontiguousarray(np.atleast_1d(values))
+    points = {} if point is None else {"point": np.array(require_pair("point", point))}
+    answer = ask("mobility", case=case_text(Case(floor=floor)), frequency=frequencies, **points)
+    return np.asarray(answer["real"] + 1j * answer["imaginary"])

@@ -110,11 +110,11 @@ def _new_impact(files: _Files) -> Impact:
     case = Case.from_text(files.read("effective.nml"))
     numbers = f90nml.reads(files.read("summary.nml"))
     history, _ = _read_history(files, "", numbers["summary"], numbers.get("model_quantities", {}))
-    found = _texts(numbers.get("warnings", {}).get("warning", []))
+    messages = _texts(numbers.get("warnings", {}).get("warning", []))
     if not files.listed:
         warning = f"{MANIFEST} is missing: nothing shows that the files belong together"
         warnings.warn(f"{files.folder}: {warning}", PlausibilityWarning, stacklevel=3)
-        found += (warning,)
+        messages += (warning,)
     on_floor = None
     if "floor_summary" in numbers:
         scalars, own = numbers["floor_summary"], numbers.get("floor_model_quantities", {})
@@ -129,7 +129,7 @@ def _new_impact(files: _Files) -> Impact:
             point_velocity=np.array([*columns.values()]).reshape(-1, len(moving["time"])),
             **moving,
         )
-    return Impact(case=case, warnings=found, on_floor=on_floor, **history)
+    return Impact(case=case, warnings=messages, on_floor=on_floor, **history)
 
 
 def _read_history(
@@ -138,7 +138,7 @@ def _read_history(
     """Return what the files of a history hold, and further columns of its forces."""
     force = _table(files.read(f"{prefix}force.csv"))
     further = f"{prefix}model_histories.csv"
-    found = _table(files.read(further)) if further in files else {}
+    histories = _table(files.read(further)) if further in files else {}
     # Parts of the force stand before the whole one, further columns behind.
     columns = list(force)
     last = columns.index("floor_force_N")
@@ -147,7 +147,7 @@ def _read_history(
         "components": {
             name[: -len("_N")]: force[name] for name in columns[len(_MOTION) : last - 1]
         },
-        "model_histories": {name: values for name, values in found.items() if name != "time_s"},
+        "model_histories": {name: values for name, values in histories.items() if name != "time_s"},
         "model_quantities": dict(model_quantities),
         "motion": _read_motion(files, prefix) if f"{prefix}snapshots.xmf" in files else None,
         **{name: scalars[name] for name in IMPACT_QUANTITIES},

@@ -70,9 +70,9 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
         As `Impact.warnings`.
     """
     sampling = {"sample_rate": sample_rate, "duration": duration, "substeps": substeps}
-    given = {name: value for name, value in sampling.items() if value is not None}
+    settings = {name: value for name, value in sampling.items() if value is not None}
     if isinstance(ball, Case):
-        if given or options or any(part is not None for part in (drop, model, floor)):
+        if settings or options or any(part is not None for part in (drop, model, floor)):
             refuse("solve() takes a case or the parts of one, not both", "solve(case)")
         case = ball
     else:
@@ -80,7 +80,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
             ball=Ball() if ball is None else ball,
             drop=Drop() if drop is None else drop,
             model=new_model("hollow_sphere" if model is None else model, options),
-            sampling=Sampling(**given),  # type: ignore[arg-type]
+            sampling=Sampling(**settings),  # type: ignore[arg-type]
             floor=floor,
         )
     impact = compute(case)

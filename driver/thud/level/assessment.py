@@ -139,7 +139,7 @@ class Verdict(Displayed):
     def result(self) -> str:
         """``"does not conform"`` if any criterion fails, else ``"inconclusive"`` if any is."""
         results = {criterion.result for criterion in self.criteria}
-        return next(one for one in (RESULTS[1], RESULTS[2], RESULTS[0]) if one in results)
+        return next(result for result in (RESULTS[1], RESULTS[2], RESULTS[0]) if result in results)
 
     @property
     def conforms(self) -> bool:
@@ -223,9 +223,9 @@ def assess(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     if not (math.isnan(count) or (0 <= count < _MAX_PEAKS and count.is_integer())):
         refuse_value("peaks", peaks, f"0 <= peaks < {_MAX_PEAKS}, whole")
     criteria = []
-    for one, estimate in zip(standard, estimates, strict=True):
-        lower, upper = (limits or {}).get(one.name, (one.lower, one.upper))
-        criteria.append(Criterion(one.name, estimate, lower, upper))
+    for criterion, estimate in zip(standard, estimates, strict=True):
+        lower, upper = (limits or {}).get(criterion.name, (criterion.lower, criterion.upper))
+        criteria.append(Criterion(criterion.name, estimate, lower, upper))
     return Verdict(source, tuple(criteria))
 
 

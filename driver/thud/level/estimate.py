@@ -66,9 +66,9 @@ class Estimate(Immutable):
         cls, value: float, *contributions: Contribution, upper_bound: bool = False
     ) -> Self:
         """Combine the contributions (JCGM 100, 5.1.2 and, by Welch-Satterthwaite, G.4.1)."""
-        parts = [one for one in contributions if one.counted and one.uncertainty]
-        combined = math.sqrt(sum(one.uncertainty**2 for one in parts))
-        inverse = sum((one.uncertainty / combined) ** 4 / one.freedom for one in parts)
+        terms = [term for term in contributions if term.counted and term.uncertainty]
+        combined = math.sqrt(sum(term.uncertainty**2 for term in terms))
+        inverse = sum((term.uncertainty / combined) ** 4 / term.freedom for term in terms)
         freedom = 1 / inverse if inverse else math.inf
         return cls(value, combined, "", freedom, contributions, upper_bound)
 

@@ -118,8 +118,8 @@ def force_exposure_levels(
     require_choice("method", method, LEVEL_METHODS)
     record = _record(force)
     rate = to_float("sample_rate", sample_rate)
-    found = ask("levels", force=record, sample_rate=rate, bands=bands, method=method)
-    levels: NDArray[np.float64] = found["levels"]
+    answer = ask("levels", force=record, sample_rate=rate, bands=bands, method=method)
+    levels: NDArray[np.float64] = answer["levels"]
     return levels
 
 

@@ -113,14 +113,14 @@ def rating(levels: ArrayLike, bands: BandSet = "octave") -> Rating:
     excess = values[abs(values) > MAX_LEVEL]
     if excess.size:
         refuse_value("levels", float(excess[0]), f"{-MAX_LEVEL:g} to {MAX_LEVEL:g} dB")
-    found = ask("rating", bands=bands, levels=values)
+    answer = ask("rating", bands=bands, levels=values)
     has_classes = bands == BANDWIDTHS[0]
     return Rating(
         bands,
-        found["a_weighted"],
-        int(found["rounded"]),
-        int(found["class"]) if has_classes else None,
-        int(found["curve"]) if has_classes else None,
+        answer["a_weighted"],
+        int(answer["rounded"]),
+        int(answer["class"]) if has_classes else None,
+        int(answer["curve"]) if has_classes else None,
     )
 
 

@@ -86,9 +86,9 @@ def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
     """
     shown = _snapshots(impact)
     require_whole("instants", instants, 1, MAX_PANELS)
-    wanted = impact.touch_time + np.linspace(0, impact.contact_time, instants)
+    times = impact.touch_time + np.linspace(0, impact.contact_time, instants)
     # Fewer panels where there are fewer snapshots.
-    chosen = sorted({int(np.argmin(np.abs(shown.time - time))) for time in wanted})
+    chosen = sorted({int(np.argmin(np.abs(shown.time - time))) for time in times})
     rows = -(-len(chosen) // 3)
     figure = new_figure(0.6 + 1.6 * rows)
     panels = figure.subplots(rows, 3, squeeze=False).ravel()

@@ -197,9 +197,9 @@ def _draw_pair(
     x, y = (
         np.array(intervals[fit.names[i]]) / scale for i, scale in zip(pair, factor, strict=True)
     )
-    look: dict[str, Any] = {"color": GREY, "alpha": 0.5, "linewidth": 0, "zorder": 0}
-    axes.axvspan(*x, label=f"{100 * fit.confidence:g} % interval of each", **look)
-    axes.axhspan(*y, **look)
+    style: dict[str, Any] = {"color": GREY, "alpha": 0.5, "linewidth": 0, "zorder": 0}
+    axes.axvspan(*x, label=f"{100 * fit.confidence:g} % interval of each", **style)
+    axes.axhspan(*y, **style)
     half = 1.25 * np.sqrt(square * np.diag(block))
     axes.set_xlim(center[0] - half[0], center[0] + half[0])
     axes.set_ylim(center[1] - half[1], center[1] + half[1])

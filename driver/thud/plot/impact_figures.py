@@ -128,8 +128,8 @@ def levels(
         Bands in Hz, force exposure level in dB re 1 N.
     """
     curves = list(iterate_curves(impacts, force))
-    asked = {impact.case.levels.bands for _, impact, _ in curves}
-    bands: list[BandSet] = ["octave"] if asked == {"octave"} else ["octave", "third"]
+    requested = {impact.case.levels.bands for _, impact, _ in curves}
+    bands: list[BandSet] = ["octave"] if requested == {"octave"} else ["octave", "third"]
     figure = new_figure(0.4 + 2.5 * len(bands))
     panels = dict(zip(bands, figure.subplots(len(bands), 1, squeeze=False)[:, 0], strict=True))
     draw_levels(panels, impacts, force, common_source(impacts, source), method)
@@ -171,10 +171,12 @@ def common_source(impacts: Mapping[str, Curve], source: LimitsSource | None = No
     if source is not None:
         return source
     stated = (impact.limits_source for impact in impacts.values())
-    sources = {one for one in stated if one}
+    sources = {name for name in stated if name}
     if len(sources) > 1:
-        what = f"&limits: source differs ({', '.join(sorted(sources))})"
-        refuse(what, "cases and recordings with one source, or the choice of one")
+        refuse(
+            f"&limits: source differs ({', '.join(sorted(sources))})",
+            "cases and recordings with one source, or the choice of one",
+        )
     return sources.pop() if sources else Limits.source
 
 

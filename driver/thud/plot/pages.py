@@ -82,7 +82,7 @@ def html_page(
     )
 
 
-def curve_look(i: int, label: str) -> dict[str, Any]:
+def curve_style(i: int, label: str) -> dict[str, Any]:
     """Return name, line and marker of a curve by its number."""
     return {
         "name": "<br>".join(html.escape(line) for line in wrap(label, _LINE)),
@@ -196,7 +196,7 @@ def comparison_page(
     source: LimitsSource,
     table: Sequence[Sequence[str]],
 ) -> Figure:
-    """Draw forces, octave and third-octave levels of several impacts, and a table, on one page.
+    """Draw forces, octave and one-third-octave levels of impacts, and a table, on one page.
 
     The table is rows of text, first the head; the tolerance band is that of the source. Other
     arguments are those of `thud.compare`.
@@ -205,8 +205,8 @@ def comparison_page(
     grid = figure.add_gridspec(3, 2)
     draw_forces(figure.add_subplot(grid[0, :]), impacts, force)
     octaves = figure.add_subplot(grid[1, 0])
-    thirds = figure.add_subplot(grid[1, 1], sharey=octaves)
-    draw_levels({"octave": octaves, "third": thirds}, impacts, force, source)
+    third_octaves = figure.add_subplot(grid[1, 1], sharey=octaves)
+    draw_levels({"octave": octaves, "third": third_octaves}, impacts, force, source)
     octaves.set_ylabel(level_label(impacts, force))
     legend_above(octaves)
     head, *body = table
@@ -245,12 +245,12 @@ def comparison_html(
     forces: list[dict[str, Any]] = []
     levels: dict[BandSet, list[dict[str, Any]]] = {"octave": [], "third": []}
     for i, (label, impact, kind) in enumerate(iterate_curves(impacts, force)):
-        look = curve_look(i, label)
+        style = curve_style(i, label)
         time, newton = contact_force(impact, kind)
-        forces.append({**look, "mode": "lines", **curve_points(time, newton), "showlegend": True})
+        forces.append({**style, "mode": "lines", **curve_points(time, newton), "showlegend": True})
         for bands, traces in levels.items():
             points = curve_points(_names(bands), impact.levels(bands, force=kind))
-            traces.append({**look, "mode": "lines+markers", **points, "showlegend": False})
+            traces.append({**style, "mode": "lines+markers", **points, "showlegend": False})
     levels["octave"].append(_tolerance(source))
     level = level_label(impacts, force)
     plots = [
@@ -326,12 +326,12 @@ def floors_html(comparison: FloorComparison) -> str:
     """Return the page of `draw_floors` with interactive plots."""
     traces: list[list[dict[str, Any]]] = [[] for _ in _STEPS]
     for i, (name, prediction) in enumerate(comparison.predictions.items()):
-        look = curve_look(i, name)
+        style = curve_style(i, name)
         names = [f"{frequency:g}" for frequency in prediction.frequency]
         for step, values in zip(traces, _chain(prediction), strict=True):
             points = curve_points(names, values)
             step.append(
-                {**look, "mode": "lines+markers", **points, "showlegend": step is traces[-1]}
+                {**style, "mode": "lines+markers", **points, "showlegend": step is traces[-1]}
             )
     plots = [
         {
@@ -369,7 +369,7 @@ def _draw_classes(axes: Axes, comparison: FloorComparison) -> None:
     )  # fmt: skip
     axes.bar(
         x + 0.2, after, 0.36, color="white", edgecolor="black", linewidth=0.5,
-        hatch="//////", label="standardized, of prediction-third-octave bands",
+        hatch="//////", label="standardized, of one-third-octave bands",
     )  # fmt: skip
     for number, limit in enumerate(CLASS_LIMITS, 1):
         axes.axhline(limit, color=COLORS[1], linewidth=0.8, linestyle="--")

@@ -78,10 +78,10 @@ def _recorded(drop: Drop, time: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @own_style()
-def recording_figure(recording: Recording, what: str = "levels") -> Figure:
+def recording_figure(recording: Recording, quantity: str = "levels") -> Figure:
     """Draw the ``"levels"`` or the ``"force"`` of a recording."""
-    require_choice("what", what, ("levels", "force"))
-    return recording_levels(recording) if what == "levels" else recording_forces(recording)
+    require_choice("quantity", quantity, ("levels", "force"))
+    return recording_levels(recording) if quantity == "levels" else recording_forces(recording)
 
 
 @own_style()
@@ -102,16 +102,16 @@ def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
     if bands == BANDWIDTHS[0]:
         verdict = recording.assess()
         octaves = verdict.criteria[: len(average.level)]
-        own = any(one.name in recording.config.limits for one in octaves)
+        own = any(criterion.name in recording.config.limits for criterion in octaves)
         draw_tolerance(
             axes,
-            np.array([one.lower for one in octaves]),
-            np.array([one.upper for one in octaves]),
+            np.array([criterion.lower for criterion in octaves]),
+            np.array([criterion.upper for criterion in octaves]),
             verdict.source.replace("_", " ") + ", own limits" * own,
         )
     x = np.arange(len(average.level), dtype=float)
     _draw_drops(axes, x, average.drops, recording)
-    expanded = np.array([one.expanded for one in recording.level_estimates(bands)])
+    expanded = np.array([estimate.expanded for estimate in recording.level_estimates(bands)])
     mark = "average, 95 %" if len(average.drops) > 1 else "drop, 95 %"
     axes.errorbar(
         x, average.level, yerr=_bar(expanded), label=mark, marker="o", markersize=3, **BARS,

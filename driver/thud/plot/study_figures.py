@@ -362,15 +362,15 @@ def draw_sensitivity(result: Sensitivity) -> Figure:
             hatch=HATCHES[i % len(HATCHES)], edgecolor="white", linewidth=0,
             label=humanize(name),
         )  # fmt: skip
-        look: dict[str, Any] = {"color": "black", "linestyle": "none", "elinewidth": 0.6}
+        style: dict[str, Any] = {"color": "black", "linestyle": "none", "elinewidth": 0.6}
         axes.errorbar(
             row["total"], at - thickness / 5, xerr=row["total_interval"], marker="|", markersize=3,
-            label="total index" if i == len(parameters) - 1 else None, **look,
+            label="total index" if i == len(parameters) - 1 else None, **style,
         )  # fmt: skip
         axes.errorbar(
             row["first_order"], at + thickness / 5, xerr=row["first_order_interval"], marker="D",
             markersize=2, markerfacecolor="white", markeredgewidth=0.5,
-            label="first order" if i == len(parameters) - 1 else None, **look,
+            label="first order" if i == len(parameters) - 1 else None, **style,
         )  # fmt: skip
     axes.set_yticks(position, outputs)
     axes.set_ylim(len(outputs) - 0.5, -0.5)
@@ -387,7 +387,9 @@ def draw_surrogate(result: Surrogate) -> Figure:
 
     Quantities that are not levels have errors in 20 lg of their ratio.
     """
-    labels = [name for name, judged in zip(result.labels, result.assessed, strict=True) if judged]
+    labels = [
+        name for name, assessed in zip(result.labels, result.assessed, strict=True) if assessed
+    ]
     residuals = result.residuals[:, result.assessed]
     figure, axes = empty_axes(0.9 + 0.2 * len(labels))
     bound = result.bound

@@ -97,8 +97,8 @@ def legend_above(axes: Axes, *others: Axes, title: str = "") -> Legend:
         raise InputError(message)
     entries = [
         (handle, fill(name, _LINE))
-        for one in (axes, *others)
-        for handle, name in zip(*one.get_legend_handles_labels(), strict=True)
+        for panel in (axes, *others)
+        for handle, name in zip(*panel.get_legend_handles_labels(), strict=True)
     ]
     handles, names = zip(*entries, strict=True)
     rows = 0
@@ -176,10 +176,10 @@ def force_words(impacts: Mapping[str, Curve], force: LevelsForce | None) -> str:
     return FORCE_WORDS[kinds.pop()] if len(kinds) == 1 else "force"
 
 
-def level_label(impacts: Mapping[str, Curve], force: LevelsForce | None, what: str = LEVEL) -> str:
+def level_label(impacts: Mapping[str, Curve], force: LevelsForce | None, label: str = LEVEL) -> str:
     """Return the label of an axis of levels, with their force where labels do not say which."""
     words = force_words(impacts, force)
-    return what if words == "force" else f"{what}\n({words})"
+    return label if words == "force" else f"{label}\n({words})"
 
 
 def octave_axis(axes: Axes, bands: BandSet = "octave") -> None:

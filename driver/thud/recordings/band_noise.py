@@ -34,8 +34,8 @@ def band_functionals(count: int, rate: float, lower: float, upper: float) -> NDA
     scale = np.sqrt((upper - lower) * weights)[:, None] / rate
     waves = np.concatenate([scale * np.cos(phase), scale * np.sin(phase)])
     _, size, rows = np.linalg.svd(waves, full_matrices=False)
-    kept = size**2 > NEGLIGIBLE * size[0] ** 2
-    return np.asarray(size[kept, None] * rows[kept])
+    significant = size**2 > NEGLIGIBLE * size[0] ** 2
+    return np.asarray(size[significant, None] * rows[significant])
 
 
 def band_noise(drops: Sequence[Drop], bands: Bands) -> NDArray[np.float64]:
@@ -56,7 +56,7 @@ def band_noise(drops: Sequence[Drop], bands: Bands) -> NDArray[np.float64]:
         for count, indices in gates.items():
             for k in range(0, len(indices), MAX_DROPS):
                 some = indices[k : k + MAX_DROPS]
-                rows = [one[:, :count] for one in functionals]
+                rows = [functional[:, :count] for functional in functionals]
                 energies[some] = _energies([drops[i] for i in some], rows, edges)
     return energies
 
@@ -69,8 +69,10 @@ def _energies(
     """Return the energies of drops with gates of one length, [n_drop, n_band, 2]."""
     contacts = [drop.contact for drop in drops]
     forces = np.array([drop.force[slice(*drop.gate)] for drop in drops])
-    slow = np.array([one.covariance for one in contacts])
-    white = np.array([one.background.variances[0] * one.sample_rate / 2 for one in contacts])
+    slow = np.array([contact.covariance for contact in contacts])
+    white = np.array(
+        [contact.background.variances[0] * contact.sample_rate / 2 for contact in contacts]
+    )
     energies = np.empty((len(drops), len(edges), 2))
     for band, (rows, edge) in enumerate(zip(functionals, edges, strict=True)):
         values, summed = forces @ rows.T, contacts[0].summed(rows)
@@ -80,7 +82,7 @@ def _energies(
         # On average the first term is too large by twice the second.
         variance = 4 * np.einsum("di,dij,dj->d", values, covariance, values) - 2 * squares
         middle = sum(edge) / 2
-        density, spread = np.array([one.background.density(middle) for one in contacts]).T
+        density, spread = np.array([contact.background.density(middle) for contact in contacts]).T
         variance = np.maximum(variance, 2 * squares) + (noise * spread / density) ** 2
         energies[:, band] = np.column_stack([noise, np.sqrt(variance)])
     return energies

@@ -110,11 +110,11 @@ def _source(
     channels = choose_channels(read_channels(path), channel, shown_path(path))
     if len(channels) != 1:
         refuse(f"{shown_path(path)}: {len(channels)} channels fit", "channel = one of them")
-    one = channels[0]
-    word = find_unit(one.unit) if unit is None else require_unit(unit, path.name)
+    selected = channels[0]
+    word = find_unit(selected.unit) if unit is None else require_unit(unit, path.name)
     if not word:
         refuse(f"{shown_path(path)}: the values are without a unit", f"unit = one of {ALLOWED}")
-    return shown_path(path), word, one.samples, one.n_sample
+    return shown_path(path), word, selected.samples, selected.n_sample
 
 
 def _means(samples: Callable[[int, int], NDArray[np.float64]], count: int) -> NDArray[np.float64]:

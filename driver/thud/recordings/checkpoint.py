@@ -76,7 +76,7 @@ class Checkpoint:
                 warnings.warn(message, ReportWarning, stacklevel=2)
             return
         # Files of other signals belong to another measurement.
-        files = [p for one in self._digests for p in self._files(one)]
+        files = [file for digest in self._digests for file in self._files(digest)]
         with uninterrupted():
             for path in files:
                 path.unlink(missing_ok=True)
@@ -92,15 +92,15 @@ class Checkpoint:
         identity = "\n".join(map(str, (version(), signal.checksum, signal.name, config)))
         self._digest = hashlib.sha256(identity.encode("utf-8", "surrogateescape")).hexdigest()[:32]
         self._digests.add(self._digest)
-        found: dict[int, Drop] = {}
+        drops: dict[int, Drop] = {}
         for path in self._files(self._digest):
-            found |= _read(path)
-        return found
+            drops |= _read(path)
+        return drops
 
     def _files(self, digest: str) -> list[Path]:
         """Return the files of a signal and a configuration."""
-        found = self.folder.glob(f"{PREFIX}{digest}-*{SUFFIX}") if self.folder else ()
-        return sorted(filter(is_regular, found))
+        files = self.folder.glob(f"{PREFIX}{digest}-*{SUFFIX}") if self.folder else ()
+        return sorted(filter(is_regular, files))
 
     def add(self, start: int, drop: Drop) -> None:
         """Store a drop by its first sample; it is on disk after some seconds."""
@@ -124,11 +124,11 @@ class Checkpoint:
 def _read(path: Path) -> dict[int, Drop]:
     """Return the drops of a file, none if it is damaged or of another kind."""
     try:
-        found = _DataOnly(io.BytesIO(path.read_bytes())).load()
+        content = _DataOnly(io.BytesIO(path.read_bytes())).load()
     except Exception:  # noqa: BLE001 - a damaged pickle raises anything; its drops are measured again
         return {}
-    valid = isinstance(found, dict) and all(isinstance(drop, Drop) for drop in found.values())
-    return found if valid else {}
+    valid = isinstance(content, dict) and all(isinstance(drop, Drop) for drop in content.values())
+    return content if valid else {}
 
 
 class _DataOnly(pickle.Unpickler):
@@ -136,9 +136,9 @@ class _DataOnly(pickle.Unpickler):
 
     def find_class(self, module: str, name: str) -> Any:  # noqa: ANN401 - a class
         """Return a class; raise UnpicklingError of what is no data."""
-        found = super().find_class(module, name) if module in sys.modules else None
-        ours = module.startswith("thud.") and dataclasses.is_dataclass(found)
+        result = super().find_class(module, name) if module in sys.modules else None
+        ours = module.startswith("thud.") and dataclasses.is_dataclass(result)
         if not ours and not (module.partition(".")[0] == "numpy" and name in NUMPY):
             message = f"{module}.{name} is no data"
             raise pickle.UnpicklingError(message)
-        return found
+        return result

@@ -127,7 +127,7 @@ def find_windows(signal: Signal, *, progress: bool = False) -> list[Window]:
 def _pieces(signal: Signal, *, progress: bool) -> Iterator[tuple[int, NDArray[np.float64]]]:
     """Yield the first sample and the cell means of the pieces of a signal."""
     width = max(1, round(signal.sample_rate * CELL))
-    kept = np.empty(0)
+    cells = np.empty(0)
     first = 0
     bar = tqdm(
         total=signal.n_sample, unit="sample", unit_scale=True, desc=signal.name,
@@ -145,11 +145,11 @@ def _pieces(signal: Signal, *, progress: bool) -> Iterator[tuple[int, NDArray[np
             parts.append(force[whole:].mean(keepdims=True))
         ready += len(parts[-1]) if whole == len(force) else len(parts[-1]) + len(parts[-2])
         bar.update(stop - start)
-        if ready + len(kept) >= PIECE or stop == signal.n_sample:
-            kept = np.concatenate([kept, *parts])
-            yield first * width, kept
-            first += max(len(kept) - OVERLAP, 0)
-            kept, parts, ready = kept[-OVERLAP:], [], 0
+        if ready + len(cells) >= PIECE or stop == signal.n_sample:
+            cells = np.concatenate([cells, *parts])
+            yield first * width, cells
+            first += max(len(cells) - OVERLAP, 0)
+            cells, parts, ready = cells[-OVERLAP:], [], 0
     bar.close()
 
 

@@ -115,13 +115,13 @@ def _fill(
     total = int(lengths[lost].sum())
     if not total:
         return force, (), ()
-    found = f"{len(lost)} dropouts of {1e3 * total / rate:.3g} ms in all"
+    summary = f"{len(lost)} dropouts of {1e3 * total / rate:.3g} ms in all"
     if total > MAX_REPAIRED * rate:
-        refuse(f"{window.name}: the contact has {found}", f"up to {1e3 * MAX_REPAIRED:g} ms")
+        refuse(f"{window.name}: the contact has {summary}", f"up to {1e3 * MAX_REPAIRED:g} ms")
     good = np.ones(len(force), dtype=bool)
     for k in lost:
         good[first + starts[k] : first + starts[k] + lengths[k]] = False
     filled = force.copy()
     index = np.arange(len(force))
     filled[~good] = np.interp(index[~good], index[good], force[good])
-    return filled, (f"{found} were filled by lines",), (f"the contact has {found}",)
+    return filled, (f"{summary} were filled by lines",), (f"the contact has {summary}",)

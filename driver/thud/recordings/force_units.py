@@ -86,11 +86,11 @@ def find_unit(text: str) -> str:
     return word if word in UNITS else SPELLINGS.get(word.casefold(), "")
 
 
-def require_unit(text: object, place: str) -> str:
+def require_unit(text: object, label: str) -> str:
     """Return the unit that a text names; raise InputError where it names none."""
     unit = find_unit(text) if isinstance(text, str) else ""
     if not unit:
-        refuse(f"{place}: unit = {shown(text)} is not known", ALLOWED)
+        refuse(f"{label}: unit = {shown(text)} is not known", ALLOWED)
     return unit
 
 
@@ -105,12 +105,12 @@ def read_chain(text: object) -> list[Factor]:
     parts = [part.strip() for part in re.split(r"[;,]", text[:1000]) if part.strip()]
     factors = []
     for part in parts:
-        found = FACTOR.fullmatch(part)
-        value = float(found["value"]) if found else 0.0
-        if not found or not SIZES[0] < abs(value) < SIZES[1]:
+        match = FACTOR.fullmatch(part)
+        value = float(match["value"]) if match else 0.0
+        if not match or not SIZES[0] < abs(value) < SIZES[1]:
             refuse(f"calibration: {part[:60]!r} is not a number with units", EXAMPLES)
         (top, over), (bottom, under) = (
-            UNITS[require_unit(found[side], f"calibration {part[:60]!r}")]
+            UNITS[require_unit(match[side], f"calibration {part[:60]!r}")]
             for side in ("top", "bottom")
         )
         factors.append(Factor(value * over / under, top, bottom))
@@ -120,13 +120,13 @@ def read_chain(text: object) -> list[Factor]:
 
 
 def newtons_per_unit(
-    unit: str, calibration: float | str | Calibration | None, counts: float | None, place: str
+    unit: str, calibration: float | str | Calibration | None, counts: float | None, label: str
 ) -> tuple[float, str, float | None]:
     """Return N per unit of the values, its description, and its relative uncertainty or None.
 
     The unit is that of the values, `ASSUMED`, or empty if the calibration is a number of N per
     value; the calibration is None if the values are forces. `counts` are those of full scale if the
-    values are integers, and `place` is the file and channel for messages.
+    values are integers, and `label` is the file and channel for messages.
     """
     if unit == ASSUMED:
         return 1.0, "values assumed to be in N", None
@@ -134,11 +134,11 @@ def newtons_per_unit(
     if calibration is None:
         if base != "N":
             words = {"FS": "full-scale values"}.get(unit, f"values in {unit}")
-            refuse(f"{place}: enter a calibration: the file holds {words}", EXAMPLES)
+            refuse(f"{label}: enter a calibration: the file holds {words}", EXAMPLES)
         return multiple, f"values in {unit}", None
     if isinstance(calibration, int | float | np.number) and not isinstance(calibration, bool):
         if not SIZES[0] < abs(calibration) < SIZES[1]:
-            refuse_value(f"{place}: calibration", calibration, EXAMPLES)
+            refuse_value(f"{label}: calibration", calibration, EXAMPLES)
         return float(calibration), f"{calibration:.6g} N per {unit or 'recorded value'}", None
     known = calibration if isinstance(calibration, Calibration) else Calibration(str(calibration))
     factors = read_chain(known.chain)
@@ -146,13 +146,13 @@ def newtons_per_unit(
     size = _follow(base, factors, scale)
     if size is None:
         refuse(
-            f"{place}: calibration {known.chain!r} does not lead from {unit} to N by all its "
+            f"{label}: calibration {known.chain!r} does not lead from {unit} to N by all its "
             "factors",
             EXAMPLES,
         )
     value = size * multiple
     if not math.isfinite(value) or not SIZES[0] < abs(value) < SIZES[1]:
-        refuse(f"{place}: calibration {known.chain!r} gives {value:g} N per {unit}", EXAMPLES)
+        refuse(f"{label}: calibration {known.chain!r} gives {value:g} N per {unit}", EXAMPLES)
     words = f"{known.chain}: {value:.6g} N per {unit}" + (f" ({known.origin})" * bool(known.origin))
     return value, words, known.uncertainty
 

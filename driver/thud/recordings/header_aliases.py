@@ -94,15 +94,15 @@ def read_number(text: object, decimal: str = "") -> tuple[float, str] | None:
     """
     if isinstance(text, int | float):
         return float(text), ""
-    found = NUMBER.fullmatch(str(text).strip().strip("\"'").strip()[:MAX_LENGTH])
-    if not found:
+    match = NUMBER.fullmatch(str(text).strip().strip("\"'").strip()[:MAX_LENGTH])
+    if not match:
         return None
-    values = {mark: to_number(found["number"], mark) for mark in MARKS}
+    values = {mark: to_number(match["number"], mark) for mark in MARKS}
     known = {value for value in values.values() if value is not None}
-    if not known or (len(known) > 1 and not decimal and "," in found["number"]):
+    if not known or (len(known) > 1 and not decimal and "," in match["number"]):
         return None
     value = values[decimal or "."] if len(known) > 1 else known.pop()
-    return (value, found["unit"].strip(" []()")) if value is not None else None
+    return (value, match["unit"].strip(" []()")) if value is not None else None
 
 
 def find_rate(items: Iterable[tuple[str, object]], decimal: str = "") -> float | None:

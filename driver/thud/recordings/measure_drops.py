@@ -108,17 +108,17 @@ def _measure(
     """Return the drops in the windows of one signal, including those of the checkpoint."""
     signal = windows[0].signal
     measured = checkpoint.open(signal, config)
-    left = [window for window in windows if window.start not in measured]
+    remaining = [window for window in windows if window.start not in measured]
     # A signal in memory would be copied to the processes with each window.
-    if signal.path and len(left) >= MIN_FOR_POOL:
+    if signal.path and len(remaining) >= MIN_FOR_POOL:
         processes.start()
     call = partial(measure_window, config=config)
-    results = processes.map(call, left) if signal.path else map(call, left)
+    results = processes.map(call, remaining) if signal.path else map(call, remaining)
     with tqdm(
-        total=len(windows), initial=len(windows) - len(left), unit="drop", desc=signal.name,
+        total=len(windows), initial=len(windows) - len(remaining), unit="drop", desc=signal.name,
         disable=not progress,
     ) as bar:  # fmt: skip
-        for window, drop in zip(left, results, strict=True):
+        for window, drop in zip(remaining, results, strict=True):
             checkpoint.add(window.start, drop)
             measured[window.start] = drop
             bar.update()

@@ -81,8 +81,8 @@ def _listen(reader: int) -> tuple[bytes, bool]:
     """Return the output of a process until it ends, and whether it ends in time."""
     message = b""
     end = time.monotonic() + TIMEOUT
-    while (left := end - time.monotonic()) > 0:
-        if select.select([reader], [], [], left)[0]:
+    while (remaining := end - time.monotonic()) > 0:
+        if select.select([reader], [], [], remaining)[0]:
             piece = os.read(reader, 4096)
             if not piece:
                 return message, True

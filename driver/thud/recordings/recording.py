@@ -235,10 +235,10 @@ class Recording(Displayed):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What may be wrong with the recording, its files and drops, a sentence each."""
-        found = [*self.own_warnings, *map(str, self.outliers)]
-        found += [warning for one in self.origins for warning in one.warnings]
-        found += [f"{drop.name}: {warning}" for drop in self.drops for warning in drop.warnings]
-        return tuple(dict.fromkeys(found))
+        result = [*self.own_warnings, *map(str, self.outliers)]
+        result += [warning for origin in self.origins for warning in origin.warnings]
+        result += [f"{drop.name}: {warning}" for drop in self.drops for warning in drop.warnings]
+        return tuple(dict.fromkeys(result))
 
     @cached_property
     def own_warnings(self) -> tuple[str, ...]:
@@ -253,7 +253,7 @@ class Recording(Displayed):
         if config.mass is None and math.isfinite(self.estimates["mass"].value):
             warnings.append("the mass is not stated: the effective mass is assessed")
         warnings += [
-            f"force plate: {one.sentence}" for one in config.plate_checks if one.met is False
+            f"force plate: {check.sentence}" for check in config.plate_checks if check.met is False
         ]
         plate = config.resonance
         missing = {
@@ -270,10 +270,10 @@ class Recording(Displayed):
     @property
     def steps(self) -> tuple[str, ...]:
         """Processing of the signals, a sentence each."""
-        found = [f"{one.name}: {step}" for one in self.origins for step in one.steps]
-        found += [f"{drop.name}: {step}" for drop in self.drops for step in drop.steps]
-        found += self.level_steps
-        return tuple(dict.fromkeys(found))
+        result = [f"{origin.name}: {step}" for origin in self.origins for step in origin.steps]
+        result += [f"{drop.name}: {step}" for drop in self.drops for step in drop.steps]
+        result += self.level_steps
+        return tuple(dict.fromkeys(result))
 
     @property
     def level_steps(self) -> tuple[str, ...]:
@@ -322,7 +322,7 @@ class Recording(Displayed):
         low_pass = self.config.low_pass
         levels = [compare_methods(drop, bands, low_pass=low_pass) for drop in self.drops]
         return {
-            method: np.max([np.abs(one[method] - one["exact"]) for one in levels], axis=0)
+            method: np.max([np.abs(entry[method] - entry["exact"]) for entry in levels], axis=0)
             for method in levels[0]
         }
 
@@ -361,11 +361,11 @@ class Recording(Displayed):
             **self.estimates,
         )
 
-    def plot(self, what: Literal["levels", "force"] = "levels") -> Figure:
+    def plot(self, kind: Literal["levels", "force"] = "levels") -> Figure:
         """Draw the levels of the drops over the tolerance band, or their forces."""
         from thud.plot.recording_figures import recording_figure
 
-        return recording_figure(self, what)
+        return recording_figure(self, kind)
 
     def to_xarray(self) -> xr.Dataset:
         """Return the force of the first drop, the average levels and the means over the drops.
@@ -396,16 +396,16 @@ class Recording(Displayed):
             if number <= origin.drops:
                 break
             number -= origin.drops
-        one = self.drops[drop - 1]
-        first, stop = one.gate
+        measured = self.drops[drop - 1]
+        first, stop = measured.gate
         return DropForce(
             name=self.name if len(self.drops) == 1 else f"{self.name}_drop_{drop}",
-            force=one.force[first:stop],
-            sample_rate=one.sample_rate,
-            start=float(one.time[first]),
+            force=measured.force[first:stop],
+            sample_rate=measured.sample_rate,
+            start=float(measured.time[first]),
             kind=self.assessed_force(),
-            origin=f"recording {one.name}, {origin.calibration or 'calibration not known'}",
+            origin=f"recording {measured.name}, {origin.calibration or 'calibration not known'}",
             checksum=origin.checksum,
             date=origin.date,
-            notes=(*one.steps, f"noise of {one.noise.deviation:.3g} N remains"),
+            notes=(*measured.steps, f"noise of {measured.noise.deviation:.3g} N remains"),
         )

@@ -46,30 +46,30 @@ def check_ringing(contact: Contact, plate: Plate | None = None) -> tuple[str, ..
         return ()
     frequency, energy = _matched(after, contact, plate)
     k, index = np.unravel_index(np.argmax(energy), energy.shape)
-    found, decay = float(frequency[index]), float(DECAYS[k])
-    quality = np.pi * found * decay
-    if not (MIN_FREQUENCY <= found <= MAX_FREQUENCY * rate and energy[k, index] > CLEAR):
+    resonance, decay = float(frequency[index]), float(DECAYS[k])
+    quality = np.pi * resonance * decay
+    if not (MIN_FREQUENCY <= resonance <= MAX_FREQUENCY * rate and energy[k, index] > CLEAR):
         return ()
     if quality < MIN_OSCILLATIONS:
         return ()
     if len(before) >= MIN_LENGTH * rate:
         usual, same = _matched(before, contact, plate)
-        at = int(np.argmin(np.abs(usual - found)))
+        at = int(np.argmin(np.abs(usual - resonance)))
         if energy[k, index] < OVER_BEFORE * same[k, max(at - 1, 0) : at + 2].max():
             return ()
-    density, _ = contact.background.density(found)
-    density *= float(_gain(plate, np.array([found]))[0]) if plate else 1.0
+    density, _ = contact.background.density(resonance)
+    density *= float(_gain(plate, np.array([resonance]))[0]) if plate else 1.0
     window = np.exp(-2 * np.arange(len(after)) / rate / decay).sum()
     amplitude = 2 * np.sqrt(energy[k, index] * density * rate / 2 / window)
     if amplitude < NOTABLE[plate is not None] * contact.peak:
         return ()
     # Between the frequencies of the transform: the vertex of a parabola.
     low, top, high = np.log(energy[k, index - 1 : index + 2])
-    found += (frequency[1] - frequency[0]) * (low - high) / (2 * (low - 2 * top + high))
+    resonance += (frequency[1] - frequency[0]) * (low - high) / (2 * (low - 2 * top + high))
     stated = "is not the one of [plate]" if plate else "is in levels, peaks and contact time"
     warning = (
-        f"the plate keeps ringing after the contact, at {found:.0f} Hz with {amplitude:.2g} N: a "
-        f"resonance of the plate that {stated}; state it in [plate]"
+        f"the plate keeps ringing after the contact, at {resonance:.0f} Hz with {amplitude:.2g} N: "
+        f"a resonance of the plate that {stated}; state it in [plate]"
     )
     return (warning,)
 

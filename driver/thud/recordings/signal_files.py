@@ -85,8 +85,8 @@ def open_signals(  # noqa: PLR0913 - the keys of the configuration
     file = regular_file(path)
     channels = read_channels(file)
     return [
-        _signal(file, each, stated, several=len(channels) > 1)
-        for each in choose_channels(channels, channel, shown_path(file))
+        _signal(file, entry, stated, several=len(channels) > 1)
+        for entry in choose_channels(channels, channel, shown_path(file))
     ]
 
 
@@ -99,21 +99,21 @@ def regular_file(path: str | os.PathLike[str]) -> Path:
     file = Path(path)
     name = shown_path(file)
     try:
-        found = file.stat()
-        if stat.S_ISREG(found.st_mode):
+        status = file.stat()
+        if stat.S_ISREG(status.st_mode):
             with file.open("rb") as opened:
-                stored = _stored(opened.fileno(), found.st_size)
+                stored = _stored(opened.fileno(), status.st_size)
     except OSError as error:
         reason = os.strerror(error.errno or errno.EIO)
         refuse(f"{name}: cannot be read ({reason})", "a file that can be read", error)
     except ValueError as error:  # a zero byte
         refuse(f"{shown(name)}: cannot be read", "the path of a file", error)
-    if not stat.S_ISREG(found.st_mode):
-        kind = "a directory" if stat.S_ISDIR(found.st_mode) else "no regular file"
+    if not stat.S_ISREG(status.st_mode):
+        kind = "a directory" if stat.S_ISDIR(status.st_mode) else "no regular file"
         refuse(f"{name}: is {kind}", "a file")
-    if found.st_size > MIB and stored < MIN_STORED * found.st_size:
+    if status.st_size > MIB and stored < MIN_STORED * status.st_size:
         refuse(
-            f"{name}: {found.st_size / MIB:.0f} MiB of which {stored / MIB:.1f} MiB are stored",
+            f"{name}: {status.st_size / MIB:.0f} MiB of which {stored / MIB:.1f} MiB are stored",
             "a complete file",
         )
     return file
@@ -138,29 +138,31 @@ def _stored(descriptor: int, size: int) -> int:
 def choose_channels(channels: list[Channel], channel: int | str | None, name: str) -> list[Channel]:
     """Return the selected channels; raise InputError where the selection is ambiguous."""
     listed = ", ".join(
-        f"{each.number}" + (f" {shown_text(each.name)!r}" if each.name else "")
-        for each in channels[:20]
+        f"{entry.number}" + (f" {shown_text(entry.name)!r}" if entry.name else "")
+        for entry in channels[:20]
     )
     if channel is None:
-        forces = [each for each in channels if UNITS.get(find_unit(each.unit), ("",))[0] == "N"]
+        forces = [entry for entry in channels if UNITS.get(find_unit(entry.unit), ("",))[0] == "N"]
         if not forces and len(channels) > 1:
             refuse(
                 f"{name}: has {len(channels)} channels, none of them in a unit of force",
                 f"channel = one of {listed}",
             )
         return forces or channels
-    found = [each for each in channels if channel in {each.number, each.name}]
-    if not found and isinstance(channel, str):
+    matching = [entry for entry in channels if channel in {entry.number, entry.name}]
+    if not matching and isinstance(channel, str):
         word = channel.strip().casefold()
-        found = [
-            each
-            for each in channels
+        matching = [
+            entry
+            for entry in channels
             if word
-            in {str(each.number), each.name.casefold(), each.name.rpartition("/")[2].casefold()}
+            in {str(entry.number), entry.name.casefold(), entry.name.rpartition("/")[2].casefold()}
         ]
-    if len(found) != 1:
-        refuse(f"{name}: channel = {shown(channel)} fits {len(found)} channels", f"one of {listed}")
-    return found
+    if len(matching) != 1:
+        refuse(
+            f"{name}: channel = {shown(channel)} fits {len(matching)} channels", f"one of {listed}"
+        )
+    return matching
 
 
 @dataclass(frozen=True)

@@ -193,7 +193,7 @@ def read_history(
     files = list(dict.fromkeys(file for path in paths for file in _files(Path(path))))
     if not files:
         refuse("there are no reports", "one report.json or more")
-    dated = sorted(((*_read(file), file) for file in files), key=lambda one: one[0])
+    dated = sorted(((*_read(file), file) for file in files), key=lambda entry: entry[0])
     for _, report, file in dated[1:]:
         _require_same(report, file, dated[0][1], dated[0][2], different_balls=different_balls)
     names = dict.fromkeys(
@@ -213,24 +213,28 @@ def _require_same(
     different_balls: bool,
 ) -> None:
     """Raise InputError if a report is not of the source, or the ball, of the first."""
-    one, other = ([c["name"] for c in r["criteria"]] for r in (report, first))
-    if report["source"] != first["source"] or one != other:
-        what = f"{file}: its source {report['source']!r} or its criteria are not those of {origin}"
-        refuse(what, "reports of one source")
+    names, first_names = ([c["name"] for c in r["criteria"]] for r in (report, first))
+    if report["source"] != first["source"] or names != first_names:
+        refuse(
+            f"{file}: its source {report['source']!r} or its criteria are not those of {origin}",
+            "reports of one source",
+        )
     for key, words in (("serial", "serial number"), ("ball", "ball")):
         if report[key] != first[key] and not different_balls:
-            what = f"{file}: its {words} {report[key]!r} is not that of {origin}, {first[key]!r}"
-            refuse(what, "reports of one ball, or --different-balls")
+            refuse(
+                f"{file}: its {words} {report[key]!r} is not that of {origin}, {first[key]!r}",
+                "reports of one ball, or --different-balls",
+            )
 
 
 def _files(path: Path) -> list[Path]:
     """Return the reports of a path."""
     if not path.is_dir():
         return [path]
-    found = sorted(path.rglob("report.json"))
-    if not found:
+    reports = sorted(path.rglob("report.json"))
+    if not reports:
         refuse(f"{path}: holds no report.json", "a directory of reports")
-    return found
+    return reports
 
 
 def _read(path: Path) -> tuple[datetime, dict[str, Any]]:
@@ -243,7 +247,7 @@ def _read(path: Path) -> tuple[datetime, dict[str, Any]]:
     except (OSError, ValueError, RecursionError) as error:
         reason = error.strerror if isinstance(error, OSError) else "no JSON"
         refuse(f"{path}: cannot be read ({reason})", allowed, error)
-    if not isinstance(report, dict) or report.get("format") != FORMAT or not _is_whole(report):
+    if not isinstance(report, dict) or report.get("format") != FORMAT or not _is_complete(report):
         refuse(f"{path}: is no calibration report of this version", allowed)
     date = read_date(report["date"].split(" to ")[0])
     if date is None:
@@ -254,27 +258,27 @@ def _read(path: Path) -> tuple[datetime, dict[str, Any]]:
     return date, report
 
 
-def _is_whole(report: dict[str, Any]) -> bool:
-    """Whether a report holds what a chart needs, numbers where they are due."""
+def _is_complete(report: dict[str, Any]) -> bool:
+    """Whether a report has all entries of a chart, each of its type."""
     entries = report.get("criteria")
     if any(key not in report for key in KEYS) or not isinstance(entries, list) or not entries:
         return False
     if not all(isinstance(report[key], str) for key in KEYS if key != "criteria"):
         return False
     return all(
-        isinstance(one, dict)
-        and all(key in one for key in CRITERION_KEYS)
-        and all(_is_number(one[key]) for key in ("lower", "upper"))
+        isinstance(entry, dict)
+        and all(key in entry for key in CRITERION_KEYS)
+        and all(_is_number(entry[key]) for key in ("lower", "upper"))
         and all(
-            one[key] is None or _is_number(one[key])
+            entry[key] is None or _is_number(entry[key])
             for key in (
                 "value", "uncertainty", "expanded_uncertainty", "band", "margin", "spread",
                 "background",
             )
         )
-        and all(isinstance(one[key], str) for key in ("name", "unit"))
-        and one["verdict"] in RESULTS
-        for one in entries
+        and all(isinstance(entry[key], str) for key in ("name", "unit"))
+        and entry["verdict"] in RESULTS
+        for entry in entries
     )  # fmt: skip
 
 
@@ -319,7 +323,7 @@ def _trend(
     if significant:
         limit = limits[1] if slope > 0 else limits[0]
         times = _reach(limit - mean, slope, factor(0.05), weight.sum(), spread)
-    return Trend(slope, expanded, significant, ends, line, *(middle + one for one in times))
+    return Trend(slope, expanded, significant, ends, line, *(middle + instant for instant in times))
 
 
 def _reach(

@@ -59,7 +59,7 @@ def _draw_criterion(
 ) -> None:
     """Draw one criterion."""
     style = style_of(entries[0])
-    bounds = np.array([limits_of(one) for one in entries]) / style.unit
+    bounds = np.array([limits_of(entry) for entry in entries]) / style.unit
     # A count has one value that is allowed, and its area no width.
     is_count = bounds[0, 0] == bounds[0, 1]
     bounds += is_count * np.array([-0.4, 0.4])
@@ -68,17 +68,17 @@ def _draw_criterion(
     edges = np.array([history.dates[0] - span, *history.dates, history.dates[-1] + span])
     lower, upper = np.pad(bounds, ((1, 1), (0, 0)), "edge").T
     axes.fill_between(edges, lower, upper, step="mid", color=GREY, linewidth=0)
-    for date, one in zip(history.dates, entries, strict=True):
-        if one["value"] is None:
+    for date, entry in zip(history.dates, entries, strict=True):
+        if entry["value"] is None:
             continue
-        marker, color = MARKS.get(one["verdict"], ("D", "white"))
-        bar = (one["expanded_uncertainty"] or 0.0) / style.unit
+        marker, color = MARKS.get(entry["verdict"], ("D", "white"))
+        bar = (entry["expanded_uncertainty"] or 0.0) / style.unit
         axes.errorbar(
-            date, one["value"] / style.unit, yerr=bar,  # type: ignore[arg-type]
+            date, entry["value"] / style.unit, yerr=bar,  # type: ignore[arg-type]
             marker=marker, markersize=4.5, markerfacecolor=color, color="black", capsize=2,
             elinewidth=0.8, markeredgewidth=0.7,
         )  # fmt: skip
-    if all(one["value"] is None for one in entries):
+    if all(entry["value"] is None for entry in entries):
         axes.text(0.5, 0.5, NOT_KNOWN, transform=axes.transAxes, ha="center")
     if trend is not None and trend.significant:
         dates = np.array([history.day(year) for year in trend.time])

@@ -78,26 +78,26 @@ def _attributes(data: dict[str, Any]) -> dict[str, Any]:
                 [
                     *data[kind],
                     *(
-                        f"{one['name']}: {message}"
+                        f"{entry['name']}: {message}"
                         for key in ("files", "drops")
-                        for one in data[key]
-                        for message in one[kind]
+                        for entry in data[key]
+                        for message in entry[kind]
                     ),
                 ]
             )
         )
         for kind in ("steps", "warnings")
     }
-    found = {**known, "instruments": "\n".join(data["instruments"]), **notes}
-    return {k: _plain(one) if isinstance(one, str) else one for k, one in found.items()}
+    result = {**known, "instruments": "\n".join(data["instruments"]), **notes}
+    return {k: _plain(value) if isinstance(value, str) else value for k, value in result.items()}
 
 
 def _numbers(values: Iterable[float | None]) -> NDArray[np.float64]:
-    return np.array([np.nan if one is None else one for one in values], dtype=np.float64)
+    return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
 
 
 def _texts(values: Iterable[str]) -> NDArray[np.object_]:
-    return np.array([_plain(one) for one in values], dtype=object)
+    return np.array([_plain(value) for value in values], dtype=object)
 
 
 def _plain(text: str) -> str:

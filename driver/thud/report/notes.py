@@ -11,51 +11,44 @@ if TYPE_CHECKING:
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 
 
-def group_sentences(said: Iterable[tuple[str, str]], places: int, kind: str) -> list[str]:
-    """Return sentences that differ in numbers only as one, with the range of each number.
+def group_messages(messages: Iterable[tuple[str, str]], count: int, kind: str) -> list[str]:
+    """Return messages that differ in numbers only as one, with the range of each number.
 
     Parameters
     ----------
-    said
-        Place (name of a drop or a file) and sentence.
-    places
-        Number of all places.
+    messages
+        Name of a drop or a file, and its message.
+    count
+        Number of all drops or files.
     kind
-        What places are, such as ``"drops"``.
+        Plural of what has a name, such as ``"drops"``.
 
-    >>> group_sentences([("a", "an offset of 3 N"), ("b", "an offset of 4.5 N")], 2, "drops")
+    >>> group_messages([("a", "an offset of 3 N"), ("b", "an offset of 4.5 N")], 2, "drops")
     ['an offset of 3 to 4.5 N (2 of 2 drops)']
     """
     groups: dict[str, list[tuple[str, list[str]]]] = {}
-    for place, sentence in said:
-        pattern = NUMBER.sub("\0", sentence)
-        groups.setdefault(pattern, []).append((place, NUMBER.findall(sentence)))
-    found = []
+    for name, message in messages:
+        pattern = NUMBER.sub("\0", message)
+        groups.setdefault(pattern, []).append((name, NUMBER.findall(message)))
+    result = []
     for pattern, members in groups.items():
-        names = list(dict.fromkeys(place for place, _ in members))
-        columns = zip(*(numbers for _, numbers in members), strict=True)
+        names = list(dict.fromkeys(name for name, _ in members))
         text = pattern
-        for column in columns:
+        for column in zip(*(numbers for _, numbers in members), strict=True):
             text = text.replace("\0", _range(column), 1)
-        if places > 1:
-            text += f" ({names[0]})" if len(names) == 1 else f" ({len(names)} of {places} {kind})"
-        found.append(text)
-    return found
+        if count > 1:
+            text += f" ({names[0]})" if len(names) == 1 else f" ({len(names)} of {count} {kind})"
+        result.append(text)
+    return result
 
 
-def group_places(places: Mapping[str, Sequence[tuple[str, Sequence[str]]]]) -> list[str]:
-    """Return sentences of places of several kinds, those of one kind that are alike as one.
-
-    Parameters
-    ----------
-    places
-        By kind, such as ``"drops"``: name and sentences of each place.
-    """
+def group_by_kind(messages: Mapping[str, Sequence[tuple[str, Sequence[str]]]]) -> list[str]:
+    """Return messages by kind, such as ``"drops"``, grouped; each entry is a name with its own."""
     return [
-        sentence
-        for kind, ones in places.items()
-        for sentence in group_sentences(
-            [(name, one) for name, sentences in ones for one in sentences], len(ones), kind
+        message
+        for kind, entries in messages.items()
+        for message in group_messages(
+            [(name, text) for name, texts in entries for text in texts], len(entries), kind
         )
     ]
 

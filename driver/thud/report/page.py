@@ -15,7 +15,7 @@ from thud.plot.style import own_style
 from thud.recordings.measured_drop import ESTIMATES
 from thud.recordings.recorded_levels import BACKGROUND, MARGIN
 from thud.report.fonts import FAMILY, font_faces
-from thud.report.notes import group_places, shorten
+from thud.report.notes import group_by_kind, shorten
 from thud.report.rows import HEAD, NOT_KNOWN, criterion_row, limits_of, number, style_of
 from thud.report.template import BODY, PAGE
 
@@ -76,7 +76,7 @@ def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) 
 
 
 def page_text(data: dict[str, Any]) -> str:
-    """Return the texts of the laboratory, which may need any font."""
+    """Return the texts of the laboratory, which may hold any characters."""
     keys = ("laboratory", "ball", "serial", "date", "name")
     files = [file[key] for file in data["files"] for key in ("name", "calibration")]
     return _plain("".join([*(data[key] for key in keys), *data["instruments"], *files]))
@@ -123,13 +123,15 @@ def _measured(data: dict[str, Any]) -> list[tuple[str, str]]:
     listed = " to ".join(dict.fromkeys(f"{rate / 1e3:.4g}" for rate in (rates[0], rates[-1])))
     amount = f"{_count(drops, 'drop')} in {_count(len(files), 'file')}, {listed} kHz"
     calibrations = list(dict.fromkeys(file["calibration"] for file in files if file["calibration"]))
-    share = data["calibration_uncertainty"]
-    given = f"u = {100 * share:.2g} %" if share is not None else "uncertainty not stated"
+    relative = data["calibration_uncertainty"]
+    uncertainty = (
+        f"u = {100 * relative:.2g} %" if relative is not None else "uncertainty not stated"
+    )
     more = f" and {len(calibrations) - 1} more" if len(calibrations) > 1 else ""
     calibration = f"{calibrations[0]}{more}" if calibrations else NOT_KNOWN
     return [
         ("Recordings", amount),
-        ("Calibration", f"{calibration}; {given}"),
+        ("Calibration", f"{calibration}; {uncertainty}"),
         ("Instruments", "\n".join(shorten(data["instruments"], INSTRUMENTS))),
     ]
 
@@ -191,7 +193,7 @@ def _rule(data: dict[str, Any]) -> str:
 
 
 def _means(drops: Sequence[dict[str, Any]]) -> list[str]:
-    """Return sentences on means of the drops that are no criteria."""
+    """Return the means over the drops of quantities that are no criteria."""
     means = []
     for name in ESTIMATES:
         known = [drop[name]["value"] for drop in drops if drop[name]["value"] is not None]
@@ -208,7 +210,7 @@ def _means(drops: Sequence[dict[str, Any]]) -> list[str]:
 
 
 def _results(data: dict[str, Any]) -> list[str]:
-    """Return sentences on drops, other quantities and methods."""
+    """Return the notes on drops, other quantities and methods."""
     drops, low, high = data["drops"], *BACKGROUND
     results = _means(drops)
     averaged = "energy average of the drops" if len(drops) > 1 else "of one drop"
@@ -235,40 +237,42 @@ def _results(data: dict[str, Any]) -> list[str]:
 
 
 def _outliers(outliers: Iterable[dict[str, Any]]) -> str:
-    """Return a sentence on the drops that differ from the others."""
+    """Return the note on outliers among the drops."""
     names: dict[str, list[str]] = {}
     for outlier in outliers:
         names.setdefault(outlier["name"], []).append(outlier["quantity"].split(",")[0])
     if not names:
         return "no drop differs from the others by more than chance (Grubbs, 5 %)"
-    listed = "; ".join(f"{name} ({', '.join(what)})" for name, what in names.items())
+    listed = "; ".join(f"{name} ({', '.join(quantities)})" for name, quantities in names.items())
     return f"{_count(len(names), 'outlier')}, marked and not left out (Grubbs, 5 %): {listed}"
 
 
 def _messages(data: dict[str, Any], kind: str) -> list[str]:
     """Return the steps or warnings of the recording, its files and its drops, grouped."""
-    said = {key: [(one["name"], one[kind]) for one in data[key]] for key in ("files", "drops")}
-    return [*data[kind], *group_places(said)]
+    messages = {
+        key: [(entry["name"], entry[kind]) for entry in data[key]] for key in ("files", "drops")
+    }
+    return [*data[kind], *group_by_kind(messages)]
 
 
 def _notes(title: str, messages: Sequence[str]) -> str:
     """Return messages as a list with a title."""
-    items = "".join(f"<li>{_text(one)}</li>" for one in shorten(messages, NOTES))
+    items = "".join(f"<li>{_text(message)}</li>" for message in shorten(messages, NOTES))
     return f"<h2>{_text(title)}</h2><ul>{items}</ul>"
 
 
 def _files(files: Sequence[dict[str, Any]]) -> str:
     """Return the names and checksums of the first files."""
-    names = shorten([_plain(one["name"]) for one in files], FILES)
-    checksums = [*(one["sha256"] for one in files[: len(names) - (len(files) > FILES)]), ""]
+    names = shorten([_plain(file["name"]) for file in files], FILES)
+    checksums = [*(file["sha256"] for file in files[: len(names) - (len(files) > FILES)]), ""]
     return "\n".join(
         f"<tr><td>{_text(name)}</td><td>{checksum}</td></tr>"
         for name, checksum in zip(names, checksums, strict=False)
     )
 
 
-def _count(number_of: int, what: str) -> str:
-    return f"{number_of} {what}{'s' * (number_of != 1)}"
+def _count(number_of: int, noun: str) -> str:
+    return f"{number_of} {noun}{'s' * (number_of != 1)}"
 
 
 def _cells(figures: Sequence[Figure]) -> list[str]:

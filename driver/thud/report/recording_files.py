@@ -17,7 +17,7 @@ from thud.level.assessment import RESULTS
 from thud.level.estimate import Estimate
 from thud.level.levels import get_bands
 from thud.report.contents import criteria_data, report_data
-from thud.report.notes import group_places
+from thud.report.notes import group_by_kind
 from thud.report.rows import HEAD, NOT_KNOWN, criterion_rows
 from thud.report.write import HTML, JSON, PDF, json_bytes, page_contents, write_files
 
@@ -61,12 +61,12 @@ def drop_table(recording: Recording) -> list[tuple[str, ...]]:
     return rows
 
 
-def sentences(recording: Recording, kind: str) -> list[str]:
-    """Return the ``"steps"`` or ``"warnings"`` of files and drops, those that are alike as one."""
-    return group_places(
+def messages(recording: Recording, kind: str) -> list[str]:
+    """Return the ``"steps"`` or ``"warnings"`` of files and drops, grouped."""
+    return group_by_kind(
         {
-            "files": [(one.name, getattr(one, kind)) for one in recording.origins],
-            "drops": [(one.name, getattr(one, kind)) for one in recording.drops],
+            "files": [(file.name, getattr(file, kind)) for file in recording.origins],
+            "drops": [(drop.name, getattr(drop, kind)) for drop in recording.drops],
         }
     )
 
@@ -93,7 +93,7 @@ def verdict_text(recording: Recording) -> str:
         "does not conform": f"The source does not conform to the limits of the {name}",
         "inconclusive": f"The result is inconclusive by the limits of the {name}",
     }[assessment.result]
-    own = any(not one["limits_of_standard"] for one in criteria_data(recording))
+    own = any(not criterion["limits_of_standard"] for criterion in criteria_data(recording))
     more = " Limits marked * are those of the laboratory." if own else ""
     return f"{sentence} at 95 %: {count_verdicts(d.result for d in assessment.criteria)}.{more}"
 

@@ -114,7 +114,7 @@ def write_files(
 
 
 def _checksums(data: dict[str, Any]) -> list[str]:
-    return [one["sha256"] for one in data["files"]]
+    return [file["sha256"] for file in data["files"]]
 
 
 def _earlier(folder: Path) -> list[str] | None:

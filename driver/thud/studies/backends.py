@@ -99,7 +99,7 @@ def _collect(
         done, _ = wait(running, CHECK_INTERVAL, FIRST_COMPLETED)
     for future in done:
         try:
-            found = future.result()
+            result = future.result()
         except ThudError:
             raise
         except Exception as error:
@@ -107,7 +107,7 @@ def _collect(
             reason = f"{type(error).__name__}: {error}".partition("\n")[0].removesuffix(": ")
             message = _lost(f"the backend lost a block of samples ({reason})")
             raise NumericalError(message) from error
-        keep(running[future], found)
+        keep(running[future], result)
         del running[future]
 
 
@@ -179,7 +179,7 @@ def _connected(kind: type, address: str) -> Any:  # noqa: ANN401 - of an optiona
     The client's own limit does not count the time after the connection, so that another thread
     waits for it, which closes a client that comes too late.
     """
-    found: Future[Any] = Future()
+    connection: Future[Any] = Future()
     late = Event()
 
     def connect() -> None:
@@ -187,15 +187,15 @@ def _connected(kind: type, address: str) -> Any:  # noqa: ANN401 - of an optiona
             # The default client would also manage locks of files, which stay in this process.
             client = kind(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
         except Exception as error:  # noqa: BLE001 - for the one who waits
-            found.set_exception(error)
+            connection.set_exception(error)
             return
         if late.is_set():
             client.close()
-        found.set_result(client)
+        connection.set_result(client)
 
     Thread(target=connect, daemon=True).start()
     try:
-        return found.result(SCHEDULER_TIMEOUT + 1)
+        return connection.result(SCHEDULER_TIMEOUT + 1)
     except TimeoutError:
         late.set()
         raise
@@ -238,8 +238,8 @@ def _new_check(client: Any) -> Callable[[], None]:  # noqa: ANN401 - of an optio
     return check
 
 
-def _lost(what: str) -> str:
-    return f"{what}; what was finished is kept; allowed: run the study again"
+def _lost(cause: str) -> str:
+    return f"{cause}; what was finished is kept; allowed: run the study again"
 
 
 @contextmanager

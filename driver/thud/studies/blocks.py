@@ -146,9 +146,9 @@ def block_paths(partial: Path) -> list[Path]:
 def read_identity(path: Path) -> dict[str, str] | None:
     """Return what results depend on; None where they have no finished block."""
     if path.suffix == ".partial":
-        for one in path.iterdir():
-            if not is_regular(one) or not (_OWN.fullmatch(one.name) or is_temporary(one.name)):
-                refuse(f"{one} is not of a study", "finished blocks of a study")
+        for file in path.iterdir():
+            if not is_regular(file) or not (_OWN.fullmatch(file.name) or is_temporary(file.name)):
+                refuse(f"{file} is not of a study", "finished blocks of a study")
         if not block_paths(path) and not (path / MARK).exists():
             return None
         content = json.loads(read_input(path / MARK))
@@ -209,7 +209,7 @@ def _open(path: Path, *, known_intact: bool = False) -> Iterator[xr.Dataset]:
         with uninterrupted():
             if path.suffix == ".zarr":
                 # To open a pipe could block.
-                if any(not (one.is_dir() or is_regular(one)) for one in path.rglob("*")):
+                if any(not (entry.is_dir() or is_regular(entry)) for entry in path.rglob("*")):
                     message = "holds other than files"
                     raise ValueError(message)
                 dataset = _open_zarr(path)

@@ -65,11 +65,11 @@ def new_dataset(study: SampleStudy, columns: Columns, results: Columns) -> xr.Da
 
 
 def _attributes(study: SampleStudy, parameter: Parameter) -> dict[str, Any]:
-    key, law = parameter.key, study.temperature
+    key, temperature = parameter.key, study.temperature
     shown_unit, power = parameter.shown_unit
     meaning = key.meaning
-    if law and parameter.name in law.keys:
-        meaning += f" at {law.reference:g} degC; changed by its temperature"
+    if temperature and parameter.name in temperature.keys:
+        meaning += f" at {temperature.reference:g} degC; changed by its temperature"
     return {
         **attributes(key),
         "long_name": meaning,
@@ -91,7 +91,7 @@ def provenance(study: SampleStudy) -> dict[str, str]:
         "design": study.design,
         "seed": str(study.seed) if study.size else "none",
         "parameters": " ".join(parameter.coordinate for parameter in study.parameters),
-        **({"surrogate": study.surrogate.sentence} if study.surrogate else {}),
+        **({"surrogate": study.surrogate.accuracy} if study.surrogate else {}),
         **sampler_versions(study.design),
         **origin(study.case),
     }

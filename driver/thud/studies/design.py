@@ -92,9 +92,9 @@ class DesignKind(SampleKind[Design]):
     name = "design"
     designs = ("grid",)
 
-    def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SampleStudy:
+    def complete(self, study: Study, content: Mapping[str, Any], folder: Path) -> SampleStudy:
         """Return a study of two numeric parameters."""
-        result = super().complete(study, given, folder)
+        result = super().complete(study, content, folder)
         if len(result.parameters) != _AXES or not all(map(_is_axis, result.parameters)):
             refuse("[parameters] do not make a map", "two numeric ones of two values or more")
         return result

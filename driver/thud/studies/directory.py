@@ -67,7 +67,7 @@ def require_version(
     `readers` return the identity of results by their paths; `others` are names of files that are
     removed with them. Nothing is removed before all results are known.
     """
-    gone: list[Path] = []
+    outdated: list[Path] = []
     for path, identity_in in readers.items():
         if not os.path.lexists(path):
             continue
@@ -79,7 +79,7 @@ def require_version(
                 raise
             if is_directory(path) or not results.replace:
                 refuse_foreign(path)
-            gone.append(path)
+            outdated.append(path)
             continue
         if changes and not results.replace:
             refuse(
@@ -87,10 +87,10 @@ def require_version(
                 "another directory, or --replace (replace=True) to compute it again",
             )
         if changes:
-            gone.append(path)
-    for path in gone:
+            outdated.append(path)
+    for path in outdated:
         remove(path)
-    if gone:
+    if outdated:
         results.write({}, stale=others)
 
 

@@ -116,19 +116,19 @@ def fit(  # noqa: PLR0913 - options of a search
     known = bound_parameters(case, parameters)
     pairs = _pairs(case, _targets(target), {parameter.name for parameter in known})
     trained = None if surrogate is None else get_surrogate(surrogate)
-    found = _search(pairs, get_ranges(case, known), options, trained, progress=progress)
-    for sentence in found.warnings:
-        warnings.warn(sentence, FitWarning, stacklevel=3)
-    return found
+    result = _search(pairs, get_ranges(case, known), options, trained, progress=progress)
+    for message in result.warnings:
+        warnings.warn(message, FitWarning, stacklevel=3)
+    return result
 
 
-def _targets(given: Any) -> tuple[Target, ...]:  # noqa: ANN401 - that is the question
+def _targets(target: Any) -> tuple[Target, ...]:  # noqa: ANN401 - that is the question
     """Return the targets of a call of `fit`."""
-    if not isinstance(given, list):
-        given = [given if isinstance(given, Target) else ForceTarget(given)]
-    elif not given or not all(isinstance(one, Target) for one in given):
+    if not isinstance(target, list):
+        target = [target if isinstance(target, Target) else ForceTarget(target)]
+    elif not target or not all(isinstance(entry, Target) for entry in target):
         refuse("target is a list of something else", "one or more of ForceTarget and LevelTarget")
-    return tuple(given)
+    return tuple(target)
 
 
 def _pairs(
@@ -225,11 +225,11 @@ class FitKind(Kind[FitStudy, Fit]):
     name = "fit"
     words = ("target", "surrogate", *OPTIONS)
 
-    def new_parameter(self, name: str, given: object, case: Case, density: object) -> Parameter:  # noqa: ARG002
+    def new_parameter(self, name: str, entry: object, case: Case, density: object) -> Parameter:  # noqa: ARG002
         """Return a parameter that is fitted."""
-        return fitted_parameter(name, given, case)
+        return fitted_parameter(name, entry, case)
 
-    def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> FitStudy:
+    def complete(self, study: Study, content: Mapping[str, Any], folder: Path) -> FitStudy:
         """Return a study with its target."""
         names = {parameter.name for parameter in study.parameters}
         if study.density is not None and names & {"outer_radius", "wall_thickness"}:
@@ -237,23 +237,23 @@ class FitKind(Kind[FitStudy, Fit]):
         case = study.case
         if study.density is not None:
             case = with_density(case, study.density)
-        tables = given.get("target")
+        tables = content.get("target")
         if not isinstance(tables, list):
-            tables = [table_of(given, "target")]
+            tables = [table_of(content, "target")]
         elif not tables or not all(isinstance(table, dict) for table in tables):
             refuse_value("target", tables, "a table [target], or several [[target]]")
         targets = tuple(read_target(table, folder) for table in tables)
-        options = {name: given.get(name, default) for name, default in OPTIONS.items()}
+        options = {name: content.get(name, default) for name, default in OPTIONS.items()}
         _require_options(options)
         get_ranges(case, study.parameters)
         # JSON knows neither dates nor infinity.
-        shown = json.loads(json.dumps(given, default=str), parse_constant=str)
+        shown = json.loads(json.dumps(content, default=str), parse_constant=str)
         head = {**vars(study), "case": case}
         result = FitStudy(**head, targets=targets, tables=shown, options=options)
         result.pairs()
-        if "surrogate" not in given:
+        if "surrogate" not in content:
             return result
-        trained = read_plan(table_of(given, "surrogate"), folder)
+        trained = read_plan(table_of(content, "surrogate"), folder)
         if not isinstance(trained, Surrogate):
             refuse("[surrogate] of a fit has no file", "file, of a surrogate that is trained")
         return self.with_surrogate(result, trained)

@@ -71,12 +71,12 @@ class Kind(ABC, Generic[S, R]):
             if source.kind != self.name:
                 refuse(f"{source.name} is a {source.kind} study", f"a {self.name} study")
             return source  # type: ignore[return-value]
-        with read_tables(source) as (given, folder, text):
-            common = read_common(given, folder, self.name, self.words, self.new_parameter)
+        with read_tables(source) as (content, folder, text):
+            common = read_common(content, folder, self.name, self.words, self.new_parameter)
             own = () if isinstance(source, Mapping) else (source,)
-            inputs = (*own, *named_files(given, folder))
+            inputs = (*own, *named_files(content, folder))
             common = dataclasses.replace(common, text=text, inputs=inputs)
-            return self.complete(common, given, folder)
+            return self.complete(common, content, folder)
 
     def run(
         self,
@@ -102,12 +102,12 @@ class Kind(ABC, Generic[S, R]):
 
     @abstractmethod
     def new_parameter(
-        self, name: str, given: object, case: Case, density: float | None
+        self, name: str, entry: object, case: Case, density: float | None
     ) -> Parameter:
         """Return a parameter of its name and table; the density of the wall where it is fixed."""
 
     @abstractmethod
-    def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> S:
+    def complete(self, study: Study, content: Mapping[str, Any], folder: Path) -> S:
         """Return a study with what only this kind has."""
 
     def with_surrogate(self, study: S, trained: Surrogate) -> S:  # noqa: ARG002

@@ -96,7 +96,7 @@ class Parameter(Plain):
         return coordinate(self.name, self.key)
 
     @property
-    def given(self) -> dict[str, object]:
+    def table(self) -> dict[str, object]:
         """Its table, without defaults."""
         words = (word for word in vars(self) if word not in {"name", "key"})
         return {w: vars(self)[w] for w in words if vars(self)[w] != getattr(Parameter, w)}
@@ -154,7 +154,7 @@ class Parameter(Plain):
     def __str__(self) -> str:
         """Return the parameter as it would stand in a file."""
         _, power = self.shown_unit
-        entries: dict[str, Any] = self.given
+        entries: dict[str, Any] = self.table
         for word, value in entries.items():
             if word == "values":
                 entries[word] = [_in_unit(entry, power) for entry in value]
@@ -169,68 +169,68 @@ def _in_unit(value: Value, power: int) -> Value:
 
 
 def varied(
-    name: str, given: object, owners: tuple[str, ...], default_mean: Value | None
+    name: str, table: object, owners: tuple[str, ...], default_mean: Value | None
 ) -> Parameter:
     """Return a parameter that varies; `default_mean` is its value in the case."""
     words = [word for form in FORMS.values() for word in form]
-    label, key, given, power = _begin(name, given, owners, words)
-    form = next((form for form in FORMS if form in given), None)
+    label, key, table, power = _begin(name, table, owners, words)
+    form = next((form for form in FORMS if form in table), None)
     if form is None:
         refuse(
-            f"{label} = {shown(given)} has no values",
+            f"{label} = {shown(table)} has no values",
             "a table with values = [...], or low and high, or std, and unit",
         )
-    require_words(f"{label} with {form}", given, (*FORMS[form], "unit"))
+    require_words(f"{label} with {form}", table, (*FORMS[form], "unit"))
     if form != "values" and key.kind not in NUMBERS:
         allowed = ", ".join(map(repr, key.choices)) or "true, false"
         refuse(f"{label} is not a number", f"values = [...] of {allowed}")
 
     def read(word: str) -> float:
-        return float(checked(f"{label}: {word}", key, given[word], power))
+        return float(checked(f"{label}: {word}", key, table[word], power))
 
     result: dict[str, Any]
     if form == "values":
-        values = given["values"]
+        values = table["values"]
         if not isinstance(values, list | tuple) or not values:
             refuse(f"{label}: values = {shown(values)} is empty or no list", "[one, or, more]")
         result = {"values": tuple(checked(f"{label}: values", key, v, power) for v in values)}
     elif form == "low":
-        result = _between(label, key, given, read)
+        result = _between(label, key, table, read)
     else:
-        result = _normal(label, key, given, read, default_mean)
-    return Parameter(**result, unit=given.get("unit"), name=name, key=key)
+        result = _normal(label, key, table, read, default_mean)
+    return Parameter(**result, unit=table.get("unit"), name=name, key=key)
 
 
-def fitted(name: str, given: object, owners: tuple[str, ...]) -> Parameter:
+def fitted(name: str, entry: object, owners: tuple[str, ...]) -> Parameter:
     """Return a fitted parameter, given as its table, a `Parameter`, its start, or None."""
-    if isinstance(given, Parameter):
-        given = given.given
-    elif given is None:
-        given = {}
-    elif not isinstance(given, Mapping):
-        given = {"start": given}
-    label, key, given, power = _begin(name, given, owners, FITTED)
+    if isinstance(entry, Parameter):
+        entry = entry.table
+    elif entry is None:
+        entry = {}
+    elif not isinstance(entry, Mapping):
+        entry = {"start": entry}
+    label, key, table, power = _begin(name, entry, owners, FITTED)
     numbers: dict[str, Any] = {}
-    for word, value in given.items():
+    for word, value in table.items():
         if word != "unit" and value is not None:
             require_number(f"{label}: {word}", value)
             numbers[word] = scaled(value, power)
-    return Parameter(**numbers, unit=given.get("unit"), name=name, key=key)
+    return Parameter(**numbers, unit=table.get("unit"), name=name, key=key)
 
 
 def _begin(
-    name: str, given: object, owners: tuple[str, ...], words: Sequence[str]
+    name: str, table: object, owners: tuple[str, ...], words: Sequence[str]
 ) -> tuple[str, Key, Mapping[str, Any], int]:
     """Return label, key, table and power of ten of the unit of a parameter."""
     label = f"[parameters] {name}"
     key, entry = find_key(name, owners)
     if key.kind == "list" and entry is None:
         refuse(f"{label} is a list", f"one entry of it, such as {name + '(1)'!r}")
-    if not isinstance(given, Mapping):
-        refuse(f"{label} = {shown(given)} is not a table", f"{', '.join(words)}, unit")
-    require_words(label, given, (*words, "unit"))
-    unit = key.unit or "1" if given.get("unit") is None else given["unit"]
-    return label, key, given, power_of(unit, key.unit, label)
+    if not isinstance(table, Mapping):
+        refuse(f"{label} = {shown(table)} is not a table", f"{', '.join(words)}, unit")
+    require_words(label, table, (*words, "unit"))
+    unit = key.unit or "1" if table.get("unit") is None else table["unit"]
+    return label, key, table, power_of(unit, key.unit, label)
 
 
 def checked(label: str, key: Key, value: object, power: int) -> Value:
@@ -249,9 +249,9 @@ def checked(label: str, key: Key, value: object, power: int) -> Value:
 
 
 def _between(
-    label: str, key: Key, given: Mapping[str, Any], read: Callable[[str], float]
+    label: str, key: Key, table: Mapping[str, Any], read: Callable[[str], float]
 ) -> dict[str, Any]:
-    if "high" not in given:
+    if "high" not in table:
         refuse(f"{label} has no high end", "high beside low")
     low, high = read("low"), read("high")
     whole = key.kind == "whole"
@@ -263,12 +263,12 @@ def _between(
             f"{label}: low = {low:g} and high = {high:g} are not allowed",
             f"{lower:g} <= low < high <= {upper:g}",
         )
-    count, scale = given.get("count", 0), given.get("scale", _SCALES[0])
+    count, scale = table.get("count", 0), table.get("scale", _SCALES[0])
     require_choice(f"{label}: scale", scale, _SCALES)
     positive = ", 0 < low" if scale == "log" else ""
     if not low < high or (positive and low <= 0):
-        refuse_value(f"{label}: low", given["low"], f"low < high{positive}")
-    if "count" in given:
+        refuse_value(f"{label}: low", table["low"], f"low < high{positive}")
+    if "count" in table:
         require_whole(f"{label}: count", count, 2, int(high - low) + 1 if whole else MAX_VALUES)
     return {"low": low, "high": high, "count": count, "scale": scale}
 
@@ -276,7 +276,7 @@ def _between(
 def _normal(
     label: str,
     key: Key,
-    given: Mapping[str, Any],
+    table: Mapping[str, Any],
     read: Callable[[str], float],
     default_mean: Value | None,
 ) -> dict[str, Any]:
@@ -284,25 +284,25 @@ def _normal(
         refuse(f"{label} is a whole number", "values = [...], or low and high")
     std = read("std")
     if not std > 0:
-        refuse_value(f"{label}: std", given["std"], "0 < std")
-    mean = read("mean") if "mean" in given else default_mean
+        refuse_value(f"{label}: std", table["std"], "0 < std")
+    mean = read("mean") if "mean" in table else default_mean
     if mean is None or not math.isfinite(float(mean)):
         refuse(f"{label} has no mean", "mean beside std")
     return {"mean": float(mean), "std": std}
 
 
-def quantity(label: str, given: object, unit: str) -> Any:  # noqa: ANN401 - a value of any kind
+def quantity(label: str, entry: object, unit: str) -> Any:  # noqa: ANN401 - a value of any kind
     """Return a value, a list, or a table of ``value`` and ``unit``, in the unit of a key."""
-    if not isinstance(given, Mapping):
-        return given
-    require_words(label, given, ("value", "unit"))
-    power = power_of(given.get("unit", unit or "1"), unit, label)
-    if "value" not in given:
+    if not isinstance(entry, Mapping):
+        return entry
+    require_words(label, entry, ("value", "unit"))
+    power = power_of(entry.get("unit", unit or "1"), unit, label)
+    if "value" not in entry:
         refuse(f"{label} has no value", "value, and its unit")
-    value: Any = given["value"]
-    entries = value if isinstance(value, list) else [value]
-    if "unit" in given:
-        for entry in entries:
-            require_number(label, entry)
-        entries = [scaled(entry, power) for entry in entries]
-    return entries if isinstance(value, list) else entries[0]
+    value: Any = entry["value"]
+    numbers = value if isinstance(value, list) else [value]
+    if "unit" in entry:
+        for number in numbers:
+            require_number(label, number)
+        numbers = [scaled(number, power) for number in numbers]
+    return numbers if isinstance(value, list) else numbers[0]

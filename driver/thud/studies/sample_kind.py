@@ -56,7 +56,7 @@ class DropsKind(Kind[SampleStudy, R]):
     designs: ClassVar[tuple[str, ...]]
 
     def new_parameter(
-        self, name: str, given: object, case: Case, density: float | None
+        self, name: str, entry: object, case: Case, density: float | None
     ) -> Parameter:
         """Return a parameter that varies."""
         if name == "bands":
@@ -64,15 +64,15 @@ class DropsKind(Kind[SampleStudy, R]):
                 "[parameters] bands is not allowed", "bands in [fixed], the same for all samples"
             )
         mean = density if name == DENSITY.name else value_in(case, name)
-        return varied(name, given, key_owners(case), mean)
+        return varied(name, entry, key_owners(case), mean)
 
-    def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SampleStudy:
+    def complete(self, study: Study, content: Mapping[str, Any], folder: Path) -> SampleStudy:
         """Return a study with its design."""
-        written = given.get("format", _FILE_FORMATS[0])
+        written = content.get("format", _FILE_FORMATS[0])
         require_choice("format", written, _FILE_FORMATS)
-        law = table_of(given, "temperature") if "temperature" in given else None
-        temperature = read_temperature(law, study.case, study.parameters)
-        design = read_design(table_of(given, "design"), self.designs, study.parameters)
+        table = table_of(content, "temperature") if "temperature" in content else None
+        temperature = read_temperature(table, study.case, study.parameters)
+        design = read_design(table_of(content, "design"), self.designs, study.parameters)
         # Samples need neither snapshots nor free modes nor a compression.
         case = replace(study.case, modes=None, compression=None)
         owned = (key for key in KEYS if key.owner == study.model)
@@ -81,10 +81,10 @@ class DropsKind(Kind[SampleStudy, R]):
             case = replace(case, model=replace(case.model, **files))  # type: ignore[arg-type]
         head = {**vars(study), "case": case}
         result = SampleStudy(**head, **design, temperature=temperature, format=written)
-        if "surrogate" not in given:
+        if "surrogate" not in content:
             return result
         _require_no_floor(case)
-        plan = read_plan(table_of(given, "surrogate"), folder)
+        plan = read_plan(table_of(content, "surrogate"), folder)
         if isinstance(plan, Surrogate):
             return self.with_surrogate(result, plan)
         return replace(result, plan=plan)

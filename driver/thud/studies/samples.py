@@ -71,7 +71,7 @@ class SampleStudy(Study):
         if self.size:
             result |= {"[design] size": f"{self.size}", "[design] seed": f"{self.seed}"}
         if self.temperature:
-            result |= {f"[temperature] {k}": f"{v!r}" for k, v in self.temperature.given.items()}
+            result |= {f"[temperature] {k}": f"{v!r}" for k, v in self.temperature.table.items()}
         if self.plan:
             result |= self.plan.identity
         elif self.surrogate:
@@ -185,5 +185,8 @@ def level_names(case: Case) -> dict[str, tuple[LevelsForce, BandSet]]:
 
     Octaves are always among them: the verdict needs them.
     """
-    wanted = {BANDWIDTHS[0], *(BANDWIDTHS if case.levels.bands == "both" else [case.levels.bands])}
-    return {name: entry for name, entry in LEVELS.items() if entry[1] in wanted}
+    bandwidths = {
+        BANDWIDTHS[0],
+        *(BANDWIDTHS if case.levels.bands == "both" else [case.levels.bands]),
+    }
+    return {name: entry for name, entry in LEVELS.items() if entry[1] in bandwidths}

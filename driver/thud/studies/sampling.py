@@ -32,14 +32,14 @@ def sampler_versions(design: str) -> dict[str, str]:
 
 
 def read_design(
-    given: Mapping[str, Any], allowed: tuple[str, ...], parameters: tuple[Parameter, ...]
+    table: Mapping[str, Any], allowed: tuple[str, ...], parameters: tuple[Parameter, ...]
 ) -> dict[str, Any]:
     """Return design, size and seed of ``[design]``; the first allowed kind is the default."""
-    design = given.get("kind", allowed[0])
+    design = table.get("kind", allowed[0])
     if design not in allowed:
         refuse_value("[design] kind", design, ", ".join(allowed))
     words = ("kind", "size", "seed") if design in SAMPLED else ("kind",)
-    require_words(f"[design] of kind {design}", given, words)
+    require_words(f"[design] of kind {design}", table, words)
     for parameter in parameters:
         if design in SAMPLED and parameter.count:
             refuse(
@@ -57,7 +57,7 @@ def read_design(
         refuse("[parameters] make too many samples", "up to 2^63 - 1 in a grid")
     if design not in SAMPLED:
         return {"design": design}
-    size, seed = given.get("size", 0), given.get("seed", 0)
+    size, seed = table.get("size", 0), table.get("seed", 0)
     minimum = MIN_BASE_SAMPLES if design == "saltelli" else 1
     require_whole("[design] size", size, minimum, MAX_VALUES)
     require_whole("[design] seed", seed, 0, LARGEST_SEED)

@@ -125,15 +125,15 @@ def read_tables(
         refuse(f"{path}: {error}", "TOML", error)
 
 
-def named_files(given: object, folder: Path) -> Iterator[Path]:
+def named_files(value: object, folder: Path) -> Iterator[Path]:
     """Yield the files that the texts of a study name, relative to its folder."""
-    if isinstance(given, str):
+    if isinstance(value, str):
         with suppress(OSError, ValueError):
-            if (folder / given).is_file():
-                yield folder / given
-    elif isinstance(given, Mapping | list):
-        for one in given.values() if isinstance(given, Mapping) else given:
-            yield from named_files(one, folder)
+            if (folder / value).is_file():
+                yield folder / value
+    elif isinstance(value, Mapping | list):
+        for entry in value.values() if isinstance(value, Mapping) else value:
+            yield from named_files(entry, folder)
 
 
 def _content(path: Path) -> str:
@@ -156,7 +156,7 @@ def _text(source: Mapping[str, object]) -> str:
 def _plain(value: object) -> object:
     """Return tables, paths, numbers and arrays of NumPy in types of JSON."""
     if isinstance(value, Parameter):
-        return value.given
+        return value.table
     if isinstance(value, Mapping):
         return dict(value)
     if isinstance(value, np.generic | np.ndarray):
@@ -168,20 +168,20 @@ def _plain(value: object) -> object:
 
 
 def read_common(
-    given: dict[str, Any],
+    content: dict[str, Any],
     folder: Path,
     kind: str,
     words: Iterable[str],
     new_parameter: Callable[[str, object, Case, float | None], Parameter],
 ) -> Study:
     """Read what all kinds share; `words` are those that this kind has in addition to `WORDS`."""
-    require_words("the study", given, (*WORDS, *words))
-    fixed, parameters = (table_of(given, name) for name in ("fixed", "parameters"))
-    name = given["name"]
+    require_words("the study", content, (*WORDS, *words))
+    fixed, parameters = (table_of(content, name) for name in ("fixed", "parameters"))
+    name = content["name"]
     is_text = isinstance(name, str) and name.strip() and name.isprintable()
     if not is_text or name == ".." or Path(name).name != name:
         refuse_value("name", name, "the name of a file, without folders")
-    case, density = fix_keys(_case(given.get("case"), folder, fixed), fixed)
+    case, density = fix_keys(_case(content.get("case"), folder, fixed), fixed)
     if not parameters:
         refuse("[parameters] is empty", "one parameter or more")
     result = tuple(new_parameter(name, entry, case, density) for name, entry in parameters.items())
@@ -191,9 +191,9 @@ def read_common(
     return study
 
 
-def table_of(given: Mapping[str, Any], name: str) -> dict[str, Any]:
+def table_of(content: Mapping[str, Any], name: str) -> dict[str, Any]:
     """Return a table of a study, empty where it is missing."""
-    table = given.get(name, {})
+    table = content.get(name, {})
     if not isinstance(table, dict):
         refuse_value(name, table, f"a table [{name}]")
     return table

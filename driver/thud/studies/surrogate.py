@@ -31,18 +31,18 @@ class SurrogateKind(DropsKind[Surrogate]):
     designs = ("grid",)
 
     def new_parameter(
-        self, name: str, given: object, case: Case, density: float | None
+        self, name: str, entry: object, case: Case, density: float | None
     ) -> Parameter:
         """Return a parameter that varies from a minimum to a maximum."""
-        result = super().new_parameter(name, given, case, density)
+        result = super().new_parameter(name, entry, case, density)
         if result.low is None or result.count or result.scale != Parameter.scale:
             refuse(f"[parameters] {name} is not a range of a surrogate", "low, high and unit")
         # The samples of the study are the corners of the region.
         return replace(result, count=2)
 
-    def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SampleStudy:
+    def complete(self, study: Study, content: Mapping[str, Any], folder: Path) -> SampleStudy:
         """Return a study with the plan of its training."""
-        result = super().complete(study, {"surrogate": {}, **given}, folder)
+        result = super().complete(study, {"surrogate": {}, **content}, folder)
         if result.plan is None:
             refuse("[surrogate] file is not allowed in its own training", "error, size and seed")
         return result

@@ -101,11 +101,11 @@ def within_region(entry: Range, surrogate: Surrogate) -> Range:
     return replace(entry, low=low, high=high, spread=spread)
 
 
-def confirmed(found: Fit) -> Fit:
+def confirmed(fit: Fit) -> Fit:
     """Return a fit with the impacts of the model itself, and what these say of the surrogate."""
     targets = []
     missed = share = 0.0
-    for target in found.targets:
+    for target in fit.targets:
         misfit = cast("SurrogateLevels", target.misfit)
         impact = compute(target.case)
         off = np.abs(misfit.values(impact) - misfit.values(target.impact))
@@ -115,16 +115,16 @@ def confirmed(found: Fit) -> Fit:
         if misfit.known_noise:
             share = max(share, float((misfit.model_error / misfit.deviation).max() ** 2))
         targets.append(replace(target, impact=impact))
-    sentences = []
+    messages = []
     if share:
-        sentences.append(
+        messages.append(
             f"the errors of the surrogate are up to {100 * share:.2g} % of the variances of the "
             "residuals"
         )
     # One in 15 000 of a normal distribution; held-out errors have longer tails.
     if missed > 4:  # noqa: PLR2004
-        sentences.append(
+        messages.append(
             f"the model itself differs at the result from the surrogate by {missed:.2g} standard "
             "deviations of the surrogate's errors"
         )
-    return replace(found, targets=tuple(targets), warnings=(*found.warnings, *sentences))
+    return replace(fit, targets=tuple(targets), warnings=(*fit.warnings, *messages))

@@ -77,29 +77,29 @@ def train(study: SampleStudy, results: Results | None, how: RunOptions) -> Surro
     if folder:
         # Anything else of this name is replaced, see `take`.
         with suppress(InputError):
-            found = read_surrogate(folder / name)
-            if found.identity == study.identity:
-                return found
+            saved = read_surrogate(folder / name)
+            if saved.identity == study.identity:
+                return saved
     stages: list[xr.Dataset] = []
-    tried = []
+    errors = []
     for first, stop in plan.stages:
         drops = TrainingStudy(
             f"{study.name}_training_{stop}", "training", study.case, parameters,
             design="sobol", size=stop, seed=plan.seed, first=first,
         )  # fmt: skip
         if results:
-            paths = {results.folder / one: read_identity for one in result_names(drops)}
+            paths = {results.folder / file: read_identity for file in result_names(drops)}
             require_version(paths, drops, results)
         stages.append(compute_samples(drops, folder, how).load())
-        found = _learn(drops, stages, plan, study.identity)
-        label, error = found.worst
-        tried.append(f"{error:.3g} dB with {stop}")
+        surrogate = _learn(drops, stages, plan, study.identity)
+        label, error = surrogate.worst
+        errors.append(f"{error:.3g} dB with {stop}")
         if error <= plan.error:
             if results:
-                results.write({name: found.to_bytes()})
-            return found
+                results.write({name: surrogate.to_bytes()})
+            return surrogate
     message = (
-        f"the surrogate's error of the {label} is {', '.join(tried[-3:])} drops; allowed: up to "
+        f"the surrogate's error of the {label} is {', '.join(errors[-3:])} drops; allowed: up to "
         f"{plan.error:g} dB ([surrogate] error): narrower ranges without a jump of the results, "
         f"more drops than {plan.size} ([surrogate] size), or a larger error"
     )
@@ -161,18 +161,22 @@ def _learn(
     values = np.concatenate(list(quantities.values()), axis=1)
     outputs = {name: part.shape[1] for name, part in quantities.items()}
     blank = np.full((1, values.shape[1]), np.nan)
-    found = Surrogate(
+    surrogate = Surrogate(
         case=drops.case, keys=tuple(p.name for p in drops.parameters), region=region,
         outputs=outputs, bound=plan.error, peaks=int(peaks[0]), identity=identity, points=points,
         length=np.ones(len(region)), weights=blank, mean=blank[0], scale=blank[0], residuals=blank,
     )  # fmt: skip
-    unknown = [n for n, v in zip(found.labels, values.T, strict=True) if not np.isfinite(v).all()]
-    assessed = [n for n, j in zip(found.labels, found.assessed, strict=True) if j and n in unknown]
+    unknown = [
+        n for n, v in zip(surrogate.labels, values.T, strict=True) if not np.isfinite(v).all()
+    ]
+    assessed = [
+        n for n, j in zip(surrogate.labels, surrogate.assessed, strict=True) if j and n in unknown
+    ]
     if assessed:
         refuse(
             f"{assessed[0]} is 0 or not known in some drops", "a model and ranges in which it is"
         )
-    return replace(found, **regress(points, values, found.assessed))
+    return replace(surrogate, **regress(points, values, surrogate.assessed))
 
 
 def _decibels(name: str, values: Values) -> Values:

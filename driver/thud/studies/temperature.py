@@ -48,7 +48,7 @@ class Temperature:
     c2: float | None = None
 
     @property
-    def given(self) -> dict[str, float]:
+    def table(self) -> dict[str, float]:
         """Its table, without what is left out."""
         return {word: value for word, value in vars(self).items() if value is not None}
 
@@ -94,28 +94,28 @@ def _loss_law(case: Case) -> str:
 
 
 def read_temperature(
-    given: object, case: Case, parameters: tuple[Parameter, ...]
+    table: object, case: Case, parameters: tuple[Parameter, ...]
 ) -> Temperature | None:
     """Return the law in the table ``[temperature]``."""
     varies = any(parameter.key == TEMPERATURE for parameter in parameters)
-    if varies != (given is not None):
+    if varies != (table is not None):
         refuse(
             "temperature needs both a parameter and the table [temperature]",
             "reference, degC, and coefficient, 1/K, or c1 and c2, K, in [temperature]",
         )
-    if not isinstance(given, Mapping):
+    if not isinstance(table, Mapping):
         return None
-    require_words("[temperature]", given, _WORDS)
-    shifts = ["c1", "c2"] if {"c1", "c2"} & set(given) else []
-    changes = ["coefficient"] if "coefficient" in given or not shifts else []
+    require_words("[temperature]", table, _WORDS)
+    shifts = ["c1", "c2"] if {"c1", "c2"} & set(table) else []
+    changes = ["coefficient"] if "coefficient" in table or not shifts else []
     numbers = {}
     for word in ["reference", *changes, *shifts]:
-        if word not in given:
+        if word not in table:
             refuse(f"[temperature] has no {word}", "reference with coefficient, or with c1 and c2")
-        numbers[word] = float(checked(f"[temperature] {word}", TEMPERATURE, given[word], 0))
+        numbers[word] = float(checked(f"[temperature] {word}", TEMPERATURE, table[word], 0))
     for word in ("c1", "c2"):
         if numbers.get(word, 1.0) <= 0:
-            refuse_value(f"[temperature] {word}", given[word], f"0 < {word}")
+            refuse_value(f"[temperature] {word}", table[word], f"0 < {word}")
     if "c1" in numbers:
         _require_shift(case, parameters)
     return Temperature(**numbers)

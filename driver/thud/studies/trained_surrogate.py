@@ -130,7 +130,7 @@ class Surrogate(StudyResult):
     @property
     def notes(self) -> tuple[str, ...]:
         """How close it is, and what it does not answer."""
-        return (self.sentence,)
+        return (self.accuracy,)
 
     def plot(self) -> Figure:
         """Return the errors of the held-out drops."""
@@ -160,8 +160,8 @@ class Surrogate(StudyResult):
         count = len(self.points)
         # With 58 drops or fewer there is no such order statistic.
         rank = int(binom.ppf(COVERAGE, count, COVERAGE))
-        found: Values = np.sort(np.abs(self.residuals), axis=0)[rank]
-        return found
+        result: Values = np.sort(np.abs(self.residuals), axis=0)[rank]
+        return result
 
     @property
     def worst(self) -> tuple[str, float]:
@@ -170,7 +170,7 @@ class Surrogate(StudyResult):
         return self.labels[int(np.nanargmax(errors))], float(np.nanmax(errors))
 
     @property
-    def sentence(self) -> str:
+    def accuracy(self) -> str:
         """How it was trained, its largest assessed error, and what it does not answer."""
         label, error = self.worst
         result = (
@@ -217,7 +217,8 @@ class Surrogate(StudyResult):
         model = self.case.model.name  # type: ignore[union-attr]
         if case.model is None or case.model.name != model:
             refuse("the surrogate was trained on another model", f"model = {model!r}")
-        before, now = (keys_of(with_values(one, middle)) for one in (self.case, case))
+        before = keys_of(with_values(self.case, middle))
+        now = keys_of(with_values(case, middle))
         if changed := [key for key in before if before[key] != now.get(key)]:
             key = changed[0]
             refuse(f"{key} = {now.get(key)}: the surrogate was trained with {before[key]}", "that")
@@ -234,8 +235,10 @@ class Surrogate(StudyResult):
             from sklearn.gaussian_process.kernels import Matern
 
         count = len(next(iter(columns.values())))
-        given = {n: np.asarray(columns.get(n, value_in(case, n))) for n in self.keys}
-        values = np.column_stack([np.broadcast_to(v, count) for v in given.values()]).astype(float)
+        samples = {n: np.asarray(columns.get(n, value_in(case, n))) for n in self.keys}
+        values = np.column_stack([np.broadcast_to(v, count) for v in samples.values()]).astype(
+            float
+        )
         low, high = self.region.T
         width = high - low
         edge = _ROUNDING * np.maximum(width, np.abs(high))
@@ -250,7 +253,7 @@ class Surrogate(StudyResult):
         numbers[:, ~(self.errors <= self.bound)] = np.nan
         failed = outside.any(axis=1)
         numbers[failed] = np.nan
-        return self._answer(case, numbers, given, self._reasons(values, outside))
+        return self._answer(case, numbers, samples, self._reasons(values, outside))
 
     def _reasons(self, values: Values, outside: NDArray[np.bool_]) -> NDArray[np.object_]:
         reasons = np.full(len(values), "", dtype=object)
@@ -264,14 +267,14 @@ class Surrogate(StudyResult):
         return reasons
 
     def _answer(
-        self, case: Case, numbers: Values, given: Columns, reasons: NDArray[np.object_]
+        self, case: Case, numbers: Values, samples: Columns, reasons: NDArray[np.object_]
     ) -> Columns:
         parts = self._split(numbers)
         levels = {name: part for name, part in parts.items() if self.outputs[name] > 1}
         result: Columns = {n: 10 ** (part[:, 0] / 20) for n, part in parts.items()} | levels
         names = ("contact_time", "restitution")
         level = f"{case.levels.force}_level"
-        rest = [given.get(n, np.asarray(value_in(case, n))) for n in ("mass", "height")]
+        rest = [samples.get(n, np.asarray(value_in(case, n))) for n in ("mass", "height")]
         exact = [np.zeros(1)] * 3
         verdicts = assess_many(
             (result[level], *(result[n] for n in names), np.array([self.peaks]), *rest),
@@ -362,12 +365,12 @@ def assess_many(
         Source whose limits apply.
     """
     count, bands = values[0].shape
-    assessed, by = (_columns(part, count) for part in (values, errors))
+    assessed, deviation = (_columns(part, count) for part in (values, errors))
     criteria = get_criteria(source)
-    lower = np.array([one.lower for one in criteria])
-    upper = np.array([one.upper for one in criteria])
+    lower = np.array([criterion.lower for criterion in criteria])
+    upper = np.array([criterion.upper for criterion in criteria])
     inside = np.minimum(assessed - lower, upper - assessed)
-    surely, perhaps = ((inside >= sign * by).all(axis=1) for sign in (1, -1))
+    surely, perhaps = ((inside >= sign * deviation).all(axis=1) for sign in (1, -1))
     return {
         "margin": inside[:, :bands].min(axis=1),
         "conforms": (inside >= 0).all(axis=1),
@@ -392,9 +395,9 @@ def keys_of(case: Case) -> dict[str, str]:
     }
 
 
-def get_surrogate(given: Surrogate | str | os.PathLike[str]) -> Surrogate:
+def get_surrogate(surrogate: Surrogate | str | os.PathLike[str]) -> Surrogate:
     """Return a surrogate, read where the path of its file is given."""
-    return given if isinstance(given, Surrogate) else read_surrogate(given)
+    return surrogate if isinstance(surrogate, Surrogate) else read_surrogate(surrogate)
 
 
 def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
@@ -463,17 +466,17 @@ class Plan:
         return list(zip([0, *ends[:-1]], ends, strict=True))
 
 
-def read_plan(given: Mapping[str, object], folder: Path) -> Plan | Surrogate:
+def read_plan(table: Mapping[str, object], folder: Path) -> Plan | Surrogate:
     """Return the plan of a table ``[surrogate]``, or the surrogate of the file that it names."""
     label = "[surrogate]"
-    if "file" in given:
-        require_words(f"{label} with file", given, ("file",))
-        path = given["file"]
+    if "file" in table:
+        require_words(f"{label} with file", table, ("file",))
+        path = table["file"]
         if not isinstance(path, str) or not path.strip():
             refuse_value(f"{label} file", path, "the path of a saved surrogate")
         return read_surrogate(folder / path)
-    require_words(label, given, ("error", "size", "seed", "file"))
-    error, size, seed = (given.get(w, getattr(Plan, w)) for w in ("error", "size", "seed"))
+    require_words(label, table, ("error", "size", "seed", "file"))
+    error, size, seed = (table.get(w, getattr(Plan, w)) for w in ("error", "size", "seed"))
     require_number(f"{label} error", error)
     if not error > 0:  # type: ignore[operator]
         refuse_value(f"{label} error", error, "numbers above 0, dB")

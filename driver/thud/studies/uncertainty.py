@@ -130,7 +130,7 @@ class UncertaintyKind(SampleKind[Uncertainty]):
     designs = ("random",)
 
     def new_parameter(
-        self, name: str, given: object, case: Case, density: float | None
+        self, name: str, entry: object, case: Case, density: float | None
     ) -> Parameter:
         """Return a parameter that varies; the limits are the same for all samples."""
         if name in {"source", "force"}:
@@ -138,7 +138,7 @@ class UncertaintyKind(SampleKind[Uncertainty]):
                 f"[parameters] {name} is not allowed, because all samples have the same limits",
                 f"{name} in [fixed]",
             )
-        return super().new_parameter(name, given, case, density)
+        return super().new_parameter(name, entry, case, density)
 
     def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> Uncertainty:
         """Return the distribution over all samples."""

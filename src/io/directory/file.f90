@@ -1,4 +1,4 @@
-!> Texts of whole files.
+!> Files as texts.
 module thud_file
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_error, only: error_type, input_error
@@ -12,11 +12,11 @@ module thud_file
    !> Maximum size of an input file, bytes.
    integer(int64), parameter :: max_input_size = 65536_int64
 
-   !> A file to be written.
+   !> A file to write.
    type :: text_file_type
       !> Name without directory.
       character(len=32) :: name = ''
-      !> All of its text.
+      !> The whole text.
       character(len=:), allocatable :: content
    end type text_file_type
 
@@ -26,12 +26,12 @@ contains
    subroutine read_text_file(path, text, error)
       character(len=*), intent(in) :: path
       character(len=:), allocatable, intent(out) :: text
-      !> The file is missing, unreadable, empty or too large.
+      !> Set if the file is missing, unreadable, empty or too large.
       type(error_type), allocatable, intent(out) :: error
       integer(int64) :: bytes
       integer :: descriptor, count, done
 
-      ! The run-time library would drop the blanks at the end of a path.
+      ! Fortran's own `inquire` and `open` would drop blanks at the end of a path.
       call get_file_size(path, bytes)
       if (directory_exists(path)) then
          error = input_error('this is a directory; allowed: the path of a namelist file')
@@ -55,10 +55,10 @@ contains
       if (done < len(text)) error = input_error('the file cannot be read; allowed: a readable namelist file')
    end subroutine read_text_file
 
-   !> Name of a file without directory and ending.
+   !> Name of a file without directory and extension.
    pure function get_file_stem(path) result(stem)
       character(len=*), intent(in) :: path
-      !> Its stem: `inputs/ball.nml` gives `ball`.
+      !> The stem: `ball` for `inputs/ball.nml`.
       character(len=:), allocatable :: stem
       integer :: dot
 

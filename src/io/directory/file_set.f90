@@ -1,8 +1,8 @@
-!> Sets of files: which files of a directory belong together, and how another set replaces them.
+!> Sets of files: which files of a directory belong together, and how a new set replaces them.
 !>
-!> A manifest lists the files that thud has written with the checksums of their contents and the command, blank for the
-!> set; all others in the directory, and those that have changed since, are the user's and stay. A workspace is a directory
-!> with the next set and its manifest.
+!> A manifest lists the files that thud has written, each with the checksum of its content and the command that wrote it
+!> (blank for files of the set). All other files, and listed files that have changed since, are the user's and stay. A
+!> workspace is a directory with the new set and its manifest.
 module thud_file_set
    use, intrinsic :: iso_fortran_env, only: int32, int64
    use thud_error, only: error_type, input_error
@@ -16,42 +16,41 @@ module thud_file_set
    public :: add_entries, clear_workspace, entry_type, get_kept, is_listed, is_workspace, manifest, new_entries
    public :: read_manifest, replace_set
 
-   !> Name of the manifest, and its first line.
+   !> Name and first line of the manifest.
    character(len=*), parameter :: manifest = '.thud'
    character(len=*), parameter :: head = '# files that thud has written, with checksums (CRC-32)'
 
-   !> Temporary name of a file that the driver writes; a period and the writer follow where there are no locks.
+   !> Name of a file while the driver writes it; without locks a period and the name of the writer follow.
    character(len=*), parameter :: temporary = manifest//'.new'
 
-   !> Before the name of a file that is set aside in the workspace.
+   !> Prefix of the names of old files that are set aside in the workspace.
    character(len=*), parameter :: aside = manifest//'~'
 
-   !> Between name, checksum and command.
+   !> Separates name, checksum and command.
    character(len=*), parameter :: tab = achar(9)
 
    !> A line of a manifest.
    type :: entry_type
       !> Name of the file.
       character(len=name_length) :: name = ''
-      !> Checksum of its content, hexadecimal; blank before it is written.
+      !> Checksum of the content, hexadecimal; blank before the file is written.
       character(len=8) :: sum = ''
-      !> The command that has written it; blank for the results of a case and their figures.
+      !> The command that has written the file; blank for results of a case and their figures.
       character(len=32) :: command = ''
    end type entry_type
 
 contains
 
-   !> Whether the names in a directory are those of a workspace.
+   !> Whether a directory is a workspace: empty, or with a name that begins with that of the manifest.
    pure function is_workspace(names) result(yes)
-      !> The names: [n_name].
+      !> Names in the directory: [n_name].
       character(len=*), intent(in) :: names(:)
-      !> They are, or there are none.
       logical :: yes
 
       yes = size(names) == 0 .or. any(index(names, manifest) == 1)
    end function is_workspace
 
-   !> Entries of files.
+   !> Manifest entries of files.
    pure function new_entries(names, sums) result(entries)
       !> The names: [n_file].
       character(len=*), intent(in) :: names(:)
@@ -67,7 +66,7 @@ contains
       end do
    end function new_entries
 
-   !> Whether a name is that of a file that the driver has not finished.
+   !> Whether a file is one that the driver has not finished.
    elemental function is_temporary(name) result(yes)
       character(len=*), intent(in) :: name
       logical :: yes
@@ -75,9 +74,9 @@ contains
       yes = name == temporary .or. index(name, temporary//'.') == 1
    end function is_temporary
 
-   !> Whether a file of a directory is as its manifest lists it.
-   function is_listed(place, name, entries) result(yes)
-      character(len=*), intent(in) :: place
+   !> Whether a manifest lists a file, with the checksum of its content.
+   function is_listed(target, name, entries) result(yes)
+      character(len=*), intent(in) :: target
       character(len=*), intent(in) :: name
       !> The manifest: [n_entry].
       type(entry_type), intent(in) :: entries(:)
@@ -87,164 +86,165 @@ contains
 
       yes = any(entries%name == name)
       if (.not. yes) return
-      call get_file_checksum(place//'/'//trim(name), checksum)
+      call get_file_checksum(target//'/'//trim(name), checksum)
       write (digits, '(z8.8)') checksum
       yes = checksum >= 0 .and. any(entries%name == name .and. entries%sum == digits)
    end function is_listed
 
-   !> Which files of a directory stay beside the next set: figures of the same input, and results of other commands.
-   subroutine get_kept(place, names, same, kept, gone)
+   !> Finds unchanged old files that stay beside the new set: results of other commands, figures of the same input.
+   subroutine get_kept(target, names, same, kept, gone)
       !> The directory, under its lock.
-      character(len=*), intent(in) :: place
-      !> Names of the next set: [n_file].
+      character(len=*), intent(in) :: target
+      !> Names in the new set: [n_file].
       character(len=*), intent(in) :: names(:)
-      !> It is of the same input.
+      !> The old set has the same input.
       logical, intent(in) :: same
-      !> The manifest of those that stay: [n_kept].
+      !> Manifest entries of the files that stay: [n_kept].
       type(entry_type), allocatable, intent(out) :: kept(:)
-      !> Names of those that do not: [n_gone].
+      !> Names of the files that go: [n_gone].
       character(len=name_length), allocatable, intent(out) :: gone(:)
       type(entry_type), allocatable :: entries(:)
       logical, allocatable :: stays(:)
       logical :: is_manifest
       integer :: i
 
-      call read_manifest(place, entries, is_manifest)
-      entries = pack(entries, [(.not. any(names == entries(i)%name) .and. is_listed(place, entries(i)%name, entries), &
+      call read_manifest(target, entries, is_manifest)
+      entries = pack(entries, [(.not. any(names == entries(i)%name) .and. is_listed(target, entries(i)%name, entries), &
          i=1, size(entries))])
       stays = same .or. entries%command /= ''
       kept = pack(entries, stays)
       gone = pack(entries%name, .not. stays)
    end subroutine get_kept
 
-   !> Puts the set of a workspace in the place of the one before.
-   subroutine replace_set(workspace, place, entries, gone, exchangeable, error)
-      !> The workspace; its remaining files are to be cleared.
+   !> Replaces the set of a directory by the set in a workspace.
+   subroutine replace_set(workspace, target, entries, gone, exchangeable, error)
+      !> The workspace; the caller has to clear it afterwards.
       character(len=*), intent(in) :: workspace
       !> The directory, under its lock.
-      character(len=*), intent(in) :: place
-      !> The files, the last of which says whose they are: [n_file].
+      character(len=*), intent(in) :: target
+      !> The new files; the last one is the marker: [n_file].
       type(entry_type), intent(in) :: entries(:)
-      !> Names of files before that go with those: [n_gone].
+      !> Names of other old files to remove: [n_gone].
       character(len=*), intent(in) :: gone(:)
       !> The two directories may be exchanged.
       logical, intent(in) :: exchangeable
-      !> A file cannot be written or moved; the directory is as it was.
+      !> Set if a file cannot be written or moved; the directory is unchanged then.
       type(error_type), allocatable, intent(out) :: error
       character(len=name_length), allocatable :: replaced(:)
       logical :: done
 
       replaced = [character(len=name_length) :: entries%name, gone]
       done = exchangeable
-      if (done) call exchange(workspace, place, replaced, done)
-      if (.not. done) call move_files(workspace, place, replaced, entries, error)
+      if (done) call exchange(workspace, target, replaced, done)
+      if (.not. done) call move_files(workspace, target, replaced, entries, error)
    end subroutine replace_set
 
-   !> Exchanges workspace and directory; nothing has changed where that is impossible.
-   subroutine exchange(workspace, place, replaced, done)
-      character(len=*), intent(in) :: workspace, place
-      !> Names of files that are not carried over: [n_replaced].
+   !> Exchanges workspace and directory; changes nothing if that is impossible.
+   subroutine exchange(workspace, target, replaced, done)
+      character(len=*), intent(in) :: workspace, target
+      !> Names of old files that are not carried over: [n_replaced].
       character(len=*), intent(in) :: replaced(:)
-      !> They are exchanged.
+      !> The directories have been exchanged.
       logical, intent(out) :: done
-      character(len=name_length), allocatable :: found(:), left(:)
+      character(len=name_length), allocatable :: names(:)
       logical :: changed
       integer :: i
 
       done = .true.
-      call list_directory(place, found)
-      do i = 1, size(found)
-         if (is_temporary(found(i)) .or. any(found(i) == [character(len=name_length) :: manifest, replaced])) cycle
-         call link_file(place//'/'//trim(found(i)), workspace//'/'//trim(found(i)), done)
+      call list_directory(target, names)
+      do i = 1, size(names)
+         if (is_temporary(names(i)) .or. any(names(i) == [character(len=name_length) :: manifest, replaced])) cycle
+         call link_file(target//'/'//trim(names(i)), workspace//'/'//trim(names(i)), done)
          if (.not. done) return
       end do
-      call exchange_directories(workspace, place, done)
+      call exchange_directories(workspace, target, done)
       if (.not. done) return
-      ! The user may have changed files meanwhile; those that are the same are left alone.
-      call list_directory(workspace, left)
-      do i = 1, size(left)
-         if (is_temporary(left(i)) .or. any(left(i) == [character(len=name_length) :: manifest, replaced])) cycle
-         call rename_file(workspace//'/'//trim(left(i)), place//'/'//trim(left(i)), changed)
+      ! The user may have replaced files meanwhile; renaming a file to another link to itself does nothing.
+      call list_directory(workspace, names)
+      do i = 1, size(names)
+         if (is_temporary(names(i)) .or. any(names(i) == [character(len=name_length) :: manifest, replaced])) cycle
+         call rename_file(workspace//'/'//trim(names(i)), target//'/'//trim(names(i)), changed)
       end do
    end subroutine exchange
 
-   !> Moves files one by one: those before are set aside in the workspace, so that two inputs are never mixed.
-   subroutine move_files(workspace, place, replaced, entries, error)
-      character(len=*), intent(in) :: workspace, place
-      !> Names that the files before may have: [n_replaced].
+   !> Moves files one by one. Old files are first set aside in the workspace, so that results of two inputs never mix.
+   subroutine move_files(workspace, target, replaced, entries, error)
+      character(len=*), intent(in) :: workspace, target
+      !> Names of old files to replace or remove: [n_replaced].
       character(len=*), intent(in) :: replaced(:)
-      !> The new files, the last of which says whose they are: [n_file].
+      !> The new files; the last one is the marker: [n_file].
       type(entry_type), intent(in) :: entries(:)
-      !> A file cannot be moved; the directory is as it was.
+      !> Set if a file cannot be moved; the directory is unchanged then.
       type(error_type), allocatable, intent(out) :: error
       type(entry_type), allocatable :: listed(:)
-      character(len=name_length), allocatable :: found(:)
+      character(len=name_length), allocatable :: old_names(:)
       character(len=name_length) :: marker
       integer :: n, i
       logical :: done, is_manifest
 
       marker = entries(size(entries))%name
-      call list_directory(place, found)
-      call read_manifest(place, listed, is_manifest)
-      found = [pack(found, found == marker), pack(found, [(found(i) /= marker .and. any(replaced == found(i)), &
-         i=1, size(found))])]
-      ! A writer killed from here on leaves files that are listed, but no marker.
-      if (is_manifest) call add_entries(place, entries, error)
+      call list_directory(target, old_names)
+      call read_manifest(target, listed, is_manifest)
+      old_names = [pack(old_names, old_names == marker), pack(old_names, [(old_names(i) /= marker &
+         .and. any(replaced == old_names(i)), i=1, size(old_names))])]
+      ! If the process is killed from here on, the directory holds listed files but no marker.
+      if (is_manifest) call add_entries(target, entries, error)
       if (allocated(error)) return
-      n = size(found)
+      n = size(old_names)
       block
          character(len=len(workspace) + name_length + 8), dimension(n + size(entries)) :: from, to
 
          do i = 1, n
-            from(i) = place//'/'//found(i)
-            to(i) = workspace//'/'//aside//found(i)
+            from(i) = target//'/'//old_names(i)
+            to(i) = workspace//'/'//aside//old_names(i)
          end do
          do i = 1, size(entries)
             from(n + i) = workspace//'/'//entries(i)%name
-            to(n + i) = place//'/'//entries(i)%name
+            to(n + i) = target//'/'//entries(i)%name
          end do
          do i = 1, size(from)
             call rename_file(trim(from(i)), trim(to(i)), done)
             if (.not. done) exit
          end do
-         if (done) call rename_file(workspace//'/'//manifest, place//'/'//manifest, done)
+         if (done) call rename_file(workspace//'/'//manifest, target//'/'//manifest, done)
          if (done) return
-         error = input_error('--output '//place//': files cannot be replaced; allowed: a directory that you may write to')
+         error = input_error('--output '//target//': files cannot be replaced; allowed: a directory that you may write to')
          do i = i - 1, 1, -1
             call rename_file(trim(to(i)), trim(from(i)), done)
          end do
       end block
    end subroutine move_files
 
-   !> Empties a workspace. Files that its manifest does not list are the user's, left by a writer that was killed.
-   subroutine clear_workspace(workspace, place)
+   !> Empties a workspace. Files that its manifest does not list are the user's and return to the directory; a killed
+   !> process has left them.
+   subroutine clear_workspace(workspace, target)
       !> The workspace, under its lock; the directory.
-      character(len=*), intent(in) :: workspace, place
-      character(len=name_length), allocatable :: found(:)
+      character(len=*), intent(in) :: workspace, target
+      character(len=name_length), allocatable :: names(:)
       type(entry_type), allocatable :: listed(:)
       logical :: done, is_manifest
       integer :: i
 
       call read_manifest(workspace, listed, is_manifest)
-      call list_directory(workspace, found)
-      do i = 1, size(found)
-         if (found(i) == manifest) cycle
-         if (.not. any([listed%name == found(i), index(found(i), aside) == 1, is_temporary(found(i))])) then
-            call link_file(workspace//'/'//trim(found(i)), place//'/'//trim(found(i)), done)
+      call list_directory(workspace, names)
+      do i = 1, size(names)
+         if (names(i) == manifest) cycle
+         if (.not. any([listed%name == names(i), index(names(i), aside) == 1, is_temporary(names(i))])) then
+            call link_file(workspace//'/'//trim(names(i)), target//'/'//trim(names(i)), done)
          end if
-         call remove_file(workspace//'/'//trim(found(i)))
+         call remove_file(workspace//'/'//trim(names(i)))
       end do
-      ! The manifest tells the next writer what it may remove.
-      call list_directory(workspace, found)
-      if (all(found == manifest)) call remove_file(workspace//'/'//manifest)
+      ! Remove the manifest last: it lists the files that the next process may remove.
+      call list_directory(workspace, names)
+      if (all(names == manifest)) call remove_file(workspace//'/'//manifest)
    end subroutine clear_workspace
 
    !> The manifest of a directory.
    subroutine read_manifest(path, entries, is_manifest)
       character(len=*), intent(in) :: path
-      !> Its lines, none without a manifest: [n_entry].
+      !> Entries; none without a manifest: [n_entry].
       type(entry_type), allocatable, intent(out) :: entries(:)
-      !> There is one, or nothing of its name.
+      !> There is a manifest, or nothing of that name.
       logical, intent(out) :: is_manifest
       character(len=name_length + 64) :: line
       character(len=256) :: message
@@ -276,12 +276,12 @@ contains
       entries = entries(:n)
    end subroutine read_manifest
 
-   !> Adds lines to the manifest of a directory.
+   !> Adds entries to the manifest of a directory.
    subroutine add_entries(path, entries, error)
       character(len=*), intent(in) :: path
-      !> The lines: [n_entry].
+      !> The entries: [n_entry].
       type(entry_type), intent(in) :: entries(:)
-      !> They cannot be written.
+      !> Set if they cannot be written.
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: text
       integer(int64) :: bytes

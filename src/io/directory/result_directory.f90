@@ -1,9 +1,9 @@
-!> Directories of results: a set of files replaces the one before it as a whole, or not at all.
+!> Directories of results: a new set of files replaces the old one as a whole, or not at all.
 !>
-!> A writer works in a workspace `.<name>.part` beside the directory `<name>`, or in the directory itself where the two
-!> cannot be exchanged, as with the working directory or a mount. The lock on the workspace makes writers wait for each
-!> other; what a killed one has left there is removed. The lock on the directory is held for its check and for the
-!> replacement. The first line of the marker, a file of the set, says whose results a directory holds.
+!> A process writes into a workspace `.<name>.part` beside the directory `<name>`, or inside the directory if the two
+!> cannot be exchanged, as with the working directory or a mount. The lock on the workspace makes processes wait for each
+!> other; files left there by a killed process are removed. The directory is locked only while it is checked and replaced.
+!> The first line of the marker, a file of the set, identifies the case of the results.
 module thud_result_directory
    use, intrinsic :: iso_fortran_env, only: int32
    use thud_error, only: error_type, input_error
@@ -20,22 +20,22 @@ module thud_result_directory
 
    public :: add_text, begin_file, check_owner, close_results, open_results, result_directory_type, write_results
 
-   !> Name of a workspace in the directory itself.
+   !> Name of a workspace inside the directory.
    character(len=*), parameter :: inner_workspace = '.thud.part'
 
-   !> Whose results a directory holds: it is free, or they are of the same case with the same or another input.
+   !> Owner of a directory: none, or the same case with the same or another input.
    integer, parameter :: no_owner = 0, same_input = 1, other_input = 2
 
    !> A directory while its results are written.
    type :: result_directory_type
       private
-      !> Its path as the user gives it, the same without links, and the path of the workspace.
-      character(len=:), allocatable :: path, place, workspace
-      !> The file that says whose results these are.
+      !> Path as the user gives it, absolute path without links, and path of the workspace.
+      character(len=:), allocatable :: path, target, workspace
+      !> The file that identifies the case.
       type(text_file_type) :: marker
       !> Paths of the files that the results depend on: [n_input].
       character(len=path_length), allocatable :: inputs(:)
-      !> Files that thud has not written are replaced, too.
+      !> Also replace files that thud has not written.
       logical :: replace = .false.
       !> Names of all files of the set: [n_file].
       character(len=name_length), allocatable :: names(:)
@@ -43,26 +43,25 @@ module thud_result_directory
       integer(int32), allocatable :: sums(:)
       !> Name of the file that is being written.
       character(len=name_length) :: name = ''
-      !> Checksum of what was written to it.
+      !> Checksum of the text written to it so far.
       integer(int32) :: sum = 0_int32
-      !> Descriptors of that file, and of the locks on workspace and directory; negative where there is none.
+      !> Descriptors of that file, of the lock on the workspace, and of the lock on the directory; negative if none.
       integer :: file = -1, workspace_lock = -1, lock = -1
-      !> The directory was missing and is made already.
+      !> The directory was missing and has been created.
       logical :: is_new = .false.
    end type result_directory_type
 
 contains
 
-   !> Refuses a directory that holds anything but results of the same case.
+   !> Returns an error if a directory holds anything except results of the same case.
    subroutine check_owner(path, marker, replace, differs, error)
       character(len=*), intent(in) :: path
-      !> The file that will say whose results it holds.
+      !> The file that will identify the case.
       type(text_file_type), intent(in) :: marker
-      !> It may hold anything.
+      !> Accept a directory with any files.
       logical, intent(in) :: replace
-      !> It holds the same case with another input.
+      !> The directory holds results of the same case with another input.
       logical, intent(out) :: differs
-      !> It belongs to something else, or is no directory.
       type(error_type), allocatable, intent(out) :: error
       integer :: owner
 
@@ -72,19 +71,19 @@ contains
 
    !> Writes a set of files into a directory, completely or not at all.
    subroutine write_results(path, marker, files, inputs, replace, differs, error)
-      !> The directory, which is made where it is missing.
+      !> The directory, created if missing.
       character(len=*), intent(in) :: path
-      !> The file that says whose results these are.
+      !> The file that identifies the case.
       type(text_file_type), intent(in) :: marker
       !> The other files: [n_file].
       type(text_file_type), intent(in) :: files(:)
       !> Paths of the files that the results depend on, which are never replaced: [n_input].
       character(len=*), intent(in) :: inputs(:)
-      !> Files that thud has not written are replaced, too.
+      !> Also replace files that thud has not written.
       logical, intent(in) :: replace
-      !> They replace results of the same case with another input.
+      !> The files replace results of the same case with another input.
       logical, intent(out) :: differs
-      !> They cannot be written; the directory is as it was.
+      !> Set if the files cannot be written; the directory is unchanged then.
       type(error_type), allocatable, intent(out) :: error
       type(result_directory_type) :: directory
       integer :: i
@@ -96,21 +95,21 @@ contains
       call close_results(directory, differs, error)
    end subroutine write_results
 
-   !> Waits for other writers of a directory and begins to write.
+   !> Waits until no other process writes into a directory, and begins to write.
    subroutine open_results(path, marker, names, inputs, replace, directory, error)
-      !> The directory, which is made where it is missing.
+      !> The directory, created if missing.
       character(len=*), intent(in) :: path
-      !> The file that says whose results these are.
+      !> The file that identifies the case.
       type(text_file_type), intent(in) :: marker
       !> Names of the other files: [n_file].
       character(len=*), intent(in) :: names(:)
       !> Paths of the files that the results depend on, which are never replaced: [n_input].
       character(len=*), intent(in) :: inputs(:)
-      !> Files that thud has not written are replaced, too.
+      !> Also replace files that thud has not written.
       logical, intent(in) :: replace
-      !> The directory, to be closed in any case.
+      !> The directory; to be closed even after an error.
       type(result_directory_type), intent(out) :: directory
-      !> It belongs to something else, or cannot be written.
+      !> Set if the directory belongs to something else, or cannot be written.
       type(error_type), allocatable, intent(out) :: error
       type(entry_type) :: unwritten(size(names) + 1)
       integer :: owner
@@ -122,21 +121,21 @@ contains
       directory%replace = replace
       directory%names = [character(len=name_length) :: names, marker%name]
       allocate (directory%sums(size(directory%names)), source=0_int32)
-      call take_workspace(directory, error)
-      if (.not. allocated(error)) call lock_place(directory, owner, error)
+      call acquire_workspace(directory, error)
+      if (.not. allocated(error)) call lock_target(directory, owner, error)
       call close_descriptor(directory%lock)
       if (allocated(error)) return
-      call clear_workspace(directory%workspace, directory%place)
+      call clear_workspace(directory%workspace, directory%target)
       unwritten%name = directory%names
       call add_entries(directory%workspace, unwritten, error)
    end subroutine open_results
 
-   !> Ends the writing: all files are in the directory, or none.
+   !> Ends the writing: afterwards all files are in the directory, or none.
    subroutine close_results(directory, differs, error)
       type(result_directory_type), intent(inout) :: directory
       !> The files replace results of the same case with another input.
       logical, intent(out) :: differs
-      !> What went wrong before, or now; then the directory is as it was.
+      !> Set if an earlier step or this one fails; the directory is unchanged then.
       type(error_type), allocatable, intent(inout) :: error
       logical :: moved
 
@@ -145,12 +144,12 @@ contains
       call end_file(directory, error)
       call write_file(directory, directory%marker, error)
       if (.not. allocated(error)) call publish(directory, differs, moved, error)
-      ! Where the workspace has moved, another one of its name belongs to another writer.
+      ! If the workspace has moved, a workspace of the same name belongs to another process.
       if (directory%workspace_lock >= 0 .and. .not. moved) then
-         call clear_workspace(directory%workspace, directory%place)
+         call clear_workspace(directory%workspace, directory%target)
          call remove_file(directory%workspace)
       end if
-      if (directory%is_new .and. allocated(error)) call remove_file(directory%place)
+      if (directory%is_new .and. allocated(error)) call remove_file(directory%target)
       call close_descriptor(directory%lock)
       call close_descriptor(directory%workspace_lock)
       call pass_interrupts(merge(0, 1, allocated(error)))
@@ -159,9 +158,9 @@ contains
    !> Begins a file.
    subroutine begin_file(directory, name, error)
       type(result_directory_type), intent(inout) :: directory
-      !> Name of the file, one of those given before.
+      !> Name of the file, one of the set.
       character(len=*), intent(in) :: name
-      !> What went wrong before, or now.
+      !> Set if an earlier step or this one fails.
       type(error_type), allocatable, intent(inout) :: error
       integer :: status
 
@@ -173,11 +172,11 @@ contains
       call require_written(directory, status, error)
    end subroutine begin_file
 
-   !> Adds to the file that was begun last.
+   !> Adds text to the current file.
    subroutine add_text(directory, text, error)
       type(result_directory_type), intent(inout) :: directory
       character(len=*), intent(in) :: text
-      !> What went wrong before, or now.
+      !> Set if an earlier step or this one fails.
       type(error_type), allocatable, intent(inout) :: error
       integer :: status
 
@@ -187,10 +186,10 @@ contains
       call require_written(directory, status, error)
    end subroutine add_text
 
-   !> Ends the file that was begun last.
+   !> Ends the current file.
    subroutine end_file(directory, error)
       type(result_directory_type), intent(inout) :: directory
-      !> What went wrong before, or now.
+      !> Set if an earlier step or this one fails.
       type(error_type), allocatable, intent(inout) :: error
       integer :: status
 
@@ -204,7 +203,7 @@ contains
    subroutine write_file(directory, file, error)
       type(result_directory_type), intent(inout) :: directory
       type(text_file_type), intent(in) :: file
-      !> What went wrong before, or now.
+      !> Set if an earlier step or this one fails.
       type(error_type), allocatable, intent(inout) :: error
 
       if (allocated(error)) return
@@ -213,12 +212,12 @@ contains
       call end_file(directory, error)
    end subroutine write_file
 
-   !> Refuses to go on where a file was not written.
+   !> Returns an error if a file was not written.
    subroutine require_written(directory, status, error)
       type(result_directory_type), intent(in) :: directory
       !> 0, the number of the system's error, or negative after an interrupt.
       integer, intent(in) :: status
-      !> What went wrong before, or now.
+      !> Set if an earlier step or this one fails.
       type(error_type), allocatable, intent(inout) :: error
 
       if (status == 0 .or. allocated(error)) return
@@ -230,31 +229,31 @@ contains
       end if
    end subroutine require_written
 
-   !> Whose results a directory holds.
+   !> Finds the owner of a directory.
    subroutine find_owner(path, marker, replace, owner, error)
       character(len=*), intent(in) :: path
-      !> The file that will say whose results it holds.
+      !> The file that will identify the case.
       type(text_file_type), intent(in) :: marker
-      !> It may hold anything.
+      !> Accept a directory with any files.
       logical, intent(in) :: replace
       !> `no_owner`, `same_input` or `other_input`.
       integer, intent(out) :: owner
-      !> It belongs to something else, or is no directory.
+      !> Set if the directory belongs to something else, or is not a directory.
       type(error_type), allocatable, intent(out) :: error
       type(error_type), allocatable :: unreadable
       type(entry_type), allocatable :: entries(:)
-      character(len=name_length), allocatable :: found(:)
+      character(len=name_length), allocatable :: names(:)
       character(len=:), allocatable :: text
-      logical :: there, is_manifest
+      logical :: exists, is_manifest
 
       owner = no_owner
       if (.not. directory_exists(path)) then
-         inquire (file=path, exist=there)
-         if (there) error = making_error(path)
+         inquire (file=path, exist=exists)
+         if (exists) error = making_error(path)
          return
       end if
-      call list_directory(path, found)
-      if (all(found == inner_workspace)) return
+      call list_directory(path, names)
+      if (all(names == inner_workspace)) return
       call read_manifest(path, entries, is_manifest)
       if (directory_exists(path//'/'//manifest) .or. .not. (is_manifest .or. replace)) then
          error = foreign_error(path, manifest)
@@ -263,10 +262,10 @@ contains
          if (allocated(unreadable)) text = ''
          if (index(text, marker%content(:index(marker%content, newline))) == 1) owner = merge(same_input, other_input, &
             text == marker%content)
-      else if (any(found == marker%name)) then
+      else if (any(names == marker%name)) then
          if (.not. replace) error = foreign_error(path, marker%name)
       else if (any(entries%name == marker%name)) then
-         ! A writer killed while it moved files one by one has left the manifest without the marker.
+         ! A process killed while it moved files one by one has left a manifest without the marker.
          return
       end if
       if (owner /= no_owner .or. allocated(error) .or. replace) return
@@ -274,10 +273,9 @@ contains
          //'results of the same case, or --replace')
    end subroutine find_owner
 
-   !> Refuses to replace inputs, directories, and files that thud has not written.
+   !> Returns an error if the set would replace inputs, directories, or files that thud has not written.
    subroutine check_files(directory, error)
       type(result_directory_type), intent(in) :: directory
-      !> Names the file that is in the way.
       type(error_type), allocatable, intent(out) :: error
       type(entry_type), allocatable :: entries(:)
       character(len=:), allocatable :: path
@@ -286,34 +284,33 @@ contains
 
       call check_input(directory, manifest, error)
       if (allocated(error)) return
-      call read_manifest(directory%place, entries, is_manifest)
+      call read_manifest(directory%target, entries, is_manifest)
       do i = 1, size(directory%names)
-         path = directory%place//'/'//trim(directory%names(i))
+         path = directory%target//'/'//trim(directory%names(i))
          if (is_missing(path)) cycle
          call check_input(directory, directory%names(i), error)
          if (allocated(error)) return
          if (.not. directory_exists(path)) then
-            if (directory%replace .or. is_listed(directory%place, directory%names(i), entries)) cycle
+            if (directory%replace .or. is_listed(directory%target, directory%names(i), entries)) cycle
          end if
          error = foreign_error(directory%path, directory%names(i))
          return
       end do
    end subroutine check_files
 
-   !> Refuses to replace an input.
+   !> Returns an error if a file would replace an input.
    subroutine check_input(directory, name, error)
       type(result_directory_type), intent(in) :: directory
-      !> Name of a file to be written.
+      !> Name of a file to write.
       character(len=*), intent(in) :: name
-      !> The name leads to an input.
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: path, text
       integer :: i
 
-      path = directory%place//'/'//trim(name)
+      path = directory%target//'/'//trim(name)
       do i = 1, size(directory%inputs)
          if (.not. is_same_file(path, trim(directory%inputs(i)))) cycle
-         ! Results are repeated from their own input.
+         ! A run from the marker itself may replace the marker by the same text.
          if (name == directory%marker%name) call read_text_file(path, text, error)
          if (allocated(text)) then
             if (text == directory%marker%content) cycle
@@ -324,7 +321,7 @@ contains
       end do
    end subroutine check_input
 
-   !> Error of what thud has not written.
+   !> Error for a file that thud has not written.
    function foreign_error(path, name) result(error)
       !> Path of its directory.
       character(len=*), intent(in) :: path
@@ -339,70 +336,70 @@ contains
       end if
    end function foreign_error
 
-   !> Takes the workspace of a directory. Interrupts are kept from then on.
-   subroutine take_workspace(directory, error)
+   !> Creates and locks the workspace of a directory, and defers interrupts.
+   subroutine acquire_workspace(directory, error)
       type(result_directory_type), intent(inout) :: directory
-      !> It cannot be made.
+      !> Set if the workspace cannot be created.
       type(error_type), allocatable, intent(out) :: error
-      character(len=name_length), allocatable :: found(:)
+      character(len=name_length), allocatable :: names(:)
       integer :: slash, made
       logical :: done
 
       call keep_interrupts()
-      call resolve_path(directory%path, directory%place, done)
+      call resolve_path(directory%path, directory%target, done)
       if (done) then
-         slash = index(directory%place, '/', back=.true.)
-         directory%workspace = directory%place(:slash)//'.'//directory%place(slash + 1:)//'.part'
+         slash = index(directory%target, '/', back=.true.)
+         directory%workspace = directory%target(:slash)//'.'//directory%target(slash + 1:)//'.part'
          call lock_directory(directory%workspace, .true., directory%workspace_lock)
          if (directory%workspace_lock >= 0) then
-            done = can_exchange(directory%workspace, directory%place)
+            done = can_exchange(directory%workspace, directory%target)
             if (.not. done) call remove_file(directory%workspace)
             if (.not. done) call close_descriptor(directory%workspace_lock)
          end if
          call check_interrupt(error)
          if (allocated(error)) return
          if (directory%workspace_lock < 0) then
-            directory%is_new = .not. directory_exists(directory%place)
-            call lock_directory(directory%place, .true., made)
+            directory%is_new = .not. directory_exists(directory%target)
+            call lock_directory(directory%target, .true., made)
             call close_descriptor(made)
-            directory%workspace = directory%place//'/'//inner_workspace
+            directory%workspace = directory%target//'/'//inner_workspace
             call lock_directory(directory%workspace, .true., directory%workspace_lock)
          end if
       end if
       call check_interrupt(error)
       if (directory%workspace_lock < 0 .and. .not. allocated(error)) error = making_error(directory%path)
       if (allocated(error)) return
-      call list_directory(directory%workspace, found)
-      if (is_workspace(found)) return
+      call list_directory(directory%workspace, names)
+      if (is_workspace(names)) return
       error = input_error('--output '//directory%path//': '//directory%workspace//' is in the way; allowed: another ' &
          //'directory, or remove it first')
       call close_descriptor(directory%workspace_lock)
-   end subroutine take_workspace
+   end subroutine acquire_workspace
 
-   !> Locks a directory that is there, and finds whose results it holds.
-   subroutine lock_place(directory, owner, error)
+   !> Locks an existing directory, and finds its owner.
+   subroutine lock_target(directory, owner, error)
       type(result_directory_type), intent(inout) :: directory
       !> `no_owner`, `same_input` or `other_input`.
       integer, intent(out) :: owner
-      !> It belongs to something else, or cannot be written.
+      !> Set if the directory belongs to something else, or cannot be written.
       type(error_type), allocatable, intent(out) :: error
 
-      call lock_directory(directory%place, .false., directory%lock)
+      call lock_directory(directory%target, .false., directory%lock)
       call find_owner(directory%path, directory%marker, directory%replace, owner, error)
       if (.not. allocated(error)) call check_files(directory, error)
       if (directory%lock < 0) call check_interrupt(error)
       if (allocated(error) .or. directory%lock >= 0) return
-      if (directory_exists(directory%place)) error = making_error(directory%path)
-   end subroutine lock_place
+      if (directory_exists(directory%target)) error = making_error(directory%path)
+   end subroutine lock_target
 
-   !> Puts the files of the workspace in the place of those before.
+   !> Replaces the files of the directory by those of the workspace.
    subroutine publish(directory, differs, moved, error)
       type(result_directory_type), intent(inout) :: directory
       !> The files replace results of the same case with another input.
       logical, intent(out) :: differs
       !> The workspace itself has become the directory.
       logical, intent(out) :: moved
-      !> The directory belongs to something else by now, or its files cannot be replaced.
+      !> Set if the directory now belongs to something else, or its files cannot be replaced.
       type(error_type), allocatable, intent(out) :: error
       type(entry_type), allocatable :: kept(:)
       type(entry_type) :: entries(size(directory%names))
@@ -410,26 +407,26 @@ contains
       integer :: owner, status
 
       moved = .false.
-      call lock_place(directory, owner, error)
+      call lock_target(directory, owner, error)
       differs = owner == other_input
       if (allocated(error)) return
       entries = new_entries(directory%names, directory%sums)
-      call get_kept(directory%place, directory%names, owner == same_input, kept, gone)
+      call get_kept(directory%target, directory%names, owner == same_input, kept, gone)
       call add_entries(directory%workspace, [entries, kept], error)
       if (allocated(error)) return
       call flush_directory(directory%workspace, status)
       call require_written(directory, status, error)
       if (allocated(error)) return
       if (directory%lock < 0) then
-         call rename_file(directory%workspace, directory%place, moved)
+         call rename_file(directory%workspace, directory%target, moved)
          if (.not. moved) error = making_error(directory%path)
       else
-         call replace_set(directory%workspace, directory%place, entries, gone, &
-            directory%workspace /= directory%place//'/'//inner_workspace, error)
+         call replace_set(directory%workspace, directory%target, entries, gone, &
+            directory%workspace /= directory%target//'/'//inner_workspace, error)
       end if
    end subroutine publish
 
-   !> Error of a directory that cannot be made or written.
+   !> Error for a directory that cannot be created or written.
    pure function making_error(path) result(error)
       character(len=*), intent(in) :: path
       type(error_type) :: error

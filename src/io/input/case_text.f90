@@ -12,20 +12,20 @@ module thud_case_text
 
    public :: describe_keys, get_case_text, read_case
 
-   !> Groups whose defaults a run names where a file leaves them out, the first of them also of free modes.
+   !> Groups whose absence a run reports, because defaults apply then; for free modes alone only the first.
    character(len=*), parameter :: main_groups(*) = ['ball ', 'drop ', 'model']
 
 contains
 
-   !> Case from the text of a namelist file, complete and inside all ranges.
+   !> Reads a case from the text of a namelist file and checks it.
    subroutine read_case(text, default_name, case, error, unchecked)
       character(len=*), intent(in) :: text
-      !> Name of the case where the text gives none.
+      !> Name of the case if the text has none.
       character(len=*), intent(in) :: default_name
       type(case_type), target, intent(out) :: case
-      !> What is wrong, with group, key, value and allowed range.
+      !> Set if the text is not a valid case.
       type(error_type), allocatable, intent(out) :: error
-      !> Values may lie outside their ranges (default: they may not).
+      !> Skip the check of ranges and of the case as a whole (default: false).
       logical, intent(in), optional :: unchecked
       type(group_type), allocatable :: groups(:)
       type(field_type), allocatable :: fields(:)
@@ -53,7 +53,7 @@ contains
          call assign_group(groups(i), fields, error)
       end do
       if (allocated(error)) return
-      ! The use of an unchecked case depends on these.
+      ! The use of other keys depends on these, even in an unchecked case.
       call check_fields(pack(fields, fields%group == 'model' .or. fields%group == 'floor' .and. fields%key == 'name'), error)
       if (.not. allocated(error)) call check_name(case%name, error)
       if (.not. allocated(error)) call check_use(groups, case, error)
@@ -63,12 +63,11 @@ contains
       if (.not. allocated(error)) call check_case(case, error)
    end subroutine read_case
 
-   !> Refuses groups that do nothing.
+   !> Returns an error if the case does not use a group.
    subroutine check_use(groups, case, error)
       !> Groups of the file: [n_group].
       type(group_type), intent(in) :: groups(:)
       type(case_type), intent(in), target :: case
-      !> Names the group and its line.
       type(error_type), allocatable, intent(out) :: error
       type(field_type), allocatable :: fields(:)
       character(len=:), allocatable :: where
@@ -89,7 +88,7 @@ contains
       end do
    end subroutine check_use
 
-   !> Refuses groups that are unknown or given twice, and files without any.
+   !> Returns an error if a group is unknown or given twice, or if there is none.
    subroutine check_groups(groups, fields, error)
       !> Groups of the file: [n_group].
       type(group_type), intent(in) :: groups(:)
@@ -122,31 +121,31 @@ contains
       type(group_type), intent(in) :: group
       !> Known keys: [n_field].
       type(field_type), intent(in) :: fields(:)
-      !> A key is unknown or given twice, or its value has the wrong type.
+      !> Set if a key is unknown or given twice, or its value has the wrong type.
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: allowed, suggestion
       logical :: is_meant(size(fields))
       integer :: i, j
 
       do i = 1, size(group%assignments)
-         associate (given => group%assignments(i))
-            is_meant = fields%group == group%name .and. fields%key == given%key
+         associate (assignment => group%assignments(i))
+            is_meant = fields%group == group%name .and. fields%key == assignment%key
             if (.not. any(is_meant)) then
-               call get_suggestion(given%key, pack(fields%key, fields%group == group%name), suggestion)
-               error = input_error('&'//group%name//': '//shortened(given%key)//' in line '//to_text(given%line) &
+               call get_suggestion(assignment%key, pack(fields%key, fields%group == group%name), suggestion)
+               error = input_error('&'//group%name//': '//shortened(assignment%key)//' in line '//to_text(assignment%line) &
                   //' is not a known key'//suggestion//'; allowed: ' &
                   //join_quoted(distinct(pack(fields%key, fields%group == group%name))))
-            else if (any([(group%assignments(j)%key == given%key, j=1, i - 1)])) then
-               error = input_error('&'//group%name//': '//given%key//' is given a second time in line ' &
-                  //to_text(given%line)//'; allowed: once')
-            else if (given%value == '') then
+            else if (any([(group%assignments(j)%key == assignment%key, j=1, i - 1)])) then
+               error = input_error('&'//group%name//': '//assignment%key//' is given a second time in line ' &
+                  //to_text(assignment%line)//'; allowed: once')
+            else if (assignment%value == '') then
                call fields(findloc(is_meant, .true., dim=1))%get_allowed(allowed)
-               error = input_error('&'//group%name//': '//given%key//' in line '//to_text(given%line) &
+               error = input_error('&'//group%name//': '//assignment%key//' in line '//to_text(assignment%line) &
                   //' has no value; allowed: '//allowed)
             else
-               ! A key of two owners sets both variables.
+               ! A key with two owners sets the variables of both.
                do j = 1, size(fields)
-                  if (is_meant(j) .and. .not. allocated(error)) call fields(j)%set_from_text(given%value, error)
+                  if (is_meant(j) .and. .not. allocated(error)) call fields(j)%set_from_text(assignment%value, error)
                end do
             end if
          end associate
@@ -154,7 +153,7 @@ contains
       end do
    end subroutine assign_group
 
-   !> Each text once, in order.
+   !> Texts without repetition, in their order.
    pure function distinct(texts) result(once)
       !> The texts: [n].
       character(len=*), intent(in) :: texts(:)
@@ -169,7 +168,7 @@ contains
       once = pack(texts, first)
    end function distinct
 
-   !> Each key once, in order.
+   !> Removes repeated keys.
    subroutine drop_repeated(fields)
       !> The keys: [n_field].
       type(field_type), allocatable, intent(inout) :: fields(:)
@@ -182,7 +181,7 @@ contains
       fields = pack(fields, first)
    end subroutine drop_repeated
 
-   !> The complete input as a namelist file; reading it gives the same case.
+   !> The complete input as the text of a namelist file; reading it gives the same case.
    subroutine get_case_text(case, text)
       type(case_type), intent(in), target :: case
       character(len=:), allocatable, intent(out) :: text
@@ -203,8 +202,8 @@ contains
       end do
    end subroutine get_case_text
 
-   !> Every key with its default, allowed range and meaning, as a commented namelist file. Groups
-   !> that the default model does not use follow a `!`.
+   !> All keys with default, allowed range and meaning, as a commented namelist file. Groups that the default case does
+   !> not use are commented out.
    subroutine describe_keys(text)
       !> The description; a valid input file.
       character(len=:), allocatable, intent(out) :: text

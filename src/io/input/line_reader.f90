@@ -1,5 +1,4 @@
-!> Lines of texts of any size, from files and pipes: the run-time library would take a whole line into memory,
-!> however long.
+!> Reads files and pipes of any size line by line. Fortran's `read` would load a whole line into memory, however long.
 module thud_line_reader
    use thud_system, only: close_descriptor, open_descriptor, read_bytes
    implicit none (type, external)
@@ -10,10 +9,10 @@ module thud_line_reader
    !> Maximum length of a line.
    integer, parameter :: line_length = 4096
 
-   !> Bytes that are read at a time.
+   !> Number of bytes read at a time.
    integer, parameter :: buffer_length = 65536
 
-   !> The mark that some editors put before a text.
+   !> UTF-8 byte order mark, with which some editors begin a text.
    character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
 
    !> An open text.
@@ -22,7 +21,7 @@ module thud_line_reader
       integer :: descriptor = -1
       !> The bytes read last.
       character(len=buffer_length) :: buffer = ''
-      !> Number of bytes in it, and of those that were returned.
+      !> Number of bytes in the buffer, and number already returned.
       integer :: filled = 0, taken = 0
       !> Number of the latest line.
       integer, public :: line = 0
@@ -34,7 +33,7 @@ contains
    subroutine open_lines(path, reader, done)
       character(len=*), intent(in) :: path
       type(line_reader_type), intent(out) :: reader
-      !> It can be read.
+      !> The text can be read.
       logical, intent(out) :: done
 
       reader%descriptor = open_descriptor(path)
@@ -52,10 +51,9 @@ contains
    !> The next line, without its end.
    subroutine read_line(reader, line, length)
       type(line_reader_type), intent(inout) :: reader
-      !> The line, as far as it fits.
+      !> The line, cut to `line_length`.
       character(len=line_length), intent(out) :: line
-      !> Its characters, at most one more than fit; -1 at the end of the text, -2 where it cannot
-      !> be read.
+      !> Length of the line, at most `line_length` + 1; -1 at the end of the text, -2 if it cannot be read.
       integer, intent(out) :: length
       integer :: stop, n
 
@@ -78,23 +76,23 @@ contains
       end do
       if (length < 0) return
       reader%line = reader%line + 1
-      ! Lines of other systems end with a carriage return.
+      ! On some systems lines end with a carriage return and a line feed.
       if (length == 0 .or. length > line_length) return
       if (line(length:length) /= achar(13)) return
       line(length:length) = ' '
       length = length - 1
    end subroutine read_line
 
-   !> Reads on.
+   !> Refills the buffer.
    subroutine fill(reader)
-      !> The text; with -1 bytes where it cannot be read.
+      !> The text; `filled` is negative if it cannot be read.
       type(line_reader_type), intent(inout) :: reader
 
       reader%taken = 0
       call read_bytes(reader%descriptor, reader%buffer, reader%filled)
    end subroutine fill
 
-   !> Closes a text; one that is closed stays so.
+   !> Closes a text; does nothing if it is closed.
    subroutine close_lines(reader)
       type(line_reader_type), intent(inout) :: reader
 

@@ -1,6 +1,5 @@
-!> Splits the text of an input file into namelist groups and assignments. The run-time library
-!> reads the values later; it alone cannot tell a missing group from an unterminated one, nor say
-!> which key holds a bad value.
+!> Splits the text of an input file into namelist groups and assignments. Fortran's namelist `read` reads the values later;
+!> alone it could not distinguish a missing group from an unterminated one, nor name the key of a bad value.
 module thud_namelist_text
    use thud_error, only: error_type, input_error
    use thud_text, only: lower_case, newline, replaced, shortened, to_text
@@ -25,14 +24,14 @@ module thud_namelist_text
       character(len=:), allocatable :: name
       !> Line of the `&`.
       integer :: line = 0
-      !> Its assignments, in order: [n_assignment].
+      !> Assignments, in order: [n_assignment].
       type(assignment_type), allocatable :: assignments(:)
    end type group_type
 
-   !> Letters, digits and the underscore make a name.
+   !> Characters allowed in names.
    character(len=*), parameter :: name_characters = 'abcdefghijklmnopqrstuvwxyz0123456789_'
 
-   !> Separators of the parts.
+   !> Blank characters.
    character(len=*), parameter :: blanks = ' '//achar(9)//achar(10)//achar(13)
 
 contains
@@ -41,9 +40,9 @@ contains
    subroutine parse_groups(text, groups, error)
       !> Text of the input file.
       character(len=*), intent(in) :: text
-      !> Its groups: [n_group].
+      !> The groups: [n_group].
       type(group_type), allocatable, intent(out) :: groups(:)
-      !> The text is not made of closed groups.
+      !> Set if the text does not consist of terminated groups.
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: clean, structure
       type(group_type) :: group
@@ -67,15 +66,15 @@ contains
       end do
    end subroutine parse_groups
 
-   !> Blanks out comments, and in a second copy also the inside of quotes.
+   !> Replaces comments by blanks, and in a second copy also quoted text by `x`.
    subroutine separate(text, clean, structure, error)
       !> Text of the input file.
       character(len=*), intent(in) :: text
-      !> The text without comments, every character at its position in the file.
+      !> The text without comments; all characters keep their positions.
       character(len=:), allocatable, intent(out) :: clean
-      !> In lower case, with all quoted text made of `x`.
+      !> The same in lower case, with `x` for quoted text.
       character(len=:), allocatable, intent(out) :: structure
-      !> A quote is not closed, or the file is not text.
+      !> Set if a quote is not closed, or the file is not text.
       type(error_type), allocatable, intent(out) :: error
       character(len=1) :: quote
       logical :: in_comment
@@ -103,7 +102,7 @@ contains
             quote = text(i:i)
             structure(i:i) = 'x'
          else if (iachar(text(i:i)) < 32 .and. scan(text(i:i), blanks) == 0 .or. iachar(text(i:i)) > 126) then
-            ! Among them blanks and quotes of word processors.
+            ! Such as the special blanks and quotes of word processors.
             error = input_error('line '//to_text(line_of(text, i))//' holds a character that is not plain text outside' &
                //' quotes and comments; allowed: letters, digits and signs of ASCII')
             return
@@ -113,17 +112,17 @@ contains
          //'; allowed: quotes that begin and end in one line')
    end subroutine separate
 
-   !> Name and end of the group that starts at a position.
+   !> Finds name and end of the group that starts at a position.
    subroutine find_group(structure, start, group, finish, error)
       !> Text without comments and quoted text.
       character(len=*), intent(in) :: structure
       !> Position of the first character.
       integer, intent(in) :: start
-      !> The group, without its assignments yet.
+      !> The group, still without assignments.
       type(group_type), intent(out) :: group
       !> Position of the `/` or of the `&` in `&end`.
       integer, intent(out) :: finish
-      !> No group starts here, or it has no end.
+      !> Set if no group starts here, or it has no end.
       type(error_type), allocatable, intent(out) :: error
       integer :: length
       logical :: closed
@@ -146,7 +145,7 @@ contains
          //" is not terminated; allowed: a '/' at the end of the group")
    end subroutine find_group
 
-   !> Splits the inside of a group at its equals signs.
+   !> Splits the content of a group into assignments.
    subroutine split_group(clean, structure, start, finish, group, error)
       !> Text without comments; the same without quoted text.
       character(len=*), intent(in) :: clean, structure
@@ -154,9 +153,9 @@ contains
       integer, intent(in) :: start, finish
       !> The group, to which the assignments are added.
       type(group_type), intent(inout) :: group
-      !> Something is not `key = value`.
+      !> Set if a part of the content is not `key = value`.
       type(error_type), allocatable, intent(out) :: error
-      type(assignment_type) :: given
+      type(assignment_type) :: assignment
       integer :: equals, key_start, key_end, next_key, position
 
       allocate (group%assignments(0))
@@ -164,28 +163,28 @@ contains
       call find_key(structure(:finish), position, key_start, key_end, equals)
       if (key_start > finish .and. verify(structure(start:finish), blanks//',') == 0) return
       if (key_start > finish .or. verify(structure(start:min(key_start, finish + 1) - 1), blanks//',') > 0) then
-         call get_value(clean(start:finish), given%value)
+         call get_value(clean(start:finish), assignment%value)
          error = input_error('&'//shortened(group%name)//' in line '//to_text(group%line)//": '" &
-            //shortened(given%value)//"' is not an assignment; allowed: 'key = value'")
+            //shortened(assignment%value)//"' is not an assignment; allowed: 'key = value'")
          return
       end if
       do while (key_start <= finish)
-         given%line = line_of(structure, key_start)
+         assignment%line = line_of(structure, key_start)
          if (key_end < key_start) then
-            error = input_error('&'//shortened(group%name)//': an equals sign in line '//to_text(given%line) &
+            error = input_error('&'//shortened(group%name)//': an equals sign in line '//to_text(assignment%line) &
                //" has no key; allowed: 'key = value'")
             return
          end if
-         given%key = structure(key_start:key_end)
+         assignment%key = structure(key_start:key_end)
          position = equals + 1
          call find_key(structure(:finish), position, next_key, key_end, equals)
-         call get_value(clean(position:min(next_key, finish + 1) - 1), given%value)
-         group%assignments = [group%assignments, given]
+         call get_value(clean(position:min(next_key, finish + 1) - 1), assignment%value)
+         group%assignments = [group%assignments, assignment]
          key_start = next_key
       end do
    end subroutine split_group
 
-   !> The next key and its equals sign; all past the end where there is none.
+   !> Finds the next key and its equals sign; all positions lie past the end if there is none.
    pure subroutine find_key(structure, from, first, last, equals)
       !> Text without comments and quoted text, up to the group's end.
       character(len=*), intent(in) :: structure
@@ -203,7 +202,7 @@ contains
       first = from + verify(structure(from:last), name_characters, back=.true.)
    end subroutine find_key
 
-   !> Value in one line, without blanks around it and without the comma that may follow.
+   !> The value in one line, without surrounding blanks and trailing comma.
    pure subroutine get_value(text, value)
       !> Text between an equals sign and the next key.
       character(len=*), intent(in) :: text
@@ -216,12 +215,12 @@ contains
       if (first > 0 .and. last >= first) value = replaced(text(first:last), blanks, ' ')
    end subroutine get_value
 
-   !> Number of the line of a position.
+   !> Line number of a position.
    pure function line_of(text, position) result(line)
       character(len=*), intent(in) :: text
       !> Position of a character.
       integer, intent(in) :: position
-      !> Line, the first one is 1.
+      !> Line number, from 1.
       integer :: line
       integer :: i
 

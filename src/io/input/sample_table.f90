@@ -1,7 +1,7 @@
-!> Tables of samples: text with the keys in its first line and one sample in each of the others. Tabs, semicolons,
-!> commas or blanks separate the values, as in the first line; they may stand in quotes. Decimal commas are allowed
-!> where commas do not separate, or in quotes; the first number with a decimal mark decides for the table. Empty lines
-!> and what follows a `#` are skipped.
+!> Tables of samples: text with the keys in the first line and one sample in each further line. The first line determines
+!> whether tabs, semicolons, commas or blanks separate the values; values may stand in quotes. Decimal commas are allowed
+!> in quotes, or if the comma is not the separator; a table must not mix decimal points and commas. Empty lines and text
+!> after a `#` are skipped.
 module thud_sample_table
    use thud_case, only: case_type, get_active_fields
    use thud_column, only: column_type, find_columns
@@ -20,23 +20,23 @@ module thud_sample_table
    !> Maximum number of columns.
    integer, parameter :: max_columns = 256
 
-   !> Length of a name or value.
+   !> Maximum length of a name or value.
    integer, parameter :: cell_length = 64
 
    !> An open table.
    type :: sample_table_type
       character(len=path_length) :: path = ''
-      !> Its lines.
+      !> The open file.
       type(line_reader_type) :: reader
-      !> What separates their cells.
+      !> Separator of the cells.
       character(len=1) :: separator = ' '
-      !> Decimal mark of their numbers; a blank as long as none has one.
+      !> Decimal mark of the numbers; blank until a number has one.
       character(len=1) :: decimal = ' '
-      !> The keys of its columns: [n_column].
+      !> Keys of the columns: [n_column].
       type(column_type), allocatable :: columns(:)
-      !> Their names: [n_column].
+      !> Names of the columns: [n_column].
       character(len=cell_length), allocatable :: names(:)
-      !> What they are; pointers into the case: [n_column].
+      !> Descriptions of the keys; they point to variables of the case: [n_column].
       type(field_type), allocatable :: fields(:)
    end type sample_table_type
 
@@ -45,14 +45,14 @@ contains
    !> Opens a table and reads its first line.
    subroutine open_sample_table(path, case, table, error)
       character(len=*), intent(in) :: path
-      !> The case, which has the keys.
+      !> The case that uses the keys.
       type(case_type), intent(in), target :: case
       type(sample_table_type), intent(out) :: table
-      !> The file cannot be read, or a key is not known or given twice.
+      !> Set if the file cannot be read, or a key is unknown or given twice.
       type(error_type), allocatable, intent(out) :: error
       character(len=line_length) :: line
       type(field_type), allocatable :: fields(:)
-      logical :: done, there
+      logical :: done, has_line
 
       table%path = path
       if (directory_exists(path)) then
@@ -64,8 +64,8 @@ contains
          error = input_error(path//': the file cannot be read; allowed: a table of samples')
          return
       end if
-      call next_line(table, line, there, error)
-      if (.not. (there .or. allocated(error))) error = input_error(path//': the table is empty; allowed: keys in the ' &
+      call next_line(table, line, has_line, error)
+      if (.not. (has_line .or. allocated(error))) error = input_error(path//': the table is empty; allowed: keys in the ' &
          //'first line and one sample in each of the others')
       if (.not. allocated(error)) then
          table%separator = get_separator(line)
@@ -83,24 +83,24 @@ contains
       end if
    end subroutine open_sample_table
 
-   !> The next samples.
+   !> Reads the next samples.
    subroutine read_samples(table, values, n_sample, error)
       type(sample_table_type), intent(inout) :: table
-      !> Their values: [n_column, n_max].
+      !> Values of the samples: [n_column, n_max].
       real(wp), intent(out) :: values(:, :)
-      !> Number of samples that were read; fewer than fit at the end of the table.
+      !> Number of samples read; less than `n_max` only at the end of the table.
       integer, intent(out) :: n_sample
-      !> A line has the wrong number of values, or a value is not a number.
+      !> Set if a line has the wrong number of values, or a value is not valid.
       type(error_type), allocatable, intent(out) :: error
       character(len=line_length) :: line
       character(len=cell_length), allocatable :: cells(:)
       integer :: i
-      logical :: there
+      logical :: has_line
 
       n_sample = 0
       do while (n_sample < size(values, 2))
-         call next_line(table, line, there, error)
-         if (allocated(error) .or. .not. there) return
+         call next_line(table, line, has_line, error)
+         if (allocated(error) .or. .not. has_line) return
          call split_line(table, line, cells, error)
          if (allocated(error)) return
          if (size(cells) /= size(table%names)) then
@@ -119,20 +119,20 @@ contains
       end do
    end subroutine read_samples
 
-   !> The next line with something in it.
-   subroutine next_line(table, line, there, error)
+   !> Reads the next line that is not empty.
+   subroutine next_line(table, line, has_line, error)
       !> The table; closed at its end.
       type(sample_table_type), intent(inout) :: table
       !> The line, without comment.
       character(len=line_length), intent(out) :: line
-      !> There was one.
-      logical, intent(out) :: there
-      !> The line is too long or cannot be read.
+      !> There is such a line.
+      logical, intent(out) :: has_line
+      !> Set if the line is too long or cannot be read.
       type(error_type), allocatable, intent(out) :: error
       integer :: length, mark
 
-      there = .false.
-      do while (.not. there)
+      has_line = .false.
+      do while (.not. has_line)
          call read_line(table%reader, line, length)
          if (length == -1) exit
          if (length < 0) error = input_error(trim(table%path)//': the file cannot be read; allowed: a table of samples')
@@ -141,16 +141,16 @@ contains
          if (length > line_length .and. mark == 0) error = line_error(table, 'it is too long; allowed: up to ' &
             //to_text(line_length)//' characters')
          if (allocated(error)) exit
-         there = line /= ''
+         has_line = line /= ''
       end do
-      if (.not. there) call close_lines(table%reader)
+      if (.not. has_line) call close_lines(table%reader)
    end subroutine next_line
 
    !> Separator of a table: the first of tab, semicolon, comma and blank that its first line holds.
    pure function get_separator(line) result(separator)
       !> The first line.
       character(len=*), intent(in) :: line
-      !> A line feed, which no line holds, where there is one column.
+      !> The separator; for a single column a line feed, which no line holds.
       character(len=1) :: separator
       character(len=*), parameter :: known = achar(9)//';, '
       character(len=len(line)) :: structure
@@ -163,35 +163,35 @@ contains
       end do
    end function get_separator
 
-   !> Cells of a line.
+   !> Splits a line into cells.
    subroutine split_line(table, line, cells, error)
       type(sample_table_type), intent(in) :: table
       character(len=*), intent(in) :: line
-      !> The cells, without blanks and quotes around them: [n_cell].
+      !> The cells, without surrounding blanks and quotes: [n_cell].
       character(len=cell_length), allocatable, intent(out) :: cells(:)
-      !> There are too many, one is too long, or a quote is not closed.
+      !> Set if there are too many cells, one is too long, or a quote is not closed.
       type(error_type), allocatable, intent(out) :: error
-      character(len=len(line)) :: rest, structure
+      character(len=len(line)) :: text, structure
       integer :: i, n, at, length, last
 
-      rest = adjustl(line)
-      structure = get_structure(rest)
-      last = len_trim(rest)
+      text = adjustl(line)
+      structure = get_structure(text)
+      last = len_trim(text)
       associate (separator => table%separator)
-         ! Spreadsheets may end lines with their separator.
+         ! Spreadsheets may end lines with the separator.
          if (separator == ';') last = verify(structure(:last), '; ', back=.true.)
          allocate (cells(max_columns))
          n = 0
          at = 1
          do while (at <= last + merge(1, 0, separator /= ' '))
             length = index(structure(at:last)//separator, separator) - 1
-            if (n == max_columns .or. len_trim(adjustl(rest(at:at + length - 1))) > cell_length) then
+            if (n == max_columns .or. len_trim(adjustl(text(at:at + length - 1))) > cell_length) then
                error = line_error(table, 'it has too many values or one that is too long; allowed: up to ' &
                   //to_text(max_columns)//' values of up to '//to_text(cell_length)//' characters')
                return
             end if
             n = n + 1
-            cells(n) = adjustl(rest(at:at + length - 1))
+            cells(n) = adjustl(text(at:at + length - 1))
             at = at + length + 1
             if (separator == ' ') at = at + max(0, verify(structure(at:)//'x', ' ') - 1)
          end do
@@ -203,16 +203,16 @@ contains
       end do
    end subroutine split_line
 
-   !> Finds the decimal mark of a table in the numbers of a line.
+   !> Finds the decimal mark of a table from the numbers of a line.
    subroutine find_decimal(table, cells, error)
       type(sample_table_type), intent(inout) :: table
       !> The cells of the line: [n_cell].
       character(len=cell_length), intent(in) :: cells(:)
-      !> A number has the other mark than those before it, or may have a decimal comma or 1000 times the value.
+      !> Set if a number has another decimal mark than earlier ones, or its comma may also separate thousands.
       type(error_type), allocatable, intent(out) :: error
-      integer :: doubtful, i, at
+      integer :: ambiguous, i, at
 
-      doubtful = 0
+      ambiguous = 0
       do i = 1, size(cells)
          at = scan(cells(i), '.,')
          if (at == 0 .or. .not. is_number(trim(replaced(cells(i), ',', '.')))) cycle
@@ -222,12 +222,12 @@ contains
             return
          end if
          if (table%decimal == ' ' .and. may_be_group(cells(i))) then
-            doubtful = i
+            ambiguous = i
          else
             table%decimal = cells(i)(at:at)
          end if
       end do
-      if (doubtful > 0 .and. table%decimal == ' ') error = line_error(table, quoted(trim(cells(doubtful))) &
+      if (ambiguous > 0 .and. table%decimal == ' ') error = line_error(table, quoted(trim(cells(ambiguous))) &
          //' may have a decimal comma or be a thousand times as much; allowed: numbers such as 1575 and 1,5750')
    end subroutine find_decimal
 
@@ -243,11 +243,11 @@ contains
          .and. verify(trim(cell(first:)), '0123456789,') == 0
    end function may_be_group
 
-   !> Removes the quotes around a cell, and the blanks inside them.
+   !> Removes the quotes around a cell, and blanks next to them.
    subroutine unquote(table, cell, error)
       type(sample_table_type), intent(in) :: table
       character(len=cell_length), intent(inout) :: cell
-      !> The quote is not closed.
+      !> Set if the quote is not closed.
       type(error_type), allocatable, intent(out) :: error
       integer :: last
 
@@ -260,7 +260,7 @@ contains
       end if
    end subroutine unquote
 
-   !> A line with quoted text made of `x`, in which separators do not separate.
+   !> A line with `x` for quoted text, because separators in quotes do not separate.
    pure function get_structure(line) result(structure)
       character(len=*), intent(in) :: line
       character(len=len(line)) :: structure
@@ -280,15 +280,15 @@ contains
       end do
    end function get_structure
 
-   !> One value of a sample.
+   !> Reads one value of a sample.
    subroutine read_value(table, column, word, value, error)
       type(sample_table_type), intent(in) :: table
       integer, intent(in) :: column
       !> The value as written in the table.
       character(len=*), intent(in) :: word
-      !> The value; of a choice its number, of a flag 0 or 1.
+      !> The value; the index of a choice, 0 or 1 for a flag.
       real(wp), intent(out) :: value
-      !> It is not what the key takes.
+      !> Set if the key cannot have this value.
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: suggestion, wanted
       character(len=128) :: message
@@ -323,12 +323,11 @@ contains
       if (status /= 0) error = line_error(table, trim(table%names(column))//' = '//quoted(word)//' is not '//wanted)
    end subroutine read_value
 
-   !> Error of a line.
+   !> Error for the latest line.
    function line_error(table, message) result(error)
       type(sample_table_type), intent(in) :: table
-      !> What is wrong with the line.
+      !> The fault in the line.
       character(len=*), intent(in) :: message
-      !> The error, with file and line.
       type(error_type) :: error
 
       error = input_error(trim(table%path)//', line '//to_text(table%reader%line)//': '//message)

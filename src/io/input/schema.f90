@@ -1,5 +1,5 @@
-!> Keys, models and results as data for other programs, in JSON: what the Python package and the reference of
-!> all keys are made from.
+!> Keys, models and results as JSON for other programs. Modules of the Python package and the key reference are generated
+!> from it.
 module thud_schema
    use thud_band, only: band_set_names, band_type, get_bands, octave_count
    use thud_case, only: case_type, get_fields, new_case
@@ -21,7 +21,7 @@ module thud_schema
 
 contains
 
-   !> The schema.
+   !> Writes the schema.
    subroutine get_schema(text)
       !> One JSON object.
       character(len=:), allocatable, intent(out) :: text
@@ -68,7 +68,7 @@ contains
       text = text//']}'
    end subroutine get_schema
 
-   !> The criteria of a source.
+   !> Describes the criteria of a source.
    subroutine describe_limits(source, text)
       character(len=*), intent(in) :: source
       !> A JSON member.
@@ -89,7 +89,7 @@ contains
       text = text//']'
    end subroutine describe_limits
 
-   !> One quantity.
+   !> Describes a quantity.
    subroutine describe_quantity(quantity, text)
       type(quantity_type), intent(in) :: quantity
       !> A JSON object.
@@ -101,7 +101,7 @@ contains
          //to_text(quantity%decimals)//', "meaning": '//text_value(quantity%meaning)//'}'
    end subroutine describe_quantity
 
-   !> One key.
+   !> Describes a key.
    subroutine describe(field, text)
       type(field_type), intent(in) :: field
       !> A JSON object.
@@ -138,7 +138,7 @@ contains
    !> One end of a range: a number, or an expression in quotes.
    function end_value(number, expression) result(value)
       real(wp), intent(in) :: number
-      !> The expression, blank where the end is a number.
+      !> The expression; blank for a number.
       character(len=*), intent(in) :: expression
       character(len=:), allocatable :: value
 
@@ -146,7 +146,7 @@ contains
       if (expression /= '') value = text_value(expression)
    end function end_value
 
-   !> Text as a JSON value.
+   !> Text as a JSON string.
    pure function text_value(text) result(value)
       !> The text; trailing blanks are dropped.
       character(len=*), intent(in) :: text

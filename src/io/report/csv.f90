@@ -1,4 +1,4 @@
-!> Tables of numbers as text with commas.
+!> Tables of numbers as comma-separated values.
 module thud_csv
    use thud_kinds, only: wp
    use thud_text, only: newline, to_text
@@ -8,24 +8,24 @@ module thud_csv
 
    public :: get_history_csv, get_table_csv
 
-   !> Width of a number with every digit, and its comma.
+   !> Width of a number with all digits and its comma.
    integer, parameter :: width = 25
 
-   !> Format of a row of such numbers.
+   !> Format of a row of numbers with all digits.
    character(len=*), parameter :: row_form = '(*(es24.16e3,:,","))'
 
 contains
 
-   !> Histories against time, every digit.
+   !> Histories against time, with all digits.
    function get_history_csv(header, time, columns) result(text)
-      !> Names of all columns, with commas between.
+      !> Names of all columns, separated by commas.
       character(len=*), intent(in) :: header
       !> The first column: [n_row].
       real(wp), intent(in) :: time(:)
-      !> The others: [n_row, n_column].
+      !> The other columns: [n_row, n_column].
       real(wp), intent(in) :: columns(:, :)
       character(len=:), allocatable :: text
-      character(len=width*size(columns, 2)) :: rest
+      character(len=width*size(columns, 2)) :: cells
       character(len=width*(size(columns, 2) + 1)) :: row
       logical :: at_rest
       integer :: i, at
@@ -35,24 +35,24 @@ contains
       at = len(header) + 1
       at_rest = .false.
       do i = 1, size(time)
-         ! Formatting takes most of a run's time, and most rows are after the release.
-         if (.not. at_rest .or. any(abs(columns(i, :)) > 0.0_wp)) write (rest, row_form) columns(i, :)
+         ! Formatting takes most of a run's time; the zeros after the release are formatted once.
+         if (.not. at_rest .or. any(abs(columns(i, :)) > 0.0_wp)) write (cells, row_form) columns(i, :)
          at_rest = .not. any(abs(columns(i, :)) > 0.0_wp)
          write (row, row_form) time(i)
-         row(width:) = ','//rest
+         row(width:) = ','//cells
          row(len(row):) = newline
          text(at + 1:at + len(row)) = row
          at = at + len(row)
       end do
    end function get_history_csv
 
-   !> A table, as many digits as its numbers have.
+   !> A table with as many digits as its numbers need.
    function get_table_csv(header, columns, labels, notes) result(text)
-      !> Names of all columns, with commas between.
+      !> Names of all columns, separated by commas.
       character(len=*), intent(in) :: header
       !> The numbers: [n_row, n_column].
       real(wp), intent(in) :: columns(:, :)
-      !> The first and the last column, where they are texts: [n_row].
+      !> Texts of a column before and after the numbers: [n_row].
       character(len=*), intent(in), optional :: labels(:), notes(:)
       character(len=:), allocatable :: text
       type(text_buffer_type) :: buffer

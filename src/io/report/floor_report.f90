@@ -20,59 +20,60 @@ module thud_floor_report
    !> Widths of the columns of the table: names, numbers, units.
    integer, parameter :: name_column = 22, number_column = 10, unit_column = 4
 
-   !> Columns of the file of forces that every floor has.
+   !> Additional columns of `floor_force.csv` for every floor.
    character(len=32), parameter :: own_columns(3) = [character(len=32) :: &
       'blocked_force_N', 'floor_displacement_m', 'floor_velocity_m_per_s']
 
 contains
 
-   !> Forces and motions against time.
-   subroutine get_floor_force_csv(blocked, contact, found, text)
-      !> The drop on a rigid floor, and on the floor.
+   !> Forces and motion of the floor against time.
+   subroutine get_floor_force_csv(blocked, contact, floor_result, text)
+      !> The drops on rigid and mobile floor.
       type(force_history_type), intent(in) :: blocked, contact
-      type(floor_result_type), intent(in) :: found
+      type(floor_result_type), intent(in) :: floor_result
       !> Text of `floor_force.csv`.
       character(len=:), allocatable, intent(out) :: text
-      character(len=32) :: names(size(own_columns) + size(found%point_velocity, 2))
+      character(len=32) :: names(size(own_columns) + size(floor_result%point_velocity, 2))
       real(wp) :: columns(size(contact%floor_force), size(names))
       integer :: i
 
       names(:size(own_columns)) = own_columns
-      do i = 1, size(found%point_velocity, 2)
+      do i = 1, size(floor_result%point_velocity, 2)
          names(size(own_columns) + i) = 'point_'//to_text(i)//'_velocity_m_per_s'
       end do
       columns(:, 1) = blocked%floor_force
       columns(:, 2) = contact%floor_displacement
       columns(:, 3) = contact%floor_velocity
-      columns(:, size(own_columns) + 1:) = found%point_velocity
+      columns(:, size(own_columns) + 1:) = floor_result%point_velocity
       text = get_force_csv(contact, names, columns)
    end subroutine get_floor_force_csv
 
-   !> Levels of both forces and energies per band.
-   subroutine get_floor_levels_csv(impact, found, text)
+   !> Levels of both forces, and energies, in each band.
+   subroutine get_floor_levels_csv(impact, floor_result, text)
       !> The drop on a rigid floor.
       type(impact_type), intent(in) :: impact
-      type(floor_result_type), intent(in) :: found
+      type(floor_result_type), intent(in) :: floor_result
       !> Text of `floor_levels.csv`.
       character(len=:), allocatable, intent(out) :: text
 
-      associate (bands => found%bands, blocked => get_blocked_levels(impact), contact => found%contact_level)
+      associate (bands => floor_result%bands, blocked => get_blocked_levels(impact), contact => floor_result%contact_level)
          text = get_table_csv('bandwidth,nominal_Hz,lower_edge_Hz,upper_edge_Hz,blocked_level_dB,contact_level_dB,' &
             //'difference_dB,energy_by_motion_J,energy_by_mobility_J,conductance_m_per_Ns', reshape([bands%nominal, &
-            bands%lower, bands%upper, blocked, contact, contact - blocked, found%energy_by_motion, &
-            found%energy_by_mobility, found%conductance], [size(bands), 9]), bands%set)
+            bands%lower, bands%upper, blocked, contact, contact - blocked, floor_result%energy_by_motion, &
+            floor_result%energy_by_mobility, floor_result%conductance], [size(bands), 9]), bands%set)
       end associate
    end subroutine get_floor_levels_csv
 
-   !> Levels of the force on a rigid floor in the bands that the case asks for, dB: [n_band].
+   !> Levels of the force on a rigid floor.
    pure function get_blocked_levels(impact) result(level)
       type(impact_type), intent(in) :: impact
+      !> Levels in the bands that the case asks for, dB: [n_band].
       real(wp), allocatable :: level(:)
 
       level = impact%assessment%level(impact%assessment%first_band:, findloc(force_names, 'floor', dim=1))
    end function get_blocked_levels
 
-   !> The quantities of the drop on the floor.
+   !> The quantities of the drop on the mobile floor.
    subroutine get_floor_summary(contact, text)
       type(force_history_type), intent(in) :: contact
       !> Groups of `summary.nml`.
@@ -83,14 +84,14 @@ contains
       if (size(contact%model_quantity) > 0) text = text//newline//get_model_quantities('floor_model_quantities', contact)
    end subroutine get_floor_summary
 
-   !> The drop on the floor beside the blocked one.
-   subroutine get_floor_table(case, impact, contact, found, text)
+   !> Table that compares the drops on mobile and rigid floor.
+   subroutine get_floor_table(case, impact, contact, floor_result, text)
       type(case_type), intent(in) :: case
       !> The drop on a rigid floor.
       type(impact_type), intent(in) :: impact
-      !> The drop on the floor.
+      !> The drop on the mobile floor.
       type(force_history_type), intent(in) :: contact
-      type(floor_result_type), intent(in) :: found
+      type(floor_result_type), intent(in) :: floor_result
       !> The table.
       character(len=:), allocatable, intent(out) :: text
       character(len=name_column) :: name
@@ -103,11 +104,12 @@ contains
       blocked_level = get_blocked_levels(impact)
       name = 'on '//trim(case%floor)
       text = '  '//name//'   blocked       contact    difference       energy'//newline
-      do i = 1, size(found%bands)
-         name = 'level, '//get_band_name(found%bands(i))//' Hz '//trim(found%bands(i)%set)
-         call get_cells([blocked_level(i), found%contact_level(i), found%contact_level(i) - blocked_level(i)], 2, &
-            spread('dB', 1, 3), cells)
-         write (energy, '(es11.2, " J")') found%energy_by_motion(i)
+      do i = 1, size(floor_result%bands)
+         name = 'level, '//get_band_name(floor_result%bands(i))//' Hz '//trim(floor_result%bands(i)%set)
+         associate (contact_level => floor_result%contact_level(i))
+            call get_cells([blocked_level(i), contact_level, contact_level - blocked_level(i)], 2, spread('dB', 1, 3), cells)
+         end associate
+         write (energy, '(es11.2, " J")') floor_result%energy_by_motion(i)
          text = text//'  '//name//cells//'  '//energy//newline
       end do
       text = text//newline
@@ -121,14 +123,14 @@ contains
       call add_row('its displacement', 0.0_wp, 1.0e3_wp*maxval(abs(contact%floor_displacement)), 4, 'mm')
       call add_quantity(get_quantity('floor_work'), 0.0_wp, contact%floor_work)
       text = text//newline//'  Energies by the velocity and by the mobility of the floor differ by at most ' &
-         //fixed(1.0e2_wp*get_disagreement(found), 3)//' % of all bands.'//newline
+         //fixed(1.0e2_wp*get_disagreement(floor_result), 3)//' % of all bands.'//newline
 
    contains
 
       !> Adds a quantity of both drops.
       subroutine add_quantity(quantity, rigid, moving)
          type(quantity_type), intent(in) :: quantity
-         !> On a rigid floor, and on the floor, SI units.
+         !> Values on rigid and mobile floor, SI units.
          real(wp), intent(in) :: rigid, moving
 
          call add_row(trim(quantity%title), quantity%display_scale*rigid, quantity%display_scale*moving, &
@@ -138,7 +140,7 @@ contains
       !> Adds a number of both drops.
       subroutine add_row(title, rigid, moving, decimals, unit)
          character(len=*), intent(in) :: title
-         !> On a rigid floor, and on the floor.
+         !> Values on rigid and mobile floor, in the shown unit.
          real(wp), intent(in) :: rigid, moving
          integer, intent(in) :: decimals
          character(len=*), intent(in) :: unit
@@ -150,15 +152,15 @@ contains
 
    end subroutine get_floor_table
 
-   !> Maximum difference of the two energies of a band over the energy of the bands of its set.
-   pure function get_disagreement(found) result(ratio)
-      type(floor_result_type), intent(in) :: found
+   !> Maximum difference between the two energies of a band, divided by the total energy of the bands of its set.
+   pure function get_disagreement(floor_result) result(ratio)
+      type(floor_result_type), intent(in) :: floor_result
       real(wp) :: ratio
       integer :: i
 
-      ratio = maxval([(abs(found%energy_by_motion(i) - found%energy_by_mobility(i)) &
-         /max(sum(found%energy_by_mobility, mask=found%bands%set == found%bands(i)%set), tiny(1.0_wp)), &
-         i=1, size(found%bands))])
+      ratio = maxval([(abs(floor_result%energy_by_motion(i) - floor_result%energy_by_mobility(i)) &
+         /max(sum(floor_result%energy_by_mobility, mask=floor_result%bands%set == floor_result%bands(i)%set), &
+         tiny(1.0_wp)), i=1, size(floor_result%bands))])
    end function get_disagreement
 
    !> Numbers with their units, each in its column.
@@ -166,7 +168,7 @@ contains
       !> The numbers: [n].
       real(wp), intent(in) :: values(:)
       integer, intent(in) :: decimals
-      !> Their units: [n].
+      !> Units of the numbers: [n].
       character(len=*), intent(in) :: units(:)
       character(len=:), allocatable, intent(out) :: text
       integer :: i

@@ -1,4 +1,4 @@
-!> Files of the finite elements: free modes, and snapshots of an impact.
+!> Files of finite element results: free modes, and snapshots of an impact.
 module thud_mesh_files
    use thud_file, only: text_file_type
    use thud_free_modes, only: free_modes_type
@@ -19,13 +19,13 @@ module thud_mesh_files
    !> Files of the snapshots of an impact.
    character(len=13), parameter :: motion_names(2) = [character(len=13) :: 'snapshots.xmf', 'pressure.csv']
 
-   !> Scalars of a snapshot.
+   !> Names of the scalars of a snapshot.
    character(len=18), parameter :: motion_scalars(4) = [character(len=18) :: 'contact_pressure', 'contact_shear', &
       'cavity_pressure', 'floor_displacement']
 
 contains
 
-   !> Table and shapes of free modes.
+   !> Table and mode shapes of free modes.
    subroutine get_modes_files(modes, files)
       type(free_modes_type), intent(in) :: modes
       !> The files: [2].
@@ -49,20 +49,20 @@ contains
 
    !> Approximate size of the snapshots of an impact, bytes.
    pure function estimate_motion_bytes(extents) result(bytes)
-      !> Nodes from pole to pole, nodes through the wall, snapshots.
+      !> Numbers of nodes from pole to pole, nodes through the wall, and snapshots.
       integer, intent(in) :: extents(3)
       real(wp) :: bytes
 
-      ! Six numbers of a node have 17 digits, the others are mostly zero; an element has four nodes.
+      ! Six numbers per node have 17 digits, the others are mostly zero; an element has four nodes.
       associate (n => real(extents, wp))
          bytes = n(3)*(1600 + 150*n(1)*n(2) + 20*(n(1) - 1)*(n(2) - 1))
       end associate
    end function estimate_motion_bytes
 
-   !> Snapshots, and the pressures on the floor.
+   !> Snapshots, and table of the pressures on the floor.
    subroutine get_motion_files(motion, prefix, files)
       type(motion_type), intent(in) :: motion
-      !> Beginning of the names of the files.
+      !> Prefix of the file names.
       character(len=*), intent(in) :: prefix
       !> The files: [2].
       type(text_file_type), intent(out) :: files(:)
@@ -92,7 +92,7 @@ contains
       call get_pressure_csv(motion, files(2)%content)
    end subroutine get_motion_files
 
-   !> Pressures on the floor and its radial stresses, one line for each snapshot and node that touches it.
+   !> Pressures and radial shear stresses on the floor, one line per snapshot and touching node.
    subroutine get_pressure_csv(motion, text)
       type(motion_type), intent(in) :: motion
       !> Text of `pressure.csv`.
@@ -111,25 +111,23 @@ contains
       text = buffer%get_text()
    end subroutine get_pressure_csv
 
-   !> Nodes one after the other, those of a ring side by side.
+   !> Vectors at all nodes, one after the other.
    pure function get_points(r, z) result(point)
-      !> First component: [n_line, n_ring].
-      real(wp), intent(in) :: r(:, :)
-      !> Second component: the same shape.
-      real(wp), intent(in) :: z(:, :)
-      !> The components: [2, n_line*n_ring].
+      !> Components of the vectors: [n_line, n_ring].
+      real(wp), intent(in) :: r(:, :), z(:, :)
+      !> The vectors, in array order: [2, n_line*n_ring].
       real(wp) :: point(2, size(r))
 
       point(1, :) = reshape(r, [size(r)])
       point(2, :) = reshape(z, [size(z)])
    end function get_points
 
-   !> Nodes of the elements, around each of them as VTK has them.
+   !> Node numbers of the elements, in VTK's order.
    pure function get_cells(n_polar, n_radial, order) result(cell)
-      !> Elements from pole to pole; elements through the wall.
+      !> Numbers of elements from pole to pole and through the wall.
       integer, intent(in) :: n_polar, n_radial
       integer, intent(in) :: order
-      !> Numbers of the nodes: [4 or 9, n_element].
+      !> Node numbers, from 1: [4 or 9, n_element].
       integer :: cell((order + 1)**2, n_polar*n_radial)
       integer :: i, j, line, first
 

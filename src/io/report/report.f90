@@ -21,9 +21,9 @@ contains
    !> Force and motion against time.
    function get_force_csv(history, names, columns) result(text)
       type(force_history_type), intent(in) :: history
-      !> Names, with units, of further columns: [n_column].
+      !> Names, with units, of additional columns: [n_column].
       character(len=*), intent(in), optional :: names(:)
-      !> The columns: [n_time, n_column].
+      !> The additional columns: [n_time, n_column].
       real(wp), intent(in), optional :: columns(:, :)
       !> Text of `force.csv`.
       character(len=:), allocatable :: text
@@ -55,9 +55,9 @@ contains
       text = get_history_csv(header, get_times(history), values)
    end function get_force_csv
 
-   !> Further quantities of the model against time.
+   !> Additional quantities of the model against time.
    function get_model_histories_csv(history) result(text)
-      !> The history, with such quantities.
+      !> A history with such quantities.
       type(force_history_type), intent(in) :: history
       !> Text of `model_histories.csv`.
       character(len=:), allocatable :: text
@@ -71,16 +71,17 @@ contains
       text = get_history_csv(header, get_times(history), history%model_history)
    end function get_model_histories_csv
 
-   !> Times of the samples, s: [n_time].
+   !> Times of the samples.
    pure function get_times(history) result(times)
       type(force_history_type), intent(in) :: history
+      !> Times, s: [n_time].
       real(wp) :: times(size(history%floor_force))
       integer :: i
 
       times = [(real(i - 1, wp)/history%sample_rate, i=1, size(times))]
    end function get_times
 
-   !> Levels, limits and verdict per band.
+   !> Levels, limits and verdict for each band.
    function get_levels_csv(case, assessment) result(text)
       type(case_type), intent(in) :: case
       type(assessment_type), intent(in) :: assessment
@@ -100,7 +101,7 @@ contains
             limits(i) = to_text(criterion%lower)//','//to_text(criterion%upper)//','//get_word(criterion)
          end associate
       end do
-      ! The octaves serve the verdict even where only other bands are asked for.
+      ! The verdict needs the octaves even if the case asks only for other bands.
       associate (bands => assessment%bands(assessment%first_band:), first => assessment%first_band)
          text = get_table_csv(header//',lower_limit_dB,upper_limit_dB,verdict_'//trim(case%level_force), &
             reshape([bands%nominal, bands%lower, bands%upper, assessment%level(first:, :)], &
@@ -137,7 +138,7 @@ contains
       end associate
    end function get_summary
 
-   !> The numbers that describe an impact as lines of a namelist.
+   !> The quantities of an impact as lines of a namelist.
    function get_quantity_lines(history) result(text)
       type(force_history_type), intent(in) :: history
       character(len=:), allocatable :: text
@@ -151,12 +152,12 @@ contains
       end do
    end function get_quantity_lines
 
-   !> Numbers that the model chose or found as a namelist group.
+   !> The quantities of the model as a namelist group.
    function get_model_quantities(name, history) result(text)
       !> Name of the group.
       character(len=*), intent(in) :: name
       type(force_history_type), intent(in) :: history
-      !> The group; empty where there are none.
+      !> The group; empty if there are none.
       character(len=:), allocatable :: text
       integer :: i
 
@@ -174,7 +175,7 @@ contains
    function warning_group(warning) result(text)
       !> The warnings: [n].
       character(len=*), intent(in) :: warning(:)
-      !> The group; empty where there are none.
+      !> The group; empty if there are none.
       character(len=:), allocatable :: text
 
       text = ''
@@ -182,7 +183,7 @@ contains
          //'/'//newline//newline
    end function warning_group
 
-   !> Where a value lies: `conforms`, `too low` or `too high`.
+   !> Verdict on one value: `conforms`, `too low` or `too high`.
    function get_word(criterion) result(word)
       type(criterion_type), intent(in) :: criterion
       character(len=:), allocatable :: word
@@ -197,9 +198,9 @@ contains
    !> One line of a namelist group.
    pure function line(key, value, note) result(text)
       character(len=*), intent(in) :: key
-      !> Its value as text; unit or warning, may be empty.
+      !> Value as text; unit or note, may be empty.
       character(len=*), intent(in) :: value, note
-      !> The line with its end.
+      !> The line with its line feed.
       character(len=:), allocatable :: text
 
       text = '   '//key//' = '//value
@@ -207,7 +208,7 @@ contains
       text = text//newline
    end function line
 
-   !> Numbers with commas between.
+   !> Numbers separated by commas.
    pure function joined(values) result(text)
       !> The numbers: [n].
       real(wp), intent(in) :: values(:)
@@ -220,9 +221,9 @@ contains
       end do
    end function joined
 
-   !> Truth values with commas between.
+   !> Logical values separated by commas.
    pure function joined_logicals(values) result(text)
-      !> The truth values: [n].
+      !> The values: [n].
       logical, intent(in) :: values(:)
       character(len=:), allocatable :: text
       integer :: i

@@ -1,4 +1,4 @@
-!> What a case has computed as items of a bundle.
+!> Results of a case as items of a bundle.
 module thud_result_bundle
    use thud_bundle, only: bundle_type
    use thud_case, only: case_type
@@ -18,7 +18,7 @@ module thud_result_bundle
 
 contains
 
-   !> Adds what a case has computed to a bundle.
+   !> Adds the results of a case to a bundle.
    subroutine add_results(bundle, case, results)
       type(bundle_type), intent(inout) :: bundle
       type(case_type), intent(in) :: case
@@ -35,7 +35,7 @@ contains
    !> Adds warnings to a bundle.
    subroutine add_warnings(bundle, prefix, warnings)
       type(bundle_type), intent(inout) :: bundle
-      !> Beginning of the names of its items.
+      !> Prefix of the names of the items.
       character(len=*), intent(in) :: prefix
       !> Messages: [n].
       character(len=*), intent(in) :: warnings(:)
@@ -49,7 +49,7 @@ contains
    !> Adds a force history to a bundle.
    subroutine add_history(bundle, prefix, history)
       type(bundle_type), intent(inout) :: bundle
-      !> What the names of its items begin with.
+      !> Prefix of the names of the items.
       character(len=*), intent(in) :: prefix
       type(force_history_type), intent(in) :: history
       real(wp) :: values(history_quantity_count)
@@ -141,7 +141,7 @@ contains
       call bundle%add_array('modes.shape', shape(modes%shape), modes%shape)
    end subroutine add_modes
 
-   !> Adds a slow compression to a bundle.
+   !> Adds a quasi-static compression to a bundle.
    subroutine add_compression(bundle, compression)
       type(bundle_type), intent(inout) :: bundle
       type(compression_type), intent(in) :: compression

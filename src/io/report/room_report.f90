@@ -20,13 +20,13 @@ module thud_room_report
    !> Width of a column of the table.
    integer, parameter :: column = 13
 
-   !> Resistance of a floor times contact time over mass of the source above which the peak of the force loses less than
-   !> 0.1 dB by the floor: of a linear source it loses exp(-pi**2 mass/(4 resistance contact_time)).
+   !> Limit of (floor resistance x contact time / source mass) above which the floor lowers the peak force by less than
+   !> 0.1 dB; the floor multiplies the peak of a linear source by exp(-pi**2 mass/(4 resistance contact_time)).
    real(wp), parameter :: firm = 214.0_wp
 
 contains
 
-   !> The files: levels and what they are made of per third, levels of octaves, what the detector shows against time.
+   !> The files: levels and their factors in one-third-octave bands, octave levels, detector levels against time.
    subroutine get_room_files(prediction, files)
       type(room_level_type), intent(in) :: prediction
       !> The files: [size(room_file_names)].
@@ -49,13 +49,13 @@ contains
          [size(prediction%history_time), size(prediction%bands) + 1]))
    end subroutine get_room_files
 
-   !> The levels for the screen; bands with few modes are marked.
+   !> Table of the levels for the screen; bands with few modes are marked.
    subroutine get_room_table(case, prediction, contact_time, coupled, text)
       type(case_type), intent(in) :: case
       type(room_level_type), intent(in) :: prediction
       !> Contact time of the impact on a rigid floor, s.
       real(wp), intent(in) :: contact_time
-      !> The prediction is made of the force on the floor that moves, not of the blocked one.
+      !> The prediction uses the force on the mobile floor, not the force on a rigid floor.
       logical, intent(in) :: coupled
       !> The table.
       character(len=:), allocatable, intent(out) :: text
@@ -92,18 +92,18 @@ contains
    !> Adds the ratings of octaves and of one-third octaves.
    subroutine add_ratings(prediction, coupled, text)
       type(room_level_type), intent(in) :: prediction
-      !> The force is that on the floor.
+      !> The prediction uses the force on the mobile floor.
       logical, intent(in) :: coupled
       !> The table so far.
       character(len=:), allocatable, intent(inout) :: text
       real(wp) :: level
-      integer :: grade
+      integer :: class
 
       level = get_a_weighted_level(prediction%octaves(1)%set, prediction%octave_level)
-      grade = get_class(level)
+      class = get_class(level)
       text = text//': L_iA,Fmax '//fixed(level, 2)//' dB, '
-      if (grade > 0) then
-         text = text//'class '//to_text(grade)
+      if (class > 0) then
+         text = text//'class '//to_text(class)
       else
          text = text//'no class'
       end if
@@ -112,7 +112,7 @@ contains
          //trim(merge('contact force', 'blocked force', coupled))//', statistical mean over positions.'//newline
    end subroutine add_ratings
 
-   !> A text of a column's width.
+   !> A text padded to the width of a column.
    pure function padded(text) result(cell)
       character(len=*), intent(in) :: text
       character(len=column) :: cell

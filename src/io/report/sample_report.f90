@@ -14,10 +14,10 @@ module thud_sample_report
 
 contains
 
-   !> First line of the results.
+   !> Header row of the results.
    subroutine get_sample_header(table, sweep, text)
       type(sample_table_type), intent(in) :: table
-      !> The results, whose bands are known.
+      !> The sweep, with its bands and columns.
       type(sweep_type), intent(in) :: sweep
       character(len=:), allocatable, intent(out) :: text
       integer :: i, j
@@ -45,18 +45,18 @@ contains
       text = text//',margin_dB,conforms,status,reason'//newline
    end subroutine get_sample_header
 
-   !> Lines of the results, 17 digits; what could not be computed is left out.
+   !> Rows of the results, with 17 digits; cells of samples without results are empty.
    subroutine get_sample_rows(table, before, values, first, last, sweep, text)
       type(sample_table_type), intent(in) :: table
       !> Number of samples before the first of `values`.
       integer, intent(in) :: before
-      !> The samples: [n_column, n_sample].
+      !> Values of the keys: [n_column, n_sample].
       real(wp), intent(in) :: values(:, :)
-      !> The first and the last of them to be written.
+      !> Indices of the first and the last sample to write.
       integer, intent(in) :: first, last
       type(sweep_type), intent(in) :: sweep
       character(len=:), allocatable, intent(out) :: text
-      !> Width of a number with its comma.
+      !> Maximum width of a number with its comma.
       integer, parameter :: number_width = 26
       character(len=*), parameter :: numbers_form = '(*(:,",",es24.16e3))'
       character(len=number_width*(size(table%names) + sample_quantity_count + size(sweep%level(:, :, 1)) &
@@ -99,11 +99,9 @@ contains
       text = text(:end_of_text)
    end subroutine get_sample_rows
 
-   !> Width of all that is no number: names, verdicts, and the longest reason with its quotes doubled.
+   !> Width sufficient for all cells of a row except numbers: choices, verdicts, and the longest reason in quotes.
    pure function get_rest_width(sweep) result(width)
-      !> The results.
       type(sweep_type), intent(in) :: sweep
-      !> The width.
       integer :: width
       integer :: i
 
@@ -113,10 +111,10 @@ contains
       end do
    end function get_rest_width
 
-   !> A message as a cell.
+   !> A message as a cell of a table.
    pure function in_quotes(message) result(cell)
       character(len=*), intent(in) :: message
-      !> It in quotes, as far as there is space; quotes inside are doubled.
+      !> The message in quotes, with quotes inside doubled.
       character(len=2*len(message) + 2) :: cell
       integer :: i, at
 

@@ -31,7 +31,7 @@ contains
 
       assessed = get_assessed_force(case)
       other = force_count + 1 - assessed
-      ! Most models have the same force twice.
+      ! In most models both forces are equal.
       if (.not. any(abs(assessment%level(:, other) - assessment%level(:, assessed)) > 0.0_wp)) other = 0
       text = '  '//padded(get_force_title(case%level_force), 27)//padded('value', 16)//padded('limits', 13)//'verdict'
       if (other > 0) text = text//'    '//get_force_title(force_names(other))
@@ -50,7 +50,7 @@ contains
          if (size(assessment%bands) > octave_count) text = text//newline
          values = get_quantities(history)
          do i = 1, sample_quantity_count
-            ! Those with limits stand above.
+            ! Quantities with limits are listed above.
             if (any(criteria%name == quantities(i)%name)) cycle
             if (is_peak_of_other(quantities(i), case)) cycle
             text = text//quantity_row(quantities(i), values(i))
@@ -64,11 +64,11 @@ contains
 
    contains
 
-      !> Level of a band, by both forces where they differ.
+      !> Row with the level of a band, by both forces if they differ.
       function level_row(band, criterion) result(line)
          !> Index of the band.
          integer, intent(in) :: band
-         !> Its limits, where there are any.
+         !> Limits of the level, if there are any.
          type(criterion_type), intent(in), optional :: criterion
          character(len=:), allocatable :: line
 
@@ -89,17 +89,17 @@ contains
       yes = quantity%name == merge('peak_elastic_force', 'peak_force        ', case%level_force == 'floor')
    end function is_peak_of_other
 
-   !> Which groups a file has left out.
+   !> Line that names the main groups missing from the file.
    function get_defaults_line(case) result(line)
       type(case_type), intent(in) :: case
-      !> A line; empty where there are none.
+      !> The line; empty if none is missing.
       character(len=:), allocatable :: line
 
       line = ''
       if (case%left_out /= '') line = '  Defaults hold for'//trim(case%left_out)//', which the file leaves out.'//newline
    end function get_defaults_line
 
-   !> Name of a force for readers.
+   !> Name of a force in tables for readers.
    pure function get_force_title(force) result(title)
       !> One of `force_names`.
       character(len=*), intent(in) :: force
@@ -108,7 +108,7 @@ contains
       title = merge('force on the floor', 'elastic force     ', force == 'floor')
    end function get_force_title
 
-   !> The free modes on the screen.
+   !> Table of the free modes for the screen.
    function get_modes_table(modes) result(text)
       type(free_modes_type), intent(in) :: modes
       character(len=:), allocatable :: text
@@ -124,7 +124,7 @@ contains
       end do
    end function get_modes_table
 
-   !> The slow compression on the screen: its end, and the secant stiffness at its beginning and end.
+   !> Table of the quasi-static compression for the screen: last point, and secant stiffness at the last and first point.
    function get_compression_table(compression) result(text)
       type(compression_type), intent(in) :: compression
       character(len=:), allocatable :: text
@@ -138,11 +138,12 @@ contains
       end associate
    end function get_compression_table
 
-   !> A quantity, with its limits where there are any.
+   !> Row for a quantity, with its limits if there are any.
    function quantity_row(quantity, value, criterion) result(text)
       type(quantity_type), intent(in) :: quantity
-      !> Its value and its limits, in SI units.
+      !> Value, in SI units.
       real(wp), intent(in) :: value
+      !> Limits, in SI units.
       type(criterion_type), intent(in), optional :: criterion
       character(len=:), allocatable :: text
 
@@ -150,17 +151,17 @@ contains
          quantity%display_scale)
    end function quantity_row
 
-   !> One number of the table, with its limits where there are any.
+   !> Row for a number, with its limits if there are any.
    function row(name, value, decimals, unit, criterion, scale) result(text)
       character(len=*), intent(in) :: name
-      !> Its value in the shown unit.
+      !> Value in the shown unit.
       real(wp), intent(in) :: value
       integer, intent(in) :: decimals
       !> The shown unit.
       character(len=*), intent(in) :: unit
       !> Limits, in SI units.
       type(criterion_type), intent(in), optional :: criterion
-      !> Shown unit over SI unit.
+      !> Factor from the SI unit to the shown unit.
       real(wp), intent(in), optional :: scale
       character(len=:), allocatable :: text
 
@@ -169,10 +170,10 @@ contains
       text = trim(text)//newline
    end function row
 
-   !> Minimum and maximum conforming values in the shown unit; one number where they are the same.
+   !> Minimum and maximum conforming value in the shown unit; a single number if they are equal.
    pure function get_limits(criterion, scale) result(text)
       type(criterion_type), intent(in) :: criterion
-      !> Shown unit over SI unit.
+      !> Factor from the SI unit to the shown unit.
       real(wp), intent(in) :: scale
       character(len=:), allocatable :: text
 
@@ -181,7 +182,7 @@ contains
       text = padded(text, 18)
    end function get_limits
 
-   !> Minimum and maximum of a quantity, as a row.
+   !> Row with minimum and maximum of a quantity.
    function get_span_row(name, span, decimals, unit) result(text)
       character(len=*), intent(in) :: name
       !> Minimum and maximum in the shown unit: [2].
@@ -195,7 +196,7 @@ contains
          //flush_right(fixed(span(2), decimals), 8)//' '//unit//newline
    end function get_span_row
 
-   !> Numbers that the model chose or found, as rows.
+   !> Rows with the quantities of the model.
    function model_quantity_rows(history) result(rows)
       type(force_history_type), intent(in) :: history
       character(len=:), allocatable :: rows
@@ -214,7 +215,7 @@ contains
       end do
    end function model_quantity_rows
 
-   !> A limit with up to three decimals and no trailing zeros.
+   !> A limit with up to three decimals, without trailing zeros.
    pure function short(value) result(text)
       real(wp), intent(in) :: value
       character(len=:), allocatable :: text

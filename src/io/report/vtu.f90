@@ -1,4 +1,4 @@
-!> Unstructured grids as ParaView and VTK read them: VTU files with data in base 64.
+!> Unstructured grids for ParaView and VTK: VTU files with data in base 64.
 module thud_vtu
    use, intrinsic :: iso_c_binding, only: c_int64_t, c_int8_t
    use thud_kinds, only: wp
@@ -8,12 +8,12 @@ module thud_vtu
 
    public :: biquadratic_quadrilateral, get_vtu
 
-   !> Type of cells with nine nodes.
+   !> VTK's number of the cell type with nine nodes.
    integer, parameter :: biquadratic_quadrilateral = 28
 
 contains
 
-   !> A grid with vectors at its points. The plane of r and z is that of x and y.
+   !> A grid with vectors at its points; r and z become x and y.
    subroutine get_vtu(point, cell, cell_type, vector_name, vector, text)
       !> Positions r and z of the points, m: [2, n_point].
       real(wp), intent(in) :: point(:, :)
@@ -47,13 +47,13 @@ contains
    !> Adds an array.
    subroutine add_array(name, type, n_component, bytes, text)
       character(len=*), intent(in) :: name, type
-      !> Numbers of each point or cell.
+      !> Count of the numbers at each point or cell.
       integer, intent(in) :: n_component
-      !> The numbers: [n_byte].
+      !> Bytes of the numbers: [n_byte].
       integer(c_int8_t), intent(in) :: bytes(:)
       character(len=:), allocatable, intent(inout) :: text
 
-      ! The data follow their length.
+      ! The number of bytes precedes the data.
       text = text//'<DataArray type="'//type//'" Name="'//name//'" NumberOfComponents="'//to_text(n_component) &
          //'" format="binary">'//encode([transfer(size(bytes, kind=c_int64_t), [0_c_int8_t]), bytes]) &
          //'</DataArray>'//newline
@@ -63,7 +63,7 @@ contains
    pure function encode(bytes) result(text)
       !> The bytes: [n].
       integer(c_int8_t), intent(in) :: bytes(:)
-      !> Four letters for each three bytes, the last group filled up.
+      !> Four characters for every three bytes, the last group padded.
       character(len=4*((size(bytes) + 2)/3)) :: text
       character(len=*), parameter :: letters = 'ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/'
       integer :: group, i, k, n, digit
@@ -83,17 +83,17 @@ contains
       if (mod(n, 3) > 0) text(len(text) - 2 + mod(n, 3):) = repeat('=', 3 - mod(n, 3))
    end function encode
 
-   !> The bytes of numbers.
+   !> Numbers as bytes.
    pure function get_bytes(numbers) result(bytes)
       !> The numbers: [n].
       real(wp), intent(in) :: numbers(:)
-      !> Their bytes: [8*n].
+      !> The bytes: [8*n].
       integer(c_int8_t) :: bytes(8*size(numbers))
 
       bytes = transfer(numbers, bytes)
    end function get_bytes
 
-   !> Vectors of the plane in space.
+   !> Vectors of the plane as vectors in space.
    pure function in_space(plane) result(space)
       !> Components r and z: [2, n].
       real(wp), intent(in) :: plane(:, :)

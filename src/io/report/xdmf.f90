@@ -1,4 +1,4 @@
-!> Grids at many times in one file that ParaView opens: a temporal collection of XDMF, its data as text (xdmf.org).
+!> Grids at many times in one file for ParaView: a temporal collection in XDMF with its data as text (xdmf.org).
 module thud_xdmf
    use thud_kinds, only: wp
    use thud_text, only: newline, to_text
@@ -25,7 +25,7 @@ contains
       call buffer%append('</Grid>'//newline//'</Domain></Xdmf>'//newline)
    end subroutine end_snapshots
 
-   !> Adds a grid of quadrilaterals with vectors and scalars at its points. The plane of r and z is that of x and y.
+   !> Adds a grid of quadrilaterals with vectors and scalars at its points; r and z become x and y.
    subroutine add_snapshot(buffer, time, point, cell, vector_name, vector, scalar_name, scalar)
       type(text_buffer_type), intent(inout) :: buffer
       !> Time of the grid, s.
@@ -67,7 +67,7 @@ contains
       call buffer%append('</Grid>'//newline)
    end subroutine add_snapshot
 
-   !> Adds vectors of the plane.
+   !> Adds vectors of the plane as vectors in space.
    subroutine add_vectors(buffer, vector)
       type(text_buffer_type), intent(inout) :: buffer
       !> Components r and z: [2, n].
@@ -95,7 +95,7 @@ contains
       call buffer%append('</DataItem>'//newline)
    end subroutine add_scalars
 
-   !> All bits of a number: 17 digits, which are written faster than the fewest that suffice.
+   !> A number with 17 digits, which keep all its bits and are written faster than its shortest text.
    pure function digits(value) result(text)
       real(wp), intent(in) :: value
       character(len=:), allocatable :: text
@@ -107,9 +107,9 @@ contains
       text = trim(adjustl(form))
    end function digits
 
-   !> The tag before numbers.
+   !> The tag before the numbers of an array.
    pure function get_head(dimensions) result(head)
-      !> Extents of their array, the last one changing fastest.
+      !> Extents of the array, the fastest index last.
       character(len=*), intent(in) :: dimensions
       character(len=:), allocatable :: head
 

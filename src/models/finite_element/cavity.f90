@@ -1,4 +1,4 @@
-!> The gas in the ball: adiabatic, at one pressure, its volume that inside the deformed inner surface.
+!> The gas in the ball: adiabatic, of uniform pressure, in the volume inside the deformed inner surface.
 module thud_cavity
    use thud_ball, only: ball_type
    use thud_constants, only: pi
@@ -62,7 +62,7 @@ contains
       pressure = cavity%pressure*(cavity%volume/volume)**cavity%exponent - cavity%ambient
    end function get_gas_pressure
 
-   !> Work that takes the gas from its first volume to another, against the air around the ball.
+   !> Work that changes the volume of the gas, including that on the air around the ball.
    pure function get_gas_energy(cavity, volume) result(energy)
       type(cavity_type), intent(in) :: cavity
       !> Volume, above 0, m3.
@@ -82,7 +82,7 @@ contains
       energy = energy + cavity%ambient*(volume - cavity%volume)
    end function get_gas_energy
 
-   !> Adds the forces of an overpressure, which are its product with the gradient of the volume.
+   !> Adds the forces of an overpressure: its product with the gradient of the volume.
    pure subroutine add_gas_forces(pressure, r, z, force_r, force_z)
       !> Overpressure, Pa.
       real(wp), intent(in) :: pressure

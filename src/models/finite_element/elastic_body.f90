@@ -15,14 +15,14 @@ module thud_elastic_body
    public :: body_state_type, cavity_closed, elastic_body_type, element_inverted, get_internal_forces, new_elastic_body, &
       no_failure
 
-   !> Why forces cannot be computed.
+   !> Reasons why forces cannot be computed.
    integer, parameter :: no_failure = 0, element_inverted = 1, cavity_closed = 2
 
    !> The ball; arrays over nodes are [0:n_polar, 0:n_radial], components r and z last.
    type :: elastic_body_type
       !> Mesh of order 1, undeformed, around the origin.
       type(mesh_type) :: mesh
-      !> Its rings of elements: [n_radial].
+      !> Rings of elements of the mesh: [n_radial].
       type(element_row_type), allocatable :: row(:)
       type(material_type) :: material
       type(cavity_type) :: cavity
@@ -32,17 +32,17 @@ module thud_elastic_body
       real(wp), allocatable :: viscous(:, :, :, :, :)
    end type elastic_body_type
 
-   !> What the forces come with.
+   !> Energies and status that come with the forces.
    type :: body_state_type
-      !> Strain energy, that of Maxwell branches included, J.
+      !> Strain energy, including that of the Maxwell branches, J.
       real(wp) :: strain_energy = 0.0_wp
-      !> Power that viscosity dissipates, W.
+      !> Power dissipated by viscosity, W.
       real(wp) :: dissipation = 0.0_wp
       !> Work done on the gas, J.
       real(wp) :: gas_energy = 0.0_wp
       !> Overpressure of the gas, Pa.
       real(wp) :: gas_pressure = 0.0_wp
-      !> Minimum local ratio of volumes J.
+      !> Minimum of the local volume ratio J.
       real(wp) :: min_jacobian = 1.0_wp
       !> `no_failure`, or why there are no forces.
       integer :: failure = no_failure
@@ -67,10 +67,10 @@ contains
       allocate (body%mass(0:n, 0:mesh%n_radial), source=0.0_wp)
       do i = 1, mesh%n_radial
          body%row(i) = new_element_row(mesh, i - 1)
-         body%mass(:n - 1, i - 1) = body%mass(:n - 1, i - 1) + body%row(i)%share(:, 1)
-         body%mass(:n - 1, i) = body%mass(:n - 1, i) + body%row(i)%share(:, 2)
-         body%mass(1:, i - 1) = body%mass(1:, i - 1) + body%row(i)%share(:, 3)
-         body%mass(1:, i) = body%mass(1:, i) + body%row(i)%share(:, 4)
+         body%mass(:n - 1, i - 1) = body%mass(:n - 1, i - 1) + body%row(i)%nodal_volume(:, 1)
+         body%mass(:n - 1, i) = body%mass(:n - 1, i) + body%row(i)%nodal_volume(:, 2)
+         body%mass(1:, i - 1) = body%mass(1:, i - 1) + body%row(i)%nodal_volume(:, 3)
+         body%mass(1:, i) = body%mass(1:, i) + body%row(i)%nodal_volume(:, 4)
       end do
       ! The mesh is a little smaller than the sphere; the mass is that of the ball.
       body%mass = body%mass*(ball%mass/sum(body%mass))
@@ -78,7 +78,7 @@ contains
       body%viscous(:, 1:3, :, :, :) = 1.0_wp
    end function new_elastic_body
 
-   !> Forces of stress and gas.
+   !> Nodal forces of stress and gas.
    pure subroutine get_internal_forces(body, position, velocity, interval, commit, force, state)
       !> The body; its viscous tensors are updated on commit.
       type(elastic_body_type), intent(inout) :: body
@@ -88,7 +88,7 @@ contains
       real(wp), intent(in), contiguous :: velocity(0:, 0:, :)
       !> Length of the step, s.
       real(wp), intent(in) :: interval
-      !> The viscous tensors are taken to the end of the step.
+      !> Whether the viscous tensors advance to the end of the step.
       logical, intent(in) :: commit
       !> Forces, N: the same shape as the positions.
       real(wp), intent(out), contiguous :: force(0:, 0:, :)
@@ -132,7 +132,7 @@ contains
       state%gas_pressure = get_gas_pressure(body%cavity, volume)
       state%gas_energy = get_gas_energy(body%cavity, volume)
       call add_gas_forces(state%gas_pressure, position(:, 0, 1), position(:, 0, 2), force(:, 0, 1), force(:, 0, 2))
-      ! Nothing leaves the axis.
+      ! Nodes on the axis stay there.
       force(0, :, 1) = 0.0_wp
       force(n, :, 1) = 0.0_wp
    end subroutine get_internal_forces

@@ -1,10 +1,9 @@
-!> Elements of the transient model: four nodes, four Gauss points, one mean dilatation (Q1P0), which
-!> does not lock (Simo, Taylor and Pister 1985, Comput. Methods Appl. Mech. Eng. 51, 177-208).
+!> Elements of the transient model: four nodes, four Gauss points, one mean dilatation (Q1P0), which does not lock (Simo,
+!> Taylor and Pister 1985, Comput. Methods Appl. Mech. Eng. 51, 177-208).
 !>
-!> The elements of one ring of the mesh are worked on together, lane by lane: nothing is gathered or
-!> scattered, since neighbors lie side by side in memory. Arithmetic is the limit, then the first
-!> level of cache. Tensors with two axes and the hoop direction have the components
-!> 1 = rr, 2 = rz, 3 = zr, 4 = zz, 5 = hoop; symmetric ones 1 = rr, 2 = zz, 3 = hoop, 4 = rz.
+!> The elements of one ring of the mesh are processed together, one per lane: nothing is gathered or scattered, since
+!> neighbors lie side by side in memory. Arithmetic is the limit, then the first level of cache. General tensors have the
+!> components 1 = rr, 2 = rz, 3 = zr, 4 = zz, 5 = hoop; symmetric tensors 1 = rr, 2 = zz, 3 = hoop, 4 = rz.
 module thud_element_row
    use thud_constants, only: pi
    use thud_kinds, only: wp
@@ -24,7 +23,7 @@ module thud_element_row
 
    !> The elements between two rings of nodes, undeformed.
    type :: element_row_type
-      !> Derivatives of the shape functions by r and z, and their values over r, 1/m:
+      !> Derivatives of the shape functions with respect to r and z, and their values divided by r, 1/m:
       !> [n_element, 3, node 1 to 4, point].
       real(wp), allocatable :: gradient(:, :, :, :)
       !> Volume of each Gauss point, m3: [n_element, point].
@@ -32,7 +31,7 @@ module thud_element_row
       !> Volume of each element, m3: [n_element].
       real(wp), allocatable :: volume(:)
       !> Volume that belongs to each node, m3: [n_element, node].
-      real(wp), allocatable :: share(:, :)
+      real(wp), allocatable :: nodal_volume(:, :)
    end type element_row_type
 
 contains
@@ -49,7 +48,7 @@ contains
       integer :: a, b, g, j
 
       allocate (row%gradient(mesh%n_polar, 3, 4, n_point), row%weight(mesh%n_polar, n_point))
-      allocate (row%volume(mesh%n_polar), row%share(mesh%n_polar, 4), source=0.0_wp)
+      allocate (row%volume(mesh%n_polar), row%nodal_volume(mesh%n_polar, 4), source=0.0_wp)
       call get_gauss_points(point, weight)
       do j = 1, mesh%n_polar
          r = reshape(transpose(mesh%r(j - 1:j, i:i + 1)), [4])
@@ -67,14 +66,13 @@ contains
                row%gradient(j, 3, :, g) = value/radius
                row%weight(j, g) = 2*pi*radius*abs(determinant)*weight(a)*weight(b)
                row%volume(j) = row%volume(j) + row%weight(j, g)
-               row%share(j, :) = row%share(j, :) + row%weight(j, g)*value
+               row%nodal_volume(j, :) = row%nodal_volume(j, :) + row%weight(j, g)*value
             end do
          end do
       end do
    end function new_element_row
 
-   !> Gradients of a vector field at all Gauss points: of positions the deformation gradient F, of
-   !> velocities its rate.
+   !> Gradients of a vector field at all Gauss points: the deformation gradient F of positions, its rate of velocities.
    pure subroutine get_gradients(row, n, r, z, gradient)
       type(element_row_type), intent(in) :: row
       !> Number of elements.
@@ -106,7 +104,7 @@ contains
       end do
    end subroutine get_gradients
 
-   !> Takes the nodal forces of first Piola-Kirchhoff stresses off the forces of two rings of nodes.
+   !> Subtracts the nodal forces of first Piola-Kirchhoff stresses from the forces on two rings of nodes.
    pure subroutine add_nodal_forces(row, n, stress, r, z)
       type(element_row_type), intent(in) :: row
       !> Number of elements.

@@ -1,8 +1,7 @@
 !> The transient impact by finite elements at large strain (paper section 4.2, figure 5).
 !>
-!> Each sampling interval holds as many equal steps as stability asks for. Impulses of the floor are
-!> added up around each sample: the force is their mean over the interval, and the impulse of the
-!> record is that of the run.
+!> Each sampling interval holds as many equal steps as stability requires. The force of a sample is the mean over one
+!> sampling interval around it, so that the record has the impulse of the run.
 module thud_finite_element
    use thud_ball, only: ball_type, get_density
    use thud_constants, only: pi
@@ -33,27 +32,27 @@ module thud_finite_element
 
    public :: finite_element_type
 
-   !> Residual of the energy at which a run is stopped as unstable.
+   !> Energy residual at which a run is stopped as unstable.
    real(wp), parameter :: unstable_residual = 0.05_wp
 
-   !> Fraction of the wall that the surface may sink into the layer on the floor: the layer is thin.
+   !> Maximum penetration into the layer on the floor, as a fraction of the wall thickness: the layer is thin.
    real(wp), parameter :: max_penetration = 0.1_wp
 
-   !> Maximum number of steps of elements in a run; they take about half an hour.
+   !> Maximum number of steps times nodes in a run, which takes about half an hour.
    real(wp), parameter :: max_work = 2.0e10_wp
 
-   !> Time between two checks of the step, s: the ball deforms little in it.
+   !> Time between two checks of the step, s: the ball deforms little meanwhile.
    real(wp), parameter :: check_interval = 0.25e-3_wp
 
    !> The contacts of a run.
    type :: contacts_type
-      !> Time after the last contact at which it counts as over, s: shear waves crossed the ball.
+      !> Time without touch after which a contact is over, s: shear waves have crossed the ball.
       real(wp) :: settling_time = 0.0_wp
       !> First and latest instant of the present contact, s.
       real(wp) :: first = 0.0_wp, latest = 0.0_wp
-      !> There is a contact, or there was one less than `settling_time` ago.
+      !> Whether there is a contact, or was one less than `settling_time` ago.
       logical :: active = .false.
-      !> Contacts that are over.
+      !> Number of contacts that are over.
       integer :: n_over = 0
    end type contacts_type
 
@@ -79,13 +78,13 @@ contains
       real(wp) :: cost
       real(wp) :: speed, interval, time, n_step, element_cost, damping
 
-      ! Stable steps follow pressure waves through the elements, the smallest of which lie at the inner surface.
+      ! Pressure waves through the smallest elements, at the inner surface, limit the stable step.
       speed = sqrt((options%material%bulk_ratio + 4/3.0_wp)*ball%youngs_modulus/3/get_density(ball))
       associate (mesh => options%mesh)
          interval = options%step_safety/(speed*hypot(mesh%radial_elements/ball%wall_thickness, &
             mesh%polar_elements/(pi*(ball%outer_radius - ball%wall_thickness))))
          element_cost = 3.5e-8_wp
-         ! Branches cost more than all the rest.
+         ! Maxwell branches cost more than all the rest.
          if (any(options%material%viscosity == [character(len=name_length) :: 'fractional', 'constant_loss', 'prony'])) then
             element_cost = 4*element_cost
          end if
@@ -106,7 +105,7 @@ contains
       if (present(receiver)) cost = cost + n_step*3.0e-9_wp*get_pole_count(receiver)
    end function get_cost
 
-   !> Modulus of elasticity of the paper's ball, Pa (that of its published free modes, section 4.1).
+   !> Modulus of elasticity of the paper's ball, Pa (from its published free modes, section 4.1).
    function get_paper_modulus(options) result(modulus)
       class(finite_element_type), intent(in) :: options
       real(wp) :: modulus
@@ -114,7 +113,7 @@ contains
       modulus = 2.08e6_wp
    end function get_paper_modulus
 
-   !> Limits of what the mesh resolves: beyond them octaves are off by more than about 0.5 dB (docs/finite_elements.md).
+   !> Limits of the mesh: beyond them octave levels are off by more than about 0.5 dB (docs/finite_elements.md).
    function get_validity_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
@@ -134,7 +133,7 @@ contains
          reason='fewer polar_elements do not resolve the contact')]
    end function get_validity_limits
 
-   !> Loss factor of the material in shear against frequency.
+   !> Loss factor of the material in shear as a function of frequency.
    subroutine get_loss_factors(ball, options, frequency, loss_factor, error)
       type(ball_type), intent(in) :: ball
       class(finite_element_type), intent(in) :: options
@@ -150,7 +149,7 @@ contains
       loss_factor = [(get_material_loss_factor(material, frequency(i)), i=1, size(frequency))]
    end subroutine get_loss_factors
 
-   !> Force on each of two plates in a quasi-static compression, at its long-term modulus.
+   !> Force on each of two plates in a quasi-static compression, with the long-term modulus.
    subroutine compress(ball, options, deflection, force, error)
       type(ball_type), intent(in) :: ball
       class(finite_element_type), intent(in) :: options
@@ -215,18 +214,18 @@ contains
       if (.not. allocated(error)) call finish_record(ball, run, sampling, speed, history, error)
    end subroutine solve
 
-   !> Marches until the ball has left for good.
+   !> Integrates in time until the ball has left for good.
    subroutine march(run, start, contacts, options, sampling, history, error)
       type(impact_run_type), intent(inout) :: run
-      !> Height of its center of mass at first touch, m.
+      !> Height of the center of mass at first touch, m.
       real(wp), intent(in) :: start
       type(contacts_type), intent(inout) :: contacts
-      !> Bounces, flight, step.
+      !> Number of bounces, times of flight, step.
       class(finite_element_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       !> Gets its samples, its snapshots, and contact time and restitution of the first contact.
       type(force_history_type), intent(inout) :: history
-      !> The ball cannot be computed, or the record is too short.
+      !> Set if the ball cannot be computed or the record is too short.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: interval, time, first_energy
       integer :: i, k, n_step, n_sample, stride, check_stride, latest
@@ -274,19 +273,19 @@ contains
       if (.not. allocated(error)) call continue_flight(run, latest, start, history)
    end subroutine march
 
-   !> Chooses the number of steps in the next sampling intervals. Refuses a run that takes too long.
+   !> Chooses the steps of the next sampling intervals; returns an error if the run would take too long.
    subroutine check_step(run, time, options, sampling, n_sample, n_step, error)
       type(impact_run_type), intent(inout) :: run
       !> Time since the record began, s.
       real(wp), intent(in) :: time
-      !> Safety of the step.
+      !> Fraction of the stability limit to use.
       class(finite_element_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> Samples of the record.
+      !> Number of samples of the record.
       integer, intent(in) :: n_sample
-      !> Steps of each interval.
+      !> Number of steps in each interval.
       integer, intent(inout) :: n_step
-      !> The steps are too many.
+      !> Set if there would be too many steps.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: interval
 
@@ -301,20 +300,20 @@ contains
       end associate
    end subroutine check_step
 
-   !> Adds the impulse of the floor in one step to the record, as part of the means around two samples.
-   pure subroutine add_impulse(impulse, interval, i, share, history)
+   !> Adds the impulse of the floor in one step to the means around two samples.
+   pure subroutine add_impulse(impulse, interval, i, fraction, history)
       !> The impulse, N s; sampling interval, s.
       real(wp), intent(in) :: impulse, interval
-      !> Index of the sample before it.
+      !> Index of the sample before the step.
       integer, intent(in) :: i
       !> Fraction of the step that lies nearer to the next sample.
-      real(wp), intent(in) :: share
+      real(wp), intent(in) :: fraction
       !> Gets the impulse.
       type(force_history_type), intent(inout) :: history
 
       associate (force => history%floor_force)
-         force(i) = force(i) + (1 - share)*impulse/interval
-         if (i < size(force)) force(i + 1) = force(i + 1) + share*impulse/interval
+         force(i) = force(i) + (1 - fraction)*impulse/interval
+         if (i < size(force)) force(i + 1) = force(i + 1) + fraction*impulse/interval
       end associate
       history%impulse = history%impulse + impulse
    end subroutine add_impulse
@@ -332,7 +331,7 @@ contains
       end associate
    end function will_touch
 
-   !> Stress of the floor on the deformed surface, its mean since the latest sample.
+   !> Mean stress of the floor on the deformed surface since the latest sample.
    pure function get_contact_stress(run, interval) result(stress)
       type(impact_run_type), intent(in) :: run
       !> Sampling interval, s.
@@ -353,7 +352,7 @@ contains
       text = '&finite_element: '//to_text(1.0e3_wp*time)//' ms after the start'
    end function event_prefix
 
-   !> Follows the contacts: when they begin and end, and what they leave of the velocity.
+   !> Tracks beginning and end of the contacts, and the restitution of the first.
    subroutine follow_contact(run, contacts, time, step, history)
       type(impact_run_type), intent(in) :: run
       type(contacts_type), intent(inout) :: contacts
@@ -372,20 +371,20 @@ contains
          contacts%n_over = contacts%n_over + 1
          if (contacts%n_over > 1) return
          history%contact_time = contacts%latest - contacts%first
-         ! Back to the end of the contact.
+         ! Extrapolated back to the end of the contact.
          speed = get_mean_velocity(run) + run%gravity*(time + step/2 - contacts%latest)
          history%restitution = speed/history%impact_velocity
       end if
    end subroutine follow_contact
 
-   !> Refuses a ball that cannot be computed any further.
+   !> Returns an error if the ball cannot be computed any further.
    subroutine check_run(run, time, first_energy, history, error)
       type(impact_run_type), intent(in) :: run
       !> Time since the record began, s; energy of the first sample, J.
       real(wp), intent(in) :: time, first_energy
-      !> Gets the maximum residual of the energy, relative to the energy of motion at first touch.
+      !> Gets the maximum energy residual, relative to the kinetic energy at first touch.
       type(force_history_type), intent(inout) :: history
-      !> What happened, when and why.
+      !> States what happened, when and why.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: residual
 

@@ -1,4 +1,4 @@
-!> Options of the finite-element model, group by group; `thud_finite_element` adds how it is solved.
+!> Options of the finite-element model, group by group; `thud_finite_element` adds the solution.
 module thud_finite_element_options
    use thud_ball, only: ball_type
    use thud_error, only: error_type, input_error
@@ -19,21 +19,21 @@ module thud_finite_element_options
    !> Maximum memory for snapshots, bytes.
    real(wp), parameter :: max_motion_bytes = 4.0e8_wp
 
-   !> Minimum sampling rate, Hz: the mean over an interval then takes 0.03 dB off the highest octave.
+   !> Minimum sampling rate, Hz: the mean over an interval then lowers the highest octave by 0.03 dB.
    real(wp), parameter :: min_rate = 16000.0_wp
 
-   !> Minimum number of elements through the wall that bend as the wall does.
+   !> Minimum number of elements through the wall; fewer do not bend as the wall does.
    integer, parameter :: min_radial = 2
 
    !> Options of the model.
    type, abstract, extends(source_model_type) :: finite_element_options_type
-      !> Contacts to be followed.
+      !> Number of contacts to follow.
       integer :: bounces = 1
       !> Free flight before first touch, s.
       real(wp) :: flight_before = 0.0_wp
       !> Free flight after the last contact, s.
       real(wp) :: flight_after = 0.0_wp
-      !> Time step over stability limit.
+      !> Time step as a fraction of the stability limit.
       real(wp) :: step_safety = 0.85_wp
       !> Time between snapshots of the deformed ball, s; 0 for none.
       real(wp) :: snapshot_interval = 0.0_wp
@@ -54,11 +54,11 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         integer_field('bounces', options%bounces, 'contacts to be followed', '[1, 100]'), &
-         real_field('flight_before', options%flight_before, 's', 'free flight before first touch', '[0, 1]'), &
-         real_field('flight_after', options%flight_after, 's', 'free flight after the last contact', &
+         integer_field('bounces', options%bounces, 'number of contacts to compute', '[1, 100]'), &
+         real_field('flight_before', options%flight_before, 's', 'duration of free flight before first touch', '[0, 1]'), &
+         real_field('flight_after', options%flight_after, 's', 'duration of free flight after the last contact', &
          '[0, 10]'), &
-         real_field('step_safety', options%step_safety, '', 'time step over stability limit', &
+         real_field('step_safety', options%step_safety, '', 'time step divided by the stability limit', &
          '[0.01, 0.98]'), &
          in_group('mesh', get_mesh_fields(options%mesh)), &
          in_group('material', get_material_fields(options%material)), &
@@ -67,7 +67,7 @@ contains
          'time between snapshots of the deformed ball; 0: none', '[0, 10]')])]
    end function get_fields
 
-   !> Refuses options that do not fit each other, the ball or the memory.
+   !> Returns an error if options do not fit each other, the ball or the memory.
    subroutine check(ball, options, sampling, error)
       type(ball_type), intent(in) :: ball
       class(finite_element_options_type), intent(in) :: options
@@ -113,9 +113,9 @@ contains
       if (options%snapshot_interval > 0.0_wp) n_frame = 1 + get_sample_count(sampling)/get_stride(options, sampling)
    end function get_frame_count
 
-   !> Samples between two snapshots.
+   !> Number of samples between two snapshots.
    pure function get_stride(options, sampling) result(stride)
-      !> The options, with snapshots.
+      !> Options that ask for snapshots.
       class(finite_element_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       !> The number, at least 1.

@@ -1,19 +1,18 @@
-!> Contact of the ball's surface with the floor at height 0, at every node of the surface, the pole
-!> included: what holds the ball up, and Coulomb's friction.
+!> Contact of the outer surface of the ball with the floor at height 0, at every node including the pole: normal forces and
+!> Coulomb friction.
 !>
-!> Hard floor: nodes that would pass it in a step are stopped (forward increments of Lagrange
-!> multipliers, Carpenter, Taylor and Katona 1991, Int. J. Numer. Methods Eng. 32, 103-128); nothing
-!> sinks in, and the energy of what is stopped is lost. With a layer: linear springs of the floor
-!> (Winkler), lossless and without mass, that push normal to the surface of the ball.
+!> Hard floor: nodes that would pass it in a step are stopped (forward increments of Lagrange multipliers, Carpenter, Taylor
+!> and Katona 1991, Int. J. Numer. Methods Eng. 32, 103-128); they do not penetrate, and their energy is lost. With a layer:
+!> linear springs on the floor (Winkler), lossless and massless, that push normal to the surface of the ball.
 !>
-!> The edge of the contact lies between two nodes, and the one outside takes its share of the pressure
-!> before it touches; without that share the force jumps from ring to ring. Beside the edge, at the
-!> radius a, a smooth frictionless contact has the pressure p = C sqrt(s) at the distance s inside and the
-!> gap 4/3 C/E* s**(3/2) outside (Johnson 1985, Contact Mechanics, section 5.1), with C = 2 E* sqrt(2 a)/(pi R)
-!> by Hertz. With an edge at the distance e from the inner neighbor, a linear shape function of the
-!> width h gives the node the force per area 4/15 C e**(5/2)/h**2 at the gap 4/3 C/E* (h - e)**(3/2). A parabola of the
-!> same force at the floor, 4/15 C sqrt(h), and the same work, 0.1840 times that force and the gap of e = 0,
-!> replaces this relation, with a in the middle of the element. Both vanish with the elements.
+!> The edge of the contact lies between two nodes, and the outer one carries part of the pressure before it touches;
+!> otherwise the force would jump from ring to ring. Near the edge, at the radius a, a smooth frictionless contact has the
+!> pressure p = C sqrt(s) at the distance s inside and the gap 4/3 C/E* s**(3/2) at the distance s outside (Johnson 1985,
+!> Contact Mechanics, section 5.1), with C = 2 E* sqrt(2 a)/(pi R) by Hertz. With the edge at the distance e from the inner
+!> node, a linear shape function of width h gives the outer node the force per area 4/15 C e**(5/2)/h**2 at the
+!> gap 4/3 C/E* (h - e)**(3/2). A parabola replaces this relation, with a in the middle of the element: of the same force at
+!> the floor, 4/15 C sqrt(h), and the same work, 0.1840 times this force times the gap at e = 0. Force and gap vanish as the
+!> mesh is refined.
 module thud_floor_contact
    use thud_ball, only: ball_type
    use thud_constants, only: pi
@@ -28,7 +27,7 @@ module thud_floor_contact
    public :: contact_options_type, floor_contact_type, get_contact_fields, get_contact_forces, get_contact_stiffness, &
       new_floor_contact, slow_by_friction, stop_at_floor
 
-   !> Options of the group.
+   !> Options of the group `&contact`.
    type :: contact_options_type
       !> Coefficient of friction between ball and floor.
       real(wp) :: friction = 0.0_wp
@@ -38,7 +37,7 @@ module thud_floor_contact
 
    !> The contact; arrays over the nodes of the outer surface are [0:n_polar].
    type, extends(contact_options_type) :: floor_contact_type
-      !> Force on a node at the edge that reaches the floor, N.
+      !> Force on a node at the edge when it reaches the floor, N.
       real(wp), allocatable :: edge_force(:)
       !> Height at which that force begins, m.
       real(wp), allocatable :: edge_height(:)
@@ -56,7 +55,7 @@ contains
       fields = [ &
          real_field('friction', options%friction, '', 'coefficient of friction between ball and floor', '[0, 100]'), &
          real_field('layer_stiffness', options%layer_stiffness, 'N/m3', &
-         'stiffness per area of a thin layer on the floor; 0: none, the floor is hard', '[0, 1e13]')]
+         'stiffness per area of a thin layer on the floor; 0: hard floor without a layer', '[0, 1e13]')]
    end function get_contact_fields
 
    !> The contact of a ball.
@@ -66,7 +65,7 @@ contains
       !> Mesh of order 1, undeformed.
       type(mesh_type), intent(in) :: mesh
       type(floor_contact_type) :: contact
-      !> Work of the relation between force and gap, over their maxima: 1.5 B(1.5, 3.5).
+      !> Work of the exact force-gap relation divided by maximum force and maximum gap: 1.5 B(1.5, 3.5).
       real(wp), parameter :: fullness = 0.1840776945462769_wp
       real(wp) :: area(0:mesh%n_polar)
       real(wp) :: modulus, width, strength
@@ -77,32 +76,32 @@ contains
       modulus = ball%youngs_modulus/(1 - ball%poisson_ratio**2)
       associate (last => mesh%n_radial)
          area = get_nodal_areas(mesh%r(:, last), mesh%z(:, last))
-         ! Hertz's edge is straight, far from the axis: not in the first element.
+         ! Valid for a straight edge far from the axis: not in the first element.
          do j = 2, mesh%n_polar - 1
             width = hypot(mesh%r(j, last) - mesh%r(j - 1, last), mesh%z(j, last) - mesh%z(j - 1, last))
             strength = 2*modulus*sqrt(mesh%r(j, last) + mesh%r(j - 1, last))/(pi*ball%outer_radius)
             contact%edge_force(j) = 4*strength*sqrt(width)/15*area(j)
-            ! The work of a parabola is a third of force and height.
+            ! The work of a parabola is a third of force times height.
             contact%edge_height(j) = 3*fullness*4*strength*width**1.5_wp/(3*modulus)
             if (.not. options%layer_stiffness > 0.0_wp) cycle
-            ! A layer yields first, the more the softer it is to the element's edge.
+            ! A layer yields first; the softer it is relative to the element, the lower the force.
             contact%edge_force(j) = contact%edge_force(j)/(1 + modulus/(width*options%layer_stiffness))
          end do
       end associate
    end function new_floor_contact
 
-   !> Forces of the floor that depend on where the nodes are: those of its layer and at the edge of the contact.
+   !> Forces of the floor that depend on the positions of the nodes: of its layer and at the edge of the contact.
    pure subroutine get_contact_forces(contact, position, force, energy, stiffness)
       type(floor_contact_type), intent(in) :: contact
       !> Positions of the nodes of the outer surface over the floor, m: [0:n_polar, 2].
       real(wp), intent(in) :: position(0:, :)
       !> Forces of the floor on the nodes, N: [0:n_polar, 2].
       real(wp), intent(out) :: force(0:, :)
-      !> Energy that they hold, J.
+      !> Energy stored in layer and edge, J.
       real(wp), intent(out) :: energy
-      !> What the forces upwards gain as the floor rises, N/m: [0:n_polar].
+      !> Derivatives of the upward forces with respect to the height of the floor, N/m: [0:n_polar].
       real(wp), intent(out), optional :: stiffness(0:)
-      real(wp) :: part
+      real(wp) :: relative_depth
       integer :: j, n
 
       force = 0.0_wp
@@ -113,11 +112,11 @@ contains
       do j = 0, n - 1
          associate (z => position(j, 2), begin => contact%edge_height(j), edge_force => contact%edge_force(j))
             if (z >= begin) cycle
-            part = 1.0_wp
-            if (z > 0.0_wp) part = 1 - z/begin
-            force(j, 2) = edge_force*part**2
-            energy = energy + edge_force*(begin*part**3/3 + max(-z, 0.0_wp))
-            if (present(stiffness) .and. z > 0.0_wp) stiffness(j) = 2*edge_force*part/begin
+            relative_depth = 1.0_wp
+            if (z > 0.0_wp) relative_depth = 1 - z/begin
+            force(j, 2) = edge_force*relative_depth**2
+            energy = energy + edge_force*(begin*relative_depth**3/3 + max(-z, 0.0_wp))
+            if (present(stiffness) .and. z > 0.0_wp) stiffness(j) = 2*edge_force*relative_depth/begin
          end associate
       end do
       if (.not. contact%layer_stiffness > 0.0_wp) return
@@ -129,15 +128,15 @@ contains
          max(-position(:, 2), 0.0_wp), force(:, 1), force(:, 2), energy)
    end subroutine get_contact_forces
 
-   !> Adds what the layer does: the derivatives of its energy, half of the stiffness times area and squared sink. The
-   !> areas are those of the rings that the nodes stand for on the floor.
-   pure subroutine add_layer_forces(stiffness, r, sink, outwards, upwards, energy)
+   !> Adds the forces of the layer: derivatives of its energy, half of stiffness times area times squared penetration. The
+   !> areas are those of the rings on the floor that belong to the nodes.
+   pure subroutine add_layer_forces(stiffness, r, penetration, outwards, upwards, energy)
       !> Stiffness per area, N/m3.
       real(wp), intent(in) :: stiffness
       !> Distances of the nodes from the axis, m: [0:n_polar].
       real(wp), intent(in) :: r(0:)
       !> Depths of the nodes in the layer, 0 above it, m: [0:n_polar].
-      real(wp), intent(in) :: sink(0:)
+      real(wp), intent(in) :: penetration(0:)
       !> Forces, N: [0:n_polar].
       real(wp), intent(inout) :: outwards(0:), upwards(0:)
       !> Energy, J.
@@ -147,15 +146,15 @@ contains
 
       n = ubound(r, 1)
       area = get_nodal_areas(r, 0*r)
-      upwards = upwards + stiffness*area*sink
-      energy = energy + stiffness*dot_product(area, sink**2)/2
+      upwards = upwards + stiffness*area*penetration
+      energy = energy + stiffness*dot_product(area, penetration**2)/2
       associate (inner => r(:n - 2), here => r(1:n - 1), outer => r(2:))
-         outwards(1:n - 1) = outwards(1:n - 1) - stiffness*pi/6*(sink(1:n - 1)**2*(outer - inner) &
-            + sink(:n - 2)**2*(2*here + inner) - sink(2:)**2*(2*here + outer))
+         outwards(1:n - 1) = outwards(1:n - 1) - stiffness*pi/6*(penetration(1:n - 1)**2*(outer - inner) &
+            + penetration(:n - 2)**2*(2*here + inner) - penetration(2:)**2*(2*here + outer))
       end associate
    end subroutine add_layer_forces
 
-   !> Stiffness of the floor under each node, at most, N/m: [0:n_polar].
+   !> Upper bound of the stiffness of the floor under each node, N/m: [0:n_polar].
    pure function get_contact_stiffness(contact, r) result(stiffness)
       type(floor_contact_type), intent(in) :: contact
       !> Distances of the nodes of the outer surface from the axis, m: [0:n_polar].
@@ -186,8 +185,8 @@ contains
       velocity = max(velocity, -height/interval)
    end subroutine stop_at_floor
 
-   !> Coulomb's friction: nodes stick where an impulse of at most the coefficient times that of the floor
-   !> upwards holds them, and slip against the largest one otherwise.
+   !> Coulomb friction: a node sticks if an impulse of at most the friction coefficient times the normal impulse stops it;
+   !> otherwise it slips against the largest such impulse.
    pure subroutine slow_by_friction(contact, mass, normal_impulse, velocity, impulse)
       type(floor_contact_type), intent(in) :: contact
       !> Masses of the nodes, kg: [0:n_polar].

@@ -18,18 +18,18 @@ module thud_free_modes
 
    public :: check_modes, free_modes_type, get_free_modes, get_modes_fields, modes_options_type
 
-   !> Relative error of the eigenvalues that ends the iteration, far below that of the mesh.
+   !> Relative error of the eigenvalues that ends the iteration, far below the error of the mesh.
    real(wp), parameter :: eigenvalue_tolerance = 1.0e-11_wp
 
    !> Maximum number of restarts of the Lanczos method; a few are needed.
    integer, parameter :: max_restarts = 300
 
-   !> Highest harmonic that a mode is looked for in.
+   !> Highest harmonic considered for a mode.
    integer, parameter :: max_harmonic = 64
 
    !> Options of the modes.
    type :: modes_options_type
-      !> Number of elastic modes; 0 where none are asked for.
+      !> Number of elastic modes; 0 for none.
       integer :: count = 6
       type(mesh_options_type) :: mesh
    end type modes_options_type
@@ -42,13 +42,12 @@ module thud_free_modes
       real(wp), allocatable :: frequency(:)
       !> Order of the Legendre polynomial that dominates at the outer surface: [n_mode].
       integer, allocatable :: harmonic(:)
-      !> Mass of the ball times the squared vertical amplitude of the lowest point at unit modal mass,
-      !> 1 for the rigid motion: how strongly a contact there drives the mode: [n_mode].
+      !> Mass of the ball times squared vertical amplitude of the lowest point at unit modal mass, 1 for the rigid motion,
+      !> which states how strongly a contact there drives the mode: [n_mode].
       real(wp), allocatable :: participation(:)
-      !> Displacements in r and z, the maximum of length 1, the lowest point moving upwards:
-      !> [2, 0:n_line, 0:n_ring, n_mode].
+      !> Displacements in r and z, of maximum length 1, the lowest point moving upwards: [2, 0:n_line, 0:n_ring, n_mode].
       real(wp), allocatable :: shape(:, :, :, :)
-      !> Frequency that the rigid motion along the axis came out with, Hz; exactly it is 0.
+      !> Computed frequency of the rigid motion along the axis, Hz; the exact one is 0.
       real(wp) :: rigid_frequency = 0.0_wp
    end type free_modes_type
 
@@ -65,11 +64,11 @@ contains
          in_group('mesh', get_mesh_fields(options%mesh))]
    end function get_modes_fields
 
-   !> Refuses more modes than the mesh resolves.
+   !> Returns an error if the mesh does not resolve as many modes.
    subroutine check_modes(options, error)
       !> Number of modes, and the mesh.
       type(modes_options_type), intent(in) :: options
-      !> Names the count and its maximum.
+      !> Error that names the count and its maximum.
       type(error_type), allocatable, intent(out) :: error
       integer :: max_count
 
@@ -84,7 +83,7 @@ contains
       type(mesh_options_type), intent(in) :: mesh_options
       integer, intent(in) :: count
       type(free_modes_type), intent(out) :: modes
-      !> The modes cannot be computed.
+      !> Set if the modes cannot be computed.
       type(error_type), allocatable, intent(out) :: error
       type(mode_matrices_type) :: matrices
       real(wp), allocatable :: vector(:, :), eigenvalue(:)
@@ -115,7 +114,7 @@ contains
       real(wp), allocatable, intent(out) :: eigenvalue(:)
       !> Vectors of unit modal mass: [n, count].
       real(wp), allocatable, intent(out) :: vector(:, :)
-      !> The method does not converge.
+      !> Set if the method does not converge.
       type(error_type), allocatable, intent(out) :: error
       integer, parameter :: n_parameter = 11
       real(wp), allocatable :: resid(:), basis(:, :), workd(:), workl(:), product(:)
@@ -127,7 +126,7 @@ contains
       n = matrices%n
       ncv = min(n, max(2*count + 6, 20))
       allocate (resid(n), basis(n, ncv), workd(3*n), workl(ncv*(ncv + 8)), product(n), select(ncv), eigenvalue(count))
-      ! Always the same start, one that no mode is orthogonal to.
+      ! A fixed start vector that is orthogonal to no mode.
       resid = [(1.0_wp + modulo(0.618_wp*i, 1.0_wp), i=1, n)]
       ipntr = 1
       iparam = 0
@@ -164,13 +163,13 @@ contains
       call check_eigenpairs(failed, info, error)
    end subroutine find_eigenpairs
 
-   !> Refuses what an interrupt, the operator or ARPACK has ended.
+   !> Returns an error if interrupt, operator or ARPACK ended the iteration.
    subroutine check_eigenpairs(failed, info, error)
-      !> The volume could not be kept.
+      !> Whether the volume could not be kept.
       logical, intent(in) :: failed
-      !> Status of ARPACK, 0 where it succeeded.
+      !> Status of ARPACK, 0 for success.
       integer, intent(in) :: info
-      !> Names what has ended it.
+      !> Error that names the reason.
       type(error_type), allocatable, intent(out) :: error
 
       call check_interrupt(error)

@@ -1,5 +1,4 @@
-!> The record of an impact by finite elements: its samples, its flight after the computation, its
-!> balances.
+!> The record of an impact by finite elements: samples, flight after the computation, balances.
 module thud_impact_record
    use thud_ball, only: ball_type
    use thud_constants, only: recorded_band
@@ -17,13 +16,13 @@ module thud_impact_record
 
    public :: continue_flight, finish_record, new_impact_record, record_sample
 
-   !> Maximum error of the balance of energy, over the energy at first touch.
+   !> Maximum error of the balance of energy, relative to the energy at first touch.
    real(wp), parameter :: max_energy_residual = 0.005_wp
 
-   !> Maximum error of the impulse of the record, over the change of momentum.
+   !> Maximum error of the impulse of the record, relative to the change of momentum.
    real(wp), parameter :: max_impulse_residual = 1.0e-8_wp
 
-   !> Columns of the further quantities.
+   !> Columns of the additional quantities.
    integer, parameter :: at_radius = 1, at_pressure = 2, at_kinetic = 3, at_gravity = 6, at_floor = 11
 
 contains
@@ -33,7 +32,7 @@ contains
       type(sampling_type), intent(in) :: sampling
       !> Velocity towards the floor at first touch, m/s.
       real(wp), intent(in) :: impact_velocity
-      !> What the ball drops on (default: a rigid floor).
+      !> The floor under the ball (default: rigid).
       type(receiver_type), intent(in), optional :: receiver
       type(force_history_type) :: history
 
@@ -51,7 +50,7 @@ contains
       allocate (history%model_history(size(history%floor_force), size(history%model_history_name)), source=0.0_wp)
    end function new_impact_record
 
-   !> Writes one sample of everything but the force.
+   !> Writes all quantities of one sample except the force.
    subroutine record_sample(run, i, start, history)
       !> The ball, between updates of velocity and position.
       type(impact_run_type), intent(in) :: run
@@ -73,11 +72,11 @@ contains
       if (.not. run%floor%moves) return
       history%model_history(i, at_floor) = run%floor%work
       history%floor_displacement(i) = run%floor%displacement
-      ! That of the direct mobility follows from the sampled force, when it is known.
+      ! The velocity of the direct mobility is added later, from the sampled force.
       history%floor_velocity(i) = run%floor%velocity
    end subroutine record_sample
 
-   !> Goes on after the computation as free flight without further vibration, up to the next touch.
+   !> Continues after the computation as free flight without vibration, up to the next touch.
    pure subroutine continue_flight(run, last, start, history)
       !> The ball at the end of the computation.
       type(impact_run_type), intent(in) :: run
@@ -108,7 +107,7 @@ contains
          history%floor_displacement, history%floor_velocity)
    end subroutine continue_flight
 
-   !> Peaks of the impact, and the checks of the balances.
+   !> Sets the peaks of the impact, and checks the balances.
    subroutine finish_record(ball, run, sampling, speed, history, error)
       type(ball_type), intent(in) :: ball
       type(impact_run_type), intent(in) :: run
@@ -117,7 +116,7 @@ contains
       real(wp), intent(in) :: speed
       !> The history; its samples are complete.
       type(force_history_type), intent(inout) :: history
-      !> A balance does not close.
+      !> Set if a balance does not close.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: recorded(size(history%floor_force))
       real(wp) :: gain
@@ -130,7 +129,7 @@ contains
       end if
       history%component(:, 1) = history%floor_force
       history%elastic_force = history%floor_force
-      ! Nodes that touch one by one make spikes, the higher the shorter the steps.
+      ! Nodes that touch one by one cause spikes, the higher the shorter the steps.
       call get_low_pass(history%floor_force, history%sample_rate, recorded_band, recorded)
       history%peak_force = maxval(recorded)
       history%peak_elastic_force = history%peak_force

@@ -1,5 +1,4 @@
-!> The ball in motion: one step of explicit central differences after the other, and the balance of
-!> momentum and energy.
+!> The ball in motion: steps of explicit central differences, and the balances of momentum and energy.
 module thud_impact_run
    use thud_ball, only: ball_type
    use thud_constants, only: pi
@@ -19,26 +18,26 @@ module thud_impact_run
       update_velocity
    public :: new_impact_run
 
-   !> Steps of the power iteration at the start, and at each later check of the step.
+   !> Power iterations at the start of a run, and at each later check of the step.
    integer, parameter :: first_iterations = 80, next_iterations = 3
 
    !> Maximum number of steps in a sampling interval.
    integer, parameter :: max_steps = 100000
 
-   !> What is known between steps; arrays over nodes are [0:n_polar, 0:n_radial, 2].
+   !> State of a run between steps; arrays over nodes are [0:n_polar, 0:n_radial, 2].
    type :: impact_run_type
       type(elastic_body_type) :: body
       type(floor_contact_type) :: contact
       type(moving_floor_type) :: floor
       !> Gravity, m/s2.
       real(wp) :: gravity = 0.0_wp
-      !> Positions over the undisplaced floor, m.
+      !> Positions relative to the undisplaced floor, m.
       real(wp), allocatable :: position(:, :, :)
-      !> Velocities half a step before, m/s; at the very start, those of the start.
+      !> Velocities half a step before the positions, m/s; at the very start, at the same instant.
       real(wp), allocatable :: velocity(:, :, :)
       !> Masses of the nodes, kg.
       real(wp), allocatable :: mass(:, :, :)
-      !> Direction of the fastest motion.
+      !> Estimated shape of the fastest mode, over all nodes.
       real(wp), allocatable :: direction(:, :, :)
       !> Forces of the floor on the nodes of the outer surface in the latest step, N: [0:n_polar, 2].
       real(wp), allocatable :: floor_force(:, :)
@@ -46,17 +45,17 @@ module thud_impact_run
       real(wp) :: impulse = 0.0_wp
       !> Energies, power and failure of the latest step.
       type(body_state_type) :: state
-      !> Energies of the latest step: of motion, of the contact, in the field of gravity, J.
+      !> Kinetic, contact and gravitational energy in the latest step, J.
       real(wp) :: kinetic = 0.0_wp, contact_energy = 0.0_wp, potential = 0.0_wp
-      !> Energies lost so far: by viscosity, by nodes that the floor stopped, and by friction, J.
+      !> Energies lost so far to viscosity, to stopping nodes at the floor, and to friction, J.
       real(wp) :: dissipated = 0.0_wp, contact_loss = 0.0_wp, friction_loss = 0.0_wp
-      !> Time that the velocities have been driven for, s.
+      !> Time up to which the velocities are integrated, s.
       real(wp) :: time = 0.0_wp
-      !> Energies lost by stopped nodes and by friction that the next step adds, J.
+      !> Energies lost to stopping nodes and to friction that the next step adds, J.
       real(wp) :: pending_contact_loss = 0.0_wp, pending_friction_loss = 0.0_wp
       !> Impulses of the floor on the nodes of the outer surface since the latest sample, N s: [0:n_polar, 2].
       real(wp), allocatable :: node_impulse(:, :)
-      !> Length of the step before, s; 0 at the start.
+      !> Length of the previous step, s; 0 at the start.
       real(wp) :: last_interval = 0.0_wp
       !> Shortest step, s.
       real(wp) :: shortest_interval = huge(1.0_wp)
@@ -66,7 +65,7 @@ module thud_impact_run
 
 contains
 
-   !> A ball above the floor, falling.
+   !> A ball falling, above the floor.
    pure function new_impact_run(ball, options, material, gravity, gap, speed, receiver) result(run)
       type(ball_type), intent(in) :: ball
       !> Mesh and contact.
@@ -74,7 +73,7 @@ contains
       type(material_type), intent(in) :: material
       !> Gravity, m/s2; height of the lowest point, m; velocity downwards, m/s.
       real(wp), intent(in) :: gravity, gap, speed
-      !> What the ball drops on (default: a rigid floor).
+      !> The floor under the ball (default: rigid).
       type(receiver_type), intent(in), optional :: receiver
       type(impact_run_type) :: run
 
@@ -94,14 +93,13 @@ contains
       end associate
    end function new_impact_run
 
-   !> Number of steps in a sampling interval that keeps the run stable; it never falls during a run.
+   !> Chooses a stable number of steps per sampling interval, which never decreases during a run.
    subroutine choose_step(run, interval, safety, min_steps, n_step)
       type(impact_run_type), intent(inout) :: run
       !> Sampling interval, s; fraction of the stability limit to use.
       real(wp), intent(in) :: interval, safety
       integer, intent(in) :: min_steps
-      !> The number so far, 0 at the start; the number to go on with, `max_steps` or more where there
-      !> would have to be too many.
+      !> The number so far, 0 at the start; gets the new one, above `max_steps` if too many are needed.
       integer, intent(inout) :: n_step
       real(wp) :: stability_ratio, ratio, wave, width
       integer :: n_iteration, iteration
@@ -123,12 +121,12 @@ contains
          if (n_step > max_steps) exit
          call find_stability_ratio(run%body, run%contact, run%position, run%velocity, interval/n_step, n_iteration, &
             run%direction, stability_ratio)
-         ! The next step reports why there are no forces.
+         ! If there are no forces, the next step reports the reason.
          if (stability_ratio >= huge(stability_ratio)) exit
          ratio = stability_ratio/(safety*max_stability_ratio)
-         ! Growth rises with the first to the second power of the step: take the higher.
+         ! The ratio grows with the first to second power of the step: the higher number of steps is taken.
          if (ratio <= 1.0_wp) then
-            ! Later on no step is taken back: the direction follows the deforming ball late.
+            ! Later the number never decreases, since the estimated mode lags behind the deforming ball.
             if (starts) n_step = max(min_steps, 1, ceiling(n_step*sqrt(max(ratio, 0.0_wp))))
             exit
          end if
@@ -136,7 +134,7 @@ contains
       end do
    end subroutine choose_step
 
-   !> First half of a step: forces and energies where the ball is, and velocities half a step on.
+   !> First half of a step: forces and energies at the present positions, and velocities half a step later.
    pure subroutine update_velocity(run, interval)
       type(impact_run_type), intent(inout) :: run
       !> Length of the step, s.
@@ -159,6 +157,7 @@ contains
          call find_floor(run%floor, run%contact, run%mass(:, last, 2), surface, &
             before(:, last, 2) + span*(force(:, last, 2)/run%mass(:, last, 2) - run%gravity), sum(run%floor_force(:, 2)))
       end if
+      ! Floor displacements are downwards; `stop` is that of the next instant.
       surface(:, 2) = surface(:, 2) + run%floor%displacement
       call get_contact_forces(run%contact, surface, run%floor_force, run%contact_energy)
       force(:, last, :) = force(:, last, :) + run%floor_force
@@ -174,27 +173,27 @@ contains
       run%node_impulse = run%node_impulse + span*run%floor_force
       if (run%floor%moves) call advance_floor(run%floor, sum(run%floor_force(:, 2)))
       starts = .not. run%last_interval > 0.0_wp
-      ! Of what a node loses, a mobile floor gets a part.
+      ! A mobile floor takes up part of the energy that a node loses.
       call add_lost_work(impulse(:, 2), before(:, last, 2) + run%floor%velocity_before, &
          run%velocity(:, last, 2) + run%floor%velocity_after, starts, run%contact_loss, run%pending_contact_loss)
       call add_lost_work(impulse(:, 1), before(:, last, 1), run%velocity(:, last, 1), starts, run%friction_loss, &
          run%pending_friction_loss)
       run%kinetic = sum(run%mass*before*run%velocity)/2
-      ! The velocities of the start are not half a step late.
+      ! At the start the velocities are not half a step behind.
       if (starts) run%kinetic = sum(run%mass*before**2)/2
       run%potential = run%gravity*sum(run%mass(:, :, 2)*run%position(:, :, 2))
       run%dissipated = run%dissipated + span*run%state%dissipation
-      ! Nodes rest where they stopped; the force that comes anew moves a floor on.
+      ! Stopped nodes lie exactly on a rigid floor; a mobile floor moves on with each force.
       if (run%floor%moves .or. run%contact%layer_stiffness > 0.0_wp) run%penetration = max(run%penetration, &
          -minval(surface(:, 2)))
    end subroutine update_velocity
 
-   !> Adds the work that impulses of the floor take from nodes. Half of it comes with the velocities after them, in the
-   !> next step; of the first step all.
+   !> Adds the work that impulses of the floor take from nodes: half by the velocities before, half by the velocities after.
+   !> The second half is added in the next step; in the first step, both halves are.
    pure subroutine add_lost_work(impulse, before, after, starts, lost, waiting)
       !> Impulses, N s; velocities before and after, m/s: [0:n_polar].
       real(wp), intent(in) :: impulse(0:), before(0:), after(0:)
-      !> It is the first step.
+      !> Whether this is the first step.
       logical, intent(in) :: starts
       !> Energy lost so far; energy that the next step adds, J.
       real(wp), intent(inout) :: lost, waiting
@@ -210,7 +209,7 @@ contains
       end associate
    end subroutine add_lost_work
 
-   !> Second half of a step: positions a step on.
+   !> Second half of a step: positions one step later.
    pure subroutine update_position(run, interval)
       type(impact_run_type), intent(inout) :: run
       !> Length of the step, s.
@@ -221,7 +220,7 @@ contains
       run%shortest_interval = min(run%shortest_interval, interval)
    end subroutine update_position
 
-   !> Energy of the latest step, with all that was lost; it should not change.
+   !> Energy of the latest step, including all losses; it should stay constant.
    pure function get_energy(run) result(energy)
       type(impact_run_type), intent(in) :: run
       !> The energy, J.

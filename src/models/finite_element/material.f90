@@ -1,5 +1,4 @@
-!> Material of the ball in the transient model: what the group `&material` asks for, and the moduli
-!> that follow from it.
+!> Material of the ball in the transient model: options of the group `&material`, and the moduli that follow from them.
 module thud_material
    use thud_ball, only: ball_type, get_density
    use thud_constants, only: pi
@@ -23,19 +22,19 @@ module thud_material
    type :: material_options_type
       !> Law of elasticity: `neo_hookean` or `mooney_rivlin`.
       character(len=name_length) :: law = 'neo_hookean'
-      !> Fraction of the shear modulus that goes with the second invariant of a Mooney-Rivlin solid.
+      !> Second-invariant fraction of the shear modulus of a Mooney-Rivlin solid.
       real(wp) :: mooney_share = 0.2_wp
-      !> Maximum bulk modulus over shear modulus: Poisson's ratio counts as at most that of this ratio.
+      !> Maximum bulk modulus divided by shear modulus, which limits Poisson's ratio.
       real(wp) :: bulk_ratio = 200.0_wp
       !> Law of viscosity: `none`, `kelvin_voigt`, `fractional`, `constant_loss` or `prony`.
       character(len=name_length) :: viscosity = 'fractional'
       !> Loss factor at `loss_frequency`.
       real(wp) :: loss_factor = 0.143_wp
-      !> Frequency of the loss factor, Hz; there the ball's modulus of elasticity is the storage modulus.
+      !> Frequency of the loss factor, Hz; there the storage modulus is the ball's modulus of elasticity.
       real(wp) :: loss_frequency = 74.0_wp
-      !> Order of the derivative of a fractional law.
+      !> Order of the fractional derivative.
       real(wp) :: fractional_order = 0.3_wp
-      !> Prony series: moduli over the long-term modulus.
+      !> Prony series: moduli divided by the long-term modulus.
       type(list_type) :: prony_share
       !> Prony series: relaxation times, s.
       type(list_type) :: prony_time
@@ -47,11 +46,11 @@ module thud_material
       real(wp) :: density = 0.0_wp
       !> Long-term shear modulus, Pa.
       real(wp) :: shear_modulus = 0.0_wp
-      !> Second-invariant fraction of it.
+      !> Second-invariant fraction of the shear modulus.
       real(wp) :: mooney_share = 0.0_wp
       !> Bulk modulus, Pa.
       real(wp) :: bulk_modulus = 0.0_wp
-      !> Viscosity of Kelvin and Voigt, Pa s.
+      !> Kelvin-Voigt viscosity, Pa s.
       real(wp) :: viscosity = 0.0_wp
       !> Shear moduli, Pa, and relaxation times, s, of the Maxwell branches: [n_branch].
       real(wp), allocatable :: branch_modulus(:), branch_time(:)
@@ -70,24 +69,24 @@ contains
          choice_field('law', options%law, 'law of elasticity', &
          [character(len=16) :: 'neo_hookean', 'mooney_rivlin']), &
          real_field('mooney_share', options%mooney_share, '', &
-         'second-invariant fraction of the shear modulus, of mooney_rivlin', '[0, 1]'), &
+         'second-invariant fraction of the shear modulus, for mooney_rivlin', '[0, 1]'), &
          real_field('bulk_ratio', options%bulk_ratio, '', &
-         "maximum bulk modulus over shear modulus; less where Poisson's ratio says so", '[2, 100000]'), &
+         "maximum ratio of bulk to shear modulus; lower if Poisson's ratio implies a lower one", '[2, 100000]'), &
          choice_field('viscosity', options%viscosity, 'law of viscosity', &
          [character(len=16) :: 'none', 'kelvin_voigt', 'fractional', 'constant_loss', 'prony']), &
-         real_field('loss_factor', options%loss_factor, '', 'loss factor at loss_frequency, of kelvin_voigt, ' &
-         //'fractional; over 10 to 1000 Hz, of constant_loss', '(0, 1]'), &
+         real_field('loss_factor', options%loss_factor, '', 'loss factor: at loss_frequency (kelvin_voigt, ' &
+         //'fractional), or from 10 to 1000 Hz (constant_loss)', '(0, 1]'), &
          real_field('loss_frequency', options%loss_frequency, 'Hz', &
-         "where the ball's modulus is the storage modulus", '[1, 10000]'), &
+         "frequency at which the ball's modulus is the storage modulus", '[1, 10000]'), &
          real_field('fractional_order', options%fractional_order, '', &
-         'order of the derivative, of fractional; 1: kelvin_voigt', '(0, 1]'), &
-         list_field('prony_share', options%prony_share, '', 'moduli over the long-term modulus, of prony', &
-         '[0, 1000]'), &
-         list_field('prony_time', options%prony_time, 's', 'relaxation times, of prony', &
+         'order of the derivative, for fractional; 1: as kelvin_voigt', '(0, 1]'), &
+         list_field('prony_share', options%prony_share, '', &
+         'moduli of the branches divided by the long-term modulus, for prony', '[0, 1000]'), &
+         list_field('prony_time', options%prony_time, 's', 'relaxation times of the branches, for prony', &
          '(0, 1000]')]
    end function get_material_fields
 
-   !> Refuses options that do not fit each other, and balls that the model cannot take.
+   !> Returns an error if options do not fit each other, or if the model cannot take the ball.
    subroutine check_material(options, ball, error)
       !> The options, each inside its own range.
       type(material_options_type), intent(in) :: options
@@ -121,43 +120,43 @@ contains
       type(material_options_type), intent(in) :: options
       type(ball_type), intent(in) :: ball
       type(material_type), intent(out) :: material
-      !> No Prony series fits the loss factor.
+      !> Set if no Prony series fits the loss factor.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: storage_modulus, poisson_ratio, omega, viscosity
-      real(wp), allocatable :: share(:)
+      real(wp), allocatable :: relative_modulus(:)
       logical :: failed
 
       omega = 2*pi*options%loss_frequency
       material%density = get_density(ball)
       if (options%law == 'mooney_rivlin') material%mooney_share = options%mooney_share
-      ! The modulus of elasticity is kept, which is what is measured.
+      ! The modulus of elasticity stays unchanged, since it is the measured one.
       poisson_ratio = min(ball%poisson_ratio, (3*options%bulk_ratio - 2)/(2*(3*options%bulk_ratio + 1)))
       storage_modulus = ball%youngs_modulus/(2*(1 + poisson_ratio))
       material%bulk_modulus = ball%youngs_modulus/(3*(1 - 2*poisson_ratio))
-      allocate (share(0), material%branch_time(0))
+      allocate (relative_modulus(0), material%branch_time(0))
       viscosity = 0.0_wp
       select case (options%viscosity)
       case ('kelvin_voigt')
          viscosity = options%loss_factor/omega
       case ('fractional')
          call fit_fractional_loss(new_fractional_loss(options%fractional_order, options%loss_factor, &
-            options%loss_frequency), share, material%branch_time, viscosity)
+            options%loss_frequency), relative_modulus, material%branch_time, viscosity)
       case ('constant_loss')
-         call fit_constant_loss(options%loss_factor, share, material%branch_time, failed)
+         call fit_constant_loss(options%loss_factor, relative_modulus, material%branch_time, failed)
          if (failed) then
             error = input_error('&material: no Prony series has loss_factor = '//to_text(options%loss_factor) &
                //' from 10 to 1000 Hz; allowed: up to about 0.9')
             return
          end if
       case ('prony')
-         share = options%prony_share%values(:options%prony_share%count)
+         relative_modulus = options%prony_share%values(:options%prony_share%count)
          material%branch_time = options%prony_time%values(:options%prony_time%count)
       case default
          continue
       end select
-      material%shear_modulus = storage_modulus/get_storage_ratio(share, material%branch_time, omega)
+      material%shear_modulus = storage_modulus/get_storage_ratio(relative_modulus, material%branch_time, omega)
       material%viscosity = viscosity*material%shear_modulus
-      allocate (material%branch_modulus, source=share*material%shear_modulus)
+      allocate (material%branch_modulus, source=relative_modulus*material%shear_modulus)
    end subroutine new_material
 
    !> Loss factor of the material in shear.
@@ -165,14 +164,14 @@ contains
       type(material_type), intent(in) :: material
       !> Frequency, Hz.
       real(wp), intent(in) :: frequency
-      !> Loss modulus over storage modulus.
+      !> Loss modulus divided by storage modulus.
       real(wp) :: loss_factor
       real(wp) :: omega
 
       omega = 2*pi*frequency
-      associate (share => material%branch_modulus/material%shear_modulus, time => material%branch_time)
-         loss_factor = (get_loss_ratio(share, time, omega) + omega*material%viscosity/material%shear_modulus) &
-            /get_storage_ratio(share, time, omega)
+      associate (relative_modulus => material%branch_modulus/material%shear_modulus, time => material%branch_time)
+         loss_factor = (get_loss_ratio(relative_modulus, time, omega) + omega*material%viscosity/material%shear_modulus) &
+            /get_storage_ratio(relative_modulus, time, omega)
       end associate
    end function get_material_loss_factor
 

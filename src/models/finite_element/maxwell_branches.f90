@@ -1,8 +1,8 @@
 !> Stresses of the Maxwell branches of rubber at large strain, for the elements of one ring together.
 !>
-!> Branches have the energy mu_i/2 (tr(Cbar Cv^-1) - 3) and the viscous flow Cv' = (Cbar - tr(Cbar Cv^-1)/3 Cv)/tau_i (Simo
-!> and Miehe 1992), stepped in closed form after Shutov, Landgraf and Ihlemann (2013, Comput. Methods Appl. Mech. Eng. 265,
-!> 213-225), with exp(step/tau) - 1 for their step/tau, which is exact at small strain: Cv stays symmetric, positive
+!> A branch has the energy mu_i/2 (tr(Cbar Cv^-1) - 3) and the viscous flow Cv' = (Cbar - tr(Cbar Cv^-1)/3 Cv)/tau_i (Simo
+!> and Miehe 1992). Steps are in closed form after Shutov, Landgraf and Ihlemann (2013, Comput. Methods Appl. Mech. Eng. 265,
+!> 213-225), with exp(step/tau) - 1 in place of their step/tau, which is exact at small strain. Cv stays symmetric, positive
 !> definite and of determinant 1 with any step.
 !>
 !> Components as in `thud_element_row`.
@@ -15,15 +15,15 @@ module thud_maxwell_branches
 
    public :: add_branch_stress
 
-   !> Steps over the relaxation time beyond which a branch has lost its memory.
+   !> Length of a step divided by the relaxation time beyond which a branch has lost its memory.
    real(wp), parameter :: max_steps_over_time = 100.0_wp
 
 contains
 
    !> Adds the mean stresses of the Maxwell branches over a step, and updates their viscous tensors.
    !>
-   !> The viscous tensors are known at the middles between the instants of the displacements, as velocities are:
-   !> the step is of second order. A branch that relaxes within a step is a viscosity.
+   !> The viscous tensors are known at the midpoints between the instants of the displacements, as velocities are: the step
+   !> is of second order. A branch that relaxes within a step acts as a viscosity.
    pure subroutine add_branch_stress(n, modulus, time, interval, commit, weight, f, cofactor, jacobian, viscous, stress, &
       energy, power)
       !> Number of elements.
@@ -32,8 +32,8 @@ contains
       real(wp), intent(in) :: modulus(:), time(:)
       !> Length of the step, s.
       real(wp), intent(in) :: interval
-      !> The viscous tensors are taken to the end of the step; otherwise they stay, and the stresses are those of the
-      !> fastest motion, which reverses in each step, with its tensors.
+      !> Whether the viscous tensors advance to the end of the step. Otherwise they stay, and the stresses are those of the
+      !> fastest motion, which reverses in each step together with its tensors.
       logical, intent(in) :: commit
       !> Volumes of the points, undeformed, m3: [n, point].
       real(wp), intent(in) :: weight(n, n_point)
@@ -43,20 +43,20 @@ contains
       real(wp), intent(in) :: cofactor(n, n_component, n_point)
       !> Their determinants: [n, point].
       real(wp), intent(in) :: jacobian(n, n_point)
-      !> Viscous tensors Cv from half a step before to half a step after: [n, symmetric, point, branch].
+      !> Viscous tensors Cv, advanced from half a step before to half a step after: [n, symmetric, point, branch].
       real(wp), intent(inout) :: viscous(n, n_symmetric, n_point, size(time))
       !> Stresses, Pa: [n, component, point].
       real(wp), intent(inout) :: stress(n, n_component, n_point)
-      !> Gets the energy of the branches added, J; gets the power dissipated added, W.
+      !> Sums to which energy, J, and dissipated power, W, of the branches are added.
       real(wp), intent(inout) :: energy, power
       real(wp) :: isochoric_factor(n)
       real(wp), dimension(n, n_symmetric) :: c, branch_stress
-      real(wp), dimension(size(time)) :: ratio, part, effective
+      real(wp), dimension(size(time)) :: ratio, mean_weight, effective
       real(wp) :: stored
       integer :: b, g
 
       ratio = interval/time
-      part = get_part_to_mean(ratio)
+      mean_weight = get_mean_weight(ratio)
       effective = modulus
       if (.not. commit) effective = modulus*(1 + tanh(ratio/2))
       do g = 1, n_point
@@ -64,30 +64,30 @@ contains
          branch_stress = 0.0_wp
          do b = 1, size(time)
             stored = 0.0_wp
-            call take_branch_step(n, effective(b), time(b), ratio(b), part(b), commit, weight(:, g), c, viscous(:, :, g, &
-               b), branch_stress, stored, power)
-            ! Of the mean stress: so work, energy and loss of a linear branch add up over the steps.
-            energy = energy + stored*(1 + part(b))*(1 + exp(-ratio(b)))/2
+            call take_branch_step(n, effective(b), time(b), ratio(b), mean_weight(b), commit, weight(:, g), c, &
+               viscous(:, :, g, b), branch_stress, stored, power)
+            ! Energy at the mean stress: with it work, energy and loss of a linear branch balance over the steps.
+            energy = energy + stored*(1 + mean_weight(b))*(1 + exp(-ratio(b)))/2
          end do
          call add_branch_stresses(n, isochoric_factor, c, branch_stress, f(:, :, g), cofactor(:, :, g), jacobian(:, g), &
             stress(:, :, g))
       end do
    end subroutine add_branch_stress
 
-   !> Growth exp(t/time) - 1 at the instant t of a step at which a decaying stress equals its mean over
-   !> the step: x/(1 - exp(-x)) - 1.
-   pure elemental function get_part_to_mean(ratio) result(part)
-      !> Length of the step over the relaxation time, x.
+   !> Value of exp(t/time) - 1 at the instant t of a step at which a decaying stress equals its mean over the step, which is
+   !> x/(1 - exp(-x)) - 1.
+   pure elemental function get_mean_weight(ratio) result(mean_weight)
+      !> Length of the step divided by the relaxation time, x.
       real(wp), intent(in) :: ratio
-      real(wp) :: part
+      real(wp) :: mean_weight
 
       if (ratio < 1.0e-3_wp) then
-         ! Series, where the difference would lose digits; off by x**4/720.
-         part = ratio/2 + ratio**2/12
+         ! A series, since the difference would lose digits; off by x**4/720.
+         mean_weight = ratio/2 + ratio**2/12
       else
-         part = ratio/(1 - exp(-ratio)) - 1
+         mean_weight = ratio/(1 - exp(-ratio)) - 1
       end if
-   end function get_part_to_mean
+   end function get_mean_weight
 
    !> Isochoric right Cauchy-Green tensors at one Gauss point.
    pure subroutine get_isochoric(n, f, jacobian, isochoric_factor, c)
@@ -114,14 +114,15 @@ contains
       end do
    end subroutine get_isochoric
 
-   !> Adds the stress of one Maxwell branch at one Gauss point, its energy and its loss, and updates its viscous tensor.
-   pure subroutine take_branch_step(n, modulus, time, ratio, part, commit, weight, c, viscous, branch_stress, energy, power)
+   !> Adds stress, energy and loss of one Maxwell branch at one Gauss point, and updates its viscous tensor.
+   pure subroutine take_branch_step(n, modulus, time, ratio, mean_weight, commit, weight, c, viscous, branch_stress, &
+      energy, power)
       integer, intent(in) :: n
-      !> Shear modulus, Pa; relaxation time, s; length of the step over it.
+      !> Shear modulus, Pa; relaxation time, s; step divided by relaxation time.
       real(wp), intent(in) :: modulus, time, ratio
-      !> Weight of the deformation beside the viscous tensor, for that within the step.
-      real(wp), intent(in) :: part
-      !> The viscous tensors are taken to the end of the step; otherwise they stay.
+      !> Weight of the deformation relative to the viscous tensor, for the tensor within the step.
+      real(wp), intent(in) :: mean_weight
+      !> Whether the viscous tensors advance to the end of the step.
       logical, intent(in) :: commit
       !> Volumes of the points, undeformed, m3: [n].
       real(wp), intent(in) :: weight(n)
@@ -129,20 +130,20 @@ contains
       real(wp), intent(in) :: c(n, n_symmetric)
       !> Viscous tensors Cv: [n, symmetric].
       real(wp), intent(inout) :: viscous(n, n_symmetric)
-      !> Gets the modulus times the inverse of the viscous tensor within the step added, Pa: [n, symmetric].
+      !> Sum to which modulus times inverse of the viscous tensor within the step is added, Pa: [n, symmetric].
       real(wp), intent(inout) :: branch_stress(n, n_symmetric)
-      !> Gets the energy added, J; gets the power dissipated added, W.
+      !> Sums to which energy, J, and dissipated power, W, are added.
       real(wp), intent(inout) :: energy, power
       real(wp) :: determinant(n), root(n), strain_weight(n), trace(n), tensor(n, n_symmetric)
       real(wp) :: scale, square, i1, i2, i3, i4
       integer :: j
 
-      strain_weight = part
-      call mix(n, part, strain_weight, c, viscous, tensor, determinant)
+      strain_weight = mean_weight
+      call mix(n, mean_weight, strain_weight, c, viscous, tensor, determinant)
       call get_inverse_cube_root(n, determinant, root)
       !$omp simd private(scale, square, i1, i2, i3, i4) reduction(+:energy, power)
       do j = 1, n
-         ! The inverse: adjugate over determinant, with the norm of the tensor removed.
+         ! Inverse of the tensor scaled to determinant 1, which is the scaled adjugate.
          scale = root(j)**2
          i1 = scale*tensor(j, 2)*tensor(j, 3)
          i2 = scale*tensor(j, 1)*tensor(j, 3)
@@ -161,23 +162,23 @@ contains
       if (commit) call update_internal_variables(n, min(ratio, max_steps_over_time), c, trace, viscous)
    end subroutine take_branch_step
 
-   !> Takes the viscous tensors of one Maxwell branch at one Gauss point to the end of a step.
+   !> Advances the viscous tensors of one Maxwell branch at one Gauss point to the end of a step.
    pure subroutine update_internal_variables(n, ratio, c, trace, viscous)
       integer, intent(in) :: n
-      !> Length of the step over the relaxation time.
+      !> Length of the step divided by the relaxation time.
       real(wp), intent(in) :: ratio
       real(wp), intent(in) :: c(n, n_symmetric)
-      !> Traces of their products with the inverses of the viscous tensors Cv within the step: [n].
+      !> Traces of the products of c with the inverses of the viscous tensors within the step: [n].
       real(wp), intent(in) :: trace(n)
       real(wp), intent(inout) :: viscous(n, n_symmetric)
       real(wp) :: determinant(n), root(n), strain_weight(n), mixed(n, n_symmetric)
-      real(wp) :: growth
+      real(wp) :: end_weight
       integer :: j
 
-      growth = exp(ratio) - 1
-      ! At large strain the rate of the norm, tr(Cbar Cv^-1)/3 - 1, counts too, in the second order of the step.
-      strain_weight = growth + (trace/3 - 1)*ratio**2/2
-      call mix(n, growth, strain_weight, c, viscous, mixed, determinant)
+      end_weight = exp(ratio) - 1
+      ! At large strain the rate of the norm, tr(Cbar Cv^-1)/3 - 1, also matters to second order in the step.
+      strain_weight = end_weight + (trace/3 - 1)*ratio**2/2
+      call mix(n, end_weight, strain_weight, c, viscous, mixed, determinant)
       call get_inverse_cube_root(n, determinant, root)
       do j = 1, n_symmetric
          viscous(:, j) = mixed(:, j)*root
@@ -185,10 +186,10 @@ contains
    end subroutine update_internal_variables
 
    !> Mixtures of viscous tensor and deformation at one Gauss point, and their determinants, which are near 1.
-   pure subroutine mix(n, usual_share, strain_weight, c, viscous, tensor, determinant)
+   pure subroutine mix(n, usual_weight, strain_weight, c, viscous, tensor, determinant)
       integer, intent(in) :: n
-      !> Weight of the deformation beside the viscous tensor by which the norm is taken off.
-      real(wp), intent(in) :: usual_share
+      !> Weight of the deformation, relative to the viscous tensor, that normalizes the mixture.
+      real(wp), intent(in) :: usual_weight
       !> Weights of the deformation: [n].
       real(wp), intent(in) :: strain_weight(n)
       real(wp), intent(in) :: c(n, n_symmetric)
@@ -201,7 +202,7 @@ contains
       real(wp) :: scale
       integer :: i, j
 
-      scale = 1/(1 + usual_share)
+      scale = 1/(1 + usual_weight)
       !$omp simd
       do j = 1, n
          do i = 1, n_symmetric

@@ -11,8 +11,8 @@ module thud_mesh
 
    public :: get_mesh_fields, mesh_options_type, mesh_type, new_mesh
 
-   !> How much smaller elements are around the lowest point, where the contact is, than their mean: at the inner and
-   !> at the outer surface. More at the outer one, whose elements are larger: the smallest ones decide the step.
+   !> Relative reduction of the element size around the lowest point, where the contact is, at the inner and at the outer
+   !> surface. Elements are larger at the outer surface and reduced more there, since the smallest ones limit the step.
    real(wp), parameter :: grading(2) = [0.15_wp, 0.45_wp]
 
    !> Numbers of elements.
@@ -23,8 +23,8 @@ module thud_mesh
       integer :: polar_elements = 64
    end type mesh_options_type
 
-   !> Nodes of quadrilaterals. Node (j, i) lies on polar line j, counted from the lowest point, and
-   !> on ring i, counted from the inner surface; an element of order p spans p of each.
+   !> Nodes of quadrilaterals. Node (j, i) lies on polar line j, counted from the lowest point, and on ring i, counted from
+   !> the inner surface; an element of order p spans p intervals of each.
    type :: mesh_type
       !> Order of the elements: 1 (four nodes) or 2 (nine nodes).
       integer :: order = 1
@@ -48,8 +48,8 @@ contains
       type(field_type) :: fields(2)
 
       fields = [ &
-         integer_field('radial_elements', options%radial_elements, 'elements through the wall', '[1, 64]'), &
-         integer_field('polar_elements', options%polar_elements, 'elements from pole to pole', '[8, 1024]')]
+         integer_field('radial_elements', options%radial_elements, 'number of elements through the wall', '[1, 64]'), &
+         integer_field('polar_elements', options%polar_elements, 'number of elements from pole to pole', '[8, 1024]')]
    end function get_mesh_fields
 
    !> Mesh of the undeformed ball around the origin. Elements of order 1 are graded, for the contact; those of order 2,

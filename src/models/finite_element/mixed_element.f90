@@ -1,9 +1,9 @@
-!> Stiffness and mass of an axisymmetric element with nine nodes for the displacement and a linear,
-!> discontinuous pressure: stable up to Poisson's ratio 1/2 (Boffi, Brezzi and Fortin, Mixed finite
-!> element methods and applications, 2013, section 8.6).
+!> Stiffness and mass of an axisymmetric element with nine nodes for the displacement and a linear, discontinuous pressure:
+!> stable up to Poisson's ratio 1/2 (Boffi, Brezzi and Fortin, Mixed finite element methods and applications, 2013, section
+!> 8.6).
 !>
-!> The energy of the pressure, condensed in each element, is bulk_modulus/2 times the square of three
-!> mean dilatations. At Poisson's ratio 1/2 these vanish; see `thud_mode_matrices`.
+!> The pressure is condensed in each element; its energy is bulk_modulus/2 times the sum of squares of three mean
+!> dilatations. At Poisson's ratio 1/2 these vanish; see `thud_mode_matrices`.
 module thud_mixed_element
    use thud_constants, only: pi
    use thud_kinds, only: wp
@@ -16,9 +16,9 @@ module thud_mixed_element
 
    !> Nodes of the element.
    integer, parameter :: n_node = 9
-   !> Dilatations that the pressure sees: its functions are 1, r and z.
+   !> Mean dilatations: one for each function of the pressure, 1, r and z.
    integer, parameter :: n_dilatation = 3
-   !> Gauss points in each direction and in all.
+   !> Gauss points in each direction and in total.
    integer, parameter :: n_line = 3, n_point = n_line**2
 
 contains
@@ -33,10 +33,10 @@ contains
       real(wp), intent(in) :: shear_modulus, density
       !> Stiffness against distortion at constant volume, N/m, lower triangle: [18, 18].
       real(wp), intent(out) :: distortion(2*n_node, 2*n_node)
-      !> Mean dilatations by displacements; bulk_modulus*transpose(dilatation)*dilatation is the
-      !> stiffness against change of volume, sqrt(m): [3, 18].
+      !> Mean dilatations per displacement, sqrt(m); bulk_modulus*transpose(dilatation)*dilatation is the stiffness against
+      !> change of volume: [3, 18].
       real(wp), intent(out) :: dilatation(n_dilatation, 2*n_node)
-      !> Mass by pairs of nodes, the same for both directions, kg, lower triangle: [9, 9].
+      !> Mass for pairs of nodes, the same for both directions, kg, lower triangle: [9, 9].
       real(wp), intent(out) :: mass(n_node, n_node)
       real(wp) :: strain(4*n_point, 2*n_node), shape(n_point, n_node), pressure(n_dilatation, n_dilatation)
       real(wp) :: point(n_line), weight(n_line), value(n_node), gradient(n_node, 2), jacobian(2, 2)
@@ -63,7 +63,7 @@ contains
             divergence(2::2) = gradient(:, 2)
             strain(4*k - 3:4*k, :) = get_distortion(sqrt(2*shear_modulus*volume), gradient, hoop, divergence)
             shape(k, :) = sqrt(density*volume)*value
-            ! Coordinates scaled by the element keep the functions of the pressure well conditioned.
+            ! Coordinates relative to the size of the element keep the functions of the pressure well conditioned.
             basis = [1.0_wp, (radius - r(5))/(maxval(r) - minval(r)), &
                (dot_product(value, z) - z(5))/(maxval(z) - minval(z))]
             pressure = pressure + volume*spread(basis, 1, 3)*spread(basis, 2, 3)
@@ -76,16 +76,16 @@ contains
       call dtrsm('L', 'L', 'N', 'N', n_dilatation, 2*n_node, 1.0_wp, pressure, n_dilatation, dilatation, n_dilatation)
    end subroutine get_mixed_element
 
-   !> Strains by displacements at one point, such that their squares add up to twice the energy of distortion:
-   !> three stretches without their mean, and the shear.
+   !> Strains per displacement at one point: three stretches minus their mean, and the shear. Their squares add up to twice
+   !> the energy of distortion.
    pure function get_distortion(root, gradient, hoop, divergence) result(strain)
       !> Root of twice the shear modulus times the volume, sqrt(J).
       real(wp), intent(in) :: root
-      !> Derivatives of the shape functions by r and z, 1/m: [9, 2].
+      !> Derivatives of the shape functions with respect to r and z, 1/m: [9, 2].
       real(wp), intent(in) :: gradient(n_node, 2)
-      !> Hoop strain by outward displacements, 1/m: [9].
+      !> Hoop strain per outward displacement, 1/m: [9].
       real(wp), intent(in) :: hoop(n_node)
-      !> Dilatation by displacements, 1/m: [18].
+      !> Dilatation per displacement, 1/m: [18].
       real(wp), intent(in) :: divergence(2*n_node)
       !> Strains times the root, sqrt(J)/m: [4, 18].
       real(wp) :: strain(4, 2*n_node)

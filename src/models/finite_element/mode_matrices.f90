@@ -1,8 +1,8 @@
-!> Stiffness and mass of the ball as banded matrices, and the operator of shift and invert on them.
+!> Stiffness and mass of the ball as banded matrices, and the shift-and-invert operator.
 !>
-!> Below Poisson's ratio 1/2 the pressure is condensed in each element. At 1/2 every solution has to
-!> keep the mean dilatations at zero: an augmented Lagrangian does that with one factorization
-!> of a positive definite matrix; each iteration reduces the dilatations by about 1e-4.
+!> Below Poisson's ratio 1/2 the pressure is condensed in each element. At 1/2 the mean dilatations of every solution have to
+!> be zero: an augmented Lagrangian achieves this with one factorization of a positive definite matrix; each iteration
+!> multiplies the dilatations by about 1e-4.
 module thud_mode_matrices
    use thud_ball, only: ball_type, get_density
    use thud_error, only: error_type, numerical_error
@@ -17,12 +17,11 @@ module thud_mode_matrices
 
    public :: apply_inverse, apply_mass, mode_matrices_type, new_mode_matrices
 
-   !> Bulk modulus over shear modulus that stands for an infinite one while the constraint is met.
+   !> Bulk modulus divided by shear modulus that stands for infinity while the constraint is enforced.
    real(wp), parameter :: augmented_ratio = 1.0e4_wp
 
-   !> Change of the pressures, relative, at which the constraint counts as met: the remaining
-   !> dilatations is then that of a bulk modulus 1e7 times the shear modulus or more, and the
-   !> frequencies are off by less than 1e-8.
+   !> Relative change of the pressures at which the constraint counts as met: the remaining dilatations are then those of a
+   !> bulk modulus of at least 1e7 times the shear modulus, and the frequencies are off by less than 1e-8.
    real(wp), parameter :: constraint_tolerance = 1.0e-3_wp
 
    !> Maximum number of iterations of the augmented Lagrangian; two are needed.
@@ -32,33 +31,33 @@ module thud_mode_matrices
    type :: mode_matrices_type
       !> Number of unknowns and of diagonals below the main one.
       integer :: n = 0, n_band = 0
-      !> Poisson's ratio is 1/2.
+      !> Whether Poisson's ratio is 1/2.
       logical :: incompressible = .false.
       !> Bulk modulus, real or augmented, Pa.
       real(wp) :: bulk_modulus = 0.0_wp
-      !> Eigenvalue that the operator is inverted about, (rad/s)2.
+      !> Eigenvalue about which the operator is inverted, (rad/s)2.
       real(wp) :: shift = 0.0_wp
       !> Cholesky factor of stiffness - shift*mass, lower band: [n_band + 1, n].
       real(wp), allocatable :: factor(:, :)
       !> Mass, lower band: [n_band + 1, n].
       real(wp), allocatable :: mass(:, :)
-      !> Unknown of each displacement, 0 where it is held: [2, 0:n_line, 0:n_ring].
+      !> Index of the unknown of each displacement, 0 if fixed: [2, 0:n_line, 0:n_ring].
       integer, allocatable :: unknown(:, :, :)
-      !> Unknowns of each element, n + 1 where held: [18, n_element].
-      integer, allocatable :: place(:, :)
+      !> Indices of the unknowns of each element, n + 1 if fixed: [18, n_element].
+      integer, allocatable :: element_dof(:, :)
       !> Mean dilatations of each element: [3, 18, n_element].
       real(wp), allocatable :: dilatation(:, :, :)
    end type mode_matrices_type
 
 contains
 
-   !> Matrices of a ball, factored.
+   !> Matrices of a ball, factorized.
    subroutine new_mode_matrices(ball, mesh, matrices, error)
       type(ball_type), intent(in) :: ball
       !> Mesh of order 2.
       type(mesh_type), intent(in) :: mesh
       type(mode_matrices_type), intent(out) :: matrices
-      !> The matrix is not positive definite.
+      !> Set if the matrices are too large or not positive definite.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: shear_modulus, density
       integer :: info
@@ -71,7 +70,7 @@ contains
       else
          matrices%bulk_modulus = ball%youngs_modulus/(3*(1 - 2*ball%poisson_ratio))
       end if
-      ! Below zero, where the rigid motion lies, and well below the first elastic mode.
+      ! Below zero, the rigid eigenvalue, and of much smaller size than the first elastic one.
       matrices%shift = -0.1_wp*ball%youngs_modulus/density/ball%outer_radius**2
       call number_unknowns(mesh, matrices)
       call require_memory(16.0_wp*matrices%n*(matrices%n_band + 1.0_wp), '&mesh: the matrices of so many elements', &
@@ -88,7 +87,7 @@ contains
    !> Numbers the displacements ring by ring along each polar line, which keeps the band narrow.
    pure subroutine number_unknowns(mesh, matrices)
       type(mesh_type), intent(in) :: mesh
-      !> Gets its unknowns.
+      !> Gets the indices of the unknowns.
       type(mode_matrices_type), intent(inout) :: matrices
       integer :: i, j, k, a, b, c, element, n_ring, n_line
 
@@ -98,25 +97,25 @@ contains
       do j = 0, n_line
          do i = 0, n_ring
             do k = 1, 2
-               ! Nothing leaves the axis.
+               ! Nodes on the axis stay there.
                if (k == 1 .and. (j == 0 .or. j == n_line)) cycle
                matrices%n = matrices%n + 1
                matrices%unknown(k, j, i) = matrices%n
             end do
          end do
       end do
-      allocate (matrices%place(2*n_node, mesh%n_radial*mesh%n_polar))
+      allocate (matrices%element_dof(2*n_node, mesh%n_radial*mesh%n_polar))
       element = 0
       do j = 0, n_line - 2, 2
          do i = 0, n_ring - 2, 2
             element = element + 1
-            matrices%place(:, element) = [(((matrices%unknown(c, j + b, i + a), c=1, 2), a=0, 2), b=0, 2)]
-            associate (place => matrices%place(:, element))
-               matrices%n_band = max(matrices%n_band, maxval(place) - minval(place, mask=place > 0))
+            matrices%element_dof(:, element) = [(((matrices%unknown(c, j + b, i + a), c=1, 2), a=0, 2), b=0, 2)]
+            associate (dof => matrices%element_dof(:, element))
+               matrices%n_band = max(matrices%n_band, maxval(dof) - minval(dof, mask=dof > 0))
             end associate
          end do
       end do
-      where (matrices%place == 0) matrices%place = matrices%n + 1
+      where (matrices%element_dof == 0) matrices%element_dof = matrices%n + 1
    end subroutine number_unknowns
 
    !> Adds up the matrices of all elements.
@@ -131,10 +130,10 @@ contains
       integer :: a, b, i, j, element, row, column
 
       allocate (matrices%factor(0:matrices%n_band, matrices%n), matrices%mass(0:matrices%n_band, matrices%n))
-      allocate (matrices%dilatation(n_dilatation, 2*n_node, size(matrices%place, 2)))
+      allocate (matrices%dilatation(n_dilatation, 2*n_node, size(matrices%element_dof, 2)))
       inertia = 0.0_wp
       do column = 1, matrices%n
-         ! The largest matrices fill gigabytes.
+         ! The largest matrices fill gigabytes, which takes time.
          if (is_interrupted()) return
          matrices%factor(:, column) = 0.0_wp
          matrices%mass(:, column) = 0.0_wp
@@ -144,7 +143,7 @@ contains
          if (is_interrupted()) return
          do i = 0, ubound(mesh%r, 2) - 2, 2
             element = element + 1
-            associate (place => matrices%place(:, element), dilatation => matrices%dilatation(:, :, element))
+            associate (dof => matrices%element_dof(:, element), dilatation => matrices%dilatation(:, :, element))
                call get_mixed_element(reshape(transpose(mesh%r(j:j + 2, i:i + 2)), [n_node]), &
                   reshape(transpose(mesh%z(j:j + 2, i:i + 2)), [n_node]), shear_modulus, density, distortion, dilatation, &
                   mass)
@@ -152,8 +151,8 @@ contains
                inertia(2::2, 2::2) = mass
                do b = 1, 2*n_node
                   do a = b, 2*n_node
-                     row = max(place(a), place(b))
-                     column = min(place(a), place(b))
+                     row = max(dof(a), dof(b))
+                     column = min(dof(a), dof(b))
                      if (row > matrices%n) cycle
                      volume = dot_product(dilatation(:, a), dilatation(:, b))
                      matrices%factor(row - column, column) = matrices%factor(row - column, column) &
@@ -166,17 +165,17 @@ contains
       end do
    end subroutine assemble
 
-   !> Cholesky factor of a banded matrix. Wide bands take LAPACK minutes without a pause: they are factored by the
-   !> algorithm of its dpbtrf, block after block.
+   !> Cholesky factor of a banded matrix. For wide bands LAPACK would take minutes without a check for interrupts: they are
+   !> factored block by block, by the algorithm of its dpbtrf.
    subroutine factorize(n, n_band, a, info)
       !> Numbers of unknowns and of diagonals below the main one.
       integer, intent(in) :: n, n_band
       !> The matrix, then the factor, lower band: [n_band + 1, n].
       real(wp), intent(inout) :: a(n_band + 1, n)
-      !> 0, or not where the matrix is not positive definite; not meant after an interrupt.
+      !> 0, or nonzero if the matrix is not positive definite; undefined after an interrupt.
       integer, intent(out) :: info
       integer, parameter :: block = 32
-      ! The part of a block that is cut off by the band, a triangle.
+      ! Triangle of a block that the band cuts off.
       real(wp) :: corner(block, block)
       integer :: i, j, width, inside, cut
 
@@ -220,16 +219,16 @@ contains
       call dsbmv('L', matrices%n, matrices%n_band, 1.0_wp, matrices%mass, matrices%n_band + 1, x, 1, 0.0_wp, y, 1)
    end subroutine apply_mass
 
-   !> Displacements under forces on the shifted system, without change of volume at Poisson's ratio 1/2.
+   !> Displacements due to forces on the shifted system, at constant volume if Poisson's ratio is 1/2.
    subroutine apply_inverse(matrices, force, x, failed)
       type(mode_matrices_type), intent(in) :: matrices
       !> Forces, N: [n].
       real(wp), intent(in) :: force(:)
       !> Displacements, m: [n].
       real(wp), intent(out) :: x(:)
-      !> The volume could not be kept.
+      !> Whether the volume could not be kept.
       logical, intent(out) :: failed
-      real(wp) :: pressure(n_dilatation, size(matrices%place, 2)), change(n_dilatation, size(matrices%place, 2))
+      real(wp), dimension(n_dilatation, size(matrices%element_dof, 2)) :: pressure, change
       real(wp) :: padded(matrices%n + 1)
       integer :: iteration, element, info
 
@@ -242,17 +241,17 @@ contains
          if (is_interrupted()) exit
          padded(:matrices%n) = x
          padded(matrices%n + 1) = 0.0_wp
-         do element = 1, size(matrices%place, 2)
+         do element = 1, size(matrices%element_dof, 2)
             change(:, element) = matrices%bulk_modulus &
-               *matmul(matrices%dilatation(:, :, element), padded(matrices%place(:, element)))
+               *matmul(matrices%dilatation(:, :, element), padded(matrices%element_dof(:, element)))
          end do
          pressure = pressure + change
          if (sum(change**2) <= constraint_tolerance**2*sum(pressure**2)) return
-         ! The change of the pressures drives what is still to be added to the displacements.
+         ! The change of the pressures gives the correction of the displacements.
          padded = 0.0_wp
-         do element = 1, size(matrices%place, 2)
-            associate (place => matrices%place(:, element))
-               padded(place) = padded(place) - matmul(change(:, element), matrices%dilatation(:, :, element))
+         do element = 1, size(matrices%element_dof, 2)
+            associate (dof => matrices%element_dof(:, element))
+               padded(dof) = padded(dof) - matmul(change(:, element), matrices%dilatation(:, :, element))
             end associate
          end do
          call dpbtrs('L', matrices%n, matrices%n_band, 1, matrices%factor, matrices%n_band + 1, padded, matrices%n + 1, &

@@ -1,9 +1,9 @@
-!> A floor that moves under the elements, one step of central differences after the other.
+!> A mobile floor under the finite elements, in steps of central differences.
 !>
-!> The force of a step is that at its instant, constant from half a step before to half a step after; so the floor's
-!> displacement is known at the middles between the instants, as velocities are. Where the floor is at the instant, and
-!> where at the next, if the force went on, depends on the force, and the force on both: what presses depends on the
-!> first, and nodes stop at the second. As neither force grows where the floor yields, there is one solution.
+!> The force of a step is that at its instant, constant from half a step before to half a step after; so the displacement of
+!> the floor is known at the midpoints between instants, as velocities are. Contact forces depend on the displacement at the
+!> instant, stopped nodes on that at the next instant under the same force, and both displacements on the force. Since the
+!> force does not increase when the floor yields, there is one solution.
 module thud_moving_floor
    use thud_floor_contact, only: floor_contact_type, get_contact_forces
    use thud_kinds, only: wp
@@ -14,10 +14,10 @@ module thud_moving_floor
 
    public :: advance_floor, continue_freely, find_floor, moving_floor_type, new_moving_floor, predict
 
-   !> Instants of a step: its own, the middle after it, the next.
+   !> Instants of a step: its own, the midpoint after it, the next.
    integer, parameter :: here = 1, after = 2, next = 3
 
-   !> Change of the force, relative, at which the iteration for it ends.
+   !> Relative change of the force that ends the iteration.
    real(wp), parameter :: small_change = 1.0e-11_wp
 
    !> Maximum number of iterations; Newton's method takes a few.
@@ -25,25 +25,25 @@ module thud_moving_floor
 
    !> The floor; displacements are downwards. The default is rigid.
    type :: moving_floor_type
-      !> It is not rigid.
+      !> Whether the floor is mobile.
       logical :: moves = .false.
       type(receiver_type) :: receiver
-      !> Motion in the middle before the instant.
+      !> Motion at the midpoint before the instant.
       type(receiver_motion_type) :: motion
-      !> Displacement at the instant, m; where nodes stop, at the next one, m.
+      !> Displacement at the instant, and at the next, where nodes stop, m.
       real(wp) :: displacement = 0.0_wp, stop = 0.0_wp
-      !> Twice the travel from the middle before to the instant, and from there to the middle after, over the time
-      !> from middle to middle, m/s; velocity at the instant without that of the direct mobility, m/s.
+      !> Twice the travel from the midpoint before to the instant, and from the instant to the midpoint after, divided by the
+      !> time between the midpoints, m/s; velocity at the instant without that of the direct mobility, m/s.
       real(wp) :: velocity_before = 0.0_wp, velocity_after = 0.0_wp, velocity = 0.0_wp
-      !> Energy that the floor was given up to the instant, and up to the middle after it, J.
+      !> Energy given to the floor up to the instant, and up to the midpoint after it, J.
       real(wp) :: work = 0.0_wp, work_after = 0.0_wp
-      !> Lengths of the step before and of this one that the factors below are of, s; below 0 for none.
+      !> Lengths of the previous and the present step for which the factors below hold, s; negative: none.
       real(wp) :: last_interval = -1.0_wp, interval = -1.0_wp
-      !> Displacements without force at the instants, m; compliances, m/N: [3].
+      !> Displacements at the instants without force, m; compliances, m/N: [3].
       real(wp) :: free(3) = 0.0_wp, compliance(3) = 0.0_wp
-      !> Displacement that an amplitude gives up to the instants, m/(N s): [n_pole, 3].
-      complex(wp), allocatable :: part(:, :)
-      !> The step from middle to middle.
+      !> Displacement up to the instants per amplitude, m/(N s): [n_pole, 3].
+      complex(wp), allocatable :: displacement_factor(:, :)
+      !> The step from midpoint to midpoint.
       type(receiver_step_type) :: step
    end type moving_floor_type
 
@@ -51,7 +51,7 @@ contains
 
    !> A floor at rest.
    pure function new_moving_floor(receiver) result(floor)
-      !> What the ball drops on; rigid where it is absent.
+      !> The floor under the ball (default: rigid).
       type(receiver_type), intent(in), optional :: receiver
       type(moving_floor_type) :: floor
 
@@ -64,7 +64,7 @@ contains
    !> Predicts the displacements in a step without force, and the compliances.
    pure subroutine predict(floor, last_interval, interval)
       type(moving_floor_type), intent(inout) :: floor
-      !> Lengths of the step before, 0 at the start, and of this one, s.
+      !> Lengths of the previous step, 0 at the start, and of the present one, s.
       real(wp), intent(in) :: last_interval, interval
       logical :: same
       integer :: i
@@ -72,7 +72,7 @@ contains
       same = .not. (abs(last_interval - floor%last_interval) > 0.0_wp .or. abs(interval - floor%interval) > 0.0_wp)
       if (.not. same) call set_factors(floor, last_interval, interval)
       do i = 1, 3
-         floor%free(i) = floor%motion%displacement + get_real_sum(floor%part(:, i), floor%motion%amplitude)
+         floor%free(i) = floor%motion%displacement + get_real_sum(floor%displacement_factor(:, i), floor%motion%amplitude)
       end do
    end subroutine predict
 
@@ -90,10 +90,10 @@ contains
       end do
    end function get_real_sum
 
-   !> Factors of steps of some length.
+   !> Factors of steps of given lengths.
    pure subroutine set_factors(floor, last_interval, interval)
       type(moving_floor_type), intent(inout) :: floor
-      !> Lengths of the step before and of this one, s.
+      !> Lengths of the previous and the present step, s.
       real(wp), intent(in) :: last_interval, interval
       type(receiver_step_type) :: step
       real(wp) :: length(3)
@@ -102,31 +102,31 @@ contains
       floor%last_interval = last_interval
       floor%interval = interval
       length([here, after, next]) = last_interval/2 + [0.0_wp, interval/2, interval]
-      if (allocated(floor%part)) deallocate (floor%part)
-      allocate (floor%part(size(floor%motion%amplitude), 3))
+      if (allocated(floor%displacement_factor)) deallocate (floor%displacement_factor)
+      allocate (floor%displacement_factor(size(floor%motion%amplitude), 3))
       do i = 1, 3
          step = new_receiver_step(floor%receiver, length(i))
          floor%compliance(i) = length(i)*floor%receiver%direct
-         if (size(floor%part, 1) > 0) then
-            floor%part(:, i) = floor%receiver%residue*step%gain
+         if (size(floor%displacement_factor, 1) > 0) then
+            floor%displacement_factor(:, i) = floor%receiver%residue*step%gain
             floor%compliance(i) = floor%compliance(i) + sum(real(floor%receiver%residue*step%travel, wp))
          end if
          if (i == after) floor%step = step
       end do
    end subroutine set_factors
 
-   !> Finds where a floor is at an instant, and where its nodes stop, by Newton's method within bounds.
+   !> Solves for the displacements of a floor at an instant and at the next, by Newton's method within bounds.
    pure subroutine find_floor(floor, contact, mass, position, velocity, guess)
-      !> The floor, predicted; gets displacement and stop.
+      !> The floor after `predict`; gets both displacements.
       type(moving_floor_type), intent(inout) :: floor
       type(floor_contact_type), intent(in) :: contact
       !> Masses of the nodes of the outer surface, kg: [0:n_polar].
       real(wp), intent(in) :: mass(0:)
-      !> Their positions over the undisplaced floor, m: [0:n_polar, 2].
+      !> Positions of these nodes relative to the undisplaced floor, m: [0:n_polar, 2].
       real(wp), intent(in) :: position(0:, :)
-      !> Their velocities upwards half a step on, if the floor did nothing, m/s: [0:n_polar].
+      !> Upward velocities of these nodes half a step later without the floor, m/s: [0:n_polar].
       real(wp), intent(in) :: velocity(0:)
-      !> Force near to that on the floor, N.
+      !> Estimate of the force on the floor, N.
       real(wp), intent(in) :: guess
       real(wp) :: force, reaction, slope, lower, upper, change
       integer :: iteration
@@ -138,7 +138,7 @@ contains
          floor%displacement = floor%free(here) + floor%compliance(here)*force
          floor%stop = floor%free(next) + floor%compliance(next)*force
          call get_contact_reaction(floor, contact, mass, position, velocity, reaction, slope)
-         ! The answer falls as the force rises: the solution lies between the two.
+         ! The reaction falls as the force rises: the solution lies between the two.
          lower = max(lower, min(force, reaction))
          upper = min(upper, max(force, reaction))
          change = (reaction - force)/(1 + slope)
@@ -148,13 +148,13 @@ contains
       end do
    end subroutine find_floor
 
-   !> Force on a floor that is where some force takes it.
+   !> Contact reaction at the floor displacements of a trial force.
    pure subroutine get_contact_reaction(floor, contact, mass, position, velocity, reaction, slope)
       type(moving_floor_type), intent(in) :: floor
       type(floor_contact_type), intent(in) :: contact
       !> As in `find_floor`.
       real(wp), intent(in) :: mass(0:), position(0:, :), velocity(0:)
-      !> The force, N; what it loses where the force that takes the floor there grows, N/N.
+      !> The reaction, N; its negative derivative with respect to the trial force, N/N.
       real(wp), intent(out) :: reaction, slope
       real(wp), dimension(0:ubound(mass, 1)) :: stiffness
       real(wp), dimension(0:ubound(mass, 1), 2) :: over, force
@@ -179,9 +179,9 @@ contains
       end do
    end subroutine get_contact_reaction
 
-   !> Takes a floor to the middle after an instant.
+   !> Advances a floor to the midpoint after an instant.
    pure subroutine advance_floor(floor, force)
-      !> The floor, found.
+      !> The floor after `find_floor`.
       type(moving_floor_type), intent(inout) :: floor
       !> Force downwards, N.
       real(wp), intent(in) :: force
@@ -199,12 +199,12 @@ contains
       end associate
    end subroutine advance_floor
 
-   !> Motion of a floor that nothing touches any more, at the samples of a record.
+   !> Motion of a floor without contact, at the samples of a record.
    pure subroutine continue_freely(floor, time, sample_rate, first, displacement, velocity)
       type(moving_floor_type), intent(in) :: floor
-      !> Time of the middle that the floor is at, s; samples per second, Hz.
+      !> Time of the midpoint that the floor has reached, s; sampling rate, Hz.
       real(wp), intent(in) :: time, sample_rate
-      !> Index of the first sample after it.
+      !> Index of the first sample after this midpoint.
       integer, intent(in) :: first
       !> Displacement, m, and velocity, m/s; those from the first sample on are set: [n_sample].
       real(wp), intent(inout) :: displacement(:), velocity(:)

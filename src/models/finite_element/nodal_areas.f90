@@ -9,8 +9,7 @@ module thud_nodal_areas
 
 contains
 
-   !> Areas of a surface that belong to its nodes: integrals of their shape functions over the frustums
-   !> beside them, as for forces of a pressure.
+   !> Nodal areas of a surface: integrals of the shape functions over the adjacent frustums, as for forces of a pressure.
    pure function get_nodal_areas(r, z) result(area)
       !> Distances of the nodes from the axis, m: [0:n].
       real(wp), intent(in) :: r(0:)

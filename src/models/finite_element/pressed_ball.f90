@@ -1,9 +1,9 @@
-!> Quasi-static compression of the ball by finite elements: the elements of the impact at rest, between two rigid plates
-!> without friction, one at height 0 and one coming down on the ball.
+!> Quasi-static compression of the ball, with the finite elements of the impact, between two rigid plates without friction:
+!> one at height 0, and one that comes down on the ball.
 !>
-!> Newton's method, with the nodes that touch found on the way (a primal-dual active set): nodes below a plate are put
-!> on it, nodes that it would have to pull are let go. The tangent comes from differences of the forces, in 18
-!> evaluations for any mesh: nodes three apart share no element.
+!> Newton's method finds the nodes in contact on the way (a primal-dual active set): nodes beyond a plate are put on it,
+!> nodes that it would have to pull are released. The tangent comes from differences of the forces, in 18 evaluations for any
+!> mesh, since nodes three apart share no element.
 module thud_pressed_ball
    use thud_ball, only: ball_type
    use thud_cavity, only: add_gas_forces, cavity_type, get_gas_energy, get_gas_pressure, get_volume
@@ -21,27 +21,27 @@ module thud_pressed_ball
 
    public :: get_energy, new_pressed_ball, press, pressed_ball_type
 
-   !> Iterations for one approach of the plates, and halvings of a step that does not converge.
+   !> Maximum number of iterations for one approach of the plates, and of halvings of a step that does not converge.
    integer, parameter :: max_iterations = 25, max_halvings = 8
 
-   !> Force on a node that counts as none, over shear modulus times wall squared.
+   !> Force on a node that counts as zero, divided by shear modulus times squared wall thickness.
    real(wp), parameter :: balanced = 1.0e-9_wp
 
-   !> Displacement of the differences, over the thickness of an element.
+   !> Displacement for the differences, as a fraction of the thickness of an element.
    real(wp), parameter :: trial = 1.0e-7_wp
 
-   !> How much smaller elements are around the poles, where the contacts are, than their mean.
+   !> Relative reduction of the element size around the poles, where the contacts are.
    real(wp), parameter :: grading = 0.4_wp
 
-   !> Maximum approach in a step over the wall thickness.
+   !> Maximum approach in a step, as a fraction of the wall thickness.
    real(wp), parameter :: max_step = 0.05_wp
 
    !> The ball; arrays over nodes are [0:n_polar, 0:n_radial, 2].
    type :: pressed_ball_type
-      !> The body, without gas: its pressure is a force on every node of the cavity at once.
+      !> The body without gas: the gas couples all nodes of the cavity.
       type(elastic_body_type) :: body
       type(cavity_type) :: cavity
-      !> Positions over the lower plate, m.
+      !> Positions relative to the lower plate, m.
       real(wp), allocatable :: position(:, :, :)
       !> Nodes of the outer surface that lie on the lower and on the upper plate: [0:n_polar, 2].
       logical, allocatable :: touches(:, :)
@@ -49,7 +49,7 @@ module thud_pressed_ball
       real(wp) :: deflection = 0.0_wp
       !> Force on the plates, N.
       real(wp) :: force = 0.0_wp
-      !> Diameter of the undeformed ball, m; force on a node that counts as none, N.
+      !> Diameter of the undeformed ball, m; force on a node that counts as zero, N.
       real(wp) :: diameter = 0.0_wp, tolerance = 0.0_wp
       !> Thickness of the wall and of an element, m.
       real(wp) :: wall = 0.0_wp, thickness = 0.0_wp
@@ -57,7 +57,7 @@ module thud_pressed_ball
 
 contains
 
-   !> The ball at rest between plates that just touch it. A quasi-static press sees the long-term modulus.
+   !> The ball at rest between plates that just touch it. The material has its long-term modulus.
    pure function new_pressed_ball(ball, mesh, material) result(pressed)
       type(ball_type), intent(in) :: ball
       !> Mesh of order 1, whose nodes are moved along the meridians.
@@ -107,12 +107,12 @@ contains
       even%r([0, mesh%n_polar], :) = 0.0_wp
    end function get_even_mesh
 
-   !> Brings the plates to an approach.
+   !> Moves the plates to an approach.
    subroutine press(pressed, deflection, error)
       type(pressed_ball_type), intent(inout) :: pressed
-      !> The approach, not less than before, m.
+      !> The approach, at least the present one, m.
       real(wp), intent(in) :: deflection
-      !> There is no state of rest, or none that was found.
+      !> Set if there is no state of rest, or if none was found.
       type(error_type), allocatable, intent(out) :: error
       type(pressed_ball_type) :: next
       real(wp) :: step
@@ -148,7 +148,7 @@ contains
    !> Whether the cavity has closed somewhere between the plates.
    pure function has_met(pressed) result(met)
       type(pressed_ball_type), intent(in) :: pressed
-      !> A node of its lower half has come to the middle.
+      !> Whether a node of its lower half has reached mid-height.
       logical :: met
 
       associate (middle => (pressed%diameter - pressed%deflection)/2)
@@ -158,15 +158,15 @@ contains
 
    !> Newton's method at one approach of the plates.
    subroutine find_rest(pressed, converged, error)
-      !> The ball; its positions start from those of another approach.
+      !> The ball, at the positions of another approach.
       type(pressed_ball_type), intent(inout) :: pressed
-      !> It is at rest.
+      !> Whether the ball is at rest.
       logical, intent(out) :: converged
-      !> An interrupt.
+      !> Set after an interrupt.
       type(error_type), allocatable, intent(out) :: error
       real(wp), dimension(0:pressed%body%mesh%n_polar, 0:pressed%body%mesh%n_radial, 2) :: force, target, change
       logical :: fixed(0:pressed%body%mesh%n_polar, 0:pressed%body%mesh%n_radial, 2)
-      logical :: found(0:pressed%body%mesh%n_polar, 2)
+      logical :: touching(0:pressed%body%mesh%n_polar, 2)
       integer :: iteration, last, plate
       logical :: failed, same
 
@@ -188,14 +188,14 @@ contains
          call get_forces(pressed, pressed%position, force, failed)
          if (failed) return
          do plate = 1, 2
-            associate (height => get_heights(pressed, plate), push => merge(-1, 1, plate == 1)*force(:, last, 2))
-               found(:, plate) = merge(push > -pressed%tolerance, height < 0.0_wp, pressed%touches(:, plate))
+            associate (height => get_heights(pressed, plate), contact_force => merge(-1, 1, plate == 1)*force(:, last, 2))
+               touching(:, plate) = merge(contact_force > -pressed%tolerance, height < 0.0_wp, pressed%touches(:, plate))
             end associate
          end do
-         same = all(found .eqv. pressed%touches)
-         pressed%touches = found
+         same = all(touching .eqv. pressed%touches)
+         pressed%touches = touching
          converged = same .and. maxval(abs(force), mask=.not. fixed) < pressed%tolerance
-         if (.not. any(found(:, 1)) .or. .not. any(found(:, 2))) return
+         if (.not. any(touching(:, 1)) .or. .not. any(touching(:, 2))) return
          if (converged) exit
       end do
       pressed%force = -sum(force(:, last, 2), mask=pressed%touches(:, 1))
@@ -215,13 +215,13 @@ contains
 
    !> Forces of stress and gas on the nodes.
    pure subroutine get_forces(pressed, position, force, failed)
-      !> The ball; it stays as it is.
+      !> The ball; unchanged on return.
       type(pressed_ball_type), intent(inout) :: pressed
       !> Positions of the nodes, m.
       real(wp), intent(in), contiguous :: position(0:, 0:, :)
       !> Forces, N.
       real(wp), intent(out), contiguous :: force(0:, 0:, :)
-      !> An element is turned inside out, or the cavity is closed.
+      !> Whether an element is turned inside out or the cavity is closed.
       logical, intent(out) :: failed
       type(body_state_type) :: state
       real(wp) :: pressure
@@ -236,7 +236,7 @@ contains
 
    !> Energy of the ball.
    subroutine get_energy(pressed, energy)
-      !> The ball; it stays as it is.
+      !> The ball; unchanged on return.
       type(pressed_ball_type), intent(inout) :: pressed
       !> Strain energy and work done on the gas, J.
       real(wp), intent(out) :: energy
@@ -251,14 +251,14 @@ contains
    !> Change of the positions that balances the forces.
    subroutine get_newton_step(pressed, force, fixed, shift, change, failed)
       type(pressed_ball_type), intent(inout) :: pressed
-      !> Forces where it is, N.
+      !> Forces at the present positions, N.
       real(wp), intent(in) :: force(0:, 0:, :)
-      !> Coordinates that are given, and their changes, m.
+      !> Coordinates with prescribed changes, and these changes, m.
       logical, intent(in) :: fixed(0:, 0:, :)
       real(wp), intent(in) :: shift(0:, 0:, :)
       !> Changes of all coordinates, m.
       real(wp), intent(out) :: change(0:, 0:, :)
-      !> The tangent is singular, or cannot be had.
+      !> Whether the tangent is singular or cannot be computed.
       logical, intent(out) :: failed
       real(wp) :: gradient(0:ubound(force, 1), 0:ubound(force, 2), 2)
       real(wp), allocatable :: band(:, :), solution(:, :)
@@ -273,8 +273,8 @@ contains
       allocate (band(3*width + 1, n), solution(n, 2), pivot(n))
       call get_tangent(pressed, fixed, width, band, failed)
       if (failed) return
-      ! The gas ties all nodes of the cavity together: its pressure changes with the volume, whose gradient is the force
-      ! of a unit pressure.
+      ! The gas couples all nodes of the cavity: its pressure changes with the volume, whose gradient is the force of a unit
+      ! pressure.
       gradient = 0.0_wp
       associate (r => pressed%position(:, 0, 1), z => pressed%position(:, 0, 2))
          call add_gas_forces(1.0_wp, r, z, gradient(:, 0, 1), gradient(:, 0, 2))
@@ -287,7 +287,7 @@ contains
       call dgbsv(n, width, width, 2, band, size(band, 1), pivot, solution, n, info)
       failed = info /= 0
       if (failed) return
-      ! Sherman and Morrison: the tangent is the banded one less slope gradient gradient^T.
+      ! Sherman-Morrison formula: the tangent is the banded matrix minus slope gradient gradient^T.
       associate (row => in_order(gradient))
          solution(:, 1) = solution(:, 1) + solution(:, 2)*(slope*dot_product(row, solution(:, 1)) &
             /(1 - slope*dot_product(row, solution(:, 2))))
@@ -295,26 +295,26 @@ contains
       change = reshape(solution(:, 1), shape(change), order=[3, 2, 1])
    end subroutine get_newton_step
 
-   !> A field over the nodes in the order of the unknowns: components, then rings, then lines.
+   !> Values at the nodes in the order of the unknowns: components, then rings, then lines.
    pure function in_order(field) result(vector)
-      !> The field: [0:n_polar, 0:n_radial, 2].
+      !> The values: [0:n_polar, 0:n_radial, 2].
       real(wp), intent(in) :: field(0:, 0:, :)
-      !> The same: [n].
+      !> The same values: [n].
       real(wp) :: vector(size(field))
 
       vector = reshape(reshape(field, [size(field, 3), size(field, 2), size(field, 1)], order=[3, 2, 1]), [size(field)])
    end function in_order
 
-   !> Derivatives of the forces, negative, with the gas at its pressure.
+   !> Negative derivatives of the forces, at constant pressure of the gas.
    subroutine get_tangent(pressed, fixed, width, band, failed)
       type(pressed_ball_type), intent(in) :: pressed
-      !> Coordinates that are given; their rows become those of the unit matrix.
+      !> Coordinates with prescribed changes; their rows become those of the unit matrix.
       logical, intent(in) :: fixed(0:, 0:, :)
-      !> Diagonals on each side.
+      !> Number of diagonals on each side.
       integer, intent(in) :: width
       !> The matrix as LAPACK stores bands: [3 width + 1, n].
       real(wp), intent(out) :: band(:, :)
-      !> A position could not be tried.
+      !> Whether a trial position has no forces.
       logical, intent(out) :: failed
       real(wp), dimension(0:ubound(fixed, 1), 0:ubound(fixed, 2), 2) :: here, there, moved
       type(pressed_ball_type) :: held
@@ -347,9 +347,9 @@ contains
 
    contains
 
-      !> Enters the derivatives by one coordinate.
+      !> Enters the derivatives with respect to one coordinate.
       subroutine add_column(line, ring, component)
-         !> Its node and component.
+         !> Its line, ring and component.
          integer, intent(in) :: line, ring, component
          integer :: a, b, c, row, column
 

@@ -33,7 +33,7 @@ contains
       real(wp), intent(in) :: x, y
       !> Values: [(order + 1)**2].
       real(wp), intent(out) :: value(:)
-      !> Derivatives by x and y: [(order + 1)**2, 2].
+      !> Derivatives with respect to x and y: [(order + 1)**2, 2].
       real(wp), intent(out) :: gradient(:, :)
       real(wp) :: at_x(0:order), at_y(0:order), slope_x(0:order), slope_y(0:order)
       integer :: i, j, node

@@ -1,8 +1,7 @@
 !> Elastic and viscous stresses of nearly incompressible rubber at large strain, for the elements of one ring together.
 !>
-!> Elastic: W = mu/2 [(1 - c)(J^(-2/3) I1 - 3) + c (J^(-4/3) I2 - 3)] + K/2 (theta - 1)**2 with the
-!> share c of Mooney and Rivlin and the mean dilatation theta of the element.
-!> Viscous: Cauchy stress 2 eta dev D (Kelvin and Voigt).
+!> Elastic: W = mu/2 [(1 - c)(J^(-2/3) I1 - 3) + c (J^(-4/3) I2 - 3)] + K/2 (theta - 1)**2 with the second-invariant fraction
+!> c (Mooney-Rivlin) and the mean dilatation theta of the element. Viscous: Cauchy stress 2 eta dev D (Kelvin-Voigt).
 !>
 !> Components as in `thud_element_row`.
 module thud_rubber
@@ -13,7 +12,7 @@ module thud_rubber
 
    public :: add_viscous_stress, get_elastic_stress, get_inverse_cube_root, get_volume_ratios
 
-   !> Ranges, from 1 and from their middle, in which one iteration and two give all digits of the cube root.
+   !> Half-widths of the ranges around 1 and `middle` in which one and two iterations give all digits of the cube root.
    real(wp), parameter :: near = 0.2_wp, middle = 1.45_wp, far = 1.05_wp
 
 contains
@@ -45,16 +44,16 @@ contains
 
    !> x**(-1/3) of positive numbers.
    pure subroutine get_inverse_cube_root(n, x, root)
-      !> Count.
+      !> Number of values.
       integer, intent(in) :: n
       !> The numbers: [n].
       real(wp), intent(in) :: x(n)
       !> Their roots: [n].
       real(wp), intent(out) :: root(n)
-      real(wp) :: rest, n_not_near, n_not_far
+      real(wp) :: residual, n_not_near, n_not_far
       integer :: j, iteration
 
-      ! As sums: gfortran does not vectorize minimum and maximum.
+      ! Counted by sums: gfortran does not vectorize minimum and maximum.
       n_not_near = 0.0_wp
       n_not_far = 0.0_wp
       !$omp simd reduction(+:n_not_near, n_not_far)
@@ -62,21 +61,21 @@ contains
          n_not_near = n_not_near + merge(0.0_wp, 1.0_wp, abs(x(j) - 1) <= near)
          n_not_far = n_not_far + merge(0.0_wp, 1.0_wp, abs(x(j) - middle) <= far)
       end do
-      ! Polynomials of least error, 3e-5 and 4 %; each iteration raises it to its fourth power.
+      ! Minimax polynomials with errors of 3e-5 and 4 %; each iteration raises the error to its fourth power.
       if (.not. n_not_near > 0.0_wp) then
-         !$omp simd private(rest)
+         !$omp simd private(residual)
          do j = 1, n
             root(j) = 1.74098956_wp + x(j)*(-1.32838497_wp + x(j)*(0.76697019_wp - x(j)*0.17960475_wp))
-            rest = 1 - x(j)*root(j)**3
-            root(j) = root(j)*(1 + rest*(1/3.0_wp + rest*(2/9.0_wp + rest*(14/81.0_wp))))
+            residual = 1 - x(j)*root(j)**3
+            root(j) = root(j)*(1 + residual*(1/3.0_wp + residual*(2/9.0_wp + residual*(14/81.0_wp))))
          end do
       else if (.not. n_not_far > 0.0_wp) then
-         !$omp simd private(rest)
+         !$omp simd private(residual)
          do j = 1, n
             root(j) = 1.53872574_wp + x(j)*(-0.64308593_wp + x(j)*0.13116605_wp)
             do iteration = 1, 2
-               rest = 1 - x(j)*root(j)**3
-               root(j) = root(j)*(1 + rest*(1/3.0_wp + rest*(2/9.0_wp + rest*(14/81.0_wp))))
+               residual = 1 - x(j)*root(j)**3
+               root(j) = root(j)*(1 + residual*(1/3.0_wp + residual*(2/9.0_wp + residual*(14/81.0_wp))))
             end do
          end do
       else
@@ -89,7 +88,7 @@ contains
       stress, energy)
       !> Number of elements.
       integer, intent(in) :: n
-      !> Shear modulus, Pa; part of it with the second invariant; bulk modulus, Pa.
+      !> Shear modulus, Pa; its second-invariant fraction; bulk modulus, Pa.
       real(wp), intent(in) :: shear_modulus, mooney_share, bulk_modulus
       !> Volumes of the points, undeformed, m3: [n, point].
       real(wp), intent(in) :: weight(n, n_point)
@@ -103,7 +102,7 @@ contains
       real(wp), intent(in) :: jacobian(n, n_point)
       !> Stresses, Pa: [n, component, point].
       real(wp), intent(out) :: stress(n, n_component, n_point)
-      !> Gets the strain energy added, J.
+      !> Sum to which the strain energy is added, J.
       real(wp), intent(inout) :: energy
       real(wp) :: modulus, invariant, factor, total
       real(wp) :: pressure(n), root(n)
@@ -137,7 +136,7 @@ contains
    !> Adds the stresses of the second invariant, modulus/2 (J^(-4/3) I2 - 3), at one Gauss point.
    pure subroutine add_second_invariant(n, modulus, weight, f, cofactor, jacobian, root, stress, energy)
       integer, intent(in) :: n
-      !> Its part of the shear modulus, Pa.
+      !> Second-invariant part of the shear modulus, Pa.
       real(wp), intent(in) :: modulus
       !> Volumes of the points, undeformed, m3: [n].
       real(wp), intent(in) :: weight(n)
@@ -151,7 +150,7 @@ contains
       real(wp), intent(in) :: root(n)
       !> Stresses, Pa: [n, component].
       real(wp), intent(inout) :: stress(n, n_component)
-      !> Gets the energy added, J.
+      !> Sum to which the energy is added, J.
       real(wp), intent(inout) :: energy
       real(wp) :: first, second, scale, volumetric
       real(wp) :: c(n_symmetric)
@@ -173,7 +172,7 @@ contains
       end do
    end subroutine add_second_invariant
 
-   !> Adds the stresses of Kelvin's and Voigt's viscosity.
+   !> Adds the stresses of Kelvin-Voigt viscosity.
    pure subroutine add_viscous_stress(n, viscosity, weight, rate, cofactor, jacobian, stress, power)
       !> Number of elements.
       integer, intent(in) :: n
@@ -189,7 +188,7 @@ contains
       real(wp), intent(in) :: jacobian(n, n_point)
       !> Stresses, Pa: [n, component, point].
       real(wp), intent(inout) :: stress(n, n_component, n_point)
-      !> Gets the power dissipated added, W.
+      !> Sum to which the dissipated power is added, W.
       real(wp), intent(inout) :: power
       real(wp) :: rr, zz, hoop, rz, mean, scale, total
       integer :: g, j

@@ -1,9 +1,9 @@
-!> The limit of stability of the central differences, from the equations of motion themselves.
+!> The stability limit of the central differences, from the equations of motion themselves.
 !>
-!> With velocities half a step behind, the step dt is stable while dt**2 K + 2 dt C <= 4 M for the
-!> tangents K and C of elasticity and viscosity: the maximum eigenvalue of the left side over M, here
-!> the stability ratio, may reach 4. Power iteration finds it; each iteration takes one evaluation of the
-!> forces. The direction is kept between calls, so that a few iterations follow the deforming ball.
+!> With velocities half a step behind, the step dt is stable while dt**2 K + 2 dt C <= 4 M for the tangents K and C of
+!> elasticity and viscosity. The stability ratio is the maximum eigenvalue of the left side relative to M; it may reach 4.
+!> Power iteration finds it, with one evaluation of the forces per iteration. The estimate of the fastest mode is kept
+!> between calls, so that a few iterations follow the deforming ball.
 module thud_stable_step
    use thud_elastic_body, only: body_state_type, elastic_body_type, get_internal_forces, no_failure
    use thud_floor_contact, only: floor_contact_type, get_contact_stiffness
@@ -17,15 +17,15 @@ module thud_stable_step
    !> Stability ratio at the limit.
    real(wp), parameter :: max_stability_ratio = 4.0_wp
 
-   !> Maximum displacement that the forces are evaluated with, over the thickness of an element.
+   !> Maximum displacement for which the forces are evaluated, as a fraction of the thickness of an element.
    real(wp), parameter :: trial = 1.0e-6_wp
 
 contains
 
-   !> A direction that every motion has a part of, the fastest ones most.
+   !> First estimate of the fastest mode: contains every mode, the fastest ones most.
    pure function get_first_direction(body) result(direction)
       type(elastic_body_type), intent(in) :: body
-      !> The direction: [0:n_polar, 0:n_radial, 2].
+      !> The estimate: [0:n_polar, 0:n_radial, 2].
       real(wp), allocatable :: direction(:, :, :)
       integer :: i, j, k
 
@@ -41,9 +41,9 @@ contains
       direction(body%mesh%n_polar, :, 1) = 0.0_wp
    end function get_first_direction
 
-   !> Stability ratio of a step, by some iterations of the power iteration.
+   !> Stability ratio of a step after some power iterations.
    subroutine find_stability_ratio(body, contact, position, velocity, interval, n_iteration, direction, stability_ratio)
-      !> The body; it stays as it is.
+      !> The body; unchanged on return.
       type(elastic_body_type), intent(inout) :: body
       type(floor_contact_type), intent(in) :: contact
       !> Positions of the nodes, m: [0:n_polar, 0:n_radial, 2].
@@ -53,10 +53,10 @@ contains
       !> Length of the step, s.
       real(wp), intent(in) :: interval
       integer, intent(in) :: n_iteration
-      !> Direction of the fastest motion, better after each call: the same shape.
+      !> Estimate of the fastest mode, improved by each call: the same shape.
       real(wp), intent(inout), contiguous :: direction(0:, 0:, :)
-      !> The ratio; of the body from below, close after tens of iterations; of the floor from above. Huge where
-      !> there are no forces, or after an interrupt.
+      !> The ratio. The part of the body is a lower bound, close after tens of iterations; the part of the floor is an upper
+      !> bound. Huge if there are no forces, or after an interrupt.
       real(wp), intent(out) :: stability_ratio
       real(wp), dimension(0:body%mesh%n_polar, 0:body%mesh%n_radial, 2) :: here, there, product
       real(wp) :: step, thickness
@@ -72,6 +72,7 @@ contains
       if (state%failure /= no_failure) return
       do iteration = 1, n_iteration
          direction = direction/sqrt(sum(mass*direction**2))
+         ! Amplitude of the trial displacements.
          step = trial*thickness/maxval(abs(direction))
          call get_internal_forces(body, position + step*direction, velocity + 2*step/interval*direction, interval, .false., &
             there, state)
@@ -83,7 +84,7 @@ contains
          stability_ratio = sum(direction*product)
          direction = product/mass
       end do
-      ! The floor, by its maximum: some node may touch it at any time.
+      ! The maximum over the nodes: any of them may touch the floor at any time.
       stability_ratio = stability_ratio + interval**2*maxval(get_contact_stiffness(contact, position(:, last, &
          1))/body%mass(:, last))
    end subroutine find_stability_ratio

@@ -26,7 +26,7 @@ module thud_hollow_sphere
 
    !> Options of the model.
    type, extends(source_model_type) :: hollow_sphere_type
-      !> What becomes of the momentum of wall that enters or leaves the flat cap.
+      !> Treatment of the momentum of wall that enters or leaves the flat cap, one of `flux_choices`.
       character(len=name_length) :: momentum_flux = 'momentum_balance'
    contains
       procedure, pass(options) :: get_fields
@@ -68,13 +68,13 @@ module thud_hollow_sphere
 
 contains
 
-   !> The one key.
+   !> Key and allowed values.
    function get_fields(options) result(fields)
       class(hollow_sphere_type), intent(in), target :: options
       type(field_type), allocatable :: fields(:)
 
       fields = [choice_field('momentum_flux', options%momentum_flux, &
-         'momentum of wall that enters or leaves the flat cap', flux_choices)]
+         'term for the momentum of wall that enters or leaves the flat cap', flux_choices)]
    end function get_fields
 
    !> Modulus of elasticity of the paper's ball, Pa (section 2.3).
@@ -99,7 +99,7 @@ contains
          get_wall_limits(ball, history), get_gravity_limit(drop, history)]
    end function get_validity_limits
 
-   !> Force on each of two plates in a quasi-static compression: each flattens a cap of half their approach.
+   !> Force on each of two plates in a quasi-static compression: each plate flattens a cap of half their approach.
    subroutine compress(ball, options, deflection, force, error)
       type(ball_type), intent(in) :: ball
       class(hollow_sphere_type), intent(in) :: options
@@ -149,7 +149,7 @@ contains
          /(ball%outer_radius*sqrt(12*(1 - ball%poisson_ratio**2)))
    end function get_shell_stiffness
 
-   !> Enclosed volume over that of the undeformed sphere.
+   !> Enclosed volume divided by that of the undeformed sphere.
    pure function get_volume_ratio(shell, deflection) result(ratio)
       class(shell_type), intent(in) :: shell
       !> Deflection, m.
@@ -165,7 +165,7 @@ contains
       class(shell_type), intent(in) :: shell
       !> Deflection, m; below the closing deflection.
       real(wp), intent(in) :: deflection
-      !> Number of caps that are flattened so far (default: 1).
+      !> Number of caps that have this deflection (default: 1).
       integer, intent(in), optional :: caps
       !> Force, N.
       real(wp) :: force
@@ -177,7 +177,7 @@ contains
       force = overpressure*pi*deflection*(2*shell%radius - deflection)
    end function get_gas_force
 
-   !> Work against the gas force from rest to a deflection, J: the integral of `get_gas_force`.
+   !> Work against the gas force from zero to a deflection, J: the integral of `get_gas_force`.
    pure function get_gas_energy(shell, deflection) result(energy)
       class(shell_type), intent(in) :: shell
       !> Deflection, m; below the closing deflection.
@@ -208,7 +208,7 @@ contains
       real(wp) :: elastic_force, flux, moving_mass, weight
 
       associate (deflection => state(at_deflection), velocity => state(at_velocity))
-         ! Below the closing deflection the gas has volume and the ball moving mass.
+         ! Below the closing deflection gas volume and moving mass are positive.
          valid = time >= 0.0_wp .and. deflection < self%closing_deflection
          rate = 0.0_wp
          if (.not. valid) return
@@ -224,7 +224,7 @@ contains
       end associate
    end subroutine get_derivative
 
-   !> Shell, gas and flux force of one instant.
+   !> Shell, gas and flux force at one instant.
    pure subroutine get_components(self, state, components, elastic_force)
       class(shell_type), intent(in) :: self
       real(wp), intent(in) :: state(:)
@@ -246,18 +246,18 @@ contains
       weight = merge(shell%compression_weight, shell%restitution_weight, shell%compressing)
    end function get_flux_weight
 
-   !> Whether a state is so far outside that not the shell has reached it but too long a step.
+   !> Whether a state lies so far outside the domain that it results from a step that is too long.
    pure function is_diverged(shell, state) result(diverged)
       class(shell_type), intent(in) :: shell
       !> State: [4].
       real(wp), intent(in) :: state(:)
-      !> It is, or is not a number.
+      !> True also if the state is not a number.
       logical :: diverged
 
       diverged = .not. abs(state(at_deflection)/shell%closing_deflection - 0.5_wp) < 0.52_wp
    end function is_diverged
 
-   !> Error of a drop in which the cavity collapses.
+   !> Error for a drop in which the cavity collapses.
    function get_failure(self, drop, time, state) result(error)
       class(shell_type), intent(in) :: self
       type(drop_type), intent(in) :: drop

@@ -1,4 +1,4 @@
-!> Impacts of many balls side by side: their state, steps and parts of a step, and where in a step a phase ends.
+!> Impacts of a batch of balls: state, whole and shortened steps, and the search for the end of a phase within a step.
 module thud_impact_batch
    use, intrinsic :: iso_c_binding, only: c_bool, c_int
    use thud_constants, only: pi
@@ -13,14 +13,14 @@ module thud_impact_batch
 
    public :: add_end, advance, finish_step, get_single, get_watched, impact_batch_type, is_finite, locate
 
-   !> Impacts, in the units of `thud_shell_batch` unless stated otherwise. Fastest where it begins with a
-   !> line of the cache, see `thud_cache_line`; interoperable, so that it may lie in a buffer.
+   !> Impacts, in the units of `thud_shell_batch` unless stated otherwise. Fastest if it begins with a cache line, see
+   !> `thud_cache_line`; interoperable, so that it may lie in a buffer.
    type, bind(c) :: impact_batch_type
       !> Series of the equations.
       type(series_batch_type) :: series
       !> Velocity at first touch: [batch_size].
       real(wp) :: impact_velocity(batch_size)
-      !> The present state and, in the other slot, that at the end of the step under way.
+      !> The present state and, in the other slot, the state at the end of the current step.
       type(state_batch_type) :: states(2)
       !> Ones, the length of whole steps: [batch_size].
       real(wp) :: whole_step(batch_size)
@@ -28,40 +28,39 @@ module thud_impact_batch
       real(wp) :: max_deflection(batch_size)
       !> Maximum elastic force, at samples and turning point, N: [batch_size].
       real(wp) :: peak_elastic_force(batch_size)
-      !> Maximum force on the floor, likewise, N: [batch_size].
+      !> Maximum force on the floor, at the same instants, N: [batch_size].
       real(wp) :: peak_force(batch_size)
       !> Steps from first touch to release: [batch_size].
       real(wp) :: contact(batch_size)
       type(shell_batch_type) :: shell
       !> Factor s of the flux term in restitution.
       real(wp) :: restitution_weight
-      !> Slot of the present state: that at release or, where a ball did not get there, at the beginning of
-      !> its last step.
+      !> Slot of the present state: at release or, for a ball without release, at the beginning of its last step.
       integer(c_int) :: now
-      !> The ball was released: [batch_size].
+      !> Whether the ball was released: [batch_size].
       logical(c_bool) :: released(batch_size)
-      !> A stage has left the domain of the equation: [batch_size].
-      logical(c_bool) :: left(batch_size)
-      !> The last step led beyond the reach of the series: [batch_size].
+      !> Whether a stage has left the domain of the equation: [batch_size].
+      logical(c_bool) :: out_of_domain(batch_size)
+      !> Whether the last step left the reach of the series: [batch_size].
       logical(c_bool) :: out_of_range(batch_size)
    end type impact_batch_type
 
 contains
 
-   !> Takes a step, or part of one, from the present state to the other slot. Balls that go beyond the
-   !> reach of their series take it one by one as the single solver does, powers and all.
+   !> Takes a whole or shortened step from the present state to the other slot. Balls that leave the reach of their series
+   !> take it one by one with the single solver, which computes the powers.
    pure subroutine advance(impacts, active, length, elastic_force, floor_force, missed)
-      !> The impacts; the new velocity is NaN where a stage has left the domain of the equation.
+      !> The impacts; the new velocity is NaN if a stage has left the domain of the equation.
       type(impact_batch_type), intent(inout) :: impacts
-      !> The result for the ball matters: [batch_size].
+      !> Whether the result for the ball is needed: [batch_size].
       logical, intent(in) :: active(batch_size)
       !> Length of the step: [batch_size].
       real(wp), intent(in) :: length(batch_size)
       !> Elastic force at the beginning, N: [batch_size].
       real(wp), intent(out) :: elastic_force(batch_size)
-      !> Force on the floor, likewise, N: [batch_size].
+      !> Force on the floor at the beginning, N: [batch_size].
       real(wp), intent(out) :: floor_force(batch_size)
-      !> There are such balls.
+      !> Whether a ball left the reach of its series.
       logical, intent(out) :: missed
       integer :: i, then
 
@@ -77,7 +76,7 @@ contains
 
    !> The step of one ball by the single solver.
    pure subroutine take_single_step(impacts, i, length)
-      !> The impacts; the new velocity stays NaN where a stage leaves the domain of the equation.
+      !> The impacts; the new velocity stays NaN if a stage leaves the domain of the equation.
       type(impact_batch_type), intent(inout) :: impacts
       !> Index of the ball.
       integer, intent(in) :: i
@@ -94,7 +93,7 @@ contains
       impacts%states(3 - impacts%now)%velocity(i) = new(at_velocity)
    end subroutine take_single_step
 
-   !> The equation of one ball as the single solver has it, in the units of the balls.
+   !> The equation of one ball for the single solver, in the units of the batch.
    pure function get_single(shell, i) result(single)
       type(shell_batch_type), intent(in) :: shell
       !> Index of the ball.
@@ -113,7 +112,7 @@ contains
       single%restitution_weight = shell%weight
    end function get_single
 
-   !> Whether a value is a number.
+   !> Whether a value is finite.
    elemental function is_finite(value) result(finite)
       real(wp), intent(in) :: value
       logical :: finite
@@ -121,16 +120,16 @@ contains
       finite = abs(value) <= huge(value)
    end function is_finite
 
-   !> Parts of the step at whose end the phase ends, to rounding: `locate_zero` of `thud_rk4` for all
-   !> balls at once. Balls without such an end get the whole step.
+   !> Fractions of the step at which the phase ends, to rounding: `locate_zero` of `thud_rk4` for all balls together; 1 for
+   !> balls without such an end.
    subroutine locate(impacts, compressing, ends, length)
       !> The impacts, at the beginning of the step.
       type(impact_batch_type), intent(inout) :: impacts
-      !> The phase ends with the velocity, not with the deflection.
+      !> Whether the phase is compression, which ends at zero velocity.
       logical, intent(in) :: compressing
-      !> The phase of the ball ends in this step: [batch_size].
+      !> Whether the phase of the ball ends in this step: [batch_size].
       logical, intent(in) :: ends(batch_size)
-      !> The parts: [batch_size].
+      !> The fractions: [batch_size].
       real(wp), intent(out) :: length(batch_size)
       integer, parameter :: max_iterations = 200
       real(wp), dimension(batch_size) :: left, right, left_value, right_value, value, rounding
@@ -151,7 +150,7 @@ contains
          length = right - right_value*(right - left)/(right_value - left_value)
          where (mod(iteration, 8) == 0 .or. .not. (length > left .and. length < right)) length = (left + right)/2
          call try_length(impacts, compressing, ends, length, value)
-         ! An end that stays twice has its value halved, or regula falsi would creep.
+         ! Halve the value at an end kept twice (Illinois): regula falsi would converge slowly.
          where (open .and. value > 0.0_wp)
             left = length
             left_value = value
@@ -161,7 +160,7 @@ contains
             right_value = value
             left_value = merge(left_value/2, left_value, right_moved)
          end where
-         ! A value of rounding only gives no better estimate.
+         ! A value within rounding gives no better estimate.
          where (open .and. abs(value) <= rounding)
             left = length
             right = length
@@ -172,15 +171,15 @@ contains
       length = right
    end subroutine locate
 
-   !> Where a part of the step would lead.
+   !> Value at the end of a shortened step.
    subroutine try_length(impacts, compressing, active, length, value)
       type(impact_batch_type), intent(inout) :: impacts
       logical, intent(in) :: compressing
-      !> The result for the ball matters: [batch_size].
+      !> Whether the result for the ball is needed: [batch_size].
       logical, intent(in) :: active(batch_size)
-      !> The part: [batch_size].
+      !> Fraction of the step: [batch_size].
       real(wp), intent(in) :: length(batch_size)
-      !> What the end of the phase brings to zero: [batch_size].
+      !> Velocity or deflection, zero at the end of the phase: [batch_size].
       real(wp), intent(out) :: value(batch_size)
       real(wp), dimension(batch_size) :: elastic_force, floor_force
       logical :: missed
@@ -189,10 +188,10 @@ contains
       value = get_watched(impacts%states(3 - impacts%now), compressing)
    end subroutine try_length
 
-   !> What the end of the phase brings to zero: velocity or deflection.
+   !> Quantity that is zero at the end of the phase: velocity or deflection.
    pure function get_watched(state, compressing) result(watched)
       type(state_batch_type), intent(in) :: state
-      !> The phase ends with the velocity.
+      !> Whether the phase is compression, which ends at zero velocity.
       logical, intent(in) :: compressing
       !> Velocity or deflection: [batch_size].
       real(wp) :: watched(batch_size)
@@ -201,17 +200,17 @@ contains
       if (compressing) watched = state%velocity
    end function get_watched
 
-   !> Takes a part of a step in some of the balls.
+   !> Takes a shortened step for some of the balls.
    subroutine finish_step(impacts, active, length, elastic_force, floor_force)
-      !> The impacts; their series are expanded at the end.
+      !> The impacts; their series are expanded at the end of the step.
       type(impact_batch_type), intent(inout) :: impacts
-      !> The ball takes the step: [batch_size].
+      !> Whether the ball takes the step: [batch_size].
       logical, intent(in) :: active(batch_size)
-      !> Its length: [batch_size].
+      !> Length of the step: [batch_size].
       real(wp), intent(in) :: length(batch_size)
-      !> Elastic force at its beginning, N: [batch_size].
+      !> Elastic force at the beginning, N: [batch_size].
       real(wp), intent(out) :: elastic_force(batch_size)
-      !> Force on the floor, likewise, N: [batch_size].
+      !> Force on the floor at the beginning, N: [batch_size].
       real(wp), intent(out) :: floor_force(batch_size)
       logical :: missed
 
@@ -228,17 +227,17 @@ contains
       end associate
    end subroutine finish_step
 
-   !> Adds one end of an interval to the sums of impulse and loss. With the sums of the values at the
-   !> beginnings of all steps these are the integrals by the trapezoidal rule with its first correction
-   !> (Euler and Maclaurin), of fourth order as the steps are.
+   !> Adds one end of an interval to the sums of impulse and loss. Together with the values at the beginnings of all steps
+   !> they become integrals by the trapezoidal rule with its first correction (Euler and Maclaurin), of fourth order like the
+   !> steps.
    pure subroutine add_end(impacts, active, value_factor, rate_factor)
-      !> The impacts, in reach of their series.
+      !> The impacts, within reach of their series.
       type(impact_batch_type), intent(inout) :: impacts
-      !> The ball takes part: [batch_size].
+      !> Whether to add for the ball: [batch_size].
       logical, intent(in) :: active(batch_size)
       !> Factor of the values at the end: [batch_size].
       real(wp), intent(in) :: value_factor(batch_size)
-      !> Factor of their rates of change: [batch_size].
+      !> Factor of the rates of change at the end: [batch_size].
       real(wp), intent(in) :: rate_factor(batch_size)
       real(wp), dimension(batch_size) :: force, force_rate, power, power_rate
 

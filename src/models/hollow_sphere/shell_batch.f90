@@ -1,5 +1,5 @@
-!> The equation of motion of the shell model (see `thud_hollow_sphere`) for many balls side by side, one
-!> per lane of the processor's vectors.
+!> The equation of motion of the shell model (see `thud_hollow_sphere`) for a batch of balls, one per lane of the processor's
+!> vectors.
 !>
 !> With the deflection y in diameters 2R and the time in steps h, z = dy/dt, the equation
 !> m a = s (M/2R) v**2 - F_B - F_G becomes
@@ -15,8 +15,8 @@ module thud_shell_batch
 
    public :: batch_size, shell_batch_type, state_batch_type
 
-   !> Balls side by side: several vectors, so that the latency of one is filled by the others, and
-   !> few enough that their forces stay in cache.
+   !> Balls of a batch: several vectors, so that the latency of one is filled by the others, and few enough that the forces
+   !> of all balls stay in cache.
    integer, parameter :: batch_size = 32
 
    !> The equations, one ball per lane.
@@ -37,15 +37,15 @@ module thud_shell_batch
       real(wp) :: weight
    end type shell_batch_type
 
-   !> States, in diameters, steps and masses.
+   !> States; units are diameters, steps and masses.
    type, bind(c) :: state_batch_type
       !> y: [batch_size].
       real(wp) :: deflection(batch_size)
       !> z: [batch_size].
       real(wp) :: velocity(batch_size)
-      !> Impulse given to the floor over 2 R M/h: [batch_size].
+      !> Impulse on the floor, in units of 2 R M/h: [batch_size].
       real(wp) :: impulse(batch_size)
-      !> Energy lost over 4 R**2 M/h**2: [batch_size].
+      !> Energy lost, in units of 4 R**2 M/h**2: [batch_size].
       real(wp) :: loss(batch_size)
    end type state_batch_type
 

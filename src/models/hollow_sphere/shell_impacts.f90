@@ -1,9 +1,9 @@
-!> Impacts of many balls side by side: the march of `thud_lumped`, with the same steps and the same
-!> change of phase at the turning point and at release, located on the step itself.
+!> Impacts of a batch of balls: the time integration of `thud_lumped`, with the same steps and the same change of phase at
+!> the turning point and at release, located within the step.
 !>
-!> Balls run in step, so that sample i of all forces is written at once. A ball that has reached its
-!> turning point waits until all others have, or closed; then the turning points are located
-!> together, and each ball goes on at its own time.
+!> All balls take their steps in parallel, so that sample i of all forces is written together. A ball that has reached its
+!> turning point waits until all others have reached theirs or collapsed; then the turning points are located together, and
+!> each ball continues at its own time.
 module thud_shell_impacts
    use thud_impact_batch, only: add_end, advance, finish_step, get_watched, impact_batch_type, is_finite, locate
    use thud_interrupt, only: is_interrupted
@@ -15,20 +15,20 @@ module thud_shell_impacts
 
    public :: solve_impacts
 
-   !> A step that never comes.
+   !> Step that never comes.
    real(wp), parameter :: never = huge(1.0_wp)
 
 contains
 
-   !> Impacts from first touch to release, and their forces.
-   subroutine solve_impacts(impacts, n_sample, substeps, force, last_sample)
+   !> Impacts from first touch to release, and the forces.
+   subroutine solve_impacts(impacts, n_sample, substeps, force, n_written)
       type(impact_batch_type), intent(inout) :: impacts
-      !> Samples of the record; steps per sampling interval.
+      !> Number of samples of the record; steps per sampling interval.
       integer, intent(in) :: n_sample, substeps
       !> Elastic forces, then floor forces, N, up to the last contact: [2 batch_size, n_sample].
       real(wp), intent(inout) :: force(2*batch_size, n_sample)
-      !> Index of the last sample that was written.
-      integer, intent(out) :: last_sample
+      !> Number of samples that were written.
+      integer, intent(out) :: n_written
       real(wp), dimension(batch_size) :: start, last, length, elastic_force, floor_force
       logical :: turning(batch_size), released(batch_size)
       integer :: n_step, last_step
@@ -40,40 +40,40 @@ contains
       impacts%states(1)%velocity = impacts%impact_velocity
       impacts%states(1)%impulse = 0.0_wp
       impacts%states(1)%loss = 0.0_wp
-      impacts%left = .false.
+      impacts%out_of_domain = .false.
       impacts%whole_step = 1.0_wp
 
       start = 0.0_wp
       call march(impacts, .true., start, last, n_step, substeps, n_sample, force, last_step)
-      turning = last < never .and. .not. impacts%left
-      call turn(impacts, turning)
+      turning = last < never .and. .not. impacts%out_of_domain
+      call pass_turning_point(impacts, turning)
       start = merge(last + 1, never, turning)
       call march(impacts, .false., start, last, n_step, substeps, n_sample, force, last_step)
-      released = last < never .and. .not. impacts%left
+      released = last < never .and. .not. impacts%out_of_domain
       impacts%released = released
       call locate(impacts, .false., released, length)
       call finish_step(impacts, released, length, elastic_force, floor_force)
       impacts%contact = last + length
-      last_sample = last_step/substeps + 1
-      call get_peaks(force(:, :last_sample), impacts%peak_elastic_force, impacts%peak_force)
-      ! A part that starts with a jump at first touch: a sample of a jump is the mean of its two sides.
+      n_written = last_step/substeps + 1
+      call get_peaks(force(:, :n_written), impacts%peak_elastic_force, impacts%peak_force)
+      ! A component may jump at first touch: the first sample is the mean of both sides.
       force(:, 1) = force(:, 1)/2
    end subroutine solve_impacts
 
-   !> Marches until every ball has reached the end of its phase or of the record.
+   !> Integrates in time until every ball has reached the end of the phase or of the record.
    subroutine march(impacts, compressing, start, last, n_step, substeps, n_sample, force, last_step)
       type(impact_batch_type), intent(inout) :: impacts
-      !> The phase ends with the velocity, not with the deflection.
+      !> Whether the phase is compression, which ends at zero velocity.
       logical, intent(in) :: compressing
-      !> Step with which each ball begins: [batch_size].
+      !> First step of each ball: [batch_size].
       real(wp), intent(in) :: start(batch_size)
-      !> Step in which its phase ends, or in which it fails; `never` if neither: [batch_size].
+      !> Step in which the phase of each ball ends or the ball fails; `never` if neither: [batch_size].
       real(wp), intent(out) :: last(batch_size)
-      !> Steps of the record; steps per sampling interval; samples of the record.
+      !> Number of steps of the record; steps per sampling interval; number of samples.
       integer, intent(in) :: n_step, substeps, n_sample
       !> Forces, N: [2 batch_size, n_sample].
       real(wp), intent(inout) :: force(2*batch_size, n_sample)
-      !> Last step of any ball; unchanged where none began.
+      !> Last step of any ball; unchanged if no ball took one.
       integer, intent(inout) :: last_step
       real(wp), dimension(batch_size) :: elastic_force, floor_force
       real(wp) :: latest
@@ -111,8 +111,8 @@ contains
       where (.not. start < never) last = never
    end subroutine march
 
-   !> A new series for each ball that begins or went out of range and, checked at fixed times, where the old one will
-   !> not last: nothing that depends on other balls.
+   !> Expands a new series for balls that begin or went out of range and, at fixed steps, for balls whose series will not
+   !> last: no condition depends on other balls.
    pure subroutine renew_series(impacts, start, n)
       type(impact_batch_type), intent(inout) :: impacts
       real(wp), intent(in) :: start(batch_size)
@@ -129,7 +129,7 @@ contains
       impacts%out_of_range = .false.
    end subroutine renew_series
 
-   !> Forces of one sample: those of moving balls, none after the contact; balls that have yet to turn keep
+   !> Writes the forces of one sample: those of moving balls, zero after the contact; balls before their turning point keep
    !> theirs.
    pure subroutine record(elastic_force, floor_force, n, start, last, force)
       !> Elastic forces, N: [batch_size].
@@ -139,7 +139,7 @@ contains
       !> Index of the step.
       real(wp), intent(in) :: n
       real(wp), intent(in) :: start(batch_size)
-      !> Step in which it has ended: [batch_size].
+      !> Step in which the phase has ended: [batch_size].
       real(wp), intent(in) :: last(batch_size)
       !> The sample, N: [2 batch_size].
       real(wp), intent(inout) :: force(2*batch_size)
@@ -147,17 +147,17 @@ contains
       where ([start, start] <= n) force = merge([elastic_force, floor_force], 0.0_wp, [last, last] >= n)
    end subroutine record
 
-   !> Takes over a step where it stays inside the phase; other balls stop in front of it.
+   !> Accepts a step that stays inside the phase; other balls stop before the step.
    pure subroutine commit_step(impacts, compressing, n, start, last, undisturbed, done)
       type(impact_batch_type), intent(inout) :: impacts
       logical, intent(in) :: compressing
       real(wp), intent(in) :: n
       real(wp), intent(in) :: start(batch_size)
-      !> Step in which it ends: [batch_size].
+      !> Step in which the phase ends: [batch_size].
       real(wp), intent(inout) :: last(batch_size)
-      !> All balls are under way; false from the first that stops on.
+      !> Whether all balls are moving; false from the first stop on.
       logical, intent(inout) :: undisturbed
-      !> All balls have stopped.
+      !> Whether all balls have stopped.
       logical, intent(out) :: done
       logical, dimension(batch_size) :: on, stays
 
@@ -167,7 +167,7 @@ contains
          if (.not. undisturbed) then
             on = n >= start .and. n < last
             stays = on .and. is_finite(next%velocity) .and. get_watched(next, compressing) > 0.0_wp
-            impacts%left = impacts%left .or. (on .and. .not. is_finite(next%velocity))
+            impacts%out_of_domain = impacts%out_of_domain .or. (on .and. .not. is_finite(next%velocity))
             where (on .and. .not. stays) last = n
             where (.not. stays)
                next%deflection = state%deflection
@@ -189,7 +189,7 @@ contains
       real(wp) :: lost
       integer :: i
 
-      ! Sums of zeros, which compilers vectorize; velocities are NaN where a stage has left the domain.
+      ! Sums of zeros, which compilers vectorize; velocities are NaN if a stage has left the domain.
       lost = 0.0_wp
       if (compressing) then
          !$omp simd reduction(+: lost)
@@ -205,10 +205,10 @@ contains
       all_do = lost <= 0.0_wp
    end function all_stay
 
-   !> To the turning point and on to the end of its step, with the flux term of restitution.
-   subroutine turn(impacts, turning)
+   !> Continues to the turning point and, with the flux term of restitution, to the end of the same step.
+   subroutine pass_turning_point(impacts, turning)
       type(impact_batch_type), intent(inout) :: impacts
-      !> The ball has a turning point: [batch_size].
+      !> Whether the ball has a turning point: [batch_size].
       logical, intent(in) :: turning(batch_size)
       real(wp), dimension(batch_size) :: length, elastic_force, floor_force
 
@@ -218,12 +218,12 @@ contains
       impacts%shell%weight = impacts%restitution_weight
       impacts%max_deflection = impacts%states(impacts%now)%deflection
       call finish_step(impacts, turning, 1 - length, elastic_force, floor_force)
-      ! Those at the turning point.
+      ! Forces at the turning point.
       impacts%peak_elastic_force = elastic_force
       impacts%peak_force = floor_force
-   end subroutine turn
+   end subroutine pass_turning_point
 
-   !> Raises the forces at the turning point to the maximum of all samples.
+   !> Updates the maxima, so far the forces at the turning point, from all samples.
    pure subroutine get_peaks(force, peak_elastic_force, peak_force)
       !> Elastic forces, then floor forces, N: [2 batch_size, n_sample].
       real(wp), intent(in) :: force(:, :)

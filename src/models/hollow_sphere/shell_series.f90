@@ -1,17 +1,15 @@
-!> The Runge-Kutta step of `thud_shell_batch`, its forces taken from Taylor series.
+!> The Runge-Kutta step of `thud_shell_batch` with forces from Taylor series.
 !>
-!> Powers and quotients are slow and a ball moves little from step to step: each ball has an expansion
-!> point, a deflection about which c and 1/(1 - y) are expanded, and needs nothing but multiplications and
-!> additions while it stays near.
+!> Powers and quotients are slow, and a ball moves little in a step: c and 1/(1 - y) are expanded about a deflection, the
+!> expansion point of the ball, and only multiplications and additions are needed while the ball stays near this point.
 !>
-!> The terms: x, a cubic with a double root at 1 and one at -1/2, has the power
-!> A x**(-gamma) = sum p_n d**n with J. C. P. Miller's recurrence over its three Taylor coefficients,
-!> 1/(1 - y) is a geometric series. The remainder: with rho = min(1 - y, 1/2 + y), the distance of the
-!> next root, the coefficients of x**(-gamma)/x_0**(-gamma) are at most those of
-!> (1 - d/rho)**(-3 gamma), for gamma <= 2 those of (1 - d/rho)**(-6), which are binomial(n + 5, 5)/rho**n. The
-!> first term left out, n = 8, is at most 1287 near**8, the ratio of later ones below 14/9 near: in all
-!> 4.7e-12 of the pressure at most. For gamma = 1.4 the same reads 7.6e-13, in the inner part of the reach,
-!> where balls from 1 m stay at the default step, 1.3e-14.
+!> The terms: x is a cubic with a double root at 1 and a single root at -1/2, so A x**(-gamma) = sum p_n d**n follows from
+!> its three Taylor coefficients by J. C. P. Miller's recurrence; 1/(1 - y) is a geometric series. The remainder: the nearest
+!> root has the distance rho = min(1 - y, 1/2 + y). The coefficients of x**(-gamma)/x_0**(-gamma) are at most those of (1 -
+!> d/rho)**(-3 gamma), hence for gamma <= 2 those of (1 - d/rho)**(-6), which are binomial(n + 5, 5)/rho**n. The first term
+!> left out, n = 8, is at most 1287 near**8, and the ratio of successive later terms is below 14/9 near: in total at most
+!> 4.7e-12 of the pressure. For gamma = 1.4 this bound is 7.6e-13, and 1.3e-14 in the inner part of the reach, where balls
+!> from 1 m stay at the default step.
 module thud_shell_series
    use thud_kinds, only: wp
    use thud_power, only: not_a_number, vector_power
@@ -24,23 +22,22 @@ module thud_shell_series
    !> Highest power of the series.
    integer, parameter :: degree = 7
 
-   !> Farthest that a series is used, in distances to the next root of x.
+   !> Maximum distance at which a series is used, as a fraction of that to the nearest root of x.
    real(wp), parameter :: near = 1.0_wp/64
 
-   !> Fraction of the reach that is used as long as the steps are short.
+   !> Fraction of the reach that is used as long as steps are short.
    real(wp), parameter :: inner = 0.6_wp
 
-   !> Steps between two checks of the series. At the default step a ball from 2.7 m stays in
-   !> reach of its series for as many.
+   !> Steps between two checks of the series; at the default step a ball from 2.7 m stays in reach of its series for as many.
    integer, parameter :: series_steps = 16
 
    !> The series.
    type, bind(c) :: series_batch_type
       !> Deflection about which a ball is expanded: [batch_size].
       real(wp) :: expansion_point(batch_size)
-      !> Distance up to which the series is used: [batch_size].
+      !> Distance from the expansion point up to which the series is used: [batch_size].
       real(wp) :: reach(batch_size)
-      !> 1/(1 - y) there: [batch_size].
+      !> 1/(1 - y) at the expansion point: [batch_size].
       real(wp) :: inverse(batch_size)
       !> Coefficients of c: [batch_size, 0:degree].
       real(wp) :: term(batch_size, 0:degree)
@@ -48,10 +45,10 @@ module thud_shell_series
 
 contains
 
-   !> Whether the series of a ball lasts for the next `series_steps`, in the inner part of its reach.
+   !> Whether a ball stays in the inner part of the reach of its series for the next `series_steps`.
    elemental function will_last(expansion_point, reach, deflection, velocity) result(lasts)
       real(wp), intent(in) :: expansion_point
-      !> Its reach; y; z.
+      !> Reach of the series; y; z.
       real(wp), intent(in) :: reach, deflection, velocity
       logical :: lasts
 
@@ -59,11 +56,11 @@ contains
          inner*reach
    end function will_last
 
-   !> Expands balls about the middle of their next way; the present deflection is in reach.
+   !> Expands balls about the middle of their next steps; the present deflection is in reach.
    pure subroutine expand_series(shell, state, wanted, series)
       type(shell_batch_type), intent(in) :: shell
       type(state_batch_type), intent(in) :: state
-      !> The ball is expanded again: [batch_size].
+      !> Whether to expand the ball again: [batch_size].
       logical, intent(in) :: wanted(batch_size)
       type(series_batch_type), intent(inout) :: series
       real(wp), dimension(batch_size) :: expansion_point, inverse, power
@@ -84,7 +81,7 @@ contains
       do i = 1, batch_size
          inverse(i) = 1/(1 - expansion_point(i))
          associate (e => shell%exponent(i), r => inverse(i), k => shell%stiffness(i))
-            ! Taylor coefficients of x over x itself.
+            ! Taylor coefficients of x divided by x.
             x3 = 2/get_ratio(expansion_point(i))
             x1 = -3*expansion_point(i)*(1 - expansion_point(i))*x3
             x2 = (3*expansion_point(i) - 1.5_wp)*x3
@@ -114,7 +111,7 @@ contains
       series%reach = merge(min(get_reach(expansion_point), shell%closing - expansion_point), series%reach, wanted)
    end subroutine expand_series
 
-   !> Ratio of volumes x; private as the functions below, so that compilers put them into the loops.
+   !> Ratio of volumes x; private like the functions below, so that compilers inline them in the loops.
    elemental function get_ratio(deflection) result(ratio)
       !> y.
       real(wp), intent(in) :: deflection
@@ -123,7 +120,7 @@ contains
       ratio = (1 - deflection)*(1 - deflection)*(1 + 2*deflection)
    end function get_ratio
 
-   !> Distance from a deflection up to which its series is used.
+   !> Distance from an expansion point up to which its series is used.
    elemental function get_reach(deflection) result(reach)
       real(wp), intent(in) :: deflection
       real(wp) :: reach
@@ -131,18 +128,18 @@ contains
       reach = near*min(1 - deflection, 0.5_wp + deflection)
    end function get_reach
 
-   !> Deceleration y c by shell and gas.
+   !> Deceleration y c due to shell and gas.
    elemental function get_deceleration(y, d, c0, c1, c2, c3, c4, c5, c6, c7) result(acceleration)
-      !> y, its distance from the expansion point, and the terms of the series.
+      !> y, the distance from the expansion point, and the terms of the series.
       real(wp), intent(in) :: y, d, c0, c1, c2, c3, c4, c5, c6, c7
       real(wp) :: acceleration
 
       acceleration = y*(c0 + d*(c1 + d*(c2 + d*(c3 + d*(c4 + d*(c5 + d*(c6 + d*c7)))))))
    end function get_deceleration
 
-   !> Acceleration z**2/(1 - y) by the flux, for s = 1; eight terms of the geometric series as a product.
+   !> Acceleration z**2/(1 - y) due to the flux for s = 1, with eight terms of the geometric series as a product.
    elemental function get_flux_acceleration(z, d, inverse) result(acceleration)
-      !> z, the distance from the expansion point, and 1/(1 - y) there.
+      !> z, the distance from the expansion point, and 1/(1 - y) at this point.
       real(wp), intent(in) :: z, d, inverse
       !> z**2/(1 - y).
       real(wp) :: acceleration
@@ -156,19 +153,19 @@ contains
       acceleration = acceleration + acceleration*(square*square)
    end function get_flux_acceleration
 
-   !> Force on the floor and power lost, and their rates of change.
+   !> Force on the floor, dissipated power, and their rates of change.
    pure subroutine get_flows(shell, series, state, force, force_rate, power, power_rate)
       type(shell_batch_type), intent(in) :: shell
-      !> The series, in whose reach the states are.
+      !> The series; the states are in reach.
       type(series_batch_type), intent(in) :: series
       type(state_batch_type), intent(in) :: state
       !> Force on the floor: [batch_size].
       real(wp), intent(out) :: force(batch_size)
-      !> Its rate: [batch_size].
+      !> Rate of the force: [batch_size].
       real(wp), intent(out) :: force_rate(batch_size)
-      !> Power lost: [batch_size].
+      !> Dissipated power: [batch_size].
       real(wp), intent(out) :: power(batch_size)
-      !> Its rate: [batch_size].
+      !> Rate of the dissipated power: [batch_size].
       real(wp), intent(out) :: power_rate(batch_size)
       real(wp), dimension(batch_size) :: d, c, c_rate, a
       integer :: n
@@ -189,20 +186,20 @@ contains
       end associate
    end subroutine get_flows
 
-   !> One classical step, or part of one, as `rk4_step`; the forces at its beginning, and their sums.
+   !> Whole or shortened step of `rk4_step`, with the forces at its beginning; adds these to the sums of impulse and loss.
    pure subroutine take_step(shell, series, state, length, new, elastic_force, floor_force, missed)
       type(shell_batch_type), intent(in) :: shell
       type(series_batch_type), intent(in) :: series
       type(state_batch_type), intent(in) :: state
-      !> Length, in whole steps: [batch_size].
+      !> Length of the step, in whole steps: [batch_size].
       real(wp), intent(in) :: length(batch_size)
-      !> State at the end; its velocity is NaN where a stage was out of reach.
+      !> State at the end; the velocity is NaN if a stage was out of reach.
       type(state_batch_type), intent(inout) :: new
       !> Force of shell and gas, N: [batch_size].
       real(wp), intent(out) :: elastic_force(batch_size)
       !> Force on the floor, N: [batch_size].
       real(wp), intent(out) :: floor_force(batch_size)
-      !> A ball was out of reach.
+      !> Whether a ball was out of reach.
       logical, intent(out) :: missed
       real(wp) :: half, sixth, y2, y3, y4, z2, z3, z4, d1, d2, d3, d4, a1, a2, a3, a4, elastic, whole, outside, outsides
       integer :: i
@@ -233,7 +230,7 @@ contains
                d4 = y4 - point
                a4 = s*get_flux_acceleration(z4, d4, inverse) - get_deceleration(y4, d4, c0, c1, c2, c3, c4, c5, c6, c7)
 
-               ! Added, as a branch would not be vectorized.
+               ! Added, since a branch would not be vectorized.
                outside = merge(0.0_wp, not_a_number, max(max(abs(d1), abs(d2)), max(abs(d3), abs(d4))) <= series%reach(i))
                outsides = outsides + outside
                sixth = h*(1/6.0_wp)
@@ -248,7 +245,7 @@ contains
             end associate
          end do
       else
-         ! The same without the flux: gfortran does not make two loops of one, which would compute it for s = 0 too.
+         ! The same without the flux, which gfortran would otherwise compute for s = 0 too.
          !$omp simd private(half, sixth, y2, y3, y4, z2, z3, z4, d1, d2, d3, d4, a1, a2, a3, a4, elastic, whole, outside) &
          !$omp& reduction(+: outsides)
          do i = 1, batch_size

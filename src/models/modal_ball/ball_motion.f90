@@ -15,19 +15,19 @@ module thud_ball_motion
 
    !> Motion of the ball.
    type :: ball_motion_type
-      !> Amplitudes of the modes, m sqrt(kg), their rates and strains of their branches: [n_mode, 2 + n_branch].
+      !> Amplitudes of the modes, m sqrt(kg), their rates and the strains of their branches: [n_mode, 2 + n_branch].
       real(wp), allocatable :: motion(:, :)
       !> Height of the center of mass, m.
       real(wp) :: height
-      !> Its velocity upwards, m/s.
+      !> Upward velocity of the center of mass, m/s.
       real(wp) :: speed
-      !> Its acceleration downwards without contact, m/s2.
+      !> Downward acceleration of the center of mass without contact, m/s2.
       real(wp) :: gravity = 0.0_wp
-      !> Energy that damping has taken, J.
+      !> Energy lost to damping, J.
       real(wp) :: loss = 0.0_wp
-      !> Energy that went to the floor, and energy lost where an impulse closes a gap within a step, J.
+      !> Energy given to the floor, and energy lost when an impulse closes a gap within a step, J.
       real(wp) :: floor_work = 0.0_wp, contact_loss = 0.0_wp
-      !> The floor moves.
+      !> Whether the floor is mobile.
       logical :: floor_moves = .false.
       !> The floor, its steps, and its motion.
       type(receiver_type) :: floor
@@ -35,9 +35,9 @@ module thud_ball_motion
       type(receiver_motion_type) :: floor_motion
       !> Workspace of a step: motion at its beginning; impulses of the floor on the modes: [n_mode].
       real(wp), allocatable :: before(:, :), mode_impulse(:)
-      !> Gaps between rings and floor, and of rings that stick to where they touched first, m: [n_gap].
+      !> Gaps between rings and floor, and for sticking rings those to the positions of first touch, m: [n_gap].
       real(wp), allocatable :: gap(:)
-      !> Gaps of the undeformed ball with its center on the resting floor, m: [n_gap].
+      !> Gaps of the undeformed ball with its center at the height of the resting floor, m: [n_gap].
       real(wp), allocatable :: start(:)
    end type ball_motion_type
 
@@ -49,7 +49,7 @@ contains
       !> Length of a step, s.
       real(wp), intent(in) :: interval
       type(surface_rings_type), intent(in) :: rings
-      !> What the ball drops on.
+      !> The floor under the ball.
       type(receiver_type), intent(in) :: floor
       !> Outer radius, m; velocity at first touch, m/s; gravity during the contact, m/s2.
       real(wp), intent(in) :: outer_radius, impact_velocity, gravity
@@ -68,7 +68,7 @@ contains
       state%floor_motion = new_receiver_motion(floor)
    end function new_ball_motion
 
-   !> One step of the modes and of the floor, and the impulses between them at its beginning.
+   !> Advances modes and floor by one step, with the impulses between ball and floor at its beginning.
    subroutine take_step(step, interval, mass, state, contact, impulse, error)
       type(mode_step_type), intent(in) :: step
       !> Length of the step, s; mass of the ball, kg.
@@ -77,9 +77,9 @@ contains
       type(ball_motion_type), intent(inout) :: state
       !> The rings; get their impulses.
       type(ring_contact_type), intent(inout) :: contact
-      !> Impulse of all rings, N s.
+      !> Sum of the impulses of all rings, N s.
       real(wp), intent(out) :: impulse
-      !> The contact cannot be solved.
+      !> Set if the contact cannot be solved.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: speed, floor_start, work
       integer :: i, n_mode, n_gap
@@ -115,16 +115,16 @@ contains
             end do
             state%speed = state%speed + impulse/mass
             state%height = state%height + interval*impulse/mass
-            ! What the impulses take from the ball at once.
+            ! Energy that the impulses take from the ball instantaneously.
             state%contact_loss = state%contact_loss - impulse*(speed + impulse/(2*mass)) &
                + dot_product(mode_impulse, before(:, place_v) - mode_impulse/2)
          end if
-         ! The loss by damping lies between the impulse at the beginning and the end of the step.
+         ! Damping acts after the impulse at the beginning of the step.
          before(:, place_v) = before(:, place_v) - mode_impulse
          state%loss = state%loss + sum(get_energies(step, before) - get_energies(step, motion))
          if (.not. state%floor_moves) return
          call add_impulse(state%floor, state%floor_step, impulse, state%floor_motion)
-         ! The floor gets the work of the mean force.
+         ! The work on the floor is that of the mean force.
          work = impulse*(state%floor_motion%displacement - floor_start)/interval
          state%floor_work = state%floor_work + work
          state%contact_loss = state%contact_loss - work

@@ -1,10 +1,9 @@
-!> The improved analytical model that the paper asks for (section 5): the exact modes of the free
-!> hollow sphere, driven by unilateral contact with the floor. Geometry and material go in only.
+!> The improved analytical model that the paper asks for (section 5): the exact modes of the free hollow sphere under
+!> unilateral contact with the floor. Its only input is geometry and material.
 !>
-!> Modes up to a highest harmonic oscillate; all that is left out responds at once, by its static
-!> flexibility. Time steps are exact for each mode. In every step the impulses of the surface
-!> rings make the gaps complementary to the pressures: no ring penetrates, none pulls, and there
-!> is no penalty stiffness.
+!> Modes up to a highest harmonic oscillate; all others respond statically, by their flexibility. Time steps are exact for
+!> each mode. In every step the impulses of the surface rings make gaps and pressures complementary: no ring penetrates, none
+!> pulls, and there is no penalty stiffness.
 module thud_modal_ball
    use thud_ball, only: ball_type
    use thud_ball_motion, only: ball_motion_type, new_ball_motion, take_step
@@ -33,13 +32,13 @@ module thud_modal_ball
 
    public :: modal_ball_type
 
-   !> Maximum phase angle of a mode in a step; faster ones respond statically.
+   !> Maximum phase angle of a mode in a step; faster modes respond statically.
    real(wp), parameter :: max_phase = pi/2
 
-   !> Fraction of the energy at first touch that closing gaps within a step may take.
+   !> Maximum energy lost when gaps close within a step, as a fraction of the energy at first touch.
    real(wp), parameter :: max_contact_loss = 0.02_wp
 
-   !> Families whose energies are recorded separately, from n = 0 on.
+   !> Number of families whose energies are recorded separately, from n = 0 on.
    integer, parameter :: n_family = 6
 
    !> The model.
@@ -67,7 +66,7 @@ contains
       n_gap = options%rings*merge(2.0_wp, 1.0_wp, options%floor_friction == 'stick')
       cost = 4.5e-3_wp + 1.0e-7_wp*options%static_harmonics*n_gap + 1.0e-9_wp*n_mode*n_gap**2
       step_cost = 2.4e-7_wp + n_mode*(2.3e-9_wp + 1.05e-10_wp*n_gap)
-      ! Branches.
+      ! Maxwell branches.
       if (options%damping_law == 'fractional') step_cost = step_cost + 8.0e-9_wp*n_mode
       if (present(receiver)) then
          cost = cost + get_step_count(sampling)*(step_cost + 2.6e-9_wp*get_pole_count(receiver))
@@ -76,7 +75,7 @@ contains
       end if
    end function get_cost
 
-   !> Modulus of elasticity of the paper's ball, Pa (section 2.3; of linear modes an effective modulus).
+   !> Modulus of elasticity of the paper's ball, Pa (section 2.3; for linear modes an effective modulus).
    function get_paper_modulus(options) result(modulus)
       class(modal_ball_type), intent(in) :: options
       real(wp) :: modulus
@@ -84,8 +83,8 @@ contains
       modulus = 1.6e6_wp
    end function get_paper_modulus
 
-   !> Limits of linear modes, and of what rings and harmonics resolve: beyond them the octave of 500 Hz is off by more than
-   !> about 0.5 dB (docs/modal_ball.md).
+   !> Limits of linear modes, and of what rings and harmonics resolve: beyond them the level in the octave of 500 Hz is off
+   !> by more than about 0.5 dB (docs/modal_ball.md).
    function get_validity_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
@@ -163,19 +162,19 @@ contains
       call restore_blas_threads()
    end subroutine solve
 
-   !> Modes, their steps and the response of the rings.
+   !> Sets the modes, their steps and the response of the rings.
    subroutine prepare(ball, options, rings, floor, interval, step, contact, error)
       type(ball_type), intent(in) :: ball
       !> Modes and damping.
       class(modal_ball_options_type), intent(in) :: options
       type(surface_rings_type), intent(in) :: rings
-      !> What the ball drops on.
+      !> The floor under the ball.
       type(receiver_type), intent(in) :: floor
       !> Length of a step, s.
       real(wp), intent(in) :: interval
       type(mode_step_type), intent(out) :: step
       type(ring_contact_type), intent(out) :: contact
-      !> The modes cannot be computed, or the rings cannot be distinguished.
+      !> Set if the modes cannot be computed, or if the rings cannot be distinguished.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: response(rings%n_dof*options%rings, rings%n_dof*options%rings)
       real(wp), allocatable :: zeta(:)
@@ -196,7 +195,7 @@ contains
          //' cannot be distinguished; allowed: fewer rings, more static_harmonics, or more substeps')
    end subroutine prepare
 
-   !> Modes of all harmonics, and the static response of the rings to what these leave out.
+   !> Adds the modes of all harmonics, and the static response of the rings to the modes left out.
    subroutine add_modes(ball, options, rings, interval, step, response, error)
       type(ball_type), intent(in) :: ball
       !> Modes.
@@ -205,9 +204,9 @@ contains
       real(wp), intent(in) :: interval
       !> Gets frequencies, harmonics and shapes of the modes.
       type(mode_step_type), intent(inout) :: step
-      !> Gets the displacement of each ring by unit impulse on each added, m/(N s): [n_gap, n_gap].
+      !> Displacement of each ring due to unit impulse on each, m/(N s), to be added to: [n_gap, n_gap].
       real(wp), intent(inout) :: response(:, :)
-      !> The modes cannot be computed.
+      !> Set if the modes cannot be computed.
       type(error_type), allocatable, intent(out) :: error
       type(basis_type) :: basis
       type(family_type) :: family
@@ -249,7 +248,7 @@ contains
       end associate
    end subroutine add_modes
 
-   !> Marches from first touch until the ball has left for good, on a mobile floor to the end of the record.
+   !> Integrates in time from first touch until the ball has left for good, or on a mobile floor to the end of the record.
    subroutine march(ball, sampling, interval, rings, step, contact, state, history, error)
       type(ball_type), intent(in) :: ball
       type(sampling_type), intent(in) :: sampling
@@ -260,17 +259,17 @@ contains
       !> Motion of ball and floor.
       type(ball_motion_type), intent(inout) :: state
       type(force_history_type), intent(inout) :: history
-      !> The contact outlasts the record, or energy is lost in contact.
+      !> Set if the contact outlasts the record, or if energy is lost in contact.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: impulse, settling_time
       integer :: i, j, n_step, last
-      logical :: has_left
+      logical :: has_separated
 
       ! The surface may touch again while the slowest mode swings back, half a period later.
       settling_time = 0.0_wp
       if (size(step%omega) > 0) settling_time = pi/(sqrt(step%equilibrium_ratio)*minval(step%omega))
       last = 0
-      has_left = .false.
+      has_separated = .false.
       samples: do i = 1, size(history%floor_force)
          call record_motion(ball, step, state, i, history)
          do j = 1, sampling%substeps
@@ -286,42 +285,42 @@ contains
             end if
             if (contact%last == size(rings%radius)) then
                error = numerical_error('&drop: '//to_text(1.0e3_wp*n_step*interval)//' ms after first touch the ball lies ' &
-                  //'on its outermost ring, its center sunk by '//to_text(1.0e3_wp*(ball%outer_radius - state%height)) &
+                  //'on its outermost ring, its center lowered by '//to_text(1.0e3_wp*(ball%outer_radius - state%height)) &
                   //' mm; allowed: a lower height, or a stiffer ball')
                return
             end if
-            has_left = state%speed > 0.0_wp .and. (n_step - last)*interval > settling_time
-            if (has_left .and. .not. state%floor_moves) exit samples
+            has_separated = state%speed > 0.0_wp .and. (n_step - last)*interval > settling_time
+            if (has_separated .and. .not. state%floor_moves) exit samples
          end do
          if (state%floor_moves) then
-            ! The mean of the interval, as the force is.
+            ! The mean over the interval, as for the force.
             history%floor_velocity(i) = (state%floor_motion%displacement - history%floor_displacement(i)) &
                *sampling%sample_rate
             history%velocity(i) = history%velocity(i) - history%floor_velocity(i)
          end if
       end do samples
-      call check_end(sampling, settling_time, has_left, contact, state, error)
+      call check_end(sampling, settling_time, has_separated, contact, state, error)
       if (allocated(error)) return
       history%contact_time = last*interval
       call check_contact_samples(sampling, history%contact_time, error)
       if (.not. allocated(error)) call finish(ball, n_step*interval, step, state, history, error)
    end subroutine march
 
-   !> Refuses a record that ends too early.
-   subroutine check_end(sampling, settling_time, has_left, contact, state, error)
+   !> Returns an error if the record ends too early.
+   subroutine check_end(sampling, settling_time, has_separated, contact, state, error)
       type(sampling_type), intent(in) :: sampling
-      !> Time without contact after which the surface touches no more, s.
+      !> Time without contact after which the surface no longer touches, s.
       real(wp), intent(in) :: settling_time
-      !> It has passed, and the ball rises.
-      logical, intent(in) :: has_left
+      !> Whether this time has passed and the ball rises.
+      logical, intent(in) :: has_separated
       type(ring_contact_type), intent(in) :: contact
       !> Motion of ball and floor.
       type(ball_motion_type), intent(in) :: state
-      !> The ball touches, or may touch again.
+      !> Set if the ball touches the floor or may touch it again.
       type(error_type), allocatable, intent(out) :: error
       character(len=64) :: allowed
 
-      if (.not. has_left) then
+      if (.not. has_separated) then
          allowed = 'longer than that'
          if (state%floor_moves) allowed = 'longer than that, and a floor from which the ball rebounds'
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
@@ -334,7 +333,7 @@ contains
       end if
    end subroutine check_end
 
-   !> Scalars of the impact, and the check of the balances.
+   !> Sets the scalars of the impact, and checks the balances.
    subroutine finish(ball, time, step, state, history, error)
       type(ball_type), intent(in) :: ball
       !> Time since first touch, s.
@@ -344,7 +343,7 @@ contains
       type(ball_motion_type), intent(in) :: state
       !> The history; its samples are complete.
       type(force_history_type), intent(inout) :: history
-      !> The balance of energy does not close.
+      !> Set if the balance of energy does not close.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: energy, gain, initial
 
@@ -353,7 +352,7 @@ contains
       history%peak_force = maxval(history%floor_force)
       history%peak_elastic_force = history%peak_force
       call continue_to_zero(history)
-      ! Back to the end of the contact.
+      ! Extrapolated back to the end of the contact.
       history%restitution = (state%speed + state%gravity*(time - history%contact_time))/history%impact_velocity
       gain = ball%mass*(history%impact_velocity + state%speed + state%gravity*time)
       history%impulse_residual = abs(history%impulse - gain)/gain
@@ -375,7 +374,7 @@ contains
       end if
    end subroutine finish
 
-   !> Writes motion and energies of one instant into the history.
+   !> Writes motion and energies of one sample into the history.
    pure subroutine record_motion(ball, step, state, i, history)
       type(ball_type), intent(in) :: ball
       type(mode_step_type), intent(in) :: step

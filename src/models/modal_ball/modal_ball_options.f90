@@ -1,4 +1,4 @@
-!> Options of the modal ball; `thud_modal_ball` adds how it is solved.
+!> Options of the modal ball; `thud_modal_ball` adds the solution.
 module thud_modal_ball_options
    use thud_ball, only: ball_type
    use thud_error, only: error_type, input_error
@@ -18,25 +18,25 @@ module thud_modal_ball_options
    type, abstract, extends(source_model_type) :: modal_ball_options_type
       !> Highest harmonic n whose modes oscillate.
       integer :: harmonics = 48
-      !> Modes of each harmonic that oscillate.
+      !> Number of modes of each harmonic that oscillate.
       integer :: radial_modes = 5
-      !> Highest harmonic whose static flexibility counts.
+      !> Highest harmonic whose static flexibility is included.
       integer :: static_harmonics = 180
-      !> Rings of the surface that take the pressure.
+      !> Number of rings of the surface that carry the pressure.
       integer :: rings = 60
       !> Loss factor: `constant`, `rising` in proportion to frequency, or of a `fractional` law.
       character(len=name_length) :: damping_law = 'constant'
       !> Loss factor, twice the damping ratio.
       real(wp) :: loss_factor = 0.1_wp
-      !> Frequency of this loss factor where it is not constant, Hz; there the ball's modulus is the storage modulus.
+      !> Frequency of a loss factor that is not constant, Hz; there the storage modulus is the ball's modulus.
       real(wp) :: loss_frequency = 74.0_wp
-      !> Order of the derivative of a fractional law.
+      !> Order of the fractional derivative.
       real(wp) :: fractional_order = 0.3_wp
-      !> The gas in the cavity resists changes of its volume.
+      !> Whether the gas in the cavity resists changes of its volume.
       logical :: cavity_gas = .true.
-      !> Gravity acts during the contact too.
+      !> Whether gravity acts during the contact too.
       logical :: contact_gravity = .false.
-      !> Friction of the floor: `none`, or `stick`, by which touching rings do not slide.
+      !> Friction of the floor: `none`, or `stick` (touching rings do not slide).
       character(len=name_length) :: floor_friction = 'none'
       !> Harmonics treated as quasi-static instead of oscillating.
       type(list_type) :: static_families
@@ -53,29 +53,29 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         integer_field('harmonics', options%harmonics, 'highest harmonic whose modes oscillate', '[2, 200]'), &
-         integer_field('radial_modes', options%radial_modes, 'modes of each harmonic that oscillate', '[1, 20]'), &
+         integer_field('harmonics', options%harmonics, 'highest harmonic with oscillating modes', '[2, 200]'), &
+         integer_field('radial_modes', options%radial_modes, 'number of oscillating modes per harmonic', '[1, 20]'), &
          integer_field('static_harmonics', options%static_harmonics, &
-         'highest harmonic whose static flexibility counts', '[4, 400]'), &
-         integer_field('rings', options%rings, 'rings of the surface, from the lowest point to 60 degrees', &
+         'highest harmonic whose static flexibility is included', '[4, 400]'), &
+         integer_field('rings', options%rings, 'number of rings on the surface, from the lowest point to 60 degrees', &
          '[2, static_harmonics/3]'), &
-         choice_field('damping_law', options%damping_law, 'loss factor against frequency', &
+         choice_field('damping_law', options%damping_law, 'damping law: loss factor as a function of frequency', &
          [character(len=10) :: 'constant', 'rising', 'fractional']), &
          real_field('loss_factor', options%loss_factor, '', 'loss factor, twice the damping ratio', &
          '[0, 1.9]'), &
          real_field('loss_frequency', options%loss_frequency, 'Hz', &
-         'frequency of a loss factor that is not constant; of fractional also of the modulus', '[0.1, 100000]'), &
+         'frequency at which loss_factor (rising, fractional) and the modulus (fractional) apply', '[0.1, 100000]'), &
          real_field('fractional_order', options%fractional_order, '', &
-         'order of the derivative, of fractional; 1: rising', '(0, 1]'), &
-         logical_field('cavity_gas', options%cavity_gas, 'the gas in the cavity resists changes of its volume'), &
-         logical_field('contact_gravity', options%contact_gravity, 'gravity acts during the contact too'), &
+         'order of the derivative, for fractional; 1: as rising', '(0, 1]'), &
+         logical_field('cavity_gas', options%cavity_gas, 'the gas in the cavity resists volume changes'), &
+         logical_field('contact_gravity', options%contact_gravity, 'gravity acts also during the contact'), &
          choice_field('floor_friction', options%floor_friction, 'friction of the floor: none or infinite (sticking)', &
          [character(len=5) :: 'none', 'stick']), &
          list_field('static_families', options%static_families, '', 'harmonics treated as quasi-static', &
          '[0, harmonics]', whole=.true.)]
    end function get_fields
 
-   !> Refuses rings that are too few for the harmonics, and losses that no fractional law has.
+   !> Returns an error if the rings are too few for the harmonics, or if no fractional law has the loss.
    subroutine check(ball, options, sampling, error)
       type(ball_type), intent(in) :: ball
       class(modal_ball_options_type), intent(in) :: options

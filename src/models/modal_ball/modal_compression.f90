@@ -1,4 +1,4 @@
-!> Quasi-static compression of the modal ball: the static flexibility of every harmonic, at the long-term modulus, under
+!> Quasi-static compression of the modal ball: the static flexibility of all harmonics, with the long-term modulus, under
 !> unilateral contact with two plates.
 module thud_modal_compression
    use thud_ball, only: ball_type
@@ -17,12 +17,12 @@ module thud_modal_compression
 
    public :: compress_modal_ball, new_press
 
-   !> Maximum approach of the plates in a step where rings stick, over the outer radius.
+   !> Maximum approach of the plates in a step with sticking rings, as a fraction of the outer radius.
    real(wp), parameter :: max_step = 1.0e-3_wp
 
 contains
 
-   !> Force on each of two plates against their approach.
+   !> Force on each of two plates as a function of their approach.
    subroutine compress_modal_ball(ball, options, deflection, force, error)
       type(ball_type), intent(in) :: ball
       !> Harmonics and rings.
@@ -31,7 +31,7 @@ contains
       real(wp), intent(in) :: deflection(:)
       !> The force, N: [n].
       real(wp), intent(out) :: force(:)
-      !> The rings cannot be distinguished, or the ball lies on the outermost one.
+      !> Set if the rings cannot be distinguished, or if the ball lies on the outermost one.
       type(error_type), allocatable, intent(out) :: error
       type(surface_rings_type) :: rings
       type(ring_contact_type) :: contact
@@ -47,7 +47,7 @@ contains
       start(::rings%n_dof) = ball%outer_radius*(1 - rings%height)
       before = 0.0_wp
       do i = 1, size(deflection)
-         ! Where rings stick, the way there counts.
+         ! With sticking rings the result depends on the path.
          n_step = 1
          if (rings%n_dof == 2) n_step = 1 + int((deflection(i) - before)/(max_step*ball%outer_radius))
          do k = 1, n_step
@@ -70,15 +70,15 @@ contains
       end do
    end subroutine compress_modal_ball
 
-   !> The rings under forces, where those of a step take impulses.
+   !> Contact of the rings, with forces in place of the impulses of a time step.
    subroutine new_press(ball, options, rings, contact, error)
       type(ball_type), intent(in) :: ball
       !> Harmonics and rings.
       class(modal_ball_options_type), intent(in) :: options
       type(surface_rings_type), intent(in) :: rings
-      !> Its response is the gap by unit force, m/N.
+      !> The contact; its response is the gap due to unit force, m/N.
       type(ring_contact_type), intent(out) :: contact
-      !> The rings cannot be distinguished.
+      !> Set if the rings cannot be distinguished.
       type(error_type), allocatable, intent(out) :: error
       type(basis_type) :: basis
       type(family_type) :: family
@@ -95,7 +95,7 @@ contains
       relaxed%youngs_modulus = no_modes%equilibrium_ratio*ball%youngs_modulus
       basis = new_basis(relaxed, options%static_harmonics, options%cavity_gas)
       response = 0.0_wp
-      ! Both poles are pressed alike: even harmonics move by twice the force, odd ones stay.
+      ! Equal forces on both poles double the response of even harmonics and cancel that of odd ones.
       do n = 0, options%static_harmonics, 2
          call get_static_family(basis, n, family, failed)
          if (failed) exit

@@ -1,4 +1,4 @@
-!> The loss of the modes.
+!> Damping of the modes.
 module thud_modal_damping
    use thud_constants, only: pi
    use thud_fractional_loss, only: new_fractional_loss
@@ -13,7 +13,7 @@ module thud_modal_damping
 
 contains
 
-   !> Branches and damping ratios of the modes.
+   !> Sets the Maxwell branches and the damping ratios of the modes.
    subroutine set_damping(options, step, damping_ratio)
       class(modal_ball_options_type), intent(in) :: options
       !> The modes; get their branches.

@@ -1,7 +1,7 @@
 !> Exact time steps of damped modes of unit modal mass.
 !>
-!> Of a linear viscoelastic material: q'' + 2 zeta omega q' + omega**2 [g q + sum of g_k (q - x_k)] = 0 and
-!> x_k' = (q - x_k)/tau_k, the modulus being that of a spring g, Maxwell branches g_k and a viscosity.
+!> For a linear viscoelastic material, with a spring g, Maxwell branches g_k and a viscosity:
+!> q'' + 2 zeta omega q' + omega**2 [g q + sum of g_k (q - x_k)] = 0 and x_k' = (q - x_k)/tau_k.
 module thud_mode_step
    use thud_kinds, only: wp
    use thud_matrix_exponential, only: get_exponential
@@ -13,20 +13,20 @@ module thud_mode_step
    !> Indices of amplitude q and rate v in the motion of a mode; the strains x of the branches follow.
    integer, parameter, public :: place_q = 1, place_v = 2
 
-   !> The modes and one step of each: their motion is multiplied by the factors; an impulse p at the beginning
-   !> adds -p times the factors of the rate.
+   !> The modes and their steps: the factors multiply the motion of a mode; an impulse p at the beginning adds -p times the
+   !> factors of the rate.
    type :: mode_step_type
-      !> Angular frequencies of the storage modulus, rad/s: [n_mode].
+      !> Angular frequencies for the storage modulus, rad/s: [n_mode].
       real(wp), allocatable :: omega(:)
       !> Harmonic of each mode: [n_mode].
       integer, allocatable :: harmonic(:)
-      !> Long-term modulus over the storage modulus.
+      !> Long-term modulus divided by storage modulus.
       real(wp) :: equilibrium_ratio = 1.0_wp
-      !> Moduli of the branches over the storage modulus, and their relaxation times, s: [n_branch].
+      !> Moduli of the branches divided by the storage modulus, and their relaxation times, s: [n_branch].
       real(wp), allocatable :: relative_modulus(:), time(:)
       !> Factors of one step: [n_mode, 2 + n_branch, 2 + n_branch].
       real(wp), allocatable :: factor(:, :, :)
-      !> Mode shapes at the rings, downwards by unit amplitude: [n_mode, n_gap].
+      !> Mode shapes at the rings, downwards, per unit amplitude: [n_mode, n_gap].
       real(wp), allocatable :: shape_at_ring(:, :)
    end type mode_step_type
 
@@ -34,9 +34,9 @@ contains
 
    !> Factors of one step.
    pure subroutine set_factors(step, damping_ratio, interval)
-      !> The modes, their frequencies and branches set.
+      !> The modes; frequencies and branches are set.
       type(mode_step_type), intent(inout) :: step
-      !> Damping ratio of each mode, that of the viscosity: [n_mode].
+      !> Damping ratio of each mode from the viscosity: [n_mode].
       real(wp), intent(in) :: damping_ratio(:)
       !> Length of a step, s.
       real(wp), intent(in) :: interval
@@ -46,7 +46,7 @@ contains
       n = size(rates, 1)
       allocate (step%factor(size(step%omega), n, n))
       do i = 1, size(step%omega)
-         ! The rate over the frequency keeps the elements alike.
+         ! The rate divided by the frequency makes the elements similar.
          associate (omega => step%omega(i))
             rates = 0.0_wp
             rates(place_q, place_v) = omega
@@ -64,7 +64,7 @@ contains
       end do
    end subroutine set_factors
 
-   !> Motion of the modes a step on.
+   !> Advances the motion of the modes by one step.
    pure subroutine advance(step, before, after)
       type(mode_step_type), intent(in) :: step
       !> Motion at the beginning and at the end of the step: [n_mode, 2 + n_branch].

@@ -1,9 +1,9 @@
-!> Unilateral contact of surface rings with a plane: impulses p >= 0 and gaps g + A p >= 0 of
-!> which one is zero for every ring, a linear complementarity problem.
+!> Unilateral contact of surface rings with a plane: impulses p >= 0 and gaps g + A p >= 0, one of which is zero for every
+!> ring, a linear complementarity problem.
 !>
-!> Rings that stick have a second gap, to the position of first touch, and a second impulse of any sign. It closes the
-!> gap of the rings that touched in the step before: these do not depend on the unknowns, so the solution is unique, and
-!> the error of holding a ring too long or too late is proportional to the step.
+!> Sticking rings have a second gap, to the position of first touch, and a second impulse of any sign. The second impulse
+!> closes the second gap of the rings that touched in the previous step: this set does not depend on the unknowns, so the
+!> solution is unique, and the error of a ring that sticks too long or too late is proportional to the step.
 module thud_ring_contact
    use thud_error, only: error_type, numerical_error
    use thud_kinds, only: wp
@@ -17,17 +17,17 @@ module thud_ring_contact
    !> Gap that counts as closed, m: rounding of heights.
    real(wp), parameter :: closed = 1.0e-12_wp
 
-   !> Rounds of the search for the touching rings.
+   !> Maximum number of rounds in the search for the touching rings.
    integer, parameter :: max_rounds = 200
 
    !> Rings, ordered from the lowest point outwards.
    type :: ring_contact_type
-      !> Degrees of freedom of a ring: 1, or 2 where it sticks; its gaps are adjacent.
+      !> Degrees of freedom of a ring: 1, or 2 if it sticks; gaps of a ring are adjacent.
       integer :: n_dof = 1
-      !> Gap by unit impulses, m/(N s): [n_gap, n_gap].
+      !> Gaps due to unit impulses, m/(N s): [n_gap, n_gap].
       real(wp), allocatable :: response(:, :)
-      !> Its Cholesky factor. The touching rings are nearly always the first ones, and the factor of
-      !> a leading block is the leading block of the factor: [n_gap, n_gap].
+      !> Cholesky factor of the response: [n_gap, n_gap]. The touching rings are nearly always the first ones, and the factor
+      !> of a leading block is the leading block of the factor.
       real(wp), allocatable :: factor(:, :)
       !> Impulses in the last step, N s, and gaps after it, m: [n_gap].
       real(wp), allocatable :: impulse(:), after(:)
@@ -41,13 +41,13 @@ contains
 
    !> Prepares the contact.
    subroutine new_ring_contact(response, n_dof, contact, failed)
-      !> Gap by unit impulses, symmetric, m/(N s): [n_gap, n_gap].
+      !> Gaps due to unit impulses, symmetric, m/(N s): [n_gap, n_gap].
       real(wp), intent(in) :: response(:, :)
       !> Degrees of freedom of a ring.
       integer, intent(in) :: n_dof
-      !> The contact, nothing touching.
+      !> The contact; no ring touches.
       type(ring_contact_type), intent(out) :: contact
-      !> The response is not positive definite.
+      !> Whether the response is not positive definite.
       logical, intent(out) :: failed
       integer :: n, info
 
@@ -61,13 +61,13 @@ contains
       failed = info /= 0
    end subroutine new_ring_contact
 
-   !> Impulses of one step, by the active set of the step before.
+   !> Impulses of one step, by an active set that starts from the previous step.
    subroutine solve_contact(contact, gap, error)
-      !> The contact; impulses and touching rings are those of this step afterwards.
+      !> The contact; gets impulses and touching rings of this step.
       type(ring_contact_type), intent(inout) :: contact
       !> Gaps without contact, m: [n_gap].
       real(wp), intent(in) :: gap(:)
-      !> The touching rings were not found.
+      !> Set if the touching rings were not found.
       type(error_type), allocatable, intent(out) :: error
       logical :: wrong(size(contact%touches))
       integer :: round, first_wrong
@@ -86,7 +86,7 @@ contains
          if (round < max_rounds/2) then
             contact%touches = contact%touches .neqv. wrong
          else
-            ! One ring at a time cannot cycle (Murty's rule).
+            ! Changing one ring at a time cannot cycle (Murty's rule).
             first_wrong = findloc(wrong, .true., dim=1)
             contact%touches(first_wrong) = .not. contact%touches(first_wrong)
          end if
@@ -95,7 +95,7 @@ contains
          //' rounds; allowed: fewer rings, or more substeps')
    end subroutine solve_contact
 
-   !> Lets the rings that touch at the end of a step stick there.
+   !> Makes the rings that touch at the end of a step stick there.
    pure subroutine update_sticking(contact, start)
       type(ring_contact_type), intent(inout) :: contact
       !> Gaps without motion, m: [n_gap].
@@ -106,11 +106,11 @@ contains
       contact%sticks = contact%touches
    end subroutine update_sticking
 
-   !> Impulses that close the gaps of the touching rings, and those of the rings that are held.
+   !> Impulses that close the gaps of touching rings and the second gaps of sticking rings.
    subroutine close_gaps(contact, gap, failed)
       type(ring_contact_type), intent(inout) :: contact
       real(wp), intent(in) :: gap(:)
-      !> The response of the touching rings is not positive definite.
+      !> Whether the response of these gaps is not positive definite.
       logical, intent(out) :: failed
       real(wp), allocatable :: matrix(:, :), solution(:, :)
       integer, allocatable :: indices(:)

@@ -1,10 +1,10 @@
 !> Axisymmetric modes of a free hollow sphere without twist: displacements U(r) P_n(cos t) along
 !> the radius and V(r) dP_n/dt along the meridian, t the angle from the pole.
 !>
-!> Galerkin's method with Legendre polynomials in r; all integrals over the sphere are exact. With
-!> W = r div u the meridional displacement is V = (r U' + 2 U - W)/(n (n + 1)): the unknowns are U
-!> and W, incompressible material (nu = 1/2) is W = 0, and nearly incompressible material does not
-!> lock. Strain energy and kinetic energy become sums of Gram matrices that do not depend on n.
+!> Galerkin's method with Legendre polynomials in r; all integrals over the sphere are exact. With W = r div u the meridional
+!> displacement is V = (r U' + 2 U - W)/(n (n + 1)): the unknowns are U and W, W = 0 is incompressible material (nu = 1/2),
+!> and nearly incompressible material does not lock. Strain energy and kinetic energy become sums of Gram matrices that do
+!> not depend on n.
 module thud_sphere_modes
    use thud_ball, only: ball_type, get_density
    use thud_constants, only: pi
@@ -16,7 +16,7 @@ module thud_sphere_modes
 
    public :: basis_type, family_type, get_family, get_static_family, new_basis
 
-   !> Distance of Poisson's ratio from 1/2 within which material is incompressible: beyond it the
+   !> Distance of Poisson's ratio from 1/2 below which the material counts as incompressible: at less distance the
    !> compressible energy would drown the others in rounding, and modes differ by as little.
    real(wp), parameter :: incompressible_distance = 1.0e-7_wp
 
@@ -32,7 +32,7 @@ module thud_sphere_modes
       real(wp) :: shear_modulus
       !> First Lame constant, Pa; not used for incompressible material.
       real(wp) :: lame = 0.0_wp
-      !> The material is incompressible: W = 0.
+      !> Whether the material is incompressible: W = 0.
       logical :: incompressible
       !> Stiffness of the enclosed gas against its change of volume, Pa/m3.
       real(wp) :: gas_stiffness
@@ -44,21 +44,20 @@ module thud_sphere_modes
       real(wp), allocatable :: polynomial(:, :, :)
       !> Polynomials and two derivatives at the outer and at the inner radius: [2, degree + 1, 3].
       real(wp), allocatable :: at_end(:, :, :)
-      !> Terms of energies by their power of n (n + 1), see `new_basis`: [n, n, 5] with n up to
-      !> 2 (degree + 1).
+      !> Terms of the energies by their power of n (n + 1), see `set_gram`: [n, n, 5] with n up to 2 (degree + 1).
       real(wp), allocatable :: gram(:, :, :)
    end type basis_type
 
-   !> Modes of one harmonic as the contact sees them.
+   !> Modes of one harmonic, as far as the contact needs them.
    type :: family_type
       !> Harmonic n.
       integer :: harmonic = 0
       !> Angular frequencies, ascending, without the rigid mode, rad/s: [n_mode].
       real(wp), allocatable :: omega(:)
-      !> U and V at the outer surface of modes of unit modal mass, 1/sqrt(kg): [2, n_mode].
+      !> U and V at the outer surface for modes of unit modal mass, 1/sqrt(kg): [2, n_mode].
       real(wp), allocatable :: surface(:, :)
-      !> Static displacements of the surface by what the modes leave out, U and V by unit
-      !> generalized forces on U and V, m/N: [2, 2].
+      !> Static flexibility of the modes left out: U and V at the outer surface due to unit generalized forces on U and V,
+      !> m/N: [2, 2].
       real(wp) :: flexibility(2, 2) = 0.0_wp
    end type family_type
 
@@ -67,9 +66,9 @@ contains
    !> Basis for all harmonics up to a highest one.
    function new_basis(ball, highest_harmonic, with_gas) result(basis)
       type(ball_type), intent(in) :: ball
-      !> Highest harmonic that will be asked for.
+      !> Highest harmonic that will be used.
       integer, intent(in) :: highest_harmonic
-      !> The enclosed gas resists changes of its volume.
+      !> Whether the enclosed gas resists changes of its volume.
       logical, intent(in) :: with_gas
       type(basis_type) :: basis
       real(wp), allocatable :: node(:)
@@ -109,7 +108,7 @@ contains
 
    !> Gram matrices of the strain and kinetic energies.
    subroutine set_gram(basis, n)
-      !> The basis, its polynomials set.
+      !> The basis; its polynomials are set.
       type(basis_type), intent(inout) :: basis
       !> Number of polynomials.
       integer, intent(in) :: n
@@ -156,7 +155,7 @@ contains
          matrix = matmul(transpose(a), spread(basis%weight, 2, size(b, 2))*b)
       end function product_of
 
-      !> `product_of` both ways.
+      !> `product_of` in both orders.
       function mixed(a, b) result(matrix)
          real(wp), intent(in) :: a(:, :)
          real(wp), intent(in) :: b(:, :)
@@ -168,10 +167,10 @@ contains
 
    end subroutine set_gram
 
-   !> Degree of the polynomials that resolve a harmonic: its modes fall off like r^n, which takes
-   !> a degree in proportion to the root of the exponent; the tests compare it with higher ones.
+   !> Degree of the polynomials that resolves a harmonic. Its modes fall off like r^n, which needs a degree proportional to
+   !> sqrt(n ln(outer/inner radius)); the tests compare this degree with higher ones.
    pure function get_degree(basis, harmonic) result(degree)
-      !> The basis, its radii set.
+      !> The basis; its radii are set.
       type(basis_type), intent(in) :: basis
       integer, intent(in) :: harmonic
       integer :: degree
@@ -179,17 +178,17 @@ contains
       degree = 10 + ceiling(2.4_wp*sqrt(harmonic*log(basis%outer_radius/basis%inner_radius)))
    end function get_degree
 
-   !> The lowest modes of one harmonic, and the flexibility of all others.
+   !> The lowest modes of one harmonic, and the flexibility of all other modes.
    subroutine get_family(basis, harmonic, max_modes, highest_omega, family, failed)
       type(basis_type), intent(in) :: basis
       !> Harmonic n.
       integer, intent(in) :: harmonic
-      !> Number of modes to keep; fewer where the basis has fewer.
+      !> Maximum number of modes to keep.
       integer, intent(in) :: max_modes
       !> Highest angular frequency to keep, rad/s.
       real(wp), intent(in) :: highest_omega
       type(family_type), intent(out) :: family
-      !> The eigenproblem could not be solved.
+      !> Whether the eigenproblem could not be solved.
       logical, intent(out) :: failed
       real(wp), allocatable :: stiffness(:, :), mass(:, :), surface(:, :), square(:), work(:)
       integer :: n, info, first, last, k
@@ -214,14 +213,14 @@ contains
       end do
    end subroutine get_family
 
-   !> Flexibility of a whole harmonic, without its modes.
+   !> Flexibility of a harmonic, without its modes.
    subroutine get_static_family(basis, harmonic, family, failed)
       type(basis_type), intent(in) :: basis
       !> Harmonic n, any but 1.
       integer, intent(in) :: harmonic
       !> The flexibility; no modes.
       type(family_type), intent(out) :: family
-      !> The stiffness is singular.
+      !> Whether the stiffness is singular.
       logical, intent(out) :: failed
       real(wp), allocatable :: stiffness(:, :), mass(:, :), surface(:, :), solution(:, :)
       integer :: n, info
@@ -273,7 +272,7 @@ contains
       end associate
    end subroutine assemble
 
-   !> The same for n = 0, where U = S/r^2 with S a polynomial, a constant if incompressible.
+   !> The same for n = 0: U = S/r^2 with a polynomial S, a constant if incompressible.
    subroutine assemble_breathing(basis, stiffness, mass, surface)
       type(basis_type), intent(in) :: basis
       real(wp), allocatable, intent(out) :: stiffness(:, :)

@@ -1,11 +1,10 @@
-!> Rings around the lowest point of the sphere that take the pressure of the floor.
+!> Rings around the lowest point of the sphere that carry the pressure of the floor.
 !>
-!> The pressure is linear between neighboring rings: ring i stands for the hat that is 1 at its angle and 0 at its
-!> neighbors'. Its height is the mean over that hat, so that force times displacement is work. Loads on lines instead would
-!> converge with the first power of the spacing, and take many more harmonics.
+!> The pressure is linear between neighboring rings: ring i stands for the hat function that is 1 at its angle and 0 at the
+!> neighboring ones. The height of a ring is the mean over its hat function, so that force times displacement is work. Line
+!> loads would converge only with the first power of the spacing, and need many more harmonics.
 !>
-!> Rings that stick have two degrees of freedom, down and inwards; each has its row of the mode shapes, first that of
-!> height.
+!> Sticking rings have two degrees of freedom, downwards and inwards, each with a row of the mode shapes, downwards first.
 module thud_surface_rings
    use thud_constants, only: pi
    use thud_kinds, only: wp
@@ -20,13 +19,13 @@ module thud_surface_rings
 
    !> The rings of a sphere of radius 1.
    type :: surface_rings_type
-      !> Distance of each from the axis: [n_ring].
+      !> Distance of each ring from the axis: [n_ring].
       real(wp), allocatable :: radius(:)
-      !> Mean height of each hat below the center: [n_ring].
+      !> Mean height of each hat function below the center: [n_ring].
       real(wp), allocatable :: height(:)
-      !> Mean displacement of each hat by unit U and by unit V of each harmonic: [n_dof*n_ring, 2, 0:highest].
+      !> Mean displacement over each hat function due to unit U and unit V of each harmonic: [n_dof*n_ring, 2, 0:highest].
       real(wp), allocatable :: shape_at_ring(:, :, :)
-      !> Degrees of freedom of a ring: 1, or 2 where it sticks.
+      !> Degrees of freedom of a ring: 1, or 2 if it sticks.
       integer :: n_dof = 1
    end type surface_rings_type
 
@@ -38,7 +37,7 @@ contains
       integer, intent(in) :: n_ring
       !> Highest harmonic.
       integer, intent(in) :: highest
-      !> The rings do not slide.
+      !> Whether the rings stick.
       logical, intent(in) :: sticks
       type(surface_rings_type) :: rings
       real(wp), dimension(0:highest) :: value, first, second
@@ -52,7 +51,7 @@ contains
       rings%n_dof = merge(2, 1, sticks)
       allocate (rings%height(n_ring), rings%shape_at_ring(rings%n_dof*n_ring, 2, 0:highest), source=0.0_wp)
       area = 0.0_wp
-      ! Enough for all digits of a hat times the highest harmonic.
+      ! Enough for all digits of a hat function times the highest harmonic.
       n_node = 4 + ceiling(highest*width/2)
       allocate (node(n_node), weight(n_node))
       call get_gauss_legendre(node, weight)
@@ -64,12 +63,12 @@ contains
                area_fraction = weight(k)*merge(1 + node(k), 1 - node(k), j == 1)*sin(angle)
                area(i + j) = area(i + j) + area_fraction
                rings%height(i + j) = rings%height(i + j) + area_fraction*cos(angle)
-               ! P_n cos t and -dP_n/dt sin t.
+               ! Downwards: P_n cos t for U and -dP_n/dt sin t for V.
                row = rings%n_dof*(i + j - 1) + 1
                rings%shape_at_ring(row, 1, :) = rings%shape_at_ring(row, 1, :) + area_fraction*cos(angle)*value
                rings%shape_at_ring(row, 2, :) = rings%shape_at_ring(row, 2, :) + area_fraction*sin(angle)**2*first
                if (.not. sticks) cycle
-               ! -P_n sin t and -dP_n/dt cos t.
+               ! Inwards: -P_n sin t for U and -dP_n/dt cos t for V.
                rings%shape_at_ring(row + 1, 1, :) = rings%shape_at_ring(row + 1, 1, :) - area_fraction*sin(angle)*value
                rings%shape_at_ring(row + 1, 2, :) = rings%shape_at_ring(row + 1, 2, :) + &
                   area_fraction*sin(angle)*cos(angle)*first

@@ -76,25 +76,25 @@ def read_channels(path: Path) -> list[Channel]:
     name = shown_path(path)
     if not head:
         refuse(f"{name}: is empty", "a recording")
-    found = next((one for one in FORMATS if one.matches(head)), None)
-    named = next((one for one in FORMATS if path.suffix.lower() in one.suffixes), None)
+    actual = next((entry for entry in FORMATS if entry.matches(head)), None)
+    expected = next((entry for entry in FORMATS if path.suffix.lower() in entry.suffixes), None)
     advice = next((text for start, text in OTHERS.items() if head.startswith(start)), None)
     if advice:
         refuse(f"{name}: is of a format that is not supported", advice)
-    if found is None or (found.module == "text" and named not in {None, found}):
-        kinds = ", ".join(one.name for one in FORMATS)
-        reason = f"is no {named.name} file" if named else "is of no known format"
+    if actual is None or (actual.module == "text" and expected not in {None, actual}):
+        kinds = ", ".join(entry.name for entry in FORMATS)
+        reason = f"is no {expected.name} file" if expected else "is of no known format"
         refuse(f"{name}: {reason} by its first bytes", f"{kinds} files")
-    module = importlib.import_module(f"{__name__}.{found.module}")
-    if found.is_probed:
-        probe_in_subprocess(lambda file: _read_ends(module.read_channels(file)), path, found.name)
-    with guarded(path, found.name):
+    module = importlib.import_module(f"{__name__}.{actual.module}")
+    if actual.is_probed:
+        probe_in_subprocess(lambda file: _read_ends(module.read_channels(file)), path, actual.name)
+    with guarded(path, actual.name):
         channels: list[Channel] = module.read_channels(path)
         return channels
 
 
 def _read_ends(channels: list[Channel]) -> None:
     """Read the first and the last sample of some channels."""
-    for one in channels[:MAX_PROBED]:
-        one.samples(0, 1)
-        one.samples(one.n_sample - 1, one.n_sample)
+    for channel in channels[:MAX_PROBED]:
+        channel.samples(0, 1)
+        channel.samples(channel.n_sample - 1, channel.n_sample)

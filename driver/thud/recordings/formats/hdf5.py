@@ -108,11 +108,11 @@ def read_channels(path: Path) -> list[Channel]:
     h5py = library("h5py", "HDF5")
     name = shown_path(path)
     with _open(h5py, path) as file:
-        found = _walk(h5py, file, path)
-        times = [entry for entry in found if is_time(entry.key.rpartition("/")[2])]
+        series = _walk(h5py, file, path)
+        times = [entry for entry in series if is_time(entry.key.rpartition("/")[2])]
         channels: list[Channel] = []
-        for entry in found:
-            if entry not in times or len(found) == 1:
+        for entry in series:
+            if entry not in times or len(series) == 1:
                 channels += _channels(path, entry, times, len(channels))
     if not channels:
         refuse(
@@ -133,7 +133,7 @@ def _open(h5py: Any, path: Path) -> Any:  # noqa: ANN401 - a library
 
 def _walk(h5py: Any, file: Any, path: Path) -> list[_Vectors]:  # noqa: ANN401 - a library
     """Return the datasets that may hold channels."""
-    found: list[_Vectors] = []
+    series: list[_Vectors] = []
     waiting: list[tuple[str, int, list[tuple[str, object]]]] = [("", 0, [])]
     seen = {h5py.h5o.get_info(file.id).addr}
     while waiting:
@@ -153,8 +153,8 @@ def _walk(h5py: Any, file: Any, path: Path) -> list[_Vectors]:  # noqa: ANN401 -
         for key, data in vectors:
             own = _attributes(h5py, data)
             if find_word(own, MATLAB_CLASS) not in MATLAB_OTHERS:
-                found.append(_Vectors(key, data, [*own, *header]))
-    return found
+                series.append(_Vectors(key, data, [*own, *header]))
+    return series
 
 
 def _entries(h5py: Any, group: Any, seen: set[int], name: str) -> Iterator[tuple[str, Any]]:  # noqa: ANN401
@@ -179,16 +179,16 @@ def _entries(h5py: Any, group: Any, seen: set[int], name: str) -> Iterator[tuple
 
 def _attributes(h5py: Any, entry: Any) -> list[tuple[str, object]]:  # noqa: ANN401 - a library
     """Return the scalar attributes of an object, and any that scale it."""
-    found: list[tuple[str, object]] = []
+    attributes: list[tuple[str, object]] = []
     for key in entry.attrs:
         kind = entry.attrs.get_id(key)
         if _is_scalar(h5py, kind.shape, kind.dtype):
-            found.append((key, text_of(entry.attrs[key])))
+            attributes.append((key, text_of(entry.attrs[key])))
         elif plain(key) in SCALING:
-            found.append((key, f"values of shape {kind.shape or ()}"))
-    if len(found) > MAX_ATTRIBUTES:
-        found = [(key, value) for key, value in found if plain(key) in SCALING]
-    return found
+            attributes.append((key, f"values of shape {kind.shape or ()}"))
+    if len(attributes) > MAX_ATTRIBUTES:
+        attributes = [(key, value) for key, value in attributes if plain(key) in SCALING]
+    return attributes
 
 
 def _is_scalar(h5py: Any, shape: tuple[int, ...] | None, dtype: Any) -> bool:  # noqa: ANN401 - a library

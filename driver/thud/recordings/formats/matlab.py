@@ -58,7 +58,7 @@ def _arrays(key: str, content: object, name: str) -> Iterator[tuple[str, NDArray
             yield from _arrays(f"{key}/{field}", value, name)
         return
     value = np.asarray(content)
-    if value.dtype == object and any(isinstance(one, dict) for one in value.ravel()):
+    if value.dtype == object and any(isinstance(element, dict) for element in value.ravel()):
         refuse(
             f"{name}: {shown_text(key)} is an array of structures, or damaged",
             "a structure of one element, or vectors as variables of their own",

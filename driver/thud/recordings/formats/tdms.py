@@ -50,10 +50,10 @@ class _OpenFile:
 
 def _library() -> Any:  # noqa: ANN401 - a module
     """Return the library without its warnings, whose reasons are refused here."""
-    found = library("nptdms", "TDMS")
+    nptdms = library("nptdms", "TDMS")
     # Each of its modules has a logger with a level of its own.
-    found.log.log_manager.set_level(logging.ERROR)
-    return found
+    nptdms.log.log_manager.set_level(logging.ERROR)
+    return nptdms
 
 
 def read_channels(path: Path) -> list[Channel]:
@@ -62,12 +62,12 @@ def read_channels(path: Path) -> list[Channel]:
     with path.open("rb") as raw:
         _require_complete(raw, shown_path(path))
     file = _OpenFile(path)
-    found = [(group, channel) for group in file.tdms.groups() for channel in group.channels()]
-    if len(found) > MAX_CHANNELS:
-        refuse(f"{shown_path(path)}: {len(found)} channels", f"up to {MAX_CHANNELS}")
+    entries = [(group, channel) for group in file.tdms.groups() for channel in group.channels()]
+    if len(entries) > MAX_CHANNELS:
+        refuse(f"{shown_path(path)}: {len(entries)} channels", f"up to {MAX_CHANNELS}")
     return [
         _channel(file, number, group, channel)
-        for number, (group, channel) in enumerate(found, start=1)
+        for number, (group, channel) in enumerate(entries, start=1)
         if channel.dtype.kind in "iuf" and len(channel)
     ]
 

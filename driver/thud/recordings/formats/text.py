@@ -250,11 +250,11 @@ def _require_words(block: list[str], first: int, words: list[int], table: _Table
     """Raise InputError where a column of words has a number."""
     for number, line in enumerate(block, first):
         cells = table.cells(line)
-        found = next((i for i in words if i < len(cells) and is_number(cells[i])), None)
-        if found is not None:
+        column = next((i for i in words if i < len(cells) and is_number(cells[i])), None)
+        if column is not None:
             refuse(
-                f"{table.name}: line {number}: column {found + 1} has the number "
-                f"{shown_text(cells[found])} and none in line {table.first}",
+                f"{table.name}: line {number}: column {column + 1} has the number "
+                f"{shown_text(cells[column])} and none in line {table.first}",
                 "columns of numbers or of words",
             )
 
@@ -292,8 +292,8 @@ def _convert_each(block: list[str], first: int, table: _Table) -> NDArray[np.flo
             wrong = table.decimal.wrong(shown_text(used[row.index(None)]))
             refuse(f"{table.name}: line {number}: {wrong}", ALLOWED)
         if len(cells) != table.width:
-            what = f"{len(cells)} columns, {table.width} above it"
-            refuse(f"{table.name}: line {number}: {what}", ALLOWED)
+            problem = f"{len(cells)} columns, {table.width} above it"
+            refuse(f"{table.name}: line {number}: {problem}", ALLOWED)
         rows.append(row)
     return np.array(rows, dtype=np.float64).reshape(len(rows), len(table.used))
 
@@ -303,8 +303,8 @@ def _channels(table: _Table, values: dict[int, NDArray[np.float64]]) -> list[Cha
     numeric = list(values)
     rows = len(values[numeric[0]])
     if rows < MIN_SAMPLES:
-        what = f"{rows} rows of {len(numeric)} numbers"
-        refuse(f"{table.name}: {what}", f"{MIN_SAMPLES} rows or more of numbers")
+        problem = f"{rows} rows of {len(numeric)} numbers"
+        refuse(f"{table.name}: {problem}", f"{MIN_SAMPLES} rows or more of numbers")
     titles, units = _titles(table, table.width)
     rate = find_rate(table.header, table.decimal.mark if table.decimal.line else "")
     steps: tuple[str, ...] = ()

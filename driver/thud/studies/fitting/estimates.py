@@ -87,8 +87,8 @@ class Estimates(StudyResult):
 
         They end at the limits of the search. `confidence` is by default that of the fit.
         """
-        asked = self.confidence if confidence is None else confidence
-        factor = coverage_factor(asked, self.interval_freedom)
+        confidence = self.confidence if confidence is None else confidence
+        factor = coverage_factor(confidence, self.interval_freedom)
         half = factor * np.sqrt(np.diag(self.covariance))
         low = np.maximum(self.estimate - half, self.limits[:, 0]).tolist()
         high = np.minimum(self.estimate + half, self.limits[:, 1]).tolist()

@@ -53,10 +53,10 @@ class ForceMisfit(Misfit):
     def __init__(self, target: ForceTarget, record: Record, pulse: tuple[int, int]) -> None:
         self.time, self.force, self.sample_rate = record
         self.target, self.below = target, target.below
-        given = target.record
-        self.exact = isinstance(given, Impact)
+        source = target.record
+        self.exact = isinstance(source, Impact)
         self.kind = target.force or (
-            given.assessed_force() if isinstance(given, Impact) else "floor"
+            source.assessed_force() if isinstance(source, Impact) else "floor"
         )
         self.period = len(self.time) / self.sample_rate
         count = int(self.below * self.period * (1 + SAME)) + 1
@@ -230,8 +230,8 @@ class ForceMisfit(Misfit):
         follow is there during the contact only.
         """
         rest = self._grid(self.spectrum - self.model_spectrum(impact, own))
-        left = rest - self.weights.background(rest)
-        if np.sqrt(np.mean(left**2)) < NUMERICAL * self.force.max():
+        unexplained = rest - self.weights.background(rest)
+        if np.sqrt(np.mean(unexplained**2)) < NUMERICAL * self.force.max():
             return []
         weighted = self.weights.matrix @ rest / deviation
         time = self.time[0] + np.arange(self.count) * self.period / self.count

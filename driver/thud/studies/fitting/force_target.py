@@ -148,15 +148,15 @@ class ForceTarget(Immutable):
         return int(first), min(int(stop) + 1, len(force))
 
     def _samples(self) -> Record:
-        given = self.record
-        if isinstance(given, Recording):
-            drop = given.drops[self.drop - 1]
+        record = self.record
+        if isinstance(record, Recording):
+            drop = record.drops[self.drop - 1]
             # With what was removed: the fit weighs it itself.
             return Record(drop.time, drop.force + drop.contact.removed, drop.sample_rate)
-        if isinstance(given, Impact):
-            return Record(given.time, given.force(self.force), given.sample_rate)
+        if isinstance(record, Impact):
+            return Record(record.time, record.force(self.force), record.sample_rate)
         try:
-            table = np.column_stack([np.asarray(column, dtype=np.float64) for column in given])
+            table = np.column_stack([np.asarray(column, dtype=np.float64) for column in record])
         except (TypeError, ValueError) as error:
             refuse(
                 "target cannot be used",

@@ -106,7 +106,7 @@ def worst_directions(covariance: Array, maximum: float) -> list[tuple[float, Arr
     return result
 
 
-def null_sentence(names: Sequence[str], direction: Array) -> str:
+def null_message(names: Sequence[str], direction: Array) -> str:
     """Return the meaning of a direction that is not identifiable."""
     part = _parts(names, direction)
     if len(part) == 1:
@@ -115,7 +115,7 @@ def null_sentence(names: Sequence[str], direction: Array) -> str:
     return f"{change} leave what is compared as it is{_product(part)}"
 
 
-def weak_sentence(names: Sequence[str], direction: Array, width: float, confidence: float) -> str:
+def weak_message(names: Sequence[str], direction: Array, width: float, confidence: float) -> str:
     """Return the meaning of a direction with a relative half interval `width` that is wide."""
     part = _parts(names, direction)
     share = f"{100 * width * max(abs(value) for _, value in part):.0f} %"
@@ -130,7 +130,7 @@ def weak_sentence(names: Sequence[str], direction: Array, width: float, confiden
     )
 
 
-def pair_sentences(names: Sequence[str], correlation: Array, least: float) -> list[str]:
+def pair_messages(names: Sequence[str], correlation: Array, least: float) -> list[str]:
     """Return the pairs of parameters whose correlation reaches a size, the strongest first."""
     strong = np.triu(np.nan_to_num(np.abs(correlation)), 1)
     pairs = sorted(np.argwhere(strong >= least).tolist(), key=lambda pair: -strong[*pair])
@@ -145,7 +145,9 @@ def pair_sentences(names: Sequence[str], correlation: Array, least: float) -> li
     return result
 
 
-def statement(names: Sequence[str], covariance: Array, correlation: Array, count: int) -> list[str]:
+def identifiability(
+    names: Sequence[str], covariance: Array, correlation: Array, count: int
+) -> list[str]:
     """Return how well parameters can be separated, from the covariance of their relative values.
 
     The first `count` parameters are those of the model.
@@ -161,7 +163,7 @@ def statement(names: Sequence[str], covariance: Array, correlation: Array, count
             f"least determined: {change}, standard error {size:.2g} %; a direction that is "
             f"{worst / best:.3g} times as uncertain as the best determined one"
         )
-    return result + pair_sentences(names, correlation, STRONG)
+    return result + pair_messages(names, correlation, STRONG)
 
 
 def _parts(names: Sequence[str], direction: Array) -> list[tuple[str, float]]:
@@ -188,8 +190,8 @@ def _product(part: Sequence[tuple[str, float]]) -> str:
     """Return the product of powers that two parameters determine."""
     if len(part) > 2:  # noqa: PLR2004 - a pair determines one product of powers
         return ""
-    (first, one), (second, other) = part
-    power = -one / other
+    (first, a), (second, b) = part
+    power = -a / b
     return f"; only {first} * {second}^{power:.3g} is determined, close to these values"
 
 

@@ -65,17 +65,17 @@ class LevelTarget(Plain):
         if self.force is not None:
             require_choice("target: force", self.force, FORCES)
         nominal = get_bands(self.bands).nominal.tolist()
-        wanted = nominal
+        frequencies = nominal
         if self.frequencies is not None:
             count = len(self.frequencies) if isinstance(self.frequencies, Sized) else 1
-            wanted = numbers("frequencies", self.frequencies, count).tolist()
-        if not set(wanted) <= set(nominal) or len(set(wanted)) < len(wanted):
+            frequencies = numbers("frequencies", self.frequencies, count).tolist()
+        if not set(frequencies) <= set(nominal) or len(set(frequencies)) < len(frequencies):
             listed = ", ".join(f"{frequency:g}" for frequency in nominal)
             refuse(
                 f"target: frequencies = {shown(self.frequencies)} are not allowed",
                 f"nominal mid frequencies of {self.bands} bands, {listed}",
             )
-        levels = numbers("levels", self.levels, len(wanted))
+        levels = numbers("levels", self.levels, len(frequencies))
         deviation = np.ones_like(levels)
         if self.uncertainty is not None:
             entries: object = self.uncertainty
@@ -90,7 +90,9 @@ class LevelTarget(Plain):
         deviation = np.concatenate([deviation, [pair[1] for pair in known.values()]])
         for value in deviation.tolist():
             require_positive("uncertainty", value, "dB or SI units")
-        return LevelMisfit(self, [nominal.index(f) for f in wanted], target, deviation, list(known))
+        return LevelMisfit(
+            self, [nominal.index(f) for f in frequencies], target, deviation, list(known)
+        )
 
 
 class LevelMisfit(Misfit):

@@ -65,7 +65,7 @@ def known_parameters(case: Case) -> dict[str, tuple[Key, float]]:
     return result
 
 
-def fitted_parameter(name: str, given: object, case: Case) -> Parameter:
+def fitted_parameter(name: str, entry: object, case: Case) -> Parameter:
     """Return a parameter of a fit. Raises InputError where it cannot be fitted."""
     known = known_parameters(case)
     if name not in known:
@@ -75,7 +75,7 @@ def fitted_parameter(name: str, given: object, case: Case) -> Parameter:
             f"{suggestion(name, known)}",
             ", ".join(known),
         )
-    return fitted(name, given, key_owners(case))
+    return fitted(name, entry, key_owners(case))
 
 
 def bound_parameters(
@@ -89,7 +89,7 @@ def bound_parameters(
         parameters = dict.fromkeys(parameters)
     if not parameters:
         refuse("parameters: none is given", ", ".join(known_parameters(case)))
-    return tuple(fitted_parameter(name, given, case) for name, given in parameters.items())
+    return tuple(fitted_parameter(name, entry, case) for name, entry in parameters.items())
 
 
 def get_ranges(case: Case, parameters: Iterable[Parameter]) -> list[Range]:
@@ -100,13 +100,13 @@ def get_ranges(case: Case, parameters: Iterable[Parameter]) -> list[Range]:
     return [_get_range(begin, parameter) for parameter in result]
 
 
-def _get_range(case: Case, given: Parameter) -> Range:
-    name, key = given.name, given.key
+def _get_range(case: Case, parameter: Parameter) -> Range:
+    name, key = parameter.name, parameter.key
     start = float(known_parameters(case)[name][1])
     lower, upper = limits(key, case)
-    scale = abs(start) or ((given.high or upper) - (given.low or lower)) / 10
-    low = lower if given.low is None else given.low
-    high = upper if given.high is None else given.high
+    scale = abs(start) or ((parameter.high or upper) - (parameter.low or lower)) / 10
+    low = lower if parameter.low is None else parameter.low
+    high = upper if parameter.high is None else parameter.high
     if not lower <= low < high <= upper:
         refuse(
             f"[parameters] {name}: low = {low:g} and high = {high:g} are not allowed",
@@ -118,15 +118,15 @@ def _get_range(case: Case, given: Parameter) -> Range:
             f"{low:g} <= start <= {high:g} {key.unit}".rstrip(),
         )
     spread = (
-        max(low, start - scale / SPREAD) if given.low is None else low,
-        min(high, start + scale * (SPREAD - 1)) if given.high is None else high,
+        max(low, start - scale / SPREAD) if parameter.low is None else low,
+        min(high, start + scale * (SPREAD - 1)) if parameter.high is None else high,
     )
-    if given.high is None and high > FAR * scale:
+    if parameter.high is None and high > FAR * scale:
         high = np.inf
-    if given.low is None and low < -FAR * scale:
+    if parameter.low is None and low < -FAR * scale:
         low = -np.inf
     margin = min(INSIDE * scale, (high - low) / 4)
     start = min(max(start, low + margin), high - margin)
-    unit, power = given.shown_unit
-    given_unit = (unit, scaled(1.0, power)) if given.unit else None
+    unit, power = parameter.shown_unit
+    given_unit = (unit, scaled(1.0, power)) if parameter.unit else None
     return Range(name, key.unit, start, low, high, scale, spread, given_unit)

@@ -74,7 +74,7 @@ def _read_record(
     Tables of time and force are taken as they are unless they shall be measured; a model, or
     another program, may have written them.
     """
-    others = {end for one in FORMATS if one.module != "text" for end in one.suffixes}
+    others = {end for item in FORMATS if item.module != "text" for end in item.suffixes}
     if measured or path.suffix.lower() in others:
         return read_recording(path, config=config)
     samples = read_table(path)
@@ -82,13 +82,13 @@ def _read_record(
     return samples[:, 0], samples[:, 1]
 
 
-def _measured(label: str, given: object, unit: str) -> tuple[float, float]:
+def _measured(label: str, entry: object, unit: str) -> tuple[float, float]:
     """Return value and standard deviation of a table in the unit of a key."""
     words = ("value", "uncertainty")
-    if not isinstance(given, dict) or not set(words) <= set(given):
-        refuse_value(label, given, "a table of value, uncertainty, unit")
-    require_words(label, given, (*words, "unit"))
-    power = power_of(given.get("unit", unit or "1"), unit, label)
+    if not isinstance(entry, dict) or not set(words) <= set(entry):
+        refuse_value(label, entry, "a table of value, uncertainty, unit")
+    require_words(label, entry, (*words, "unit"))
+    power = power_of(entry.get("unit", unit or "1"), unit, label)
     for word in words:
-        require_number(f"{label}: {word}", given[word])
-    return scaled(given["value"], power), scaled(given["uncertainty"], power)
+        require_number(f"{label}: {word}", entry[word])
+    return scaled(entry["value"], power), scaled(entry["uncertainty"], power)

@@ -49,8 +49,8 @@ FLANK = 2 * MARGIN * CELL
 
 def to_grid(samples: Array, count: int) -> Array:
     """Return columns of samples on a grid of `count` points."""
-    kept = np.fft.rfft(samples, norm="ortho", axis=0)[: count // 2 + 1]
-    grid: Array = np.fft.irfft(kept, count, norm="ortho", axis=0)
+    spectrum = np.fft.rfft(samples, norm="ortho", axis=0)[: count // 2 + 1]
+    grid: Array = np.fft.irfft(spectrum, count, norm="ortho", axis=0)
     return grid
 
 
@@ -167,9 +167,9 @@ class BackgroundRecord:
         """
         cells, mean = self._means
         waves = cell_waves(cells, tones)
-        left = mean - waves @ np.linalg.lstsq(waves, mean)[0]
+        residual = mean - waves @ np.linalg.lstsq(waves, mean)[0]
         peak = float(self.force.max() - np.median(self.force))
-        result = fit_background(cells, left, peak)
+        result = fit_background(cells, residual, peak)
         # What the waves have taken of the noise.
         scale = np.where(np.arange(5) < 3, len(mean) / (len(mean) - waves.shape[1] + 1), 1.0)  # noqa: PLR2004
         return replace(result, draws=scale * result.draws)
@@ -190,11 +190,11 @@ class BackgroundRecord:
         best = _log_likelihood(self.background())
         while len(result) < MAX_TONES:
             waves = cell_waves(cells, result)
-            left = mean - waves @ np.linalg.lstsq(waves, mean)[0]
+            residual = mean - waves @ np.linalg.lstsq(waves, mean)[0]
             tried = [
                 (_log_likelihood(self.background((*result, tone))), tone)
                 for whiten in (_trendless(cells), _whitening(self.background(result)))
-                for tone, gain in [_strongest(cells, whiten @ left, whiten, grid)]
+                for tone, gain in [_strongest(cells, whiten @ residual, whiten, grid)]
                 if gain > min_gain
             ]
             likelihood, tone = max(tried, default=(best, 0.0))
@@ -233,8 +233,8 @@ def cell_waves(cells: Cells, tones: Sequence[float]) -> Array:
     middle, width = (cells[0] + cells[1]) / 2, cells[1] - cells[0]
     phase = 2 * np.pi * np.multiply.outer(middle, np.asarray(tones, dtype=np.float64))
     weight = np.sinc(np.multiply.outer(width, np.asarray(tones, dtype=np.float64)))
-    one = np.ones((len(middle), 1))
-    return np.concatenate([one, weight * np.cos(phase), weight * np.sin(phase)], axis=1)
+    constant = np.ones((len(middle), 1))
+    return np.concatenate([constant, weight * np.cos(phase), weight * np.sin(phase)], axis=1)
 
 
 def _strongest(cells: Cells, mean: Array, whiten: Array, grid: Array) -> tuple[float, float]:
@@ -328,8 +328,8 @@ class Weights:
     def background(self, rest: Array) -> Array:
         """Return what offset, drift and hum add to the record, N: [n], from record − model."""
         value, _ = self.estimates(rest)
-        left = self._whiten.T @ (self.matrix @ rest)
-        result: Array = self.nuisance @ value + self.predicted @ left
+        weighted = self._whiten.T @ (self.matrix @ rest)
+        result: Array = self.nuisance @ value + self.predicted @ weighted
         return result
 
 
@@ -340,7 +340,7 @@ def hum_harmonics(hum: float, below: float) -> tuple[float, ...]:
 
 
 def new_weights(  # noqa: PLR0913 - what the noise of a record is made of
-    quiet: BackgroundRecord,
+    record: BackgroundRecord,
     count: int,
     *,
     background: Background | None,
@@ -353,7 +353,7 @@ def new_weights(  # noqa: PLR0913 - what the noise of a record is made of
 
     Parameters
     ----------
-    quiet
+    record
         The record.
     count
         Number of points of the grid.
@@ -368,8 +368,8 @@ def new_weights(  # noqa: PLR0913 - what the noise of a record is made of
     mains
         Hum of 50 and 60 Hz counts as the background knows it.
     """
-    n, rate = len(quiet.force), quiet.rate
-    time = np.arange(n) / rate - quiet.middle
+    n, rate = len(record.force), record.rate
+    time = np.arange(n) / rate - record.middle
     white, colored, humming = (noise or 1.0) ** 2, np.zeros(n), np.zeros(n)
     drift = 0.0
     if background is not None:

@@ -19,11 +19,11 @@ from thud.studies.fitting.inference import (
     UNLIKELY,
     Inference,
     coverage_factor,
+    identifiability,
     infer,
-    null_sentence,
-    pair_sentences,
-    statement,
-    weak_sentence,
+    null_message,
+    pair_messages,
+    weak_message,
     worst_directions,
 )
 from thud.studies.fitting.objective import Objective, new_terms
@@ -189,7 +189,7 @@ def _conclude(objective: Objective, x: Array, confidence: float, *, converged: b
     )
     spread = inferred.covariance * deviation**2
     texts = _warnings(objective, answer, x, inferred, spread)
-    text = statement(answer.names, spread, answer.correlation, count)
+    text = identifiability(answer.names, spread, answer.correlation, count)
     return replace(answer, warnings=tuple(texts), identifiability=tuple(text))
 
 
@@ -200,17 +200,17 @@ def _warnings(
     result = []
     if not answer.converged:
         result.append("the search has not converged; allow more steps, or start elsewhere")
-    result += [null_sentence(answer.names, direction) for direction in inferred.null]
+    result += [null_message(answer.names, direction) for direction in inferred.null]
     factor = coverage_factor(answer.confidence, answer.interval_freedom)
     count = objective.count
     # Of a confidence below rounding the factor is 0, and no interval is wide.
     wide = worst_directions(covariance[:count, :count], WIDE / factor) if factor else []
     for deviation, direction in wide:
         result.append(
-            weak_sentence(answer.names[:count], direction, factor * deviation, answer.confidence)
+            weak_message(answer.names[:count], direction, factor * deviation, answer.confidence)
         )
     if not inferred.null.size and not wide:
-        result += pair_sentences(answer.names, answer.correlation, INSEPARABLE)
+        result += pair_messages(answer.names, answer.correlation, INSEPARABLE)
     for entry, value, low, high in zip(
         objective.ranges, x, objective.low, objective.high, strict=False
     ):

@@ -1,8 +1,8 @@
-!> Many drops of `thud_hollow_sphere`, a block of balls at a time: the same equation, steps and checks
-!> as `solve_hollow_sphere`, and the same numbers to 1e-10; the impulse to the residual of its balance.
+!> Many drops of `thud_hollow_sphere`, a block of balls at a time: the same equation, steps and checks as
+!> `solve_hollow_sphere`, and the same values to 1e-10, the impulse to the residual of its balance.
 !>
-!> Sets that cannot be computed have NaN; they leave the others as they are.
-module thud_shell_sets
+!> Samples that cannot be computed are NaN and do not affect others.
+module thud_shell_samples
    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc, c_sizeof
    use thud_ball, only: ball_type, get_ball_fields
    use thud_cache_line, only: get_aligned_start, line_length
@@ -24,22 +24,22 @@ module thud_shell_sets
    implicit none (type, external)
    private
 
-   public :: block_size, get_blocks, get_numbers, get_set_fields, set_outcome_type, set_type, solve_block
+   public :: block_size, get_blocks, get_numbers, get_sample_fields, sample_outcome_type, sample_type, solve_block
 
-   !> Sets of one block.
+   !> Samples of one block.
    integer, parameter :: block_size = batch_size
 
    !> One drop.
-   type :: set_type
+   type :: sample_type
       type(ball_type) :: ball
       type(drop_type) :: drop
       !> Index of the flux term, as in `flux_choices`.
       integer :: flux = 1
-   end type set_type
+   end type sample_type
 
-   !> Outcome of one drop; NaN where it could not be computed.
-   type :: set_outcome_type
-      !> The batch has computed it; else the single solver has the result or the error.
+   !> Outcome of one drop; NaN if it could not be computed.
+   type :: sample_outcome_type
+      !> Whether the batch has computed the drop; otherwise the single solver has the result or the error.
       logical :: computed = .false.
       !> Time from first touch to release, s.
       real(wp) :: contact_time = not_a_number
@@ -49,62 +49,62 @@ module thud_shell_sets
       real(wp) :: peak_force = not_a_number
       !> Maximum deflection, m.
       real(wp) :: max_deflection = not_a_number
-      !> Velocity at release over velocity at first touch.
+      !> Velocity at release divided by velocity at first touch.
       real(wp) :: restitution = not_a_number
-      !> Impulse given to the floor, N s: the change of momentum, which the sum of the forces has confirmed.
+      !> Impulse on the floor, N s: the change of momentum, confirmed by the sum of the forces.
       real(wp) :: impulse = not_a_number
-   end type set_outcome_type
+   end type sample_outcome_type
 
-   !> Residual of the balances of impulse and energy above which the single solver decides: the sums that
-   !> are taken here have up to some twenty times the error of the single solver's.
-   real(wp), parameter :: doubtful = 0.1_wp*max_residual
+   !> Residual of the balances of impulse and energy above which the single solver decides: the sums of the batch have up to
+   !> about twenty times the error.
+   real(wp), parameter :: max_batch_residual = 0.1_wp*max_residual
 
 contains
 
-   !> Keys and allowed ranges of the numbers of a set.
-   function get_set_fields(set) result(fields)
-      !> The set that the fields read and set.
-      type(set_type), intent(in), target :: set
+   !> Keys and allowed ranges of the numbers of a sample.
+   function get_sample_fields(sample) result(fields)
+      !> The sample that the fields read and set.
+      type(sample_type), intent(in), target :: sample
       !> One field per number, as in `get_numbers`: [n_key].
       type(field_type), allocatable :: fields(:)
 
-      fields = [in_group('ball', get_ball_fields(set%ball)), in_group('drop', get_drop_fields(set%drop))]
-   end function get_set_fields
+      fields = [in_group('ball', get_ball_fields(sample%ball)), in_group('drop', get_drop_fields(sample%drop))]
+   end function get_sample_fields
 
-   !> The numbers of a set: ball and drop hold nothing else, in the order of their keys.
-   pure function get_numbers(set) result(values)
-      type(set_type), intent(in) :: set
+   !> The numbers of a sample, in the order of their keys: ball and drop contain nothing else.
+   pure function get_numbers(sample) result(values)
+      type(sample_type), intent(in) :: sample
       !> The numbers: [n_key].
-      real(wp) :: values((storage_size(set%ball) + storage_size(set%drop))/storage_size(1.0_wp))
+      real(wp) :: values((storage_size(sample%ball) + storage_size(sample%drop))/storage_size(1.0_wp))
 
-      values = [transfer(set%ball, values), transfer(set%drop, values)]
+      values = [transfer(sample%ball, values), transfer(sample%drop, values)]
    end function get_numbers
 
-   !> Blocks of the sets that can be computed: of one choice of the flux term, so that balls share their
-   !> equation, and with similar contact times, because a block takes as long as its longest contact.
-   subroutine get_blocks(sets, valid, order, first)
-      !> The sets: [n_set].
-      type(set_type), intent(in) :: sets(:)
-      !> The values of each set lie inside their ranges: [n_set].
+   !> Blocks of the samples that can be computed: with one choice of the flux term, so that balls share their equation, and
+   !> with similar contact times, because a block takes as long as its longest contact.
+   subroutine get_blocks(samples, valid, order, first)
+      !> The samples: [n_sample].
+      type(sample_type), intent(in) :: samples(:)
+      !> Whether the values of each sample lie inside their ranges: [n_sample].
       logical, intent(out) :: valid(:)
-      !> Numbers of the sets whose input is right: [n_valid].
+      !> Indices of the valid samples: [n_valid].
       integer, allocatable, intent(out) :: order(:)
-      !> Indices in `order` where blocks begin, and the one after the last: [n_block + 1].
+      !> Indices in `order` at which blocks begin, and the index after the last: [n_block + 1].
       integer, allocatable, intent(out) :: first(:)
-      !> Classes of contact times per doubling.
+      !> Number of classes of contact times per doubling.
       integer, parameter :: classes = 64
       !> Maximum number of classes, for each choice of the flux term.
       integer, parameter :: max_class = 64*classes
       integer :: next(0:size(compression_weights)*max_class)
-      integer :: class(size(sets))
+      integer :: class(size(samples))
       integer :: i, j
 
-      call check_sets(sets, valid)
+      call check_samples(samples, valid)
       next = 0
-      do i = 1, size(sets)
+      do i = 1, size(samples)
          if (.not. valid(i)) cycle
-         class(i) = int(classes*(32 + log(get_rough_contact_time(sets(i)))/log(2.0_wp)))
-         class(i) = min(max(class(i), 0), max_class - 1) + (sets(i)%flux - 1)*max_class
+         class(i) = int(classes*(32 + log(get_rough_contact_time(samples(i)))/log(2.0_wp)))
+         class(i) = min(max(class(i), 0), max_class - 1) + (samples(i)%flux - 1)*max_class
          next(class(i) + 1) = next(class(i) + 1) + 1
       end do
       do i = 1, ubound(next, 1)
@@ -113,64 +113,64 @@ contains
       allocate (order(next(ubound(next, 1))))
       first = [((j, j=next((i - 1)*max_class) + 1, next(i*max_class), block_size), &
          i=1, size(compression_weights)), size(order) + 1]
-      do i = 1, size(sets)
+      do i = 1, size(samples)
          if (.not. valid(i)) cycle
          next(class(i)) = next(class(i)) + 1
          order(next(class(i))) = i
       end do
    end subroutine get_blocks
 
-   !> Whether the values of each set lie inside their ranges.
-   subroutine check_sets(sets, valid)
-      type(set_type), intent(in) :: sets(:)
-      !> Whether they do: [n_set].
+   !> Whether the values of each sample lie inside their ranges.
+   subroutine check_samples(samples, valid)
+      type(sample_type), intent(in) :: samples(:)
+      !> Whether the values do: [n_sample].
       logical, intent(out) :: valid(:)
-      type(set_type), target :: any_set
+      type(sample_type), target :: any_sample
       type(field_type), allocatable :: fields(:)
       type(interval_type) :: range
       real(wp), allocatable :: values(:, :)
       integer :: i
 
-      allocate (fields, source=get_set_fields(any_set))
-      allocate (values(size(sets), size(fields)))
-      do i = 1, size(sets)
-         values(i, :) = get_numbers(sets(i))
+      allocate (fields, source=get_sample_fields(any_sample))
+      allocate (values(size(samples), size(fields)))
+      do i = 1, size(samples)
+         values(i, :) = get_numbers(samples(i))
       end do
-      valid = sets%flux >= 1 .and. sets%flux <= size(compression_weights)
+      valid = samples%flux >= 1 .and. samples%flux <= size(compression_weights)
       do i = 1, size(fields)
          range = new_interval(fields(i)%range)
-         valid = valid .and. range%contains_sets(i, fields%key, values)
+         valid = valid .and. range%contains_rows(i, fields%key, values)
       end do
-   end subroutine check_sets
+   end subroutine check_samples
 
-   !> Half a period of the linear spring and the gas to third order, s: the amplitude from the energy,
-   !> the period of a Duffing oscillator by harmonic balance. Good to 10 %, and alike for like sets.
-   pure function get_rough_contact_time(set) result(time)
-      type(set_type), intent(in) :: set
+   !> Half a period with the linear spring and the gas to third order, s: amplitude from the energy, period of a Duffing
+   !> oscillator by harmonic balance. Accurate to 10 %, and similar for similar samples.
+   pure function get_rough_contact_time(sample) result(time)
+      type(sample_type), intent(in) :: sample
       !> The time, s.
       real(wp) :: time
       real(wp) :: linear, cubic, speed
 
-      associate (ball => set%ball)
+      associate (ball => sample%ball)
          linear = (get_shell_stiffness(ball) + 2*pi*ball%outer_radius*ball%gauge_pressure)/ball%mass
          cubic = 1.5_wp*pi*ball%heat_capacity_ratio*(ball%ambient_pressure + ball%gauge_pressure) &
             /(ball%outer_radius*ball%mass)
       end associate
-      speed = get_impact_velocity(set%drop)
+      speed = get_impact_velocity(sample%drop)
       time = pi/sqrt(linear + 0.75_wp*cubic*2*speed**2/(linear + sqrt(linear**2 + 2*cubic*speed**2)))
    end function get_rough_contact_time
 
-   !> Outcomes and forces of up to `block_size` sets with the same choice of the flux term.
-   subroutine solve_block(sets, sampling, force, last_sample, outcomes)
-      !> The sets, their input checked: [n_set].
-      type(set_type), intent(in) :: sets(:)
+   !> Outcomes and forces of up to `block_size` samples with the same choice of the flux term.
+   subroutine solve_block(samples, sampling, force, n_written, outcomes)
+      !> The samples, with checked input: [n_sample].
+      type(sample_type), intent(in) :: samples(:)
       type(sampling_type), intent(in) :: sampling
-      !> Elastic forces, then floor forces, N, up to the last contact: [2 block_size, n_sample].
+      !> Elastic forces, then floor forces, N, up to the last contact: [2 block_size, n_time].
       real(wp), intent(inout), contiguous :: force(:, :)
-      !> Index of the last sample that was written.
-      integer, intent(out) :: last_sample
-      !> The outcomes: [n_set].
-      type(set_outcome_type), intent(out) :: outcomes(:)
+      !> Number of instants that were written.
+      integer, intent(out) :: n_written
+      !> The outcomes: [n_sample].
+      type(sample_outcome_type), intent(out) :: outcomes(:)
       type(impact_batch_type), pointer :: impacts
       real(wp), target :: buffer(c_sizeof(impacts)/c_sizeof(1.0_wp) + line_length)
       real(wp) :: sampled(block_size)
@@ -180,74 +180,74 @@ contains
       call c_f_pointer(c_loc(buffer(get_aligned_start(buffer))), impacts)
 
       step = 1/(sampling%sample_rate*real(sampling%substeps, wp))
-      impacts%shell%weight = compression_weights(sets(1)%flux)
-      impacts%restitution_weight = restitution_weights(sets(1)%flux)
+      impacts%shell%weight = compression_weights(samples(1)%flux)
+      impacts%restitution_weight = restitution_weights(samples(1)%flux)
       do i = 1, block_size
-         ! Balls without a set repeat the last one.
-         call set_lane(impacts, i, sets(min(i, size(sets))), step)
+         ! Lanes without a sample repeat the last one.
+         call initialize_ball(impacts, i, samples(min(i, size(samples))), step)
       end do
-      call solve_impacts(impacts, get_sample_count(sampling), sampling%substeps, force, last_sample)
-      sampled = sum(force(block_size + 1:, :last_sample), dim=2)/sampling%sample_rate
-      do i = 1, size(sets)
-         outcomes(i)%computed = is_computed(impacts, i, sets(i), sampling)
+      call solve_impacts(impacts, get_sample_count(sampling), sampling%substeps, force, n_written)
+      sampled = sum(force(block_size + 1:, :n_written), dim=2)/sampling%sample_rate
+      do i = 1, size(samples)
+         outcomes(i)%computed = is_computed(impacts, i, samples(i), sampling)
          if (.not. outcomes(i)%computed) cycle
-         associate (diameter => 2*sets(i)%ball%outer_radius)
+         associate (diameter => 2*samples(i)%ball%outer_radius)
             outcomes(i)%contact_time = impacts%contact(i)*step
             outcomes(i)%peak_elastic_force = impacts%peak_elastic_force(i)
             outcomes(i)%peak_force = impacts%peak_force(i)
             outcomes(i)%max_deflection = impacts%max_deflection(i)*diameter
             outcomes(i)%restitution = -impacts%states(impacts%now)%velocity(i)/impacts%impact_velocity(i)
-            outcomes(i)%impulse = sets(i)%ball%mass*(1 + outcomes(i)%restitution)*get_impact_velocity(sets(i)%drop)
+            outcomes(i)%impulse = samples(i)%ball%mass*(1 + outcomes(i)%restitution)*get_impact_velocity(samples(i)%drop)
          end associate
          outcomes(i)%computed = holds_impulse(sampled(i), outcomes(i)%impulse)
       end do
    end subroutine solve_block
 
-   !> Equation and beginning of one ball; see `thud_shell_batch` for the units.
-   pure subroutine set_lane(impacts, i, set, step)
+   !> Sets equation and initial values of one ball; see `thud_shell_batch` for the units.
+   pure subroutine initialize_ball(impacts, i, sample, step)
       type(impact_batch_type), intent(inout) :: impacts
       !> Index of the ball.
       integer, intent(in) :: i
-      type(set_type), intent(in) :: set
+      type(sample_type), intent(in) :: sample
       !> The step, s.
       real(wp), intent(in) :: step
       real(wp) :: pressure_unit
 
-      associate (ball => set%ball, shell => impacts%shell)
+      associate (ball => sample%ball, shell => impacts%shell)
          pressure_unit = 2*pi*ball%outer_radius*step**2/ball%mass
          shell%stiffness(i) = get_shell_stiffness(ball)*step**2/ball%mass
          shell%gas_pressure(i) = pressure_unit*(ball%ambient_pressure + ball%gauge_pressure)
          shell%air_pressure(i) = pressure_unit*ball%ambient_pressure
          shell%exponent(i) = -ball%heat_capacity_ratio
          shell%closing(i) = (ball%outer_radius - ball%wall_thickness)/ball%outer_radius
-         impacts%impact_velocity(i) = get_impact_velocity(set%drop)*step/(2*ball%outer_radius)
+         impacts%impact_velocity(i) = get_impact_velocity(sample%drop)*step/(2*ball%outer_radius)
          shell%force_unit(i) = 2*ball%outer_radius*ball%mass/step**2
       end associate
-   end subroutine set_lane
+   end subroutine initialize_ball
 
-   !> Whether a ball has a result: the checks of `solve_lumped`.
-   function is_computed(impacts, i, set, sampling) result(computed)
+   !> Whether a ball has a result, by the checks of `solve_lumped`.
+   function is_computed(impacts, i, sample, sampling) result(computed)
       type(impact_batch_type), intent(in) :: impacts
       integer, intent(in) :: i
-      type(set_type), intent(in) :: set
+      type(sample_type), intent(in) :: sample
       type(sampling_type), intent(in) :: sampling
       logical :: computed
       type(force_history_type) :: history
       type(error_type), allocatable :: error
       real(wp) :: change, energy
 
-      computed = impacts%released(i) .and. .not. impacts%left(i)
+      computed = impacts%released(i) .and. .not. impacts%out_of_domain(i)
       if (computed) computed = impacts%contact(i) >= min_contact_samples*sampling%substeps
       if (.not. computed) return
       associate (state => impacts%states(impacts%now), v0 => impacts%impact_velocity(i))
          change = abs(state%impulse(i) - (v0 - state%velocity(i)))/(v0 - state%velocity(i))
          energy = abs(state%velocity(i)**2 + 2*state%loss(i) - v0**2)/v0**2
       end associate
-      if (max(change, energy) <= doubtful) return
+      if (max(change, energy) <= max_batch_residual) return
       ! The sums of the single solver, which include the stages of each step, decide.
-      call solve_hollow_sphere(set%ball, set%drop, hollow_sphere_type(momentum_flux=flux_choices(set%flux)), sampling, &
-         history, error)
+      call solve_hollow_sphere(sample%ball, sample%drop, hollow_sphere_type(momentum_flux=flux_choices(sample%flux)), &
+         sampling, history, error)
       computed = .not. allocated(error)
    end function is_computed
 
-end module thud_shell_sets
+end module thud_shell_samples

@@ -1,19 +1,19 @@
-!> Samples of a case as parameter sets of the shell model, which are computed in batches (`thud_ensemble`).
-module thud_batch_sets
+!> Samples of a case as samples of the shell model, which `thud_ensemble` computes in batches.
+module thud_batch_samples
    use thud_case, only: case_type, get_active_fields, get_model_number
    use thud_column, only: column_type
    use thud_field, only: field_type
    use thud_hollow_sphere, only: flux_choices, hollow_sphere_type
    use thud_kinds, only: wp
-   use thud_shell_sets, only: get_set_fields, set_type
+   use thud_shell_samples, only: get_sample_fields, sample_type
    implicit none (type, external)
    private
 
-   public :: fill_sets, suits_batch
+   public :: fill_samples, suits_batch
 
 contains
 
-   !> Whether samples can be computed in batches: by the shell model, with exact levels, on a rigid floor, if they
+   !> Whether samples can be computed in batches: the case has the shell model, exact levels and no floor, and the samples
    !> differ only in ball, drop and options of the model.
    function suits_batch(case, columns) result(suits)
       type(case_type), intent(in), target :: case
@@ -33,43 +33,43 @@ contains
       end select
    end function suits_batch
 
-   !> Parameter sets of the shell model.
-   subroutine fill_sets(case, columns, values, sets)
-      !> The case, which gives what is not in the columns.
+   !> Makes the parameter sets of the shell model.
+   subroutine fill_samples(case, columns, values, samples)
+      !> The case, for all values that are not in the columns.
       type(case_type), intent(in), target :: case
       !> Keys in which the samples differ: [n_column].
       type(column_type), intent(in) :: columns(:)
-      !> Their values: [n_column, n_drop].
+      !> Values of the keys: [n_column, n_sample].
       real(wp), intent(in) :: values(:, :)
-      !> The sets: [n_drop].
-      type(set_type), intent(out) :: sets(:)
-      type(set_type), target :: set
-      type(field_type), allocatable :: fields(:), set_fields(:)
+      !> The sets: [n_sample].
+      type(sample_type), intent(out) :: samples(:)
+      type(sample_type), target :: sample
+      type(field_type), allocatable :: fields(:), sample_fields(:)
       integer :: index_of(size(columns))
       integer :: i, j
 
-      set%ball = case%ball
-      set%drop = case%drop
+      sample%ball = case%ball
+      sample%drop = case%drop
       allocate (fields, source=get_active_fields(case))
-      allocate (set_fields, source=get_set_fields(set))
+      allocate (sample_fields, source=get_sample_fields(sample))
       ! The only other key is the choice of the flux term.
-      index_of = [(findloc(set_fields%key == fields(columns(j)%field)%key, .true., dim=1), j=1, size(columns))]
+      index_of = [(findloc(sample_fields%key == fields(columns(j)%field)%key, .true., dim=1), j=1, size(columns))]
       select type (model => case%models(get_model_number(case))%model)
       type is (hollow_sphere_type)
-         set%flux = findloc(flux_choices == model%momentum_flux, .true., dim=1)
+         sample%flux = findloc(flux_choices == model%momentum_flux, .true., dim=1)
       end select
-      do i = 1, size(sets)
+      do i = 1, size(samples)
          do j = 1, size(columns)
             if (index_of(j) > 0) then
-               set_fields(index_of(j))%real_value = values(j, i)
+               sample_fields(index_of(j))%real_value = values(j, i)
             else
-               set%flux = nint(values(j, i))
-               ! A number that is not whole chooses nothing.
-               if (abs(values(j, i) - set%flux) > 0.0_wp) set%flux = 0
+               sample%flux = nint(values(j, i))
+               ! A number that is not whole is no valid choice.
+               if (abs(values(j, i) - sample%flux) > 0.0_wp) sample%flux = 0
             end if
          end do
-         sets(i) = set
+         samples(i) = sample
       end do
-   end subroutine fill_sets
+   end subroutine fill_samples
 
-end module thud_batch_sets
+end module thud_batch_samples
