@@ -44,7 +44,7 @@ HEIGHTS = {"parameters": {"height": {"values": [50, 100], "unit": "cm"}}}
 LONG = """
 name = "long"
 fixed = { model = "modal_ball", harmonics = 16, static_harmonics = 60, rings = 20 }
-design = { kind = "random", size = 1000, seed = 4 }
+design = { kind = "random", size = 500, seed = 4 }
 parameters = { height = { low = 0.9, high = 1.1 } }
 """
 
@@ -145,7 +145,7 @@ def test_ended_study_goes_on_where_it_stopped(
         assert process.returncode == -signal.SIGKILL
     assert not (tmp_path / "long.nc").exists()
     finished = thud.read_sweep(tmp_path / "long.partial").dataset
-    assert 0 < finished.sizes["sample"] < 1000
+    assert 0 < finished.sizes["sample"] < 500
     known = np.isin(whole["height"], finished["height"])
     assert values(finished).identical(values(whole.isel(sample=known)))
 
@@ -161,12 +161,12 @@ def test_ended_study_goes_on_where_it_stopped(
     left = disk_space(thud.read_study(tmp_path / "long.toml")) - 1
     monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=left))
     resumed = thud.sweep(tmp_path / "long.toml", tmp_path).dataset
-    assert sum(computed) == 1000 - finished.sizes["sample"]
+    assert sum(computed) == 500 - finished.sizes["sample"]
     assert values(resumed).identical(values(whole))
     assert not (tmp_path / "long.partial").exists()
     again = thud.sweep(tmp_path / "long.toml", tmp_path).dataset
     assert again.identical(resumed)
-    assert sum(computed) == 1000 - finished.sizes["sample"]
+    assert sum(computed) == 500 - finished.sizes["sample"]
 
 
 @pytest.mark.slow
@@ -224,7 +224,7 @@ def test_disk_that_is_full_for_zarr_is_reported_and_loses_nothing(
     assert "File too large" in errors
     assert errors.count("\n") == 1
     assert names_in(tmp_path) == ["long.partial", "long.toml"]
-    assert thud.read_sweep(tmp_path / "long.partial").dataset.sizes["sample"] == 1000
+    assert thud.read_sweep(tmp_path / "long.partial").dataset.sizes["sample"] == 500
 
     def compute_again(*_: object) -> None:
         pytest.fail("all samples were kept")
