@@ -39,11 +39,10 @@ _SLOW_FRACTION = 0.25
 class BallImpedance(Displayed):
     """Impedance of a source during its impact, and the floors on which it matters.
 
-    A linear source in permanent contact acts on a floor of impedance Z with the force F = F_b/(1 +
-    Z_B/Z); F_b is its force on a rigid floor, Z_B its own impedance. An impact is nonlinear and
-    ends: its effective Z_B is defined by this equation, in bands, from F_b and bands, force F on a
-    floor that is a resistance Z. It tends to a limit as
-    Z grows.
+    A linear source in permanent contact acts on a floor of impedance Z with the force
+    F = F_b/(1 + Z_B/Z); F_b is its force on a rigid floor, Z_B its own impedance. An impact is
+    nonlinear and ends. Its effective Z_B solves this equation in bands, F being the force on a
+    floor that is a resistance Z; it tends to a limit as Z grows.
 
     Attributes
     ----------
