@@ -217,7 +217,7 @@ def _results(data: dict[str, Any]) -> list[str]:
         results.append(f"levels {low:g} to {high:g} dB above the background were corrected for it")
     if "background" in flags:
         results.append(f"levels less than {low:g} dB above the background are upper bounds")
-    met = [entry["sentence"] for entry in data["plate"] if entry["met"]]
+    met = [entry["reason"] for entry in data["plate"] if entry["met"]]
     if met:
         results.append(f"force plate: {'; '.join(met)}")
     bands = [f"{entry['band']:g}" for entry in data["criteria"] if entry["band"] is not None]
