@@ -301,11 +301,11 @@ def test_weights_of_the_restitution_hold_the_calibration() -> None:
             weight = other.uncertainty**2 / (by.uncertainty**2 + scale**2 + other.uncertainty**2)
             expected = weight * by.value + (1 - weight) * other.value
             assert drop.restitution.value == pytest.approx(expected, abs=1e-9)
-            found = drop.restitution_shared.get("calibration", 0.0)
+            found = drop.shared_effects.get("calibration", 0.0)
             assert found == pytest.approx(weight * scale, rel=1e-9)
         budget = recording.estimates["restitution"].contributions
         shares = {part.name: part.uncertainty for part in budget}
-        mean = np.mean([d.restitution_shared.get("calibration", 0.0) for d in recording.drops])
+        mean = np.mean([d.shared_effects.get("calibration", 0.0) for d in recording.drops])
         assert shares.get("calibration", 0.0) == pytest.approx(mean)
 
 

@@ -138,9 +138,9 @@ def average_restitution(
     its interval includes both.
     """
     known = [drop for drop in drops if drop.restitutions]
-    causes = dict.fromkeys(cause for drop in known for cause in drop.restitution_shared)
+    causes = dict.fromkeys(cause for drop in known for cause in drop.shared_effects)
     systematic = [
-        _mean_effect(cause, [drop.restitution_shared.get(cause, 0.0) for drop in known])
+        _mean_effect(cause, [drop.shared_effects.get(cause, 0.0) for drop in known])
         for cause in causes
     ]
     both = [drop for drop in known if {IMPULSE, BOUNCES} <= set(drop.restitutions)]
@@ -159,7 +159,7 @@ def _difference(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
         impulse, bounces = (drop.restitutions[name] for name in (IMPULSE, BOUNCES))
         combined = math.hypot(impulse.uncertainty, bounces.uncertainty)
         differences.append(Estimate(impulse.value - bounces.value, combined))
-        shared = conditions.shared(drop.restitutions, drop.impulse)
+        shared = conditions.shared_effects(drop.restitutions, drop.impulse)
         for cause, effect in shared[IMPULSE].items():
             effects.setdefault(cause, []).append(effect - shared[BOUNCES].get(cause, 0.0))
     systematic = [_mean_effect(cause, values) for cause, values in effects.items()]
@@ -180,7 +180,7 @@ def average_mass(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
     change = float(np.mean([drop.impulse.value for drop in known])) / value
     height = value * conditions.speed / change * conditions.height_uncertainty
     height /= 2 * conditions.height
-    systematic = {"calibration": value * conditions.calibration, "drop height": height}
+    systematic = {"calibration": value * conditions.calibration_uncertainty, "drop height": height}
     return average_estimates(
         [drop.effective_mass for drop in known],
         *(Contribution(cause, part) for cause, part in systematic.items() if part),

@@ -15,7 +15,7 @@ from thud.base.checks import refuse
 from thud.base.immutable import Immutable
 from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
-from thud.recordings.contact import Contact, find_contact, find_edges
+from thud.recordings.contact import Contact, estimate_limits, find_contact
 from thud.recordings.faults import min_background, repair
 from thud.recordings.noise import Noise
 from thud.recordings.recorded_levels import measure_levels
@@ -67,9 +67,9 @@ class Drop(Immutable):
         First and stop index of the contact with its margins, over which levels are measured.
     contact_time, restitution, peak_force, impulse, effective_mass : Estimate
         In s (`thud.impact.contact_time`), 1, N (below 1.25 kHz), N s and kg; NaN if unknown.
-    restitution_shared : dict of str to float
-        Signed effects of calibration, mass and drop height on the restitution of all drops, which
-        its uncertainty excludes.
+    shared_effects : dict of str to float
+        Change of the restitution by one standard uncertainty of calibration, mass and drop height,
+        which all drops share and the uncertainty of the restitution excludes.
     restitution_method : str
         ``"impulse"``, ``"bounces"``, ``"impulse and bounces"`` or ``""``.
     restitutions : dict of str to Estimate
@@ -93,7 +93,7 @@ class Drop(Immutable):
     gate: tuple[int, int]
     contact_time: Estimate
     restitution: Estimate
-    restitution_shared: dict[str, float]
+    shared_effects: dict[str, float]
     restitution_method: str
     restitutions: dict[str, Estimate]
     peak_force: Estimate
@@ -170,7 +170,7 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
         gate=(contact.gate[0] - first, contact.gate[1] - first),
         contact_time=contact_time,
         restitution=restitution,
-        restitution_shared=shared,
+        shared_effects=shared,
         restitution_method=" and ".join(methods),
         restitutions=methods,
         peak_force=_peak(contact),
@@ -200,7 +200,7 @@ def _landings(window: Window, drop: Contact, count: int) -> list[tuple[Estimate,
         delay = (bounce.start - window.start) / window.sample_rate
         begin, end = (
             Estimate(delay + edge.value, edge.uncertainty)
-            for edge in find_edges(bounce, drop.background)
+            for edge in estimate_limits(bounce, drop.background)
         )
         landings.append((begin, end))
     return landings
