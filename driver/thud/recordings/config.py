@@ -1,4 +1,4 @@
-"""Configuration of a laboratory: a small TOML file beside its recordings."""
+"""Configuration of a laboratory: a small TOML file next to its recordings."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ def _text(value: object, key: str) -> str:
 
 
 def _texts(value: object, key: str) -> tuple[str, ...]:
-    """Return one text or more."""
+    """Return a tuple of texts from one text or several."""
     return tuple(
         _text(text, key) for text in (value if isinstance(value, list | tuple) else [value])
     )
 
 
 def _choice(choices: Mapping[str, object] | tuple[str, ...], value: object, key: str) -> str:
-    """Return one of several words."""
+    """Return one of the choices."""
     require_choice(key, value, choices)
     return str(value)
 
@@ -100,7 +100,7 @@ def _pair(value: object, key: str, ends: str, low: float, high: float) -> tuple[
 
 
 def _linearity(value: object, key: str) -> tuple[tuple[float, float], ...]:
-    """Return pairs of forces."""
+    """Return pairs of the force applied and the force indicated, N."""
     pairs = value if isinstance(value, list | tuple) else []
     if len(pairs) < 2:  # noqa: PLR2004
         refuse(f"{key} = {shown(value)} is not allowed", "[[applied, indicated], ...], N")
@@ -121,7 +121,7 @@ def _limits(value: object, key: str) -> dict[str, tuple[float, float]]:
 
 
 def _key(check: Callable[[object, str], object], default: object = None) -> Any:  # noqa: ANN401
-    """Declare a key by its check, which returns the value or raises InputError."""
+    """Declare a key with its check, which returns the value or raises InputError."""
     return field(default=default, metadata={"check": check})
 
 
@@ -132,13 +132,13 @@ class PlateConfig:
     Attributes
     ----------
     f0, Q : float or None
-        Frequency, Hz, and quality factor of the first resonance, which is corrected.
+        Frequency, Hz, and quality factor of the first resonance, which will be corrected.
     f0_uncertainty : float or None
         Relative standard uncertainty of the frequency.
     time_constant : float or None
         Time constant of the amplifier, s.
     full_scale : float or None
-        Largest force that plate and recorder can read, N.
+        Largest force that plate and recorder can measure, N.
     linearity : tuple of tuple
         Pairs of a force applied and the force indicated, N.
     """
@@ -165,7 +165,7 @@ def _plate(value: object, key: str) -> PlateConfig:
 
 @dataclass(frozen=True)
 class Config:
-    """Statements of a laboratory about its ball, instruments and files; None if unknown.
+    """What a laboratory states about its ball, instruments and files; None if unknown.
 
     Attributes
     ----------
@@ -192,7 +192,7 @@ class Config:
     low_pass : bool
         Whether levels are those of the force below 1.25 kHz.
     limits : mapping
-        Minimum and maximum by criterion that replace those of the standards.
+        Minimum and maximum by criterion, which replace those of the standards.
     """
 
     laboratory: str = _key(_text, "")
@@ -238,7 +238,7 @@ class Config:
 
     @property
     def plate_checks(self) -> tuple[PlateCheck, ...]:
-        """Demands of the standard on the plate; none without ``[plate]``."""
+        """Checks of the plate by the standard; none without ``[plate]``."""
         plate = self.plate
         if plate is None:
             return ()
@@ -253,12 +253,12 @@ class Config:
 def read_config(path: str | os.PathLike[str]) -> Config:
     """Read a configuration.
 
-    Raise InputError with the file and the key that is unknown, of another kind or out of range.
+    Raise InputError if a key is unknown, or its value of the wrong type or out of range.
     """
     file = regular_file(path)
     name = shown_path(file)
     if file.stat().st_size > MIB:
-        refuse(f"{name}: is larger than 1 MiB", "a TOML file of some lines")
+        refuse(f"{name}: is larger than 1 MiB", "a TOML file of a few lines")
     try:
         table = tomllib.loads(file.read_text(encoding="utf-8"))
     except UnicodeDecodeError as error:
@@ -269,7 +269,7 @@ def read_config(path: str | os.PathLike[str]) -> Config:
 
 
 def checked_config(config: Config) -> Config:
-    """Return a configuration; raise InputError where a value is not allowed."""
+    """Return a configuration; raise InputError if a value is not allowed."""
     _checked({key: value for key, value in vars(config).items() if value is not None}, Config, "")
     return config
 

@@ -112,9 +112,9 @@ class Contact(Immutable):
 
     def covariance_of(self, functionals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the covariance, [k, k], of functionals, [k, n], of the samples of the gate."""
-        white_density = self.background.variances[0] * self.sample_rate / 2
+        white_variance = self.background.variances[0] * self.sample_rate / 2
         summed = self.summed(functionals)
-        result: NDArray[np.float64] = white_density * functionals @ functionals.T
+        result: NDArray[np.float64] = white_variance * functionals @ functionals.T
         return result + summed @ self.covariance @ summed.T
 
 

@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-# Minimum and maximum sample rate, Hz: the octave of 500 Hz needs 1.42 kHz and a filter.
+# Minimum and maximum sample rate, Hz: the octave of 500 Hz needs 1.42 kHz and room for a filter.
 RATES = (2500.0, 1e8)
-# Minimum stored fraction of a file, which else is sparse, and maximum number of inspected pieces.
+# Minimum stored fraction of a file, below which it is sparse, and maximum number of pieces counted.
 MIN_STORED = 0.01
 MAX_PIECES = 1000
 
@@ -52,19 +52,19 @@ def open_signals(  # noqa: PLR0913 - the keys of the configuration
     Parameters
     ----------
     path
-        File; its format is found by content.
+        File; its content determines the format.
     channel
-        Number, from 1 (of a table: of the column), or name; without it the channels in units of
-        force, or the only one.
+        Number, from 1 (in tables that of the column), or name; by default all channels in units of
+        force, or the only channel.
     unit
-        Unit of the recorded values, where the file does not say it or is wrong.
+        Unit of the recorded values, if the file does not state it or is wrong.
     calibration
         N per unit, a chain of factors such as ``"4.1 pC/N, 10 mV/pC"``, or a `Calibration`.
     polarity
-        Sign of a compression in the file, ``"positive"`` or ``"negative"``; without it that of
-        the larger excursion.
+        Sign of a compression in the file, ``"positive"`` or ``"negative"``; by default that of
+        the larger peak.
     sample_rate
-        Samples per second, Hz, where the file does not say it or is wrong.
+        Samples per second, Hz, if the file does not state it or is wrong.
 
     Returns
     -------
@@ -73,8 +73,8 @@ def open_signals(  # noqa: PLR0913 - the keys of the configuration
     Raises
     ------
     InputError
-        Where the file is missing, damaged, too large or of unknown format; channel, unit, rate,
-        calibration or sign are unknown; or the force is implausible.
+        If the file is missing, damaged, too large or of unknown format, if channel, unit, rate,
+        calibration or sign are unknown, or if the force is implausible.
     """
     if polarity is not None:
         require_choice("polarity", polarity, POLARITIES)
@@ -91,9 +91,9 @@ def open_signals(  # noqa: PLR0913 - the keys of the configuration
 
 
 def regular_file(path: str | os.PathLike[str]) -> Path:
-    """Return a path; raise InputError where it is no readable, completely stored, regular file.
+    """Return a path; raise InputError if it is not a readable, completely stored regular file.
 
-    Opening a pipe could block; reading a sparse file of gigabytes takes minutes.
+    Opening a pipe could block, and reading a sparse file of gigabytes would take minutes.
     """
     require_kind("recording", path, str | os.PathLike)
     file = Path(path)
@@ -120,14 +120,14 @@ def regular_file(path: str | os.PathLike[str]) -> Path:
 
 
 def _stored(descriptor: int, size: int) -> int:
-    """Return the number of stored bytes of a file, at least of its first pieces."""
+    """Return the number of stored bytes of a file; its size if it has too many pieces."""
     position = stored = 0
     for _ in range(MAX_PIECES):
         try:
             begin = os.lseek(descriptor, position, os.SEEK_DATA)
             position = os.lseek(descriptor, begin, os.SEEK_HOLE)
         except OSError as error:
-            # No more data, or a file system without this information.
+            # ENXIO: no more data; else the file system does not know.
             return stored if error.errno == errno.ENXIO else size
         stored += position - begin
         if position >= size:
@@ -136,7 +136,7 @@ def _stored(descriptor: int, size: int) -> int:
 
 
 def choose_channels(channels: list[Channel], channel: int | str | None, name: str) -> list[Channel]:
-    """Return the selected channels; raise InputError where the selection is ambiguous."""
+    """Return the selected channels; raise InputError if the selection is ambiguous."""
     listed = ", ".join(
         f"{entry.number}" + (f" {shown_text(entry.name)!r}" if entry.name else "")
         for entry in channels[:20]
@@ -167,7 +167,7 @@ def choose_channels(channels: list[Channel], channel: int | str | None, name: st
 
 @dataclass(frozen=True)
 class _Stated:
-    """Statements of the user on the values of a file."""
+    """What the user states about the values in a file."""
 
     unit: str | None
     calibration: float | str | Calibration | None
@@ -176,7 +176,7 @@ class _Stated:
 
 
 def _signal(path: Path, channel: Channel, stated: _Stated, *, several: bool) -> Signal:
-    """Return the signal of a channel; raise InputError where its rate or unit is unknown."""
+    """Return the signal of a channel; raise InputError if its rate or unit is unknown."""
     name = shown_path(Path(path.name))
     if several:
         name += f", {shown_text(channel.name) or f'channel {channel.number}'}"
@@ -184,7 +184,9 @@ def _signal(path: Path, channel: Channel, stated: _Stated, *, several: bool) -> 
         refuse(f"{name}: {channel.n_sample} samples", f"{MIN_SAMPLES} samples or more")
     rate, steps = _rate(channel, stated, name)
     unit, replaced = _unit(channel, stated, name)
-    factor, words, uncertainty = newtons_per_unit(unit, stated.calibration, channel.counts, name)
+    factor, description, uncertainty = newtons_per_unit(
+        unit, stated.calibration, channel.counts, name
+    )
     # Integers are read as fractions of full scale.
     scale = factor * channel.counts if channel.counts and unit == "counts" else factor
     extremes = scan(channel.samples, channel.n_sample, name)
@@ -197,7 +199,7 @@ def _signal(path: Path, channel: Channel, stated: _Stated, *, several: bool) -> 
         samples=partial(_read_scaled, channel.samples, sign * scale),
         full_scale=abs(scale) if channel.counts else None,
         date=shown_text(channel.date),
-        calibration=words,
+        calibration=description,
         calibration_uncertainty=uncertainty,
         steps=(*channel.steps, *steps, *replaced, *changed),
         warnings=check_peak(extremes, sign * scale, name, assumed=unit == ASSUMED),

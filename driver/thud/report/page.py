@@ -1,4 +1,4 @@
-"""The page of a calibration report: A4 in one file, from its data and its figures."""
+"""The page of a calibration report: one A4 sheet, in one HTML file with its figures."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-# Maximum number of instruments, of files, and of notes in a list.
+# Maximum length of the lists of instruments, files and notes.
 INSTRUMENTS, FILES, NOTES = 6, 5, 7
 # Number of drops up to which none can be an outlier.
 MIN_DROPS = 2
@@ -32,15 +32,15 @@ STANDARDS = {
     "rubber_ball": "JIS A 1418-2, ISO 10140-5 and ISO 16283-2",
     "tyre": "JIS A 1418-2",
 }
-# Position of the limits in the picture of a criterion, of 100.
+# Positions of the limits in the picture of a criterion, of width 100.
 LOW, HIGH = 25.0, 75.0
 
 
 def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) -> str:
     """Return the page as self-contained HTML.
 
-    `data` is from `thud.report.contents.report_data`, `figures` are up to two of column width,
-    `checksum` is the SHA-256 of ``report.json``.
+    `data` is the result of `thud.report.contents.report_data`, `figures` are up to two figures of
+    column width, and `checksum` is the SHA-256 of ``report.json``.
     """
     source = data["source"].replace("_", " ")
     body = BODY.substitute(
@@ -70,14 +70,14 @@ def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) 
 
 
 def page_text(data: dict[str, Any]) -> str:
-    """Return the texts of the laboratory, which may hold any characters."""
+    """Return the texts that the laboratory stated, which may have any characters."""
     keys = ("laboratory", "ball", "serial", "date", "name")
     files = [file[key] for file in data["files"] for key in ("name", "calibration")]
     return _plain("".join([*(data[key] for key in keys), *data["instruments"], *files]))
 
 
 def _plain(text: str) -> str:
-    """Return a text in one line of printable characters."""
+    """Return a text as one line of printable characters."""
     line = " ".join(text.split())
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in line)
 
@@ -88,7 +88,7 @@ def _text(text: str) -> str:
 
 
 def _reason(criteria: Sequence[dict[str, Any]]) -> str:
-    """Return which criteria are not met."""
+    """Return the criteria that are inconclusive or not met, as text."""
     parts = []
     for verdict in RESULTS[1:]:
         missed = [criterion for criterion in criteria if criterion["verdict"] == verdict]
@@ -99,7 +99,7 @@ def _reason(criteria: Sequence[dict[str, Any]]) -> str:
 
 
 def _about(data: dict[str, Any]) -> list[tuple[str, str]]:
-    """Return laboratory, ball and conditions."""
+    """Return labels and texts: laboratory, ball and conditions."""
     temperature = data["temperature"]
     return [
         ("Laboratory", data["laboratory"]),
@@ -111,7 +111,7 @@ def _about(data: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _measured(data: dict[str, Any]) -> list[tuple[str, str]]:
-    """Return recordings, calibration and instruments."""
+    """Return labels and texts: recordings, calibration and instruments."""
     files, drops = data["files"], len(data["drops"])
     rates = sorted({file["sample_rate"] for file in files})
     listed = " to ".join(dict.fromkeys(f"{rate / 1e3:.4g}" for rate in (rates[0], rates[-1])))
@@ -131,7 +131,7 @@ def _measured(data: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _pairs(pairs: Iterable[tuple[str, str]]) -> str:
-    """Return labels and values as rows."""
+    """Return labels and texts as rows of an HTML table."""
     rows = []
     for label, value in pairs:
         shown = "<br>".join(map(_text, value.split("\n"))) if value else NOT_KNOWN
@@ -140,7 +140,7 @@ def _pairs(pairs: Iterable[tuple[str, str]]) -> str:
 
 
 def _columns(row: Sequence[str], picture: str) -> list[str]:
-    """Return a row with a picture before the verdict."""
+    """Insert a picture before the verdict, the last cell of a row."""
     return [*row[:-1], picture, row[-1]]
 
 
@@ -175,19 +175,19 @@ def _range(criterion: dict[str, Any]) -> str:
 
 
 def _rule(data: dict[str, Any]) -> str:
-    """Return the rules of limits and verdicts."""
+    """Return an explanation of limits and verdicts."""
     own = any(not criterion["limits_of_standard"] for criterion in data["criteria"])
     limits = f"Limits of {STANDARDS.get(data['source'], 'the standards')}"
     limits += ", those marked * of the laboratory. " if own else ". "
     return limits + (
-        "U: expanded uncertainty for 95 % (JCGM 100, Student's t). A criterion conforms where "
-        "value ± U lies within its limits, does not conform where it lies outside, and is "
+        "U: expanded uncertainty for 95 % (JCGM 100, Student's t). A criterion conforms if "
+        "value ± U lies within its limits, does not conform if it lies outside, and is "
         "inconclusive otherwise (JCGM 106). Spread: standard deviation of single drops."
     )
 
 
 def _means(drops: Sequence[dict[str, Any]]) -> list[str]:
-    """Return the means over the drops of quantities that are no criteria."""
+    """Return notes on the means over the drops of quantities that are not criteria."""
     means = []
     for name in ESTIMATES:
         known = [drop[name]["value"] for drop in drops if drop[name]["value"] is not None]
@@ -204,7 +204,7 @@ def _means(drops: Sequence[dict[str, Any]]) -> list[str]:
 
 
 def _results(data: dict[str, Any]) -> list[str]:
-    """Return the notes on drops, other quantities and methods."""
+    """Return notes on drops, other quantities and methods."""
     drops, low, high = data["drops"], *BACKGROUND
     results = _means(drops)
     averaged = "energy average of the drops" if len(drops) > 1 else "of one drop"
@@ -231,14 +231,14 @@ def _results(data: dict[str, Any]) -> list[str]:
 
 
 def _outliers(outliers: Iterable[dict[str, Any]]) -> str:
-    """Return the note on outliers among the drops."""
+    """Return a note on the outliers among the drops."""
     names: dict[str, list[str]] = {}
     for outlier in outliers:
         names.setdefault(outlier["name"], []).append(outlier["quantity"].split(",")[0])
     if not names:
         return "no drop differs from the others by more than chance (Grubbs, 5 %)"
     listed = "; ".join(f"{name} ({', '.join(quantities)})" for name, quantities in names.items())
-    return f"{_count(len(names), 'outlier')}, marked and not left out (Grubbs, 5 %): {listed}"
+    return f"{_count(len(names), 'outlier')}, marked but not excluded (Grubbs, 5 %): {listed}"
 
 
 def _messages(data: dict[str, Any], kind: str) -> list[str]:
@@ -250,13 +250,13 @@ def _messages(data: dict[str, Any], kind: str) -> list[str]:
 
 
 def _notes(title: str, messages: Sequence[str]) -> str:
-    """Return messages as a list with a title."""
+    """Return messages as an HTML list with a title."""
     items = "".join(f"<li>{_text(message)}</li>" for message in shorten(messages, NOTES))
     return f"<h2>{_text(title)}</h2><ul>{items}</ul>"
 
 
 def _files(files: Sequence[dict[str, Any]]) -> str:
-    """Return the names and checksums of the first files."""
+    """Return the names and checksums of the first files as rows of an HTML table."""
     names = shorten([_plain(file["name"]) for file in files], FILES)
     checksums = [*(file["sha256"] for file in files[: len(names) - (len(files) > FILES)]), ""]
     return "\n".join(
@@ -270,7 +270,7 @@ def _count(number_of: int, noun: str) -> str:
 
 
 def _cells(figures: Sequence[Figure]) -> list[str]:
-    """Return the cells of the figures that can be drawn."""
+    """Return the figures that can be drawn as cells of an HTML table."""
     cells = []
     for i, figure in enumerate(figures):
         with left_out("a figure of the report"):
