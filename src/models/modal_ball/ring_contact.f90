@@ -63,7 +63,7 @@ contains
 
    !> Impulses of one step, by an active set that starts from the previous step.
    subroutine solve_contact(contact, gap, error)
-      !> The contact; gets impulses and touching rings of this step.
+      !> The contact; impulses and touching rings of this step are set here.
       type(ring_contact_type), intent(inout) :: contact
       !> Gaps without contact, m: [n_gap].
       real(wp), intent(in) :: gap(:)
@@ -98,7 +98,8 @@ contains
    !> Makes the rings that touch at the end of a step stick there.
    pure subroutine update_sticking(contact, start)
       type(ring_contact_type), intent(inout) :: contact
-      !> Gaps without motion, m: [n_gap].
+      !> Gaps without motion, m: [n_gap]. The second gaps of rings that do not stick yet are set so that these gaps are now
+      !> zero.
       real(wp), intent(inout) :: start(:)
 
       if (contact%n_dof == 1) return
