@@ -2,7 +2,7 @@
 !>
 !> The state holds displacement towards the floor (m) and velocity (m/s) of each mass in turn, then impulse on the floor
 !> (N s) and energy lost (J); a source may append components. On a mobile floor displacements and velocities are relative to
-!> the floor; accelerations are absolute, and force and loss are the same as on a rigid floor.
+!> the floor; accelerations are absolute, and force and loss are defined as on a rigid floor.
 module thud_contact_source
    use thud_drop, only: drop_type
    use thud_error, only: error_type, numerical_error

@@ -2,9 +2,9 @@
 !>
 !> The energy of a record f in a band is f'Qf with the sinc kernel Q of the band (see `thud_force_exposure`). All bands lie
 !> below one frequency W. The kernel of all frequencies below W has few eigenvectors with significant eigenvalues: about
-!> 2 W T for records of length T, the discrete prolate spheroidal sequences (Slepian 1978). They are also the eigenvectors
-!> of a tridiagonal matrix, with which the kernel commutes: computed from this matrix, quickly, they have no cancellation. A
-!> record is projected on the sequences once for all bands; the spectrum of the projection at Gauss-Legendre nodes gives the
+!> 2 W T for records of length T, the discrete prolate spheroidal sequences (Slepian 1978). The kernel commutes with a
+!> tridiagonal matrix: both have the same eigenvectors, and the matrix gives them quickly and without cancellation. A record
+!> is projected on the sequences once for all bands; the spectrum of the projection at Gauss-Legendre nodes gives the
 !> energies. The sequences are symmetric or antisymmetric, so records are folded first, which halves the work.
 !>
 !> The omitted sequences change the square root of a band's energy by at most sqrt(dropped) times the norm of the record, see
@@ -21,7 +21,8 @@ module thud_band_projection
    public :: band_projection_type, get_band_energies, get_class_window, get_window_class, is_projected, &
       new_band_projection
 
-   !> Energy in all bands together below which the last sequences are omitted, as a fraction of the maximum of a sequence.
+   !> The last sequences are omitted if their energy in all bands together is below this fraction of the maximum energy of a
+   !> sequence.
    real(wp), parameter :: dropped = 1.0e-22_wp
 
    !> Error of a quadrature over a band, relative to the maximum of its integrand.

@@ -35,7 +35,7 @@ module thud_result_directory
       type(text_file_type) :: marker
       !> Paths of the files that the results depend on: [n_input].
       character(len=path_length), allocatable :: inputs(:)
-      !> Whether to replace files that thud has not written, too.
+      !> Whether to replace even files that thud has not written.
       logical :: replace = .false.
       !> Names of all files of the set: [n_file].
       character(len=name_length), allocatable :: names(:)
@@ -79,7 +79,7 @@ contains
       type(text_file_type), intent(in) :: files(:)
       !> Paths of the files that the results depend on, which are never replaced: [n_input].
       character(len=*), intent(in) :: inputs(:)
-      !> Whether to replace files that thud has not written, too.
+      !> Whether to replace even files that thud has not written.
       logical, intent(in) :: replace
       !> Whether the files replace results of the same case with another input.
       logical, intent(out) :: differs
@@ -105,7 +105,7 @@ contains
       character(len=*), intent(in) :: names(:)
       !> Paths of the files that the results depend on, which are never replaced: [n_input].
       character(len=*), intent(in) :: inputs(:)
-      !> Whether to replace files that thud has not written, too.
+      !> Whether to replace even files that thud has not written.
       logical, intent(in) :: replace
       !> The directory; to be closed even after an error.
       type(result_directory_type), intent(out) :: directory

@@ -203,7 +203,7 @@ contains
 
    !> Takes a shortened step for some of the balls.
    subroutine finish_step(impacts, active, length, elastic_force, floor_force)
-      !> The impacts; their series are expanded at the end of the step.
+      !> The impacts; their series are expanded again at the end of the step.
       type(impact_batch_type), intent(inout) :: impacts
       !> Whether the ball takes the step: [batch_size].
       logical, intent(in) :: active(batch_size)

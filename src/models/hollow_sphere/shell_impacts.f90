@@ -77,7 +77,7 @@ contains
       integer, intent(inout) :: last_step
       real(wp), dimension(batch_size) :: elastic_force, floor_force
       real(wp) :: latest_start
-      integer :: n, first, sample
+      integer :: n, begin, sample
       logical :: done, all_moving, any_out_of_range
       logical :: active(batch_size)
 
@@ -87,10 +87,10 @@ contains
       ! Balls with first_step = never take no part in this phase.
       latest_start = maxval(first_step, mask=first_step < never)
       end_step = merge(never, -1.0_wp, first_step < never)
-      first = int(min(minval(first_step), real(n_step, wp)))
+      begin = int(min(minval(first_step), real(n_step, wp)))
       call expand_series(impacts%shell, impacts%states(impacts%now), first_step < never, impacts%series)
       call add_end(impacts, first_step < never, -0.5_wp*impacts%whole_step, impacts%whole_step/12)
-      do n = first, n_step - 1
+      do n = begin, n_step - 1
          if (n <= latest_start .or. mod(n, series_steps) == 0 .or. any_out_of_range) then
             call renew_series(impacts, first_step, n)
          end if
@@ -116,7 +116,7 @@ contains
    end subroutine march
 
    !> Expands a new series for balls that begin or went out of range, and at fixed steps also for balls whose series will not
-   !> last until the next of these steps. No condition depends on other balls.
+   !> last until the next of these steps. The condition for a ball does not depend on other balls.
    pure subroutine renew_series(impacts, first_step, n)
       type(impact_batch_type), intent(inout) :: impacts
       real(wp), intent(in) :: first_step(batch_size)

@@ -56,7 +56,7 @@ module thud_shell_samples
    end type sample_outcome_type
 
    !> Residual of the balances of impulse and energy above which the single solver checks them, because the sums of the batch
-   !> have up to about twenty times the error of its sums.
+   !> have up to about twenty times the error of those of the single solver.
    real(wp), parameter :: max_batch_residual = 0.1_wp*max_residual
 
 contains
@@ -122,7 +122,7 @@ contains
    !> Whether the values of each sample lie inside their ranges.
    subroutine check_samples(samples, valid)
       type(sample_type), intent(in) :: samples(:)
-      !> Whether the values do: [n_sample].
+      !> Whether all values of the sample do: [n_sample].
       logical, intent(out) :: valid(:)
       type(sample_type), target :: any_sample
       type(field_type), allocatable :: fields(:)

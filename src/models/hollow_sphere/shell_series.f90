@@ -25,7 +25,7 @@ module thud_shell_series
    !> Highest power of the series.
    integer, parameter :: degree = 7
 
-   !> Maximum distance at which a series is used, as a fraction of that to the nearest root of x.
+   !> Maximum distance at which a series is used, as a fraction of the distance to the nearest root of x.
    real(wp), parameter :: near = 1.0_wp/64
 
    !> A series is kept as long as its ball will stay within this fraction of the reach until the next check.

@@ -196,7 +196,7 @@ contains
          //' cannot be distinguished; allowed: fewer rings, more static_harmonics, or more substeps')
    end subroutine prepare
 
-   !> Adds the modes of all harmonics, and adds the static displacement of the rings by the omitted modes to the response.
+   !> Adds the modes of all harmonics to `modes`, and the static displacement due to the omitted modes to `response`.
    subroutine add_modes(ball, options, rings, interval, modes, response, error)
       type(ball_type), intent(in) :: ball
       !> Modes.
@@ -260,7 +260,7 @@ contains
       !> Motion of ball and floor.
       type(ball_motion_type), intent(inout) :: state
       type(force_history_type), intent(inout) :: history
-      !> Set if the contact outlasts the record, or if energy is lost in contact.
+      !> Set if the contact outlasts the record, or if too much energy is lost in the contact.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: impulse, settling_time
       integer :: i, j, n_step, last_contact

@@ -76,7 +76,7 @@ contains
          '[0, harmonics]', whole=.true.)]
    end function get_fields
 
-   !> Returns an error if the rings are too few for the harmonics, or if no fractional law has the loss.
+   !> Returns an error if the rings are too few for the harmonics, or if no fractional law has this loss factor.
    subroutine check(ball, options, sampling, error)
       type(ball_type), intent(in) :: ball
       class(modal_ball_options_type), intent(in) :: options
