@@ -1,7 +1,7 @@
-"""The process of ``thud-driver``: its signals and its screen.
+"""The process of ``thud-driver``: its signals and its standard streams.
 
-Imports nothing but small modules of the standard library: an interrupt and a closed output have
-their sentence from the first moment, while the rest is imported, too.
+Imports only small modules of the standard library, so that interrupts and closed outputs have their
+message from the start, also while the other modules are imported.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
     from types import FrameType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-# Errors of a screen that nobody reads: its pipe or its descriptor is closed.
+# Errors of an output that nobody reads: its pipe or its descriptor is closed.
 _CLOSED = frozenset({errno.EPIPE, errno.EBADF})
-# Time in which another signal is a copy of the first: some callers send it to process and group, s.
+# Time in which a signal repeats the first, s: some callers signal both the process and its group.
 _COPIES = 1.0
 
 
 def main() -> int:
     """Run the command line of this process; return the exit code."""
     _handle(_end)
-    _open_screen()
+    _open_streams()
     # Figures are written to files, whatever else is set.
     os.environ["MPLBACKEND"] = "agg"
     try:
@@ -40,7 +40,7 @@ def main() -> int:
         sys.stderr.write(f"thud-driver: a library cannot be loaded ({reason})\n")
         return 1
 
-    # Coroutines that an interrupt ends would say that nobody has awaited them.
+    # Coroutines that an interrupt ends would warn that they were never awaited.
     warnings.filterwarnings("ignore", "coroutine ")
     interrupt = _Interrupt()
     sys.unraisablehook = interrupt.show_lost
@@ -48,30 +48,30 @@ def main() -> int:
     try:
         code = run()
     except (Exception, KeyboardInterrupt):
-        # Compiled modules, such as those that draw, turn an interrupt into an error of their own.
+        # Compiled modules, such as those of matplotlib, may turn an interrupt into another error.
         if not interrupt.number:
             raise
-        code = _say(interrupt.number)
+        code = _report_interrupt(interrupt.number)
     if interrupt.number and code != 128 + interrupt.number:
-        # It became an error of a figure, which is left out.
-        code = _say(interrupt.number)
+        # The interrupt became an error of a figure, which was left out.
+        code = _report_interrupt(interrupt.number)
     _handle(signal.SIG_IGN)
     return code
 
 
 def _handle(handler: Any) -> None:  # noqa: ANN401 - as `signal.signal` takes it
-    """Handle signals that end the process, unless it was started to ignore them."""
+    """Handle the signals that end the process, except those that it was started to ignore."""
     for number in SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, handler)
 
 
 def _end(number: int, _: FrameType | None) -> None:
-    os._exit(_say(number))
+    os._exit(_report_interrupt(number))
 
 
-def _say(number: int) -> int:
-    """Say that the process was interrupted; return the exit code."""
+def _report_interrupt(number: int) -> int:
+    """Report an interrupt; return the exit code."""
     with suppress(OSError):
         os.write(2, b"thud-driver: interrupted; finished results are kept\n")
     return 128 + number
@@ -92,28 +92,28 @@ class _Interrupt:
             _end(number, frame)
 
     def show_lost(self, lost: sys.UnraisableHookArgs) -> None:
-        """Print errors of destructors, except after an interrupt: half-built objects have some."""
+        """Print errors of destructors, except those of incomplete objects after an interrupt."""
         if not self.number:
             sys.__unraisablehook__(lost)
 
 
-def _open_screen() -> None:
-    """Give closed descriptors a place, so that no file gets their number, and cannot be written."""
+def _open_streams() -> None:
+    """Open closed standard descriptors, so that no file gets their number; wrap the streams."""
     for number in range(3):
         try:
             os.fstat(number)
         except OSError:
             os.open(os.devnull, os.O_WRONLY if number == 0 else os.O_RDONLY)
     stdout = sys.stdout or os.fdopen(1, "w", closefd=False)
-    # Names may hold letters that the encoding of the screen lacks.
+    # Names may have characters that the encoding of the output lacks.
     cast("TextIOWrapper", stdout).reconfigure(errors="backslashreplace")
-    sys.stdout = cast("TextIO", _Screen(stdout, _CLOSED))
+    sys.stdout = cast("TextIO", _Stream(stdout, _CLOSED))
     stderr = sys.stderr or os.fdopen(2, "w", closefd=False)
-    sys.stderr = cast("TextIO", _Screen(stderr, frozenset(errno.errorcode)))
+    sys.stderr = cast("TextIO", _Stream(stderr, frozenset(errno.errorcode)))
 
 
-class _Screen:
-    """Standard output or error; where it cannot write for one of some reasons, the text is lost."""
+class _Stream:
+    """Standard output or error that drops text which it cannot write for one of some reasons."""
 
     def __init__(self, stream: TextIO, reasons: frozenset[int]) -> None:
         self._stream = stream
@@ -129,11 +129,11 @@ class _Screen:
     def flush(self) -> None:
         self._try(self._stream.flush)
 
-    def _try(self, act: Callable[[], object]) -> None:
+    def _try(self, write: Callable[[], object]) -> None:
         try:
-            act()
+            write()
         except OSError as error:
             if error.errno not in self._reasons:
                 raise
-            # What is still buffered goes there, too.
+            # Buffered text is discarded as well.
             os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())

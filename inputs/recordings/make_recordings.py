@@ -1,9 +1,9 @@
-"""Synthetic recordings of a force plate, and the truth about them.
+"""Synthetic recordings of a force plate, and their true values.
 
 .venv/bin/python inputs/recordings/make_recordings.py
 
-drops the ball of ../rubber_ball_fe.nml from heights that scatter, adds the plate's first
-resonance, offset, drift, mains hum and noise, and writes the files beside it. Nothing here was
+drops the ball of ../rubber_ball_fe.nml from scattered heights, adds the plate's first resonance,
+offset, drift, mains hum and noise, and writes the files of this directory. Nothing here was
 measured.
 """
 
@@ -143,8 +143,8 @@ def main() -> None:
     heights = HEIGHT + np.random.default_rng(SEED_HEIGHT).normal(scale=SCATTER, size=8)
     hum = ", ".join(f'"{frequency:g} Hz" = {size}' for frequency, size in HUM.items())
     head = f"""# {LABEL}.
-# What the files beside this one hold, without what was added to it: the force on the floor of the
-# ball of ../rubber_ball_fe.nml. In the sound files {FULL_SCALE:g} V are full scale and
+# True values of the recordings in this directory, without the added disturbances: the force on the
+# floor of the ball of ../rubber_ball_fe.nml. In the sound files {FULL_SCALE:g} V are full scale and
 # compression is negative; the tables are in newtons, {EXCERPT:g} s from {FIRST - 0.04:g} s on.
 
 calibration = "{FULL_SCALE:g} V/FS, 0.5 mV/pC, 4 pC/N"
@@ -156,8 +156,8 @@ drift_time = {DRIFT_TIME}      # s
 hum = {{ {hum} }} # N
 plate = {{ f0 = {PLATE_F0}, Q = {PLATE_Q} }} # Hz
 
-# Of each drop: first touch in the sound file, s; height, m; contact time at 1 % of the peak, s;
-# restitution; peak, N; impulse, N s; octave levels 31.5 to 500 Hz, dB. Bounces are those of the
+# Values of each drop: first touch in the sound file, s; height, m; contact time at 1 % of the peak,
+# s; restitution; peak, N; impulse, N s; octave levels 31.5 to 500 Hz, dB. Bounces are those of the
 # drop above them.
 """
     text = head + drops_alone(heights[:5]) + drops_in_one(heights[5:])

@@ -2,8 +2,8 @@
 
 .venv/bin/python inputs/studies/make_recording.py
 
-writes fit_recording.wav: the force of the ball of inputs/rubber_ball_fe_viscous.nml with the faults
-of a force plate; the noise comes from NumPy's default generator with the seed below.
+writes fit_recording.wav: the force of the ball of inputs/rubber_ball_fe_viscous.nml with noise,
+offset, drift and hum; the noise comes from NumPy's default generator with the seed below.
 """
 
 from __future__ import annotations

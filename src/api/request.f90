@@ -1,6 +1,7 @@
 !> Requests of callers in other languages: named texts, numbers and arrays, the counterpart of `thud_bundle`.
 module thud_request
    use thud_kinds, only: wp
+   use thud_text, only: newline, tab
    implicit none (type, external)
    private
 
@@ -21,9 +22,6 @@ module thud_request
       procedure :: get_array
    end type request_type
 
-   !> Ends of a name and of a line in the header.
-   character(len=*), parameter :: tab = achar(9), line_feed = achar(10)
-
 contains
 
    !> Whether the request has an item of a name.
@@ -32,7 +30,7 @@ contains
       character(len=*), intent(in) :: name
       logical :: exists
 
-      exists = index(line_feed//self%header, line_feed//name//tab) > 0
+      exists = index(newline//self%header, newline//name//tab) > 0
    end function has
 
    !> A text by its name; empty if there is none.
@@ -85,7 +83,7 @@ contains
       begin = 1
       do while (begin <= len(self%header))
          middle = begin + index(self%header(begin:), tab) - 1
-         end = begin + index(self%header(begin:), line_feed) - 1
+         end = begin + index(self%header(begin:), newline) - 1
          if (self%header(middle + 1:middle + 1) == kind) then
             count = get_count(self%header(middle + 2:end - 1))
             if (self%header(begin:middle - 1) == name) length = count

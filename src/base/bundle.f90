@@ -3,7 +3,7 @@ module thud_bundle
    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_intptr_t, c_loc, c_null_ptr, c_ptr
    use thud_error, only: error_type
    use thud_kinds, only: int64, wp
-   use thud_text, only: to_text
+   use thud_text, only: newline, tab, to_text
    implicit none (type, external)
    private
 
@@ -37,9 +37,6 @@ module thud_bundle
       procedure :: count_values
       procedure :: copy_values
    end type bundle_type
-
-   !> Ends of a name and of a line in the header.
-   character(len=*), parameter :: tab = achar(9), line_feed = achar(10)
 
 contains
 
@@ -93,14 +90,10 @@ contains
    pure function get_form(extents) result(form)
       !> Extents of an array: [rank].
       integer, intent(in) :: extents(:)
-      !> The extents, each followed by a comma.
-      character(len=:), allocatable :: form
-      integer :: i
+      !> The extents, each followed by a comma, then blanks.
+      character(len=12*size(extents)) :: form
 
-      form = ''
-      do i = 1, size(extents)
-         form = form//to_text(extents(i))//','
-      end do
+      write (form, '(*(i0,","))') extents
    end function get_form
 
    !> Adds a line to the header.
@@ -110,7 +103,7 @@ contains
       character(len=*), intent(in) :: name, form
 
       if (.not. allocated(self%header)) self%header = ''
-      self%header = self%header//trim(name)//tab//form//line_feed
+      self%header = self%header//trim(name)//tab//trim(form)//newline
    end subroutine add_line
 
    !> Adds an empty item.
@@ -210,7 +203,7 @@ contains
 
    !> The bundle of a handle; the caller deallocates it.
    subroutine retrieve(handle, bundle)
-      !> Handle of a bundle, from `leave`; valid once.
+      !> Handle of a bundle, from `store`; valid once.
       integer(int64), intent(in) :: handle
       type(bundle_type), pointer, intent(out) :: bundle
       type(c_ptr) :: address

@@ -5,7 +5,7 @@ module thud_field
    use thud_interval, only: get_range_text, interval_type, new_interval
    use thud_kinds, only: wp
    use thud_suggestion, only: get_suggestion
-   use thud_text, only: is_number, join_quoted, lower_case, quoted, replaced, shortened, to_text
+   use thud_text, only: is_number, join, join_quoted, lower_case, quoted, replaced, shortened, to_text
    implicit none (type, external)
    private
 
@@ -290,16 +290,11 @@ contains
       class(field_type), intent(in) :: self
       !> The value; text is in quotes.
       character(len=:), allocatable, intent(out) :: text
-      integer :: i
 
       if (associated(self%real_value)) then
          text = to_text(self%real_value)
       else if (associated(self%list_value)) then
-         text = ''
-         do i = 1, self%list_value%count
-            if (i > 1) text = text//', '
-            text = text//to_text(self%list_value%values(i))
-         end do
+         text = join(self%list_value%values(:self%list_value%count))
       else if (associated(self%integer_value)) then
          text = to_text(self%integer_value)
       else if (associated(self%logical_value)) then

@@ -3,7 +3,7 @@
 module thud_interval
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use thud_kinds, only: wp
-   use thud_text, only: to_text
+   use thud_text, only: is_number, to_text
    implicit none (type, external)
    private
 
@@ -26,7 +26,7 @@ module thud_interval
       procedure :: resolve
    end type interval_type
 
-   !> Value of an expression for one or many sets of key values.
+   !> Value of an expression for one value of each key, or for each row of a table of them.
    interface evaluate
       module procedure evaluate_row, evaluate_rows
    end interface evaluate
@@ -65,15 +65,6 @@ contains
       end if
    end subroutine read_end
 
-   !> Whether a text is a number, not an expression.
-   pure function is_number(text) result(yes)
-      !> The text, without leading blanks.
-      character(len=*), intent(in) :: text
-      logical :: yes
-
-      yes = scan(text, '0123456789+-.') == 1 .and. verify(trim(text), '0123456789+-.eEdD') == 0
-   end function is_number
-
    !> Evaluates the ends that depend on other keys.
    pure subroutine resolve(self, keys, values)
       class(interval_type), intent(inout) :: self
@@ -86,15 +77,14 @@ contains
       if (self%upper_expression /= '') self%upper = evaluate(self%upper_expression, keys, values)
    end subroutine resolve
 
-   !> Whether the value of one key lies in the interval, for many sets of values of all keys.
+   !> Whether the value of one key lies in the interval, for each row of values of all keys: [n_row].
    pure function contains_rows(self, key, keys, values) result(inside)
       class(interval_type), intent(in) :: self
       !> Index of the key.
       integer, intent(in) :: key
       character(len=*), intent(in) :: keys(:)
-      !> Values of the keys: [n_set, n_key].
+      !> Values of the keys: [n_row, n_key].
       real(wp), intent(in) :: values(:, :)
-      !> The value lies in the interval: [n_set].
       logical :: inside(size(values, 1))
       type(interval_type) :: resolved
       real(wp), allocatable :: lower(:), upper(:)
@@ -113,7 +103,7 @@ contains
       end do
    end function contains_rows
 
-   !> Value of an expression for one set of key values.
+   !> Value of an expression for one value of each key.
    pure function evaluate_row(expression, keys, values) result(value)
       !> An expression such as `static_harmonics/2`.
       character(len=*), intent(in) :: expression

@@ -85,25 +85,23 @@ contains
       field%choices(:size(choices)) = choices
    end function choice_field
 
-   !> Puts keys into a namelist group, except keys that have one already.
+   !> Puts keys into a namelist group, except keys that have one already: [n_field].
    function in_group(group, fields) result(placed)
       character(len=*), intent(in) :: group
       !> The keys: [n_field].
       type(field_type), intent(in) :: fields(:)
-      !> The keys with their group: [n_field].
       type(field_type) :: placed(size(fields))
 
       placed = fields
       where (placed%group == '') placed%group = group
    end function in_group
 
-   !> Sets the owner of keys.
+   !> Sets the owner of keys: [n_field].
    function owned_by(owner, fields) result(owned)
       !> A source model, a floor, `modes`, `compression`, `floor` or `room`.
       character(len=*), intent(in) :: owner
       !> The keys: [n_field].
       type(field_type), intent(in) :: fields(:)
-      !> The keys with their owner: [n_field].
       type(field_type) :: owned(size(fields))
 
       owned = fields

@@ -8,14 +8,17 @@ module thud_text
    implicit none (type, external)
    private
 
-   public :: fixed, flush_right, is_number, is_utf8, join_quoted, lower_case, newline, padded, quoted, replaced
-   public :: shortened, split, to_text
+   public :: fixed, flush_right, is_number, is_utf8, join, join_quoted, lower_case, newline, padded, quoted, replaced
+   public :: shortened, split, tab, to_text
 
    !> Maximum length of a value in a message.
    integer, parameter :: longest_shown = 80
 
    !> Line feed, the line end in all files that thud writes.
    character(len=*), parameter :: newline = new_line('a')
+
+   !> Horizontal tab.
+   character(len=*), parameter :: tab = achar(9)
 
    !> Length sufficient for any number.
    integer, parameter :: number_length = 40
@@ -26,6 +29,12 @@ module thud_text
       module procedure :: logical_to_text
       module procedure :: real_to_text
    end interface to_text
+
+   !> Texts or numbers separated by commas.
+   interface join
+      module procedure :: join_words
+      module procedure :: join_numbers
+   end interface join
 
 contains
 
@@ -87,7 +96,7 @@ contains
    end function format_fixed
 
    !> Shortest decimal text of a number, padded with blanks.
-   pure function format_real(value) result(buffer)
+   elemental function format_real(value) result(buffer)
       real(wp), intent(in) :: value
       character(len=number_length) :: buffer
       character(len=12) :: form
@@ -227,7 +236,6 @@ contains
    pure function quoted(text) result(constant)
       !> Any text; trailing blanks are dropped.
       character(len=*), intent(in) :: text
-      !> The text in single quotes.
       character(len=quoted_length(text)) :: constant
       integer :: i, at
 
@@ -259,19 +267,16 @@ contains
       character(len=*), intent(in) :: words(:)
       !> The words in quotes, separated by commas.
       character(len=joined_length(words)) :: text
-      integer :: i, at
+      character(len=2*len(words) + 2) :: constants(size(words))
+      integer :: i
 
-      text = ''
-      at = 1
       do i = 1, size(words)
-         text(at:) = quoted(words(i))
-         at = at + quoted_length(words(i))
-         if (i < size(words)) text(at:) = ','
-         at = at + 2
+         constants(i) = quoted(words(i))
       end do
+      text = join(constants)
    end function join_quoted
 
-   !> Length of a joined list.
+   !> Length of a list of words in quotes.
    pure function joined_length(words) result(length)
       character(len=*), intent(in) :: words(:)
       !> Length of the text from `join_quoted`.
@@ -281,11 +286,35 @@ contains
       length = sum([(quoted_length(words(i)), i=1, size(words))]) + 2*max(size(words) - 1, 0)
    end function joined_length
 
-   !> Words of a comma-separated list.
+   !> Texts separated by commas: `one, two, three`.
+   pure function join_words(words) result(text)
+      !> The texts, whose trailing blanks are dropped: [n_word].
+      character(len=*), intent(in) :: words(:)
+      character(len=sum(len_trim(words)) + 2*max(size(words) - 1, 0)) :: text
+      integer :: i, at
+
+      text = ''
+      at = 1
+      do i = 1, size(words)
+         text(at:) = words(i)
+         at = at + len_trim(words(i)) + 2
+         if (i < size(words)) text(at - 2:) = ','
+      end do
+   end function join_words
+
+   !> Numbers separated by commas.
+   pure function join_numbers(values) result(text)
+      !> The numbers: [n].
+      real(wp), intent(in) :: values(:)
+      character(len=sum(len_trim(format_real(values))) + 2*max(size(values) - 1, 0)) :: text
+
+      text = join_words(format_real(values))
+   end function join_numbers
+
+   !> Words of a comma-separated list: [n_word].
    pure function split(list, n_word) result(words)
       character(len=*), intent(in) :: list
       integer, intent(in) :: n_word
-      !> The words: [n_word].
       character(len=32) :: words(n_word)
       integer :: i, at, length
 

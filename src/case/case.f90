@@ -148,11 +148,10 @@ contains
       end if
    end function is_used
 
-   !> The keys that a case uses, without empty lists.
+   !> The keys that a case uses, without empty lists: [n_field].
    function get_active_fields(case) result(fields)
       !> The case that the fields read and set.
       type(case_type), intent(in), target :: case
-      !> The keys: [n_field].
       type(field_type), allocatable :: fields(:)
       integer :: i
 

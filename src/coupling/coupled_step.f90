@@ -57,11 +57,10 @@ module thud_coupled_step
 
 contains
 
-   !> State of the equations of the source, relative to the floor.
+   !> State of the equations of the source, relative to the floor: [n_state].
    pure function get_relative_state(source, coupled) result(state)
       class(contact_source_type), intent(in) :: source
       type(coupled_state_type), intent(in) :: coupled
-      !> The state: [n_state].
       real(wp) :: state(source%n_state)
       integer :: n
 
@@ -216,11 +215,10 @@ contains
       end associate
    end function get_residual
 
-   !> Mass of the cap at the stages, 0 after release.
+   !> Mass of the cap at the stages, 0 after release, kg: [n_stage].
    pure function get_cap_mass(source, trial) result(mass)
       class(contact_source_type), intent(in) :: source
       type(trial_type), intent(in) :: trial
-      !> The mass, kg: [n_stage].
       real(wp) :: mass(n_stage)
 
       mass = 0.0_wp

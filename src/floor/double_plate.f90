@@ -11,7 +11,7 @@ module thud_double_plate
    implicit none (type, external)
    private
 
-   public :: double_plate_type, get_layer_resonance, get_lower_conductance, new_double_receiver
+   public :: double_plate_type, get_lower_conductance, new_double_receiver
 
    !> Both plates and the layer.
    type :: double_plate_type
@@ -22,15 +22,6 @@ module thud_double_plate
    end type double_plate_type
 
 contains
-
-   !> Resonance of both masses on the layer, sqrt(s' (1/m1 + 1/m2))/(2 pi).
-   elemental function get_layer_resonance(floor) result(frequency)
-      type(double_plate_type), intent(in) :: floor
-      !> The frequency, Hz.
-      real(wp) :: frequency
-
-      frequency = sqrt(floor%layer_stiffness*(1/get_surface_mass(floor%upper) + 1/get_surface_mass(floor%lower)))/(2*pi)
-   end function get_layer_resonance
 
    !> Transfer mobility from a source to a point of the upper plate.
    !>

@@ -59,10 +59,9 @@ module thud_floor_model
 
 contains
 
-   !> Fields of the points, for rectangular floors.
+   !> Fields of the points, for rectangular floors: [2].
    function get_point_fields(options) result(fields)
       class(floor_model_type), intent(in), target :: options
-      !> The fields: [2].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &

@@ -229,13 +229,12 @@ contains
       phi_1 = phi(1)
    end function get_phi_1
 
-   !> Sums of sample(i) phase_factor**(i - 1), by Horner's scheme.
+   !> Sums of sample(i) phase_factor**(i - 1), by Horner's scheme: [n_node].
    pure function get_sums(sample, phase_factor) result(total)
       !> The samples: [n_sample].
       real(wp), intent(in) :: sample(:)
       !> Phase factor of one sample: [n_node].
       complex(wp), intent(in) :: phase_factor(n_node)
-      !> The sums: [n_node].
       complex(wp) :: total(n_node)
       real(wp), dimension(n_node) :: factor_re, factor_im, re, im, next
       integer :: i

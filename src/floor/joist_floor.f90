@@ -112,10 +112,9 @@ contains
       plate%wave_speed = sqrt(12*sqrt(along*across)/mass)/plate%thickness
    end function get_smeared
 
-   !> Bending stiffness of the sheathing per unit width.
+   !> Bending stiffness of the sheathing per unit width, N m.
    pure function get_sheathing_stiffness(options) result(stiffness)
       class(joist_floor_type), intent(in) :: options
-      !> The stiffness, N m.
       real(wp) :: stiffness
 
       stiffness = options%sheathing_modulus*options%sheathing_thickness**3/12
@@ -144,10 +143,9 @@ contains
       reason = 'half a bending wave of the sheathing is shorter than the spacing of the joists: the plate is not homogeneous'
    end subroutine get_validity
 
-   !> Frequency at which half a bending wavelength in the sheathing equals the distance between joists.
+   !> Frequency at which half a bending wavelength in the sheathing equals the distance between joists, Hz.
    pure function get_smeared_limit(options) result(frequency)
       class(joist_floor_type), intent(in) :: options
-      !> The frequency, Hz.
       real(wp) :: frequency
 
       frequency = pi/(2*options%spacing**2) &
@@ -174,19 +172,17 @@ contains
       end associate
    end subroutine get_mobility_at
 
-   !> Resistance of the infinite sheathing without joists.
+   !> Resistance of the infinite sheathing without joists, N s/m.
    pure function get_sheathing_resistance(options) result(resistance)
       class(joist_floor_type), intent(in) :: options
-      !> The resistance, N s/m.
       real(wp) :: resistance
 
       resistance = 8*sqrt(get_sheathing_stiffness(options)*options%sheathing_density*options%sheathing_thickness)
    end function get_sheathing_resistance
 
-   !> Static compliance of the sheathing between two joists.
+   !> Static compliance of the sheathing between two joists, m/N.
    pure function get_local_compliance(options) result(compliance)
       class(joist_floor_type), intent(in) :: options
-      !> The compliance, m/N.
       real(wp) :: compliance
 
       compliance = local_compliance*options%spacing**2/get_sheathing_stiffness(options)

@@ -71,10 +71,9 @@ contains
          'sum of edge lengths times absorption coefficients, for absorption', '[0, 1000]')]
    end function get_plate_fields
 
-   !> Mass per unit area.
+   !> Mass per unit area, kg/m2.
    elemental function get_surface_mass(plate) result(mass)
       type(plate_type), intent(in) :: plate
-      !> The mass, kg/m2.
       real(wp) :: mass
 
       mass = plate%density*plate%thickness
@@ -151,13 +150,12 @@ contains
          /get_directional_mean(plate%torsion_ratio)
    end function get_mode_density
 
-   !> Radiation factor of an isotropic plate for free waves (ISO 12354-1 annex B).
+   !> Radiation factor of an isotropic plate for free waves, at most 2 (ISO 12354-1 annex B).
    elemental function get_radiation_factor(frequency, critical, length, width, sound_speed) result(sigma)
       !> Frequency and critical frequency, Hz.
       real(wp), intent(in) :: frequency, critical
       !> Sides of the plate, m; speed of sound, m/s.
       real(wp), intent(in) :: length, width, sound_speed
-      !> The factor, at most 2.
       real(wp) :: sigma
       real(wp) :: first, above, plate_modes, diffuse, edge, corner, lambda
 

@@ -119,13 +119,12 @@ contains
       end associate
    end function get_modal_stiffness
 
-   !> Mode shapes at a point.
+   !> Mode shapes at a point: [n_mode].
    pure function get_shape(m, n, point) result(shape)
       !> Half waves along length and width: [n_mode].
       integer, intent(in) :: m(:), n(:)
       !> Position of the point, as fractions of length and width.
       real(wp), intent(in) :: point(2)
-      !> The shapes: [n_mode].
       real(wp) :: shape(size(m))
       real(wp) :: sine_x(maxval([m, 0])), sine_y(maxval([n, 0]))
 

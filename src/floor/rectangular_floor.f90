@@ -55,10 +55,9 @@ module thud_rectangular_floor
 
 contains
 
-   !> Fields of the position of the source.
+   !> Fields of the position of the source: [2].
    function get_source_fields(options) result(fields)
       class(rectangular_floor_type), intent(in), target :: options
-      !> The fields: [2].
       type(field_type) :: fields(2)
 
       fields = [ &

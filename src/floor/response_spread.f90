@@ -30,11 +30,10 @@ contains
       end associate
    end function get_band_variance
 
-   !> Standard deviation of a level whose energy is a product of independent log-normal factors.
+   !> Standard deviation of a level whose energy is a product of independent log-normal factors, dB.
    pure function get_level_spread(variances) result(spread)
       !> Relative variances of the factors: [n].
       real(wp), intent(in) :: variances(:)
-      !> The standard deviation, dB.
       real(wp) :: spread
 
       spread = 10/log(10.0_wp)*sqrt(sum(log(1 + variances)))

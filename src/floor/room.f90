@@ -314,11 +314,10 @@ contains
       density = 4*pi*room%volume*frequency**2/room%air%sound_speed**3
    end function get_room_mode_density
 
-   !> Reverberation times of the bands, s.
+   !> Reverberation times of the bands, s: [n_band].
    pure function get_reverberation_times(room, n_band) result(times)
       type(room_type), intent(in) :: room
       integer, intent(in) :: n_band
-      !> The times: [n_band].
       real(wp) :: times(n_band)
 
       times = room%reverberation_time

@@ -54,14 +54,13 @@ contains
       end do
    end subroutine get_fast_maximum
 
-   !> Response of the Fast detector to a weighted sum of energies, at equal time steps.
+   !> Response of the Fast detector to a weighted sum of energies, at equal time steps: [n_step].
    pure function get_fast_history(loss, start, weight, interval, n_step) result(detector)
       !> As in `get_fast_maximum`: [n, n], [n], [n].
       real(wp), intent(in) :: loss(:, :), start(:), weight(:)
       !> Time step, s.
       real(wp), intent(in) :: interval
       integer, intent(in) :: n_step
-      !> Response y at the end of each step: [n_step].
       real(wp) :: detector(n_step)
       real(wp) :: step(size(start) + 1, size(start) + 1), state(size(start) + 1)
       integer :: i

@@ -138,7 +138,7 @@ contains
       history%exact_contact_time = (last - 1 + fraction)/history%sample_rate - history%touch_time
    end subroutine continue_to_zero
 
-   !> A history of zero force.
+   !> A history of zero force, all arrays allocated and zero.
    pure function new_force_history(sample_rate, n_sample, component_name, model_history_name) result(history)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
@@ -147,7 +147,6 @@ contains
       character(len=*), intent(in) :: component_name(:)
       !> Names, with units, of further quantities against time (default: none): [n_model_history].
       character(len=*), intent(in), optional :: model_history_name(:)
-      !> The history, all arrays allocated and zero.
       type(force_history_type) :: history
 
       history%sample_rate = sample_rate

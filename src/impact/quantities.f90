@@ -76,10 +76,9 @@ module thud_quantities
 
 contains
 
-   !> Values of the quantities of an impact.
+   !> Values of the quantities of an impact, SI units: [history_quantity_count].
    function get_quantities(history) result(values)
       type(force_history_type), intent(in) :: history
-      !> Values, SI units: [history_quantity_count].
       real(wp) :: values(history_quantity_count)
 
       values = [history%contact_time, history%peak_force, history%peak_elastic_force, history%max_deflection, &

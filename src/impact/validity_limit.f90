@@ -89,11 +89,10 @@ contains
          reason='it is the order of the strain of the wall')
    end function get_wave_limit
 
-   !> Limits of models of an elastic wall that stays close to the sphere.
+   !> Limits of models of an elastic wall that stays close to the sphere: [4].
    pure function get_wall_limits(ball, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(force_history_type), intent(in) :: history
-      !> The limits: [4].
       type(validity_limit_type) :: limits(4)
 
       associate (radius => ball%outer_radius, wall => ball%wall_thickness)

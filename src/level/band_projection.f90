@@ -58,11 +58,10 @@ module thud_band_projection
 
 contains
 
-   !> Index of the shortest window that holds the samples.
+   !> Index of the shortest window that holds the samples, from 1.
    elemental function get_window_class(n_sample) result(window)
       !> Samples of the record.
       integer, intent(in) :: n_sample
-      !> Index of the window, from 1.
       integer :: window
 
       window = 1

@@ -79,13 +79,12 @@ contains
       bands = bands(first:first + rated_sets(at)%n_band - 1)
    end subroutine find_rated_bands
 
-   !> A-weighted maximum level from the bands of a set (ISO 717-2 annex D), not rounded.
+   !> A-weighted maximum level from the bands of a set (ISO 717-2 annex D), not rounded, dB.
    pure function get_a_weighted_level(name, level) result(total)
       !> One of `rated_set_names`.
       character(len=*), intent(in) :: name
       !> Levels of its rated bands, dB: [n_band].
       real(wp), intent(in) :: level(:)
-      !> The level, dB.
       real(wp) :: total
       integer :: at
 

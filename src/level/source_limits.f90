@@ -83,7 +83,7 @@ contains
       end if
    end subroutine get_source_limits
 
-   !> All criteria for a source, in a fixed order.
+   !> All criteria for a source, in a fixed order: [criterion_count].
    pure function get_criteria(limits, levels, contact_time, restitution, peak_count, mass, drop_height) &
       result(criteria)
       type(source_limits_type), intent(in) :: limits
@@ -94,7 +94,6 @@ contains
       integer, intent(in) :: peak_count
       !> Mass of the source, kg; drop height, m.
       real(wp), intent(in) :: mass, drop_height
-      !> The criteria: [criterion_count].
       type(criterion_type) :: criteria(criterion_count)
       type(band_type) :: octaves(octave_count)
       integer :: i

@@ -189,11 +189,10 @@ contains
          //to_text(max_steps))
    end subroutine choose_steps
 
-   !> Upper bound of the fastest rate of the motion: of its natural frequencies (by the trace) and of its decay rates.
+   !> Upper bound of the fastest rate of the motion, rad/s: of natural frequencies (by the trace) and of decay rates.
    pure function get_fastest_rate(tyre, impact_velocity) result(rate)
       type(tyre_type), intent(in) :: tyre
       real(wp), intent(in) :: impact_velocity
-      !> The bound, rad/s.
       real(wp) :: rate
       real(wp) :: energy, deflection, power
 

@@ -7,7 +7,7 @@ module thud_fractional_loss
    implicit none (type, external)
    private
 
-   public :: fractional_loss_type, get_modulus, new_fractional_loss
+   public :: fractional_loss_type, new_fractional_loss
 
    !> The damping law; moduli are divided by the storage modulus at the frequency of the loss factor.
    type :: fractional_loss_type
@@ -35,15 +35,5 @@ contains
       law%spring = 1 - law%springpot*cos(pi/2*order)
       law%omega = 2*pi*frequency
    end function new_fractional_loss
-
-   !> Complex modulus, divided by the storage modulus at the frequency of the loss factor.
-   pure elemental function get_modulus(law, omega) result(modulus)
-      type(fractional_loss_type), intent(in) :: law
-      !> Angular frequency, rad/s.
-      real(wp), intent(in) :: omega
-      complex(wp) :: modulus
-
-      modulus = law%spring + law%springpot*(omega/law%omega)**law%order*exp(cmplx(0.0_wp, pi/2*law%order, wp))
-   end function get_modulus
 
 end module thud_fractional_loss

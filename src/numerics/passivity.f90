@@ -221,11 +221,10 @@ contains
       end associate
    end function get_response
 
-   !> Numbers in ascending order.
+   !> Numbers in ascending order: [n].
    pure function sorted(values) result(rising)
       !> The numbers: [n].
       real(wp), intent(in) :: values(:)
-      !> The sorted numbers: [n].
       real(wp) :: rising(size(values))
       real(wp) :: value
       integer :: i, j

@@ -5,7 +5,7 @@ module thud_phi
    implicit none (type, external)
    private
 
-   public :: get_phi, max_phi
+   public :: get_phi
 
    !> Highest index n.
    integer, parameter :: max_phi = 8
@@ -21,13 +21,12 @@ module thud_phi
 
 contains
 
-   !> The functions phi_0 to phi_highest.
+   !> The functions phi_0 to phi_highest: [0:highest].
    pure function get_phi(z, highest) result(phi)
       !> Argument whose real part is not large.
       complex(wp), intent(in) :: z
       !> Index of the last function, up to `max_phi`.
       integer, intent(in) :: highest
-      !> Their values: [0:highest].
       complex(wp) :: phi(0:highest)
       complex(wp) :: reciprocal
       integer :: k, n

@@ -12,14 +12,14 @@
 !> m - 1 is exact, so s errs by 2 u (sum, quotient), the series in s**2 by 2.2 u (rounded coefficients, the last sum; the
 !> rest is scaled down by s**2), their product by one more: 5.5 u. Adding k and multiplying by the exponent add u each: t
 !> errs by 7.5 u |t|, the power by ln 2 times that. n and r are exact. The last series has positive terms for r > 0 and errs
-!> by 3 u for either sign; its scaling is exact. The sum is (5.2 |t| + 3) u, stated as `power_error`.
+!> by 3 u for either sign; its scaling is exact. The sum is (5.2 |t| + 3) u.
 module thud_power
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_kinds, only: wp
    implicit none (type, external)
    private
 
-   public :: not_a_number, power_error, vector_power
+   public :: not_a_number, vector_power
 
    !> Natural logarithm of 2.
    real(wp), parameter :: ln2 = log(2.0_wp)
@@ -89,14 +89,5 @@ contains
          power(i) = merge(value, not_a_number, base(i) > 0.0_wp)
       end do
    end subroutine vector_power
-
-   !> Bound of the relative error of `vector_power`, derived above.
-   elemental function power_error(base, exponent) result(bound)
-      real(wp), intent(in) :: base, exponent
-      !> Maximum relative error.
-      real(wp) :: bound
-
-      bound = (5.2_wp*abs(exponent*log(base))/ln2 + 3)*epsilon(1.0_wp)/2
-   end function power_error
 
 end module thud_power

@@ -46,13 +46,12 @@ contains
       basis(:, j + 1) = 1.0_wp
    end subroutine get_basis
 
-   !> Residues from the coefficients of the basis.
+   !> Residues from the coefficients of the basis, doubled for pairs: [n].
    pure function get_residues(pole, coefficient) result(residue)
       !> Poles: [n].
       complex(wp), intent(in) :: pole(:)
       !> Coefficients of the basis: [order].
       real(wp), intent(in) :: coefficient(:)
-      !> Residues, doubled for pairs: [n].
       complex(wp) :: residue(size(pole))
       integer :: j, k
 
@@ -66,11 +65,10 @@ contains
       end do
    end function get_residues
 
-   !> Coefficients of the basis from residues.
+   !> Coefficients of the basis from residues: [order].
    pure function get_coefficients(pole, residue) result(coefficient)
       !> Poles, and residues, doubled for pairs: [n].
       complex(wp), intent(in) :: pole(:), residue(:)
-      !> Coefficients of the basis: [order].
       real(wp), allocatable :: coefficient(:)
       integer :: j, k
 

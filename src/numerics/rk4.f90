@@ -109,7 +109,6 @@ contains
       real(wp), intent(in) :: state(:)
       !> Length of a step that leaves the domain.
       real(wp), intent(in) :: step
-      !> Length of the longest step that stays in the domain.
       real(wp) :: length
       type(bisection_type) :: bracket
       real(wp) :: new_state(size(state))

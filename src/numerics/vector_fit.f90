@@ -206,11 +206,10 @@ contains
       failed = info /= 0
    end subroutine solve_least_squares
 
-   !> Real parts, then imaginary parts.
+   !> Real parts, then imaginary parts: [2 n].
    pure function halves(values) result(parts)
       !> Complex values: [n].
       complex(wp), intent(in) :: values(:)
-      !> Their parts: [2 n].
       real(wp) :: parts(2*size(values))
 
       parts = [real(values), aimag(values)]

@@ -33,7 +33,7 @@ contains
       end select
    end function suits_batch
 
-   !> Makes the parameter sets of the shell model.
+   !> Makes the samples of the shell model.
    subroutine fill_samples(case, columns, values, samples)
       !> The case, for all values that are not in the columns.
       type(case_type), intent(in), target :: case
@@ -41,7 +41,7 @@ contains
       type(column_type), intent(in) :: columns(:)
       !> Values of the keys: [n_column, n_sample].
       real(wp), intent(in) :: values(:, :)
-      !> The sets: [n_sample].
+      !> The samples: [n_sample].
       type(sample_type), intent(out) :: samples(:)
       type(sample_type), target :: sample
       type(field_type), allocatable :: fields(:), sample_fields(:)

@@ -1,7 +1,7 @@
-!> Many drops of the shell model: threads share blocks of parameter sets, and the levels of a block are computed while
+!> Many drops of the shell model: threads share blocks of samples, and the levels of a block are computed while
 !> its forces are in cache.
 !>
-!> The results of a set do not depend on the number of threads, the other sets or its index: they come from the set's
+!> The results of a sample do not depend on the number of threads, the other samples or its index: they come from its
 !> own column in arrays of fixed shape or, for levels of a long contact, from its own record.
 module thud_ensemble
    use thud_band, only: band_type, get_octaves, octave_count
@@ -44,7 +44,7 @@ module thud_ensemble
       real(wp), allocatable :: folded(:)
       !> Index of the last force sample that is not zero.
       integer :: n_written = 0
-      !> Criteria, with the values of one set at a time.
+      !> Criteria, with the values of one sample at a time.
       type(criterion_type) :: criteria(criterion_count)
       !> Error that stops the thread.
       type(error_type), allocatable :: error
@@ -83,7 +83,7 @@ contains
       alike = abs(first%sample_rate - other%sample_rate) <= 0.0_wp .and. all(first%bands%set == other%bands%set)
    end function are_alike
 
-   !> Computes quantities, levels and verdicts of all sets.
+   !> Computes quantities, levels and verdicts of all samples.
    subroutine solve_ensemble(samples, sampling, source, threads, with_levels, projections, computed, quantity, levels, met, &
       forces, error)
       !> The samples: [n_sample].
@@ -92,19 +92,19 @@ contains
       !> Source whose limits apply.
       character(len=*), intent(in) :: source
       integer, intent(in) :: threads
-      !> Compute levels and verdicts; otherwise levels are NaN and no set conforms.
+      !> Compute levels and verdicts; otherwise levels are NaN and no sample conforms.
       logical, intent(in) :: with_levels
       !> Matrices of the levels for this sampling rate.
       type(projections_type), intent(inout) :: projections
-      !> The set has been computed: [n_set].
+      !> The sample has been computed: [n_sample].
       logical, intent(out) :: computed(:)
-      !> The quantities of samples, SI units, NaN if not computed: [sample_quantity_count, n_set].
+      !> The quantities of samples, SI units, NaN if not computed: [sample_quantity_count, n_sample].
       real(wp), intent(out) :: quantity(:, :)
-      !> Force exposure levels, dB, NaN if not computed: [n_band, force_count, n_set].
+      !> Force exposure levels, dB, NaN if not computed: [n_band, force_count, n_sample].
       real(wp), intent(out) :: levels(:, :, :)
-      !> The source conforms, by each force: [force_count, n_set].
+      !> The source conforms, by each force: [force_count, n_sample].
       logical, intent(out) :: met(:, :)
-      !> Forces, N, NaN if not computed; of size 0 if not wanted: [n_sample, force_count, n_set].
+      !> Forces, N, NaN if not computed; of size 0 if not wanted: [n_time, force_count, n_sample].
       real(wp), intent(out) :: forces(:, :, :)
       !> Set if the sampling is invalid, its records do not fit into memory, the source is unknown, or after an interrupt.
       type(error_type), allocatable, intent(out) :: error
@@ -144,7 +144,7 @@ contains
          !$omp end critical (thud_ensemble_error)
       end subroutine run_blocks
 
-      !> Computes one block, from sets to verdicts.
+      !> Computes one block, from samples to verdicts.
       subroutine run_block(workspace, indices)
          type(workspace_type), intent(inout) :: workspace
          !> Indices of the samples: [n_in_block].
@@ -206,7 +206,7 @@ contains
       type(sample_outcome_type), intent(out) :: outcomes(:)
       !> Levels, dB: [n_band, force_count, n_sample].
       real(wp), intent(out) :: levels(:, :, :)
-      !> The source conforms, by each force: [force_count, n_set].
+      !> The source conforms, by each force: [force_count, n_sample].
       logical, intent(out) :: met(:, :)
       real(wp), pointer, contiguous :: force(:, :)
       integer :: class(size(samples))
@@ -224,7 +224,7 @@ contains
          class(i) = get_window_class(min(int(outcomes(i)%contact_time*sampling%sample_rate) + 1, size(force, 2)))
       end do
       force(:, n_written + 1:get_class_window(max(1, maxval(class)))) = 0.0_wp
-      ! Each set has its own window, so that its levels do not depend on the other sets of the block.
+      ! Each sample has its own window, so that its levels do not depend on the other samples of the block.
       do window = minval(class, mask=class > 0), maxval(class)
          if (.not. any(class == window)) cycle
          if (is_projected(get_class_window(window), projections%sample_rate, projections%bands)) then
@@ -243,16 +243,16 @@ contains
       end do
    end subroutine solve_workspace
 
-   !> Levels of all sets with the same window, by matrix products.
+   !> Levels of all samples with the same window, by matrix products.
    subroutine project(workspace, force, window, chosen, projections, levels)
       type(workspace_type), intent(inout) :: workspace
       !> Forces, N: [force_count block_size, n_row].
       real(wp), intent(in), contiguous :: force(:, :)
       integer, intent(in) :: window
-      !> The set has this window: [n_set].
+      !> The sample has this window: [n_sample].
       logical, intent(in) :: chosen(:)
       type(projections_type), intent(inout) :: projections
-      !> Levels, dB; only those of chosen sets are set: [n_band, force_count, n_set].
+      !> Levels, dB; only those of chosen samples are written: [n_band, force_count, n_sample].
       real(wp), intent(inout) :: levels(:, :, :)
       real(wp) :: energy(force_count*block_size, size(projections%bands)), square_sum(force_count*block_size)
       integer :: i, j, row
@@ -320,7 +320,7 @@ contains
          //to_text(get_class_window(window))//' samples cannot be made; allowed: other rates')
    end subroutine require_window
 
-   !> Whether a set meets all criteria. Peaks are counted last, as this takes longer than all other criteria.
+   !> Whether a sample meets all criteria. Peaks are counted last, as this takes longer than all other criteria.
    function is_conforming(criteria, sample, outcome, levels, force, row, sampling) result(met)
       !> The criteria; their values are overwritten: [criterion_count].
       type(criterion_type), intent(inout) :: criteria(:)
@@ -346,13 +346,12 @@ contains
       met = all(conforms(criteria))
    end function is_conforming
 
-   !> One force of one set.
+   !> One force of one sample, N: [n_time].
    function get_record(workspace, i, j, sampling) result(record)
       type(workspace_type), intent(in), target :: workspace
       !> Index of the sample in the block, and of the force in `force_names`.
       integer, intent(in) :: i, j
       type(sampling_type), intent(in) :: sampling
-      !> The force, N: [n_time].
       real(wp) :: record(get_sample_count(sampling))
       real(wp), pointer, contiguous :: force(:, :)
 

@@ -297,15 +297,15 @@ contains
    end subroutine flush_directory
 
    !> Whether a directory exists.
-   function directory_exists(path) result(there)
+   function directory_exists(path) result(exists)
       character(len=*), intent(in) :: path
       !> It exists and can be read.
-      logical :: there
+      logical :: exists
       type(c_ptr) :: directory
 
       directory = c_opendir(path//c_null_char)
-      there = c_associated(directory)
-      if (there) there = c_closedir(directory) == 0
+      exists = c_associated(directory)
+      if (exists) exists = c_closedir(directory) == 0
    end function directory_exists
 
    !> Names in a directory.

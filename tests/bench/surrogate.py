@@ -42,7 +42,7 @@ def main() -> None:
     print(np.quantile(np.abs(errors), 0.95, axis=0).round(4))
     print("share of drops within 0.1 dB:", (np.abs(errors) <= 0.1).mean(axis=0).round(4))
     wrong = found["conforms"] != direct.conforms
-    print(f"verdicts that differ: {wrong.sum()} of {count}, in doubt {found['doubtful'].sum()}")
+    print(f"verdicts that differ: {wrong.sum()} of {count}, undecided {found['undecided'].sum()}")
 
     sets = dict(
         zip(trained.keys, (low + draw.random((MANY, len(low))) * (high - low)).T, strict=True)

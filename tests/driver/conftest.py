@@ -10,6 +10,7 @@ import subprocess
 import sys
 import sysconfig
 import warnings
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,8 @@ from thud import cli
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from matplotlib.figure import Figure
 
     Run = Callable[..., subprocess.CompletedProcess[str]]
     CaseFile = Callable[..., Path]
@@ -38,6 +41,7 @@ settings.load_profile("thud")
 REPOSITORY = Path(__file__).parents[2]
 INPUTS = sorted((REPOSITORY / "inputs").glob("*.nml"))
 MINIMAL = "&ball /\n&drop /\n&model /\n"
+RESULT_FILES = [".thud", "effective.nml", "force.csv", "levels.csv", "summary.nml"]
 # How patterns of `naming` begin: at the begin of a message, in any case, over all its lines.
 NAMING = r"(?is)\A"
 
@@ -67,6 +71,14 @@ def quiet_fit(*arguments: Any, **options: Any) -> thud.Fit:  # noqa: ANN401 - of
         return thud.fit(*arguments, **options)
 
 
+@cache
+def documentation_figure(name: str) -> Figure:
+    """Return a figure of the documentation, drawn once in a run."""
+    from thud.plot import documentation
+
+    return documentation.FIGURES[name]()
+
+
 def names_in(folder: Path) -> list[str]:
     """Return the sorted names of the files of a directory."""
     return sorted(path.name for path in folder.iterdir())
@@ -94,6 +106,12 @@ def executable() -> str:
     path = Path(sysconfig.get_path("scripts")) / "thud"
     assert path.exists(), f"{path} is missing: run ./bootstrap setup"
     return str(path)
+
+
+@pytest.fixture(scope="session")
+def shell() -> thud.Impact:
+    """Return the impact of the standard drop by the model of the paper."""
+    return thud.solve()
 
 
 @pytest.fixture(scope="session")
@@ -144,6 +162,12 @@ def errors_of(capsys: pytest.CaptureFixture[str]) -> ErrorsOf:
         return capsys.readouterr().err
 
     return run_failing
+
+
+@pytest.fixture
+def working_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make the directory of the test the working directory."""
+    monkeypatch.chdir(tmp_path)
 
 
 @pytest.fixture

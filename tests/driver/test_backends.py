@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
+    import xarray as xr
     from conftest import ErrorsOf
 
 # Some of these samples fail; by this method of the levels they make several blocks.
@@ -40,6 +41,12 @@ STUDY: dict[str, Any] = {
         "height": {"low": -0.1, "high": 60},
         "youngs_modulus": {"std": 0.5, "unit": "MPa"},
     },
+}
+# Of several blocks, too, which take some time.
+MODAL: dict[str, Any] = {
+    "design": {"kind": "random", "size": 400},
+    "fixed": {"model": "modal_ball", "rings": 20},
+    "parameters": {"height": {"low": 0.9, "high": 1.1}},
 }
 BLOCKS = 12
 # A scheduler and a worker in one process, which can be killed.
@@ -62,18 +69,29 @@ def cluster() -> Iterator[LocalCluster]:
         yield running
 
 
+@pytest.fixture(scope="module")
+def expected() -> xr.Dataset:
+    """Return the results of the study, computed one after the other, without their origin."""
+    return thud.sweep(STUDY, workers=1).dataset.drop_attrs(deep=False)
+
+
+@pytest.fixture(scope="module")
+def expected_modal() -> xr.Dataset:
+    """Return those of the slow study."""
+    return thud.sweep(MODAL).dataset.drop_attrs(deep=False)
+
+
 @pytest.mark.slow
-def test_every_backend_gives_the_same(cluster: LocalCluster) -> None:
-    one = thud.sweep(STUDY, workers=1).dataset
-    assert set(one["status"].values) == {0, 1, 2}
-    assert one.sizes["sample"] > KIND.read_study(STUDY).block_size
+def test_every_backend_gives_the_same(cluster: LocalCluster, expected: xr.Dataset) -> None:
+    assert set(expected["status"].values) == {0, 1, 2}
+    assert expected.sizes["sample"] > KIND.read_study(STUDY).block_size
     for how in (
         {"workers": 3},
         {"backend": "processes", "workers": 2},
         {"scheduler": cluster.scheduler_address},
     ):
         other = thud.sweep(STUDY, **how).dataset  # type: ignore[arg-type]
-        assert other.drop_attrs(deep=False).identical(one.drop_attrs(deep=False)), how
+        assert other.drop_attrs(deep=False).identical(expected), how
 
 
 def test_threads_of_a_block_do_not_matter() -> None:
@@ -139,18 +157,19 @@ def test_stopped_worker_of_dask_does_not_hold_the_study() -> None:
 
 @pytest.mark.parametrize("written", ["netcdf", "zarr"])
 @pytest.mark.slow
-def test_dask_writes_the_same(written: str, cluster: LocalCluster, tmp_path: Path) -> None:
-    expected = thud.sweep(STUDY).dataset
+def test_dask_writes_the_same(
+    written: str, cluster: LocalCluster, expected: xr.Dataset, tmp_path: Path
+) -> None:
     study = {**STUDY, "format": written}
     found = thud.sweep(study, tmp_path, scheduler=cluster.scheduler_address).dataset.load()
-    assert found.drop_attrs(deep=False).identical(expected.drop_attrs(deep=False))
+    assert found.drop_attrs(deep=False).identical(expected)
 
 
 @pytest.mark.slow
 def test_killed_worker_of_dask_leaves_no_gap_on_disk(
     cluster: LocalCluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    study = {**STUDY, "fixed": {"model": "modal_ball", "rings": 20}}
+    study = {**STUDY, "fixed": MODAL["fixed"], "design": {**STUDY["design"], "size": 400}}
     with Client(cluster, set_as_default=False) as client:
         pids = list(client.run(os.getpid).values())
     keep = Blocks.keep
@@ -169,11 +188,11 @@ def test_killed_worker_of_dask_leaves_no_gap_on_disk(
 @pytest.mark.parametrize("rest", [{"backend": "processes", "workers": 2}, {"scheduler": True}])
 @pytest.mark.slow
 def test_lost_scheduler_is_reported_and_its_study_goes_on_elsewhere(
-    rest: dict[str, Any], cluster: LocalCluster, tmp_path: Path
+    rest: dict[str, Any], cluster: LocalCluster, expected_modal: xr.Dataset, tmp_path: Path
 ) -> None:
     study = tmp_path / "some.toml"
     study.write_text(
-        "design = {kind='random', size=600}\nfixed = {model='modal_ball', rings=20}\n"
+        "design = {kind='random', size=400}\nfixed = {model='modal_ball', rings=20}\n"
         "parameters.height = {low=0.9, high=1.1}"
     )
     with subprocess.Popen(
@@ -193,11 +212,11 @@ def test_lost_scheduler_is_reported_and_its_study_goes_on_elsewhere(
     assert re.search(naming(study, "backend", "CancelledError"), errors)
     assert errors.count("\n") == 1
     finished = thud.read_sweep(tmp_path / "some.partial").dataset
-    assert 0 < finished.sizes["sample"] < 600
+    assert 0 < finished.sizes["sample"] < 400
     if "scheduler" in rest:
         rest = {"scheduler": cluster.scheduler_address}
     found = thud.sweep(study, tmp_path, **rest).dataset
-    assert found.drop_attrs(deep=False).identical(thud.sweep(study).dataset.drop_attrs(deep=False))
+    assert found.drop_attrs(deep=False).identical(expected_modal)
 
 
 def test_killed_process_is_reported_and_loses_nothing() -> None:

@@ -150,26 +150,26 @@ def test_recordings_say_what_is_doubtful_and_have_their_names() -> None:
         assert {f"{name}: {warning}" for warning in ball.warnings} <= set(comparison.warnings)
 
 
-def test_heights_of_recordings_are_those_of_the_drop_within_their_limits() -> None:
-    impact = thud.solve()
-    low, high, other = (recorded(impact, height=height) for height in (0.99, 1.01, 0.9))
-    assert len(thud.compare([impact, low, high, recorded(impact)]).impacts) == 4
+def test_heights_of_recordings_are_those_of_the_drop_within_their_limits(
+    shell: thud.Impact,
+) -> None:
+    low, high, other = (recorded(shell, height=height) for height in (0.99, 1.01, 0.9))
+    assert len(thud.compare([shell, low, high, recorded(shell)]).impacts) == 4
     # v = sqrt(2 g h)
     with pytest.raises(thud.InputError, match=naming("&drop: height", 4.429, 4.202)):
-        thud.compare([impact, other])
+        thud.compare([shell, other])
     with pytest.raises(thud.InputError, match=naming("&drop: height", 4.407, 4.202)):
         thud.compare([low, other])
 
 
-def test_recording_stands_beside_its_model(tmp_path: Path) -> None:
-    impact = thud.solve()
-    write_recording(tmp_path / "plate.csv", impact)
+def test_recording_stands_beside_its_model(shell: thud.Impact, tmp_path: Path) -> None:
+    write_recording(tmp_path / "plate.csv", shell)
     recording = thud.read_recording(tmp_path / "plate.csv")
     assert recording.sample_rate == pytest.approx(44100)
-    assert recording.contact_time == pytest.approx(impact.contact_time, abs=0.3e-3)
-    assert recording.peak_force == pytest.approx(impact.peak_force, abs=3)
-    np.testing.assert_allclose(recording.levels(), impact.levels(force="floor"), atol=0.1)
-    comparison = thud.compare({"model": impact, "plate": recording})
+    assert recording.contact_time == pytest.approx(shell.contact_time, abs=0.3e-3)
+    assert recording.peak_force == pytest.approx(shell.peak_force, abs=3)
+    np.testing.assert_allclose(recording.levels(), shell.levels(force="floor"), atol=0.1)
+    comparison = thud.compare({"model": shell, "plate": recording})
     plate = column(comparison, 2)
     assert plate["restitution"] == plate["mass, kg"] == "not known"
     assert plate["verdict"] == "does not conform"
@@ -200,13 +200,10 @@ def test_nothing_and_different_drops_are_told(case_file: CaseFile, tmp_path: Pat
         read_all(paths)
 
 
+@pytest.mark.usefixtures("working_directory")
 def test_command_writes_the_page(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    errors_of: ErrorsOf,
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], errors_of: ErrorsOf
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     write_recording(tmp_path / "plate.csv", thud.solve())
     assert cli.main(["compare", str(STEPS[0]), "plate.csv"]) == 0
     output = capsys.readouterr().out
@@ -248,34 +245,32 @@ def test_small_values_have_three_digits() -> None:
     assert [peak.show(value) for value in values] == ["0.0123", "1.0", "1574.3", ""]
 
 
-def test_drops_of_different_speeds_are_refused_and_others_named() -> None:
+def test_drops_of_different_speeds_are_refused_and_others_named(shell: thud.Impact) -> None:
     low = thud.Case(drop=thud.Drop(0.9), model=thud.HollowSphere())
     with pytest.raises(thud.InputError, match=naming("&drop: height", "gravity")):
         thud.compare([thud.solve(), low])
     # The same speed by another height.
     same = thud.Case(drop=thud.Drop(0.5, 2 * 9.81), model=thud.HollowSphere(), name="heavy")
-    impact = thud.solve()
-    found = thud.compare([impact, same, same])
-    assert list(found.impacts) == [impact.case.name, "heavy", "heavy (2)"]
+    found = thud.compare([shell, same, same])
+    assert list(found.impacts) == [shell.case.name, "heavy", "heavy (2)"]
     assert set(found.run_times) == {"heavy", "heavy (2)"}
     assert all(seconds > 0 for seconds in found.run_times.values())
-    assert found.impacts[impact.case.name] is impact
+    assert found.impacts[shell.case.name] is shell
     rows = {row[0]: row[1:] for row in found.rows()}
     assert rows["computed in, ms"][0] == ""
     expected = f"{1e3 * found.run_times['heavy']:.1f}"
     assert rows["computed in, ms"][1] == expected
-    assert rows["peak force, N"][0] == QUANTITIES["peak_force"].show(impact.peak())
+    assert rows["peak force, N"][0] == QUANTITIES["peak_force"].show(shell.peak())
 
 
-def test_impact_and_recording_answer_the_same_questions() -> None:
-    impact = thud.solve()
-    record = recorded(impact, height=1.0, mass=2.5)
-    for one in (impact, record):
+def test_impact_and_recording_answer_the_same_questions(shell: thud.Impact) -> None:
+    record = recorded(shell, height=1.0, mass=2.5)
+    for one in (shell, record):
         assert isinstance(one, ImpactResult)
         assert one.mass == 2.5
         assert one.impact_velocity == pytest.approx(4.429, abs=1e-3)
         assert one.peak("floor") == one.peak_force == pytest.approx(1574, rel=0.02)
-        assert one.impulse == pytest.approx(impact.impulse, rel=0.01)
+        assert one.impulse == pytest.approx(shell.impulse, rel=0.01)
         assert one.limits_source in (None, "rubber_ball")
         drop = one.drop_force()
         assert drop.force.max() == pytest.approx(one.peak_force, rel=0.01)

@@ -26,7 +26,7 @@ from thud.base.files import own_path
 from thud.studies import blocks, fit, samples
 from thud.studies.blocks import Blocks
 from thud.studies.dataset import disk_space
-from thud.studies.directory import take
+from thud.studies.directory import open_results
 from thud.studies.sweep import KIND
 
 sys.path.insert(0, str(REPOSITORY / "tests/faults"))
@@ -44,7 +44,7 @@ HEIGHTS = {"parameters": {"height": {"values": [50, 100], "unit": "cm"}}}
 LONG = """
 name = "long"
 fixed = { model = "modal_ball", harmonics = 16, static_harmonics = 60, rings = 20 }
-design = { kind = "random", size = 1000, seed = 4 }
+design = { kind = "random", size = 500, seed = 4 }
 parameters = { height = { low = 0.9, high = 1.1 } }
 """
 
@@ -145,7 +145,7 @@ def test_ended_study_goes_on_where_it_stopped(
         assert process.returncode == -signal.SIGKILL
     assert not (tmp_path / "long.nc").exists()
     finished = thud.read_sweep(tmp_path / "long.partial").dataset
-    assert 0 < finished.sizes["sample"] < 1000
+    assert 0 < finished.sizes["sample"] < 500
     known = np.isin(whole["height"], finished["height"])
     assert values(finished).identical(values(whole.isel(sample=known)))
 
@@ -161,12 +161,12 @@ def test_ended_study_goes_on_where_it_stopped(
     left = disk_space(thud.read_study(tmp_path / "long.toml")) - 1
     monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=left))
     resumed = thud.sweep(tmp_path / "long.toml", tmp_path).dataset
-    assert sum(computed) == 1000 - finished.sizes["sample"]
+    assert sum(computed) == 500 - finished.sizes["sample"]
     assert values(resumed).identical(values(whole))
     assert not (tmp_path / "long.partial").exists()
     again = thud.sweep(tmp_path / "long.toml", tmp_path).dataset
     assert again.identical(resumed)
-    assert sum(computed) == 1000 - finished.sizes["sample"]
+    assert sum(computed) == 500 - finished.sizes["sample"]
 
 
 @pytest.mark.slow
@@ -224,7 +224,7 @@ def test_disk_that_is_full_for_zarr_is_reported_and_loses_nothing(
     assert "File too large" in errors
     assert errors.count("\n") == 1
     assert names_in(tmp_path) == ["long.partial", "long.toml"]
-    assert thud.read_sweep(tmp_path / "long.partial").dataset.sizes["sample"] == 1000
+    assert thud.read_sweep(tmp_path / "long.partial").dataset.sizes["sample"] == 500
 
     def compute_again(*_: object) -> None:
         pytest.fail("all samples were kept")
@@ -269,7 +269,7 @@ def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
 def test_a_study_is_computed_once_at_a_time(tmp_path: Path) -> None:
     study = thud.read_study(HEIGHTS)
     with (
-        take(tmp_path, KIND, study),
+        open_results(tmp_path, KIND, study),
         pytest.raises(thud.InputError, match=naming("python")),
     ):
         thud.sweep(study, tmp_path)
@@ -317,7 +317,10 @@ def test_lock_is_that_of_the_directory_that_has_the_name(
             folder.mkdir()
 
     monkeypatch.setattr("fcntl.flock", switch)
-    with take(folder, KIND, study), pytest.raises(thud.InputError, match=naming("out/python")):
+    with (
+        open_results(folder, KIND, study),
+        pytest.raises(thud.InputError, match=naming("out/python")),
+    ):
         thud.sweep(study, folder)
 
 
@@ -336,12 +339,12 @@ def test_other_studies_leave_no_mark_on_one_at_work(tmp_path: Path) -> None:
     other = {"parameters": {"height": {"values": [70, 80], "unit": "cm"}}}
     study = thud.read_study(HEIGHTS)
     with (
-        take(tmp_path, KIND, study),
+        open_results(tmp_path, KIND, study),
         pytest.raises(thud.InputError, match=naming("python")),
     ):
         thud.sweep(other, tmp_path, replace=True)
     # Nothing was finished, so that the directory may change hands, but with nothing in it.
-    with take(tmp_path, KIND, study):
+    with open_results(tmp_path, KIND, study):
         keep_one_block(study, tmp_path)
     with pytest.raises(thud.InputError, match=naming("python", "--replace")):
         thud.sweep(other, tmp_path)

@@ -29,10 +29,8 @@ PAGES = [
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 @pytest.mark.slow
-def test_python_of_a_page_prints_what_is_shown(
-    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.usefixtures("working_directory")
+def test_python_of_a_page_prints_what_is_shown(page: Path, tmp_path: Path) -> None:
     for name in ("inputs", "docs"):
         (tmp_path / name).symlink_to(REPOSITORY / name)
     names: dict[str, object] = {"__name__": "page"}

@@ -14,14 +14,12 @@ from typing import TYPE_CHECKING
 import f90nml
 import numpy as np
 import pytest
-from conftest import INPUTS, MINIMAL, contents, names_in, naming
+from conftest import INPUTS, MINIMAL, RESULT_FILES, contents, names_in, naming
 
 import thud
 
 if TYPE_CHECKING:
     from conftest import CaseFile, Run
-
-FILES = [".thud", "effective.nml", "force.csv", "levels.csv", "summary.nml"]
 
 
 IMPACTS = [path for path in INPUTS if "&model" in path.read_text()]
@@ -36,7 +34,7 @@ def test_every_input_runs_and_agrees_with_the_driver(run: Run, tmp_path: Path, p
     impact = thud.solve(thud.read_case(path))
     more = ["model_histories.csv"] if impact.model_histories else []
     more += ["snapshots.xmf", "pressure.csv"] if impact.motion else []
-    assert names_in(directory) == sorted(FILES + more)
+    assert names_in(directory) == sorted(RESULT_FILES + more)
     if impact.model_histories:
         table = np.genfromtxt(directory / "model_histories.csv", delimiter=",", names=True)
         for channel, values in impact.model_histories.items():

@@ -150,9 +150,9 @@ def test_recording_is_seen_and_cancelled_before_the_server_answers(
     page.route("**/measure*", lambda _: None)
     page.locator("summary", has_text="Recording").click()
     page.locator("#file").set_input_files(RECORDING)
-    sync_api.expect(page.locator(".work")).to_contain_text("Measuring drop_1.wav")
-    page.locator(".work button").click()
-    sync_api.expect(page.locator(".work")).to_have_count(0)
+    sync_api.expect(page.locator(".task")).to_contain_text("Measuring drop_1.wav")
+    page.locator(".task button").click()
+    sync_api.expect(page.locator(".task")).to_have_count(0)
     sync_api.expect(page.locator("#message")).to_be_hidden()
 
 
@@ -161,8 +161,8 @@ def test_slow_work_is_cancelled(browser: Browser, server: Served) -> None:
     page.locator("#model").select_option("finite_element")
     sync_api.expect(page.locator("#verdict")).to_contain_text("Finite element", timeout=60_000)
     fill(page, "mesh.polar_elements", "400")
-    page.locator(".work button").click()
-    sync_api.expect(page.locator(".work")).to_have_count(0)
+    page.locator(".task button").click()
+    sync_api.expect(page.locator(".task")).to_have_count(0)
     sync_api.expect(page.locator("#message")).to_be_hidden()
 
 
@@ -249,7 +249,7 @@ def test_page_recovers_when_the_server_returns(browser: Browser) -> None:
         page.locator("#model").select_option("finite_element")
         sync_api.expect(page.locator("#verdict")).to_contain_text("Finite element", timeout=60_000)
         fill(page, "mesh.polar_elements", "400")
-        sync_api.expect(page.locator(".work")).to_be_visible()
+        sync_api.expect(page.locator(".task")).to_be_visible()
         # Killed while it computes.
         process.kill()
         process.wait(20)

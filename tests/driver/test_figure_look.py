@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 import numpy as np
 import pytest
-from conftest import INPUTS, MINIMAL, REPOSITORY, names_in, python
+from conftest import INPUTS, MINIMAL, REPOSITORY, documentation_figure, names_in, python
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver, QuiverKey
 from matplotlib.text import Text
@@ -48,11 +48,6 @@ OTHER_STYLE = {
 SVG = "{http://www.w3.org/2000/svg}"
 
 
-@pytest.fixture(scope="module")
-def shell() -> thud.Impact:
-    return thud.solve()
-
-
 def judging(impact: thud.Impact, force: str) -> thud.Impact:
     return replace(impact, case=replace(impact.case, levels=thud.Levels(force=force)))
 
@@ -81,7 +76,7 @@ def assert_clean(figure: Figure) -> None:
 @pytest.mark.parametrize("name", sorted(documentation.FIGURES))
 @pytest.mark.slow
 def test_nothing_crosses_a_legend_of_the_documentation(name: str) -> None:
-    figure = documentation.FIGURES[name]()
+    figure = documentation_figure(name)
     assert figure.get_figwidth() == pytest.approx(3.5)
     assert_clean(figure)
     words = " ".join(texts(figure))

@@ -120,25 +120,23 @@ def test_noise_above_the_band_does_not_count(record: tuple[Recording, float]) ->
     assert np.hypot(record[1], 5.0 * np.sqrt(2)) > 1.5 * expected
 
 
-def test_slow_noise_of_fast_records_has_weights() -> None:
+def test_slow_noise_of_fast_records_has_weights(shell: thud.Impact) -> None:
     """The constant that stands for the offset is large also at 96 kHz and below = 355."""
-    impact = thud.solve()
     force, _ = make_recording(
-        pulse(impact), impact.sample_rate, rate=96e3, noise_db=NOISE_DB, colour="brown", seed=1
+        pulse(shell), shell.sample_rate, rate=96e3, noise_db=NOISE_DB, colour="brown", seed=1
     )
     record = thud.Recording.from_array(force, 96e3)
     target = ForceTarget(record, below=355.0)
     found = thud.fit(target, ["youngs_modulus"])
     modulus, error = found.values["youngs_modulus"], found.standard_errors["youngs_modulus"]
-    assert abs(modulus - impact.case.ball.youngs_modulus) < 5 * error
+    assert abs(modulus - shell.case.ball.youngs_modulus) < 5 * error
 
 
-def test_too_little_quiet_leaves_the_noise_to_the_residuals() -> None:
-    impact = thud.solve()
+def test_too_little_quiet_leaves_the_noise_to_the_residuals(shell: thud.Impact) -> None:
     force, _ = make_recording(
-        pulse(impact), impact.sample_rate, before=0.006, after=0.006, noise_db=NOISE_DB
+        pulse(shell), shell.sample_rate, before=0.006, after=0.006, noise_db=NOISE_DB
     )
-    assert not ForceTarget(_measured(force, impact.sample_rate)).misfit().known_noise
+    assert not ForceTarget(_measured(force, shell.sample_rate)).misfit().known_noise
 
 
 def _measured(force: np.ndarray, rate: float) -> Recording:
@@ -216,10 +214,9 @@ def test_recording_that_is_missing_or_none_gets_one_sentence(two: Path) -> None:
         run(two)
 
 
-def test_arrays_have_one_drop() -> None:
-    impact = thud.solve()
+def test_arrays_have_one_drop(shell: thud.Impact) -> None:
     with pytest.raises(thud.InputError, match=naming("target", "drop", 2)):
-        ForceTarget((impact.time, impact.floor_force), drop=2).misfit()
+        ForceTarget((shell.time, shell.floor_force), drop=2).misfit()
 
 
 @pytest.mark.parametrize("name", ["fit_recording", "fit_recording_constant_loss"])

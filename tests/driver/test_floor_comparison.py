@@ -152,13 +152,14 @@ def test_comparison_has_the_numbers_of_its_predictions(found: thud.FloorComparis
     assert re.search(naming("thin", "modes", "Hz"), found.warnings[0])
 
 
-def test_floors_without_a_tapping_level_leave_its_cell_empty(found: thud.FloorComparison) -> None:
-    impact = thud.solve()
+def test_floors_without_a_tapping_level_leave_its_cell_empty(
+    shell: thud.Impact, found: thud.FloorComparison
+) -> None:
     light = thud.Plate(thickness=0.1, density=500.0)
     predictions = {
         "thick": found.predictions["thick"],
-        "light": thud.predict_level(impact, light, thud.Room()),
-        "joists": thud.predict_level(impact, thud.JoistFloor(), thud.Room()),
+        "light": thud.predict_level(shell, light, thud.Room()),
+        "joists": thud.predict_level(shell, thud.JoistFloor(), thud.Room()),
     }
     page = thud.compare_floors(predictions)
     assert list(page.predictions.values()) == list(predictions.values())

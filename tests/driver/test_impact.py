@@ -31,20 +31,18 @@ def test_arrays_share_one_clock() -> None:
         assert array.dtype == np.float64
 
 
-def test_forces_add_up() -> None:
-    impact = thud.solve()
-    assert np.allclose(impact.elastic_force, impact.shell_force + impact.gas_force, rtol=1e-15)
-    assert np.allclose(impact.floor_force, impact.elastic_force + impact.flux_force, rtol=1e-15)
-    assert impact.peak_elastic_force == pytest.approx(impact.elastic_force.max(), rel=1e-5)
-    assert impact.peak_elastic_force >= impact.elastic_force.max()
+def test_forces_add_up(shell: thud.Impact) -> None:
+    assert np.allclose(shell.elastic_force, shell.shell_force + shell.gas_force, rtol=1e-15)
+    assert np.allclose(shell.floor_force, shell.elastic_force + shell.flux_force, rtol=1e-15)
+    assert shell.peak_elastic_force == pytest.approx(shell.elastic_force.max(), rel=1e-5)
+    assert shell.peak_elastic_force >= shell.elastic_force.max()
 
 
-def test_force_is_zero_after_release() -> None:
-    impact = thud.solve()
-    after = impact.time > impact.contact_time
+def test_force_is_zero_after_release(shell: thud.Impact) -> None:
+    after = shell.time > shell.contact_time
     assert after.any()
-    assert not impact.floor_force[after].any()
-    assert (impact.floor_force[~after] > 0).all()
+    assert not shell.floor_force[after].any()
+    assert (shell.floor_force[~after] > 0).all()
 
 
 def test_impulse_changes_the_momentum() -> None:
@@ -178,22 +176,20 @@ def test_arguments_of_a_drop_are_keys_of_its_case() -> None:
             thud.solve(more, **given)  # type: ignore[call-overload]
 
 
-def test_measured_contact_time_is_that_of_the_record_around_the_contact() -> None:
-    impact = thud.solve()
+def test_measured_contact_time_is_that_of_the_record_around_the_contact(shell: thud.Impact) -> None:
     # Up to the first sample after release.
-    force = np.append(np.trim_zeros(impact.floor_force, "b"), 0.0)
-    begin, end = contact_span(force, impact.sample_rate)
-    assert impact.measured_contact_time == pytest.approx(end - begin, abs=1e-12)
+    force = np.append(np.trim_zeros(shell.floor_force, "b"), 0.0)
+    begin, end = contact_span(force, shell.sample_rate)
+    assert shell.measured_contact_time == pytest.approx(end - begin, abs=1e-12)
     # Later touch, and a second contact, make no difference.
     shift = 500
-    moved = np.concatenate([np.zeros(shift), impact.floor_force, impact.floor_force])
-    later = replace(impact, floor_force=moved, touch_time=shift / impact.sample_rate)
-    assert later.measured_contact_time == pytest.approx(impact.measured_contact_time, abs=1e-9)
+    moved = np.concatenate([np.zeros(shift), shell.floor_force, shell.floor_force])
+    later = replace(shell, floor_force=moved, touch_time=shift / shell.sample_rate)
+    assert later.measured_contact_time == pytest.approx(shell.measured_contact_time, abs=1e-9)
 
 
-def test_part_that_a_model_has_not_is_told() -> None:
-    impact = thud.solve()
+def test_part_that_a_model_has_not_is_told(shell: thud.Impact) -> None:
     for name in ("shell_force", "gas_force", "flux_force"):
-        assert getattr(impact, name) is impact.components[name]
+        assert getattr(shell, name) is shell.components[name]
     with pytest.raises(AttributeError, match=naming("gas_force")):
         _ = thud.solve(model="hunt_crossley", contact_time=0.02).gas_force

@@ -127,16 +127,14 @@ def test_default_floors_reach_from_light_to_heavy() -> None:
     assert len(RESISTANCES) == 14
 
 
-def test_tangent_mass_of_the_shell_is_that_outside_its_cap() -> None:
-    impact = thud.solve()
-    found = thud.ball_impedance(impact, resistance=[1e5])
-    expected = 2.5 * (1 - impact.max_deflection / (2 * 0.089))
+def test_tangent_mass_of_the_shell_is_that_outside_its_cap(shell: thud.Impact) -> None:
+    found = thud.ball_impedance(shell, resistance=[1e5])
+    expected = 2.5 * (1 - shell.max_deflection / (2 * 0.089))
     assert found.tangent_mass == pytest.approx(expected, rel=0.01)
 
 
-def test_limit_is_where_the_level_changes_by_1_db() -> None:
-    impact = thud.solve()
-    limit = thud.ball_impedance(impact).limit()
+def test_limit_is_where_the_level_changes_by_1_db(shell: thud.Impact) -> None:
+    limit = thud.ball_impedance(shell).limit()
     for band in (0, 2):
         floor = thud.InfinitePlate(resistance=float(limit[band]))
         moved = thud.solve(floor=floor).on_floor
@@ -154,23 +152,22 @@ def test_level_not_reached_is_nan_and_told() -> None:
         found.limit(0)
 
 
-def test_bad_input_is_refused() -> None:
-    impact = thud.solve()
+def test_bad_input_is_refused(shell: thud.Impact) -> None:
     blocked = thud.solve(
         model="measured_modes", frequency=[24.0], damping_ratio=[0.05], effective_mass=[2.5]
     )
     with pytest.raises(thud.InputError, match=naming("resistance", "ascend")):
-        thud.ball_impedance(impact, resistance=[1e5, 1e4])
+        thud.ball_impedance(shell, resistance=[1e5, 1e4])
     with pytest.raises(thud.InputError, match=naming("resistance", 1, "1.0e15 N s/m")):
-        thud.ball_impedance(impact, resistance=[0.0])
+        thud.ball_impedance(shell, resistance=[0.0])
     with pytest.raises(thud.InputError, match=naming("resistance", 1, "1.0e15 N s/m")):
-        thud.ball_impedance(impact, resistance=[np.nan])
+        thud.ball_impedance(shell, resistance=[np.nan])
     with pytest.raises(thud.InputError, match=naming("&sampling: duration", "0.05 s")):
-        thud.ball_impedance(impact, resistance=[10.0])
+        thud.ball_impedance(shell, resistance=[10.0])
     with pytest.raises(thud.InputError, match=naming("model")):
         thud.ball_impedance(blocked, resistance=[1e4])
     with pytest.raises(thud.InputError, match=naming("frequency", 0.0)):
-        thud.ball_impedance(impact, resistance=[1e4]).tangent([0.0])
+        thud.ball_impedance(shell, resistance=[1e4]).tangent([0.0])
 
 
 def test_figure_draws_sources_and_floors(linear: thud.BallImpedance) -> None:

@@ -115,14 +115,10 @@ def test_record_of_an_unknown_ball_cannot_be_decided(flagship: thud.Impact) -> N
         (["drop.wav", "--workers", "0"], naming("workers", 0, 1, 1024)),
     ],
 )
+@pytest.mark.usefixtures("working_directory")
 def test_bad_recordings_get_one_sentence(
-    arguments: list[str],
-    words: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    errors_of: ErrorsOf,
+    arguments: list[str], words: str, tmp_path: Path, errors_of: ErrorsOf
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     (tmp_path / "drop.wav").write_bytes((FOLDER / "drop_1.wav").read_bytes())
     impact = thud.solve()
     force = np.pad(impact.floor_force, 2000) / 1e3

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import REPOSITORY, names_in, naming, python
+from conftest import REPOSITORY, names_in, naming
 
 import thud
 from thud import cli
@@ -123,13 +123,10 @@ def test_criteria_are_counted_in_words() -> None:
     assert recording_files.count_verdicts(["inconclusive"]) == "1 criterion inconclusive"
 
 
+@pytest.mark.usefixtures("working_directory")
 def test_report_of_another_recording_does_not_stay_beside_new_numbers(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    errors_of: ErrorsOf,
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], errors_of: ErrorsOf
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     for name, drop in (("a", 1), ("b", 2)):
         (tmp_path / name).mkdir()
         content = (FOLDER / f"drop_{drop}.csv").read_bytes()
@@ -209,11 +206,3 @@ def test_without_xarray_a_warning_tells_what_is_left_out(
     with pytest.warns(ReportWarning, match=naming("recording.nc", "xarray", "pip install")):
         recording_files.save(noisy, Results(tmp_path), figures=False)
     assert names(tmp_path) == FILES - {"recording.nc"}
-
-
-def test_tables_need_no_figures() -> None:
-    code = (
-        "import sys, thud.report.recording_files; "
-        "print({'matplotlib', 'weasyprint', 'xarray'} & set(sys.modules))"
-    )
-    assert python("-c", code).stdout.strip() == "set()"

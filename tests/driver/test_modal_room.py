@@ -28,15 +28,9 @@ MICROPHONE = np.array([3.1, 0.9, 1.4])
 
 
 @pytest.fixture(scope="module")
-def impact() -> thud.Impact:
-    """Return the shell's impact."""
-    return thud.solve()
-
-
-@pytest.fixture(scope="module")
-def found(impact: thud.Impact) -> thud.ModalRoom:
+def found(shell: thud.Impact) -> thud.ModalRoom:
     """Return the levels of one pair of positions."""
-    return thud.modal_room(impact, FLOOR, ROOM, balls=[BALL], microphones=[MICROPHONE])
+    return thud.modal_room(shell, FLOOR, ROOM, balls=[BALL], microphones=[MICROPHONE])
 
 
 def room_modes() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -71,9 +65,9 @@ def test_orthotropic_plate_has_the_modes_that_the_source_feels() -> None:
 
 
 def test_energies_given_are_those_that_are_lost(
-    impact: thud.Impact, oracle: Callable[..., None]
+    shell: thud.Impact, oracle: Callable[..., None]
 ) -> None:
-    found = thud.modal_room(impact, FLOOR, ROOM, balls=3, microphones=1)
+    found = thud.modal_room(shell, FLOOR, ROOM, balls=3, microphones=1)
     assert found.plate_energy[:, 0] == pytest.approx(found.plate_energy[:, 1], rel=1e-9)
     oracle(
         "modal room: energy given less energy lost",
@@ -85,15 +79,15 @@ def test_energies_given_are_those_that_are_lost(
 
 
 def test_levels_are_those_of_an_integration_in_time(
-    impact: thud.Impact, found: thud.ModalRoom, oracle: Callable[..., None]
+    shell: thud.Impact, found: thud.ModalRoom, oracle: Callable[..., None]
 ) -> None:
     """Step the modes in time, with coupling by quadrature instead of the closed form."""
     step = 1 / (8 * SAMPLE_RATE)
     count = int(1.5 / step)
     # The contact force on this floor.
     source = found.prediction.source
-    assert source.peak("floor") != impact.peak("floor")
-    force = np.interp(np.arange(count) * step, impact.time, source.force("floor"), right=0.0)
+    assert source.peak("floor") != shell.peak("floor")
+    force = np.interp(np.arange(count) * step, shell.time, source.force("floor"), right=0.0)
     modes = np.array(list(itertools.product(range(1, 20), repeat=2)))
     modes = modes[plate_frequencies(FLOOR, modes) <= 400]
     numbers, frequency = room_modes()
@@ -139,15 +133,15 @@ def test_levels_are_those_of_an_integration_in_time(
 
 @pytest.mark.parametrize(("loss", "reverberation_time"), [(0.9, 0.05), (0.004, 0.2), (0.05, 3.0)])
 def test_record_is_long_enough_for_floor_room_and_detector(
-    impact: thud.Impact, loss: float, reverberation_time: float, monkeypatch: pytest.MonkeyPatch
+    shell: thud.Impact, loss: float, reverberation_time: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Twice the decay changes levels by no more than what wraps around: 60 dB below."""
     floor = replace(FLOOR, loss_factor=loss, edges="absorption")
     room = replace(ROOM, reverberation_time=reverberation_time)
     places = {"balls": [BALL], "microphones": [MICROPHONE]}
-    level = thud.modal_room(impact, floor, room, **places).level  # type: ignore[arg-type]
+    level = thud.modal_room(shell, floor, room, **places).level  # type: ignore[arg-type]
     monkeypatch.setattr(module, "DECAY_RANGE", 2 * module.DECAY_RANGE)
-    longer = thud.modal_room(impact, floor, room, **places).level  # type: ignore[arg-type]
+    longer = thud.modal_room(shell, floor, room, **places).level  # type: ignore[arg-type]
     assert level == pytest.approx(longer, abs=2 * 20 * np.log10(1 + 10 ** (-60 / 20)))
 
 
@@ -167,9 +161,9 @@ def test_detector_shows_tones_and_their_bursts(oracle: Callable[..., None]) -> N
     )
 
 
-def test_random_positions_keep_their_distance_and_are_the_same_again(impact: thud.Impact) -> None:
-    one = thud.modal_room(impact, FLOOR, ROOM, balls=2, microphones=4, seed=3)
-    two = thud.modal_room(impact, FLOOR, ROOM, balls=2, microphones=4, seed=3)
+def test_random_positions_keep_their_distance_and_are_the_same_again(shell: thud.Impact) -> None:
+    one = thud.modal_room(shell, FLOOR, ROOM, balls=2, microphones=4, seed=3)
+    two = thud.modal_room(shell, FLOOR, ROOM, balls=2, microphones=4, seed=3)
     assert (one.level == two.level).all()
     assert one.level.shape == (2, 4, 9)
     for places, sides in ((one.balls, SIZE[:2]), (one.microphones, SIZE)):
@@ -198,10 +192,10 @@ def test_random_positions_keep_their_distance_and_are_the_same_again(impact: thu
     ],
 )
 def test_what_has_no_modal_answer_is_refused(
-    impact: thud.Impact, settings: dict[str, object], words: str
+    shell: thud.Impact, settings: dict[str, object], words: str
 ) -> None:
     with pytest.raises(thud.InputError, match=words):
-        thud.modal_room(impact, **{"floor": FLOOR, "room": ROOM} | settings)  # type: ignore[arg-type]
+        thud.modal_room(shell, **{"floor": FLOOR, "room": ROOM} | settings)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("slowest", [0.5, 6.9, 200.0])
@@ -215,7 +209,7 @@ def test_record_lasts_until_the_slowest_mode_has_decayed(slowest: float) -> None
     ("room", "loss"), [(thud.Room(volume=40.0, reverberation_time=3.0), 0.05), (ROOM, 0.001)]
 )
 def test_record_is_that_of_the_slowest_mode_of_plate_or_room(
-    impact: thud.Impact, monkeypatch: pytest.MonkeyPatch, room: thud.Room, loss: float
+    shell: thud.Impact, monkeypatch: pytest.MonkeyPatch, room: thud.Room, loss: float
 ) -> None:
     asked: list[float] = []
     usual = module._spectrum  # noqa: SLF001
@@ -226,7 +220,7 @@ def test_record_is_that_of_the_slowest_mode_of_plate_or_room(
 
     monkeypatch.setattr(module, "_spectrum", keep)
     floor = replace(FLOOR, loss_factor=loss, edges="absorption", edge_absorption=0.0)
-    found = thud.modal_room(impact, floor, room, balls=1, microphones=1)
+    found = thud.modal_room(shell, floor, room, balls=1, microphones=1)
     # The room's energy falls by 60 dB in T, that of the plate at 2 pi f eta or faster.
     lowest = found.floor_frequency[0]
     of_plate = 6 * np.log(10) / (2 * np.pi * lowest * loss)
@@ -236,20 +230,20 @@ def test_record_is_that_of_the_slowest_mode_of_plate_or_room(
         assert 0.5 + 0.4 < asked[0] <= 0.5 + of_plate
 
 
-def test_spectrum_is_the_fourier_integral_of_the_force(impact: thud.Impact) -> None:
-    omega, spectrum = module._spectrum(impact, 1.7003)  # noqa: SLF001
+def test_spectrum_is_the_fourier_integral_of_the_force(shell: thud.Impact) -> None:
+    omega, spectrum = module._spectrum(shell, 1.7003)  # noqa: SLF001
     assert omega[0] == 0
     # Lines from 0 to half of the sampling rate, of a record that is no shorter than asked for.
     assert omega[-1] == pytest.approx(np.pi * SAMPLE_RATE)
     assert 2 * np.pi / omega[1] == pytest.approx(1.7003, abs=2 / SAMPLE_RATE)
     assert 2 * np.pi / omega[1] >= 1.7003
-    force = impact.force("floor")
+    force = shell.force("floor")
     for i in (0, 3, 40, 300):
-        integral = np.exp(-1j * omega[i] * impact.time) @ force / impact.sample_rate
+        integral = np.exp(-1j * omega[i] * shell.time) @ force / shell.sample_rate
         # Lines move by less than 1e-5 of the angle in 20 ms.
         assert spectrum[i] == pytest.approx(integral, rel=1e-3)
-    long = module._spectrum(impact, 1e-3)[0]  # noqa: SLF001
-    assert 2 * np.pi / long[1] >= len(force) / impact.sample_rate
+    long = module._spectrum(shell, 1e-3)[0]  # noqa: SLF001
+    assert 2 * np.pi / long[1] >= len(force) / shell.sample_rate
 
 
 def test_positions_of_small_rooms_keep_a_quarter_of_the_side() -> None:
@@ -304,8 +298,8 @@ def test_figures_show_positions_and_shapes(found: thud.ModalRoom) -> None:
 
 
 @pytest.mark.parametrize("ratio", [0.01, 100.0])
-def test_no_mode_of_an_orthotropic_plate_is_missing(impact: thud.Impact, ratio: float) -> None:
+def test_no_mode_of_an_orthotropic_plate_is_missing(shell: thud.Impact, ratio: float) -> None:
     plate = replace(FLOOR, thickness=0.08, stiffness_ratio=ratio)
-    found = thud.modal_room(impact, plate, ROOM, balls=1, microphones=1).floor_frequency
+    found = thud.modal_room(shell, plate, ROOM, balls=1, microphones=1).floor_frequency
     numbers = list(itertools.product(range(1, 60), repeat=2))
     assert len(found) == (plate_frequencies(plate, numbers) <= 400).sum()

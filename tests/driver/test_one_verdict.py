@@ -24,13 +24,10 @@ BATCH = 1e-9
 
 @pytest.mark.parametrize("path", WITH_IMPACT, ids=lambda path: path.stem)
 @pytest.mark.slow
+@pytest.mark.usefixtures("working_directory")
 def test_every_command_has_the_same_peak_levels_and_verdict(
-    path: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     case = thud.read_case(path)
     impact = thud.solve(case)
     levels, conformity = impact.levels(), impact.assess()

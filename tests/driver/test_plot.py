@@ -48,16 +48,15 @@ def test_force_history_shows_every_curve_with_units() -> None:
 
 
 @pytest.mark.parametrize("source", ["rubber_ball", "tyre"])
-def test_levels_show_the_tolerance_band(source: str) -> None:
-    impact = thud.solve()
-    (axes,) = thud.plot.levels({"ball": impact}, source=source).axes
+def test_levels_show_the_tolerance_band(shell: thud.Impact, source: str) -> None:
+    (axes,) = thud.plot.levels({"ball": shell}, source=source).axes
     assert axes.get_xlabel().endswith(", Hz")
     assert axes.get_ylabel() == "Force exposure level, dB re 1 N\n(force on the floor)"
     boxes = [box.get_datalim(axes.transData).intervaly for box in axes.collections[:5]]
-    limits = [(c.lower, c.upper) for c in impact.assess(source).criteria[:5]]
+    limits = [(c.lower, c.upper) for c in shell.assess(source).criteria[:5]]
     np.testing.assert_allclose(boxes, limits)
     curves = {str(line.get_label()): line.get_ydata() for line in axes.lines}
-    np.testing.assert_array_equal(curves["ball"], impact.levels(force="floor"))
+    np.testing.assert_array_equal(curves["ball"], shell.levels(force="floor"))
 
 
 def test_useless_impacts_are_refused() -> None:

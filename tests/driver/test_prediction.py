@@ -30,12 +30,6 @@ ROOM_CASE = f"{FLOOR_CASE}&room\n volume = 40\n/\n"
 RIGID_CASE = ROOM_CASE.replace("'plate'", "'rigid'")
 
 
-@pytest.fixture(scope="module")
-def impact() -> thud.Impact:
-    """Return the shell's impact."""
-    return thud.solve()
-
-
 def test_executable_and_python_predict_the_same(run: Run, case_file: CaseFile) -> None:
     done = run(case_file(ROOM_CASE), "-o", "out")
     assert done.returncode == 0, done.stderr
@@ -74,8 +68,8 @@ def test_executable_tells_of_a_floor_that_gives_way(
     assert "contact force" in done.stdout
 
 
-def test_energy_is_that_of_an_infinite_plate(impact: thud.Impact) -> None:
-    found = thud.predict_level(impact, thud.Plate(), thud.Room())
+def test_energy_is_that_of_an_infinite_plate(shell: thud.Impact) -> None:
+    found = thud.predict_level(shell, thud.Plate(), thud.Room())
     resistance = 8 / np.sqrt(12) * 2300 * 3500 * 0.18**2
     assert found.conductance == pytest.approx(1 / resistance)
     moved = thud.solve(floor=thud.Plate()).on_floor
@@ -83,29 +77,29 @@ def test_energy_is_that_of_an_infinite_plate(impact: thud.Impact) -> None:
     levels = moved.levels("third", force="floor")[3:]
     assert found.energy == pytest.approx(10 ** (levels / 10) / resistance)
     assert found.force == "contact"
-    assert found.force_change == pytest.approx(20 * np.log10(moved.peak() / impact.peak()))
+    assert found.force_change == pytest.approx(20 * np.log10(moved.peak() / shell.peak()))
     assert thud.predict_level(thud.solve(floor=thud.Plate()), room=thud.Room()).level == (
         pytest.approx(found.level, abs=1e-12)
     )
 
 
-def test_standardization_takes_room_and_reverberation_out(impact: thud.Impact) -> None:
+def test_standardization_takes_room_and_reverberation_out(shell: thud.Impact) -> None:
     """Of the reference room nothing is left; twice the volume halves the energy of sound."""
-    reference = thud.predict_level(impact, thud.Plate(), thud.Room())
+    reference = thud.predict_level(shell, thud.Plate(), thud.Room())
     assert reference.standardized == pytest.approx(reference.level)
-    larger = thud.predict_level(impact, thud.Plate(), thud.Room(volume=100.0))
+    larger = thud.predict_level(shell, thud.Plate(), thud.Room(volume=100.0))
     assert larger.level == pytest.approx(reference.level - 10 * np.log10(2), abs=0.1)
     times = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5)
-    longer = thud.predict_level(impact, thud.Plate(), thud.Room(reverberation_times=times))
+    longer = thud.predict_level(shell, thud.Plate(), thud.Room(reverberation_times=times))
     assert longer.reverberation_time.tolist() == list(times)
     assert (longer.level[2:] > reference.level[2:]).all()
 
 
 @pytest.mark.parametrize("thickness", [0.022, 0.005])
-def test_floor_that_gives_way_raises_a_warning(impact: thud.Impact, thickness: float) -> None:
+def test_floor_that_gives_way_raises_a_warning(shell: thud.Impact, thickness: float) -> None:
     """Chipboard, 22 mm Z about 1600 N s/m, and 5 mm, on which the force does not swing."""
     board = thud.Plate(thickness=thickness, density=650.0, wave_speed=2300.0)
-    record = recorded(impact, mass=2.5, height=1.0)
+    record = recorded(shell, mass=2.5, height=1.0)
     found = thud.predict_level(record, board, thud.Room())
     assert any("rigid floor" in warning for warning in found.warnings)
     # Integrate M F'' + (M k/Z) F' + k F = 0 of the same mass and contact time.
@@ -123,16 +117,16 @@ def test_floor_that_gives_way_raises_a_warning(impact: thud.Impact, thickness: f
     assert not any("rigid floor" in warning for warning in heavy.warnings)
 
 
-def test_recording_is_predicted_as_the_impact_that_it_records(impact: thud.Impact) -> None:
-    recording = recorded(impact, mass=2.5, height=1.0)
+def test_recording_is_predicted_as_the_impact_that_it_records(shell: thud.Impact) -> None:
+    recording = recorded(shell, mass=2.5, height=1.0)
     found = thud.predict_level(recording, thud.Plate(), thud.Room())
-    expected = thud.predict_level(impact, thud.Plate(), thud.Room())
+    expected = thud.predict_level(shell, thud.Plate(), thud.Room())
     # The noise of the record, and 0.01 dB by the floor.
     assert found.level == pytest.approx(expected.level, abs=0.1)
 
 
-def test_prediction_is_held_against_measured_levels(impact: thud.Impact) -> None:
-    found = thud.predict_level(impact, thud.Plate(), thud.Room())
+def test_prediction_is_held_against_measured_levels(shell: thud.Impact) -> None:
+    found = thud.predict_level(shell, thud.Plate(), thud.Room())
     measured = thud.read_room_levels(FLOORS / "field_levels.csv", volume=41.4)
     assert found.difference(measured) == pytest.approx(measured.level - found.level)
     octaves = thud.RoomLevels("o", "octave", np.array([63.0, 125, 250, 500]), np.full((1, 4), 60.0))
@@ -182,15 +176,15 @@ def test_floors_and_rooms_that_cannot_be_are_refused(
     assert re.search(words, done.stderr), done.stderr
 
 
-def test_prediction_without_floor_or_room_is_refused(impact: thud.Impact) -> None:
+def test_prediction_without_floor_or_room_is_refused(shell: thud.Impact) -> None:
     with pytest.raises(thud.InputError, match=naming("floor")):
-        thud.predict_level(impact)
+        thud.predict_level(shell)
     with pytest.raises(thud.InputError, match=naming("&plate: thickness", 0.0)):
-        thud.predict_level(impact, thud.Plate(thickness=0.0), thud.Room())
+        thud.predict_level(shell, thud.Plate(thickness=0.0), thud.Room())
 
 
 def test_walls_ceiling_octaves_and_history_are_written(
-    run: Run, case_file: CaseFile, impact: thud.Impact
+    run: Run, case_file: CaseFile, shell: thud.Impact
 ) -> None:
     more = "volume = 40\n wall_lengths = 5, 4\n ceiling_mass = 12\n reverberation_time = 0.8"
     done = run(case_file(ROOM_CASE.replace("volume = 40", more)), "-o", "out")
@@ -211,8 +205,8 @@ def test_walls_ceiling_octaves_and_history_are_written(
     room = thud.read_case(folder / "effective.nml").room
     assert room is not None
     assert room.wall_lengths == (5, 4)
-    found = thud.predict_level(impact, thud.Plate(thickness=0.2), room)
-    bare = thud.predict_level(impact, thud.Plate(thickness=0.2), thud.Room(volume=40.0))
+    found = thud.predict_level(shell, thud.Plate(thickness=0.2), room)
+    bare = thud.predict_level(shell, thud.Plate(thickness=0.2), thud.Room(volume=40.0))
     assert (found.level[6:] < bare.level[6:] - 10).all()
     assert f"{found.spread[0]:.1f} to" in found.warnings[0]
 
@@ -241,13 +235,13 @@ def test_figures_of_a_case_predict_its_level_once(monkeypatch: pytest.MonkeyPatc
 
 
 def test_positions_are_drawn_unless_modes_are_none_or_too_many(
+    shell: thud.Impact,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    impact = thud.solve()
 
     def drawn(floor: thud.Plate, room: thud.Room) -> set[str]:
-        case = replace(impact.case, floor=floor, room=room)
-        return set(plot.case_figures(replace(impact, case=case)))
+        case = replace(shell.case, floor=floor, room=room)
+        return set(plot.case_figures(replace(shell, case=case)))
 
     plate, room = thud.Plate(), thud.Room()
     assert "room_positions" in drawn(plate, room)
@@ -283,10 +277,10 @@ def test_tapping_level_of_an_orthotropic_plate_is_refused() -> None:
         thud.tapping_level(thud.Plate(stiffness_ratio=0.1))
 
 
-def test_floor_radiates_no_more_than_it_loses(impact: thud.Impact) -> None:
+def test_floor_radiates_no_more_than_it_loses(shell: thud.Impact) -> None:
     # So light a plate loses less to the laboratory than it radiates.
     light = thud.Plate(length=6, width=4, thickness=0.1, density=45, wave_speed=4600)
-    share = thud.predict_level(impact, light, thud.Room()).radiated_share
+    share = thud.predict_level(shell, light, thud.Room()).radiated_share
     assert (share > 0.4).any()
     assert (share <= 0.5).all()
 
@@ -307,8 +301,8 @@ def test_share_that_is_radiated_is_that_of_one_side() -> None:
     assert least[1].any()
 
 
-def test_maxima_are_drawn_on_their_decays(impact: thud.Impact) -> None:
-    found = thud.predict_level(impact, thud.Plate(), thud.Room())
+def test_maxima_are_drawn_on_their_decays(shell: thud.Impact) -> None:
+    found = thud.predict_level(shell, thud.Plate(), thud.Room())
     (axes,) = plot.draw_decay(found).axes
     drawn = [line.get_xydata() for line in axes.get_lines()][:-1]
     for decay, ((time, level),) in zip(drawn[::2], drawn[1::2], strict=True):
@@ -317,8 +311,8 @@ def test_maxima_are_drawn_on_their_decays(impact: thud.Impact) -> None:
         assert decay[np.argmax(decay[:, 1]), 0] == pytest.approx(time, abs=10)
 
 
-def test_few_modes_of_floor_or_room_raise_a_warning(impact: thud.Impact) -> None:
-    found = thud.predict_level(impact, thud.Plate(), thud.Room())
+def test_few_modes_of_floor_or_room_raise_a_warning(shell: thud.Impact) -> None:
+    found = thud.predict_level(shell, thud.Plate(), thud.Room())
     many = np.full(12, found.few_modes)
     for change in ({"floor_modes": many - 1e-9}, {"room_modes": many - 1e-9}):
         one = replace(found, **{"floor_modes": many, "room_modes": many} | change)
@@ -337,9 +331,9 @@ def test_few_modes_of_floor_or_room_raise_a_warning(impact: thud.Impact) -> None
     assert replace(enough, floor_warnings=("a", "b")).warnings == ("a", "b")
 
 
-def test_single_numbers_are_those_of_the_levels(impact: thud.Impact) -> None:
+def test_single_numbers_are_those_of_the_levels(shell: thud.Impact) -> None:
     room = thud.Room(volume=70.0, reverberation_time=0.8)
-    found = thud.predict_level(impact, thud.Plate(), room)
+    found = thud.predict_level(shell, thud.Plate(), room)
     assert found.rating == thud.rating(found.level, "third")
     assert found.octave_rating == thud.rating(found.octave_level)
     assert found.standardized == pytest.approx(thud.standardized_level(found.level, 0.8, 70.0))

@@ -208,6 +208,18 @@ def test_misplaced_and_misspelt_words_are_told(call: Callable[[], object], words
         call()
 
 
+@pytest.mark.parametrize(
+    ("module", "heavy"),
+    [
+        ("thud", {"xarray", "scipy", "SALib", "matplotlib"}),
+        ("thud.report.recording_files", {"matplotlib", "weasyprint", "xarray"}),
+    ],
+)
+def test_import_stays_light(module: str, heavy: set[str]) -> None:
+    found = python("-c", f"import sys, {module}; print({heavy} & set(sys.modules))")
+    assert found.stdout == "set()\n"
+
+
 def test_misspelt_names_are_told() -> None:
     with pytest.raises(AttributeError, match=naming("'slove'", "'solve'")):
         thud.slove  # noqa: B018

@@ -18,7 +18,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import pytest
-from conftest import MINIMAL, REPOSITORY, contents, names_in, naming
+from conftest import MINIMAL, REPOSITORY, RESULT_FILES, contents, names_in, naming
 
 import thud
 from thud.base.errors import PlausibilityWarning
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 
     TwoInputs = dict[str, dict[str, bytes]]
 
-FILES = [".thud", "effective.nml", "force.csv", "levels.csv", "summary.nml"]
 OTHER = "&ball mass = 2.4 / &drop / &model / &mesh polar_elements = 8 / &modes count = 1 /"
 
 
@@ -230,7 +229,7 @@ def test_killed_run_does_not_lock_its_directory(
     (left / ".thud").write_text(f"{FIRST_LINE}\nforce.csv\n")
     (left / "force.csv").write_text("half a fi")
     assert run(case_file(MINIMAL)).returncode == 0
-    assert names_in(tmp_path / "outputs/case") == FILES
+    assert names_in(tmp_path / "outputs/case") == RESULT_FILES
     assert names_in(tmp_path / "outputs") == ["case"]
 
 

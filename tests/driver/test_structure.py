@@ -13,11 +13,11 @@ from pkgutil import walk_packages
 
 import numpy as np
 import pytest
+from conftest import REPOSITORY
 
 import thud
 from thud.recordings.flanks import _table
 
-REPOSITORY = Path(__file__).parents[2]
 SOURCES = REPOSITORY / "src"
 
 

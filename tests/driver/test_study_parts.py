@@ -20,7 +20,7 @@ from thud.studies import sampling
 from thud.studies.design import KIND as DESIGN, Design, _mark
 from thud.studies.parameter import MAX_VALUES, Parameter, varied
 from thud.studies.sensitivity import sobol_indices
-from thud.studies.surrogate_levels import SurrogateLevels, confirmed, within_region
+from thud.studies.surrogate_levels import SurrogateLevels, recompute, within_region
 from thud.studies.surrogate_training import regress
 from thud.studies.temperature import Temperature, read_temperature
 from thud.studies.trained_surrogate import (
@@ -264,7 +264,7 @@ def test_fewest_drops_are_those_of_the_order_statistic() -> None:
     assert fewest <= MIN_DROPS < 1.1 * fewest
 
 
-def test_verdict_is_in_doubt_where_errors_reach_a_limit() -> None:
+def test_verdict_is_undecided_where_errors_reach_a_limit() -> None:
     criteria = thud.assess(np.zeros(5), 0, 0, 0, 0, 0).criteria
     middle = np.array([(one.lower + one.upper) / 2 for one in criteria])
     half = np.array([(one.upper - one.lower) / 2 for one in criteria])
@@ -272,30 +272,30 @@ def test_verdict_is_in_doubt_where_errors_reach_a_limit() -> None:
     def verdict(value: np.ndarray, error: np.ndarray) -> tuple[float, bool, bool]:
         parts = [(row[None, :5], *(row[i : i + 1] for i in range(5, 10))) for row in (value, error)]
         found = assess_many(parts[0], parts[1], "rubber_ball")  # type: ignore[arg-type]
-        return tuple(found[name][0] for name in ("margin", "conforms", "doubtful"))  # type: ignore[return-value]
+        return tuple(found[name][0] for name in ("margin", "conforms", "undecided"))  # type: ignore[return-value]
 
     none = np.zeros(10)
-    margin, conforms, doubtful = verdict(middle, none)
+    margin, conforms, undecided = verdict(middle, none)
     assert margin == pytest.approx(half[:5].min())
-    assert (conforms, doubtful) == (True, False)
+    assert (conforms, undecided) == (True, False)
     for i in (0, 4, 5, 6, 9):
         one = np.eye(10)[i]
         for side in (-1, 1):
             inside, outside = (middle + side * r * half * one for r in (0.9, 1.1))
             # An error of less than a tenth of the half width, and one of more.
-            for r, doubt in ((0.09, False), (0.11, True)):
+            for r, is_undecided in ((0.09, False), (0.11, True)):
                 error = r * half * one
-                assert verdict(inside, error)[1:] == (True, doubt)
-                assert verdict(outside, error)[1:] == (False, doubt)
-    # A set that fails for sure in another criterion is in no doubt.
+                assert verdict(inside, error)[1:] == (True, is_undecided)
+                assert verdict(outside, error)[1:] == (False, is_undecided)
+    # A sample that surely fails another criterion is decided.
     failed = middle + 2 * half * np.eye(10)[6] + 0.9 * half * np.eye(10)[0]
     assert verdict(failed, 0.2 * half * np.eye(10)[0])[1:] == (False, False)
 
 
-def test_range_of_a_surrogate_counts_doubtful_samples_twice() -> None:
+def test_range_of_a_surrogate_counts_undecided_samples_twice() -> None:
     dataset = xr.Dataset(
         {"conforms": ("sample", [True, True, True, False, False, False, False, False]),
-         "doubtful": ("sample", [True, False, False, True, True, False, False, False])}
+         "undecided": ("sample", [True, False, False, True, True, False, False, False])}
     )  # fmt: skip
     found = Uncertainty(dataset, np.empty((8, 5)), "rubber_ball", 3, 8, 0)
     assert found.surrogate_range == (2 / 8, 5 / 8)
@@ -378,7 +378,7 @@ def test_mark_of_a_map_is_the_ball_of_the_paper_or_the_case(
 
 @dataclass(frozen=True)
 class Target:
-    """What `confirmed` takes of a target."""
+    """What `recompute` takes of a target."""
 
     case: object
     misfit: object
@@ -387,7 +387,7 @@ class Target:
 
 @dataclass(frozen=True)
 class Found:
-    """What `confirmed` takes of a fit."""
+    """What `recompute` takes of a fit."""
 
     targets: tuple[Target, ...]
     warnings: tuple[str, ...]
@@ -468,7 +468,7 @@ def test_result_that_the_surrogate_misses_is_doubted(
     )  # fmt: skip
     monkeypatch.setattr("thud.studies.surrogate_levels.compute", lambda _: "model")
     target = Target(case=None, misfit=misfit, impact="answer")
-    found = confirmed(Found((target,), ("before",)))  # type: ignore[arg-type]
+    found = recompute(Found((target,), ("before",)))  # type: ignore[arg-type]
     assert found.targets[0].impact == "model"
     assert found.warnings[0] == "before"
     assert len(found.warnings) == 1 + count
@@ -522,13 +522,13 @@ def test_answers_are_the_verdict_of_what_is_predicted() -> None:
     judged = [0, 1, 2, 3, 4, 10, 11]
     worst = judged[int(np.argmax(surrogate.errors[judged]))]
     assert surrogate.worst == (surrogate.labels[worst], surrogate.errors[worst])
-    # A level at its limit within the error is in doubt, and so is a time by its ratio.
+    # A level at its limit within the error is undecided, and so is a time by its ratio.
     limit = thud.assess(np.zeros(5), 0, 0, 0, 0, 0).criteria[5].upper
-    for decibels, doubt in ((0.5, True), (1.5, False)):
+    for decibels, is_undecided in ((0.5, True), (1.5, False)):
         mean = surrogate.mean.copy()
         mean[10] = 20 * np.log10(limit) - decibels * surrogate.errors[10]
         near = replace(surrogate, mean=mean).predict(case, {"height": np.array([1.0])})
-        assert near["doubtful"].tolist() == [doubt]
+        assert near["undecided"].tolist() == [is_undecided]
     # What exceeds the bound is withheld, and what has it is not.
     for bound, known in ((surrogate.errors[11], True), (surrogate.errors[11] - 1e-12, False)):
         one = replace(surrogate, bound=float(bound), residuals=np.where(

@@ -89,8 +89,8 @@ def test_probability_lies_in_the_range_that_is_stated(
     assert result.surrogate_range
     low, high = result.surrogate_range
     assert low <= result.probability <= high
-    # Of the verdicts that are not in doubt, 5 % for each of seven quantities may err at most.
-    sure = ~result.dataset["doubtful"].values
+    # Of the verdicts that are decided, 5 % for each of seven quantities may err at most.
+    sure = ~result.dataset["undecided"].values
     wrong = (result.dataset["conforms"] != direct.dataset["conforms"]).values[sure].mean()
     assert wrong <= 7 * 0.05
     assert abs(result.probability - direct.probability) <= high - low + wrong
@@ -108,15 +108,15 @@ def test_margin_and_verdict_are_those_of_the_library(direct: thud.Uncertainty) -
     found = assess_many(values, none, "rubber_ball")
     np.testing.assert_array_equal(found["margin"], known["margin"])
     np.testing.assert_array_equal(found["conforms"], known["conforms"])
-    assert not found["doubtful"].any()
+    assert not found["undecided"].any()
     assert 0 < found["conforms"].sum() < len(known["height"])
-    # Errors of 1 cm put the verdict in doubt where the height is closer to its limits.
+    # Errors of 1 cm leave the verdict undecided where the height is closer to its limits.
     height = known["height"].values
     by = (*none[:-1], np.full(1, 0.01))
     close = np.minimum(np.abs(height - 0.99), np.abs(height - 1.01)) < 0.01
     others = found["margin"] >= 0
     np.testing.assert_array_equal(
-        assess_many(values, by, "rubber_ball")["doubtful"], close & others
+        assess_many(values, by, "rubber_ball")["undecided"], close & others
     )
 
 
@@ -346,7 +346,7 @@ def test_results_that_are_written_hold_the_errors(trained: thud.Surrogate, tmp_p
         thud.uncertainty(TOLERANCES, tmp_path)
 
 
-def test_map_shows_verdicts_in_doubt(trained: thud.Surrogate) -> None:
+def test_map_shows_undecided_verdicts(trained: thud.Surrogate) -> None:
     study = {
         "fixed": {**FIXED, "height": 1.0},
         "parameters": {
@@ -360,7 +360,7 @@ def test_map_shows_verdicts_in_doubt(trained: thud.Surrogate) -> None:
     level = ["level" in name for name in trained.labels]
     residuals = np.full_like(trained.residuals, error) * level
     found = thud.design(study, surrogate=replace(trained, residuals=residuals, bound=error))
-    doubtful = found.dataset["doubtful"]
+    undecided = found.dataset["undecided"]
     limits = {one.name: one for one in thud.assess([0] * 5, 0, 0, 1, 0, 0).criteria}
     rest = [
         (found.dataset[name] >= limits[name].lower) & (found.dataset[name] <= limits[name].upper)
@@ -368,10 +368,10 @@ def test_map_shows_verdicts_in_doubt(trained: thud.Surrogate) -> None:
     ]
     near = found.dataset["margin"] < error
     np.testing.assert_array_equal(
-        doubtful, near & (found.dataset["margin"] >= -error) & rest[0] & rest[1]
+        undecided, near & (found.dataset["margin"] >= -error) & rest[0] & rest[1]
     )
-    assert 0 < int(doubtful.sum()) < doubtful.size
-    assert ("in doubt by the surrogate", f"{int(doubtful.sum())}") in found.rows()
+    assert 0 < int(undecided.sum()) < undecided.size
+    assert ("undecided by the surrogate", f"{int(undecided.sum())}") in found.rows()
     labels = [text.get_text() for text in thud.plot.draw_design(found).legends[0].get_texts()]
     assert "Undecided by surrogate" in labels
 

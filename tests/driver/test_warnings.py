@@ -34,14 +34,10 @@ DOUBTFUL = {
 
 @pytest.mark.parametrize("words", DOUBTFUL)
 @pytest.mark.slow
+@pytest.mark.usefixtures("working_directory")
 def test_doubtful_input_raises_a_warning_by_every_command(
-    words: str,
-    case_file: CaseFile,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    words: str, case_file: CaseFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     path = case_file(DOUBTFUL[words])
     with pytest.warns(thud.PlausibilityWarning) as caught:
         impact = thud.solve(thud.read_case(path))
@@ -140,13 +136,10 @@ def test_free_modes_with_the_modulus_of_the_shell_raise_a_warning() -> None:
         thud.free_modes(thud.Ball.standard(), radial_elements=4, polar_elements=16)
 
 
+@pytest.mark.usefixtures("working_directory")
 def test_run_names_the_groups_that_are_left_out(
-    case_file: CaseFile,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    case_file: CaseFile, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     assert cli.main(["run", "--no-figures", str(case_file("&drop height = 0.5 /"))]) == 0
     assert "&ball &model" in capsys.readouterr().out
     assert cli.main(["run", "--no-figures", "-o", "m", str(case_file("&modes count = 1 /"))]) == 0

@@ -1,4 +1,4 @@
-"""Commands on cases: run, compare, export, and the figures and inputs of the documentation."""
+"""Commands on cases: run, compare, export, figures and inputs of the documentation."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def run_cases(options: argparse.Namespace) -> int:
             conforms = _run_case(path, options)
         except (ThudError, OSError) as error:
             if isinstance(error, OSError) and error.filename is None:
-                raise  # of the screen, which is no better for the other cases
+                raise  # standard output fails for the other cases, too
             tqdm.write(f"thud-driver: {message_of(error)}", file=sys.stderr)
             failure = exit_code(error)
             worst = failure if worst in (0, NOT_CONFORMING) else max(worst, failure)
@@ -65,7 +65,7 @@ def run_cases(options: argparse.Namespace) -> int:
 
 
 def _run_case(path: str, options: argparse.Namespace) -> bool:
-    """Run one case as the executable does, then draw it; return whether it conforms."""
+    """Run one case as the executable does, draw its figures; return whether it conforms."""
     case = read_case(path)
     output = options.output or ""
     if output and len(options.cases) > 1:
@@ -157,7 +157,7 @@ def draw_figures(options: argparse.Namespace) -> int:
     return 0
 
 
-# By option: what it writes.
+# Meaning of the options for formats.
 KINDS = {
     "wav": "32-bit floats, with their scale in a text file beside it",
     "csv": "table of time and force",
@@ -168,12 +168,12 @@ KINDS = {
 
 
 def run_export(options: argparse.Namespace) -> int:
-    """Write the blocked force in the formats that are asked for; return the exit code."""
+    """Write the blocked force in the chosen formats; return the exit code."""
     from thud.export import force_files
 
     chosen = [kind for kind in KINDS if getattr(options, kind)]
     if not chosen:
-        refuse("export: no format is given", ", ".join(f"--{kind}" for kind in KINDS))
+        refuse("export: no format is chosen", ", ".join(f"--{kind}" for kind in KINDS))
     source = _read_source(options.source, options.config)
     print_notes(source.warnings)
     force = force_files.blocked_force(source, drop=options.drop, rate=options.rate)
@@ -222,7 +222,7 @@ def copy_examples(options: argparse.Namespace) -> int:
     """Copy the inputs into a directory of their own; return the exit code."""
     target = Path(options.directory)
     if target.exists() or target.is_symlink():
-        refuse(f"{target} exists", "a directory that is to be made")
+        refuse(f"{target} exists", "a new directory")
     with resources.as_file(resources.files("thud") / "inputs") as source:
         if not source.is_dir():
             refuse("this package has no inputs", "an installed one; in a clone they are in inputs/")
@@ -249,10 +249,10 @@ EXAMPLES = Command(
             nargs="?",
             default="inputs",
             metavar="DIR",
-            help="directory that is made (default: inputs)",
+            help="new directory (default: inputs)",
         ),
         QUIET,
     ),
     copy_examples,
-    "what was copied is kept",
+    "copied files are kept",
 )

@@ -1,4 +1,4 @@
-"""Type of the commands of ``thud-driver``, and the arguments and messages that they share."""
+"""Commands of ``thud-driver``: their type, shared arguments and messages."""
 
 from __future__ import annotations
 
@@ -55,9 +55,9 @@ def output(meaning: str) -> tuple[Argument, Argument]:
 def results_of(
     options: argparse.Namespace, default: str, inputs: Iterable[str | None] = ()
 ) -> Results:
-    """Return the directory for the results of a command, by default one below ``outputs``.
+    """Return the results directory of a command, by default one below ``outputs``.
 
-    The inputs, which the command reads, are never replaced.
+    The input files of the command are never replaced.
     """
     return Results(
         Path(options.output or Path("outputs", default)),
@@ -104,7 +104,7 @@ def print_at_once() -> Iterator[None]:
         yield
 
 
-def save_result(  # noqa: PLR0913, PLR0917 - each of them differs
+def save_result(  # noqa: PLR0913, PLR0917 - differ between commands
     options: argparse.Namespace,
     source: str,
     result: MobilityFit | RoomLevels,
@@ -112,9 +112,9 @@ def save_result(  # noqa: PLR0913, PLR0917 - each of them differs
     file: tuple[str, bytes],
     figure: str,
 ) -> int:
-    """Save a file and the figure of a result, print its text and warnings; return the exit code.
+    """Save file and figure of a result, print text and warnings; return the exit code.
 
-    The source is the file that the result is from.
+    The source is the input file.
     """
     results = results_of(options, result.name, [source])
     contents = dict([file])

@@ -1,4 +1,4 @@
-"""The command that opens the program as a page of a browser."""
+"""The command that opens the explorer, a page in a browser."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import argparse
     from collections.abc import Iterator
 
-# Names of this machine for itself, as addresses of pages hold them.
+# Names of this machine for itself in addresses.
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 
 
@@ -48,8 +48,8 @@ def explore(options: argparse.Namespace) -> int:
         sys.stdout.flush()
     if hosts == ("*",):
         print(
-            "thud-driver: the page can be reached from other machines, and is not encrypted; "
-            "who has the address can compute here",
+            "thud-driver: other machines can reach the page, which is not encrypted; anybody with "
+            "the address can compute here",
             file=sys.stderr,
         )
     application = new_application(start, token=token, hosts=hosts)
@@ -64,7 +64,7 @@ def explore(options: argparse.Namespace) -> int:
 
 @contextmanager
 def _temporary_files_in(folder: Path) -> Iterator[None]:
-    """Keep temporary files in a directory."""
+    """Put temporary files in a directory."""
     before = tempfile.tempdir
     tempfile.tempdir = str(folder)
     try:
@@ -74,9 +74,9 @@ def _temporary_files_in(folder: Path) -> Iterator[None]:
 
 
 def _redirect(folder: Path, address: str) -> str:
-    """Return the address of a file that leads to a page.
+    """Return the address of a file that redirects to a page.
 
-    Other users of the machine see the arguments of the browser, but cannot read the file.
+    Other users of the machine can see the arguments of the browser, but not read the file.
     """
     path = folder / "open.html"
     path.touch(0o600)
@@ -85,7 +85,7 @@ def _redirect(folder: Path, address: str) -> str:
 
 
 EXPLORE = Command(
-    "the program as a page of a browser",
+    "interactive page in a browser",
     (
         argument(
             "case",

@@ -81,7 +81,7 @@ RATE = Command(
         argument(
             "levels",
             metavar="LEVELS.csv",
-            help="frequency, levels of positions, and where known background, reverberation_time",
+            help="frequency, levels of positions, and optionally background, reverberation_time",
         ),
         argument("--volume", type=float, metavar="M3", help="volume of the room"),
         *output("the results (default: outputs/<name of the file>)"),
@@ -103,7 +103,7 @@ def fit_mobility_table(options: argparse.Namespace) -> int:
 
 
 MOBILITY = Command(
-    "floor of a measured mobility, as poles for a case",
+    "fit poles to a measured mobility, as a floor for cases",
     (
         argument(
             "table",
@@ -113,9 +113,9 @@ MOBILITY = Command(
         argument(
             "--quantity",
             choices=("mobility", "accelerance", "receptance"),
-            help="what a table holds (default: mobility)",
+            help="quantity of the table (default: mobility)",
         ),
-        argument("--order", type=int, metavar="N", help="number of poles (default: chosen)"),
+        argument("--order", type=int, metavar="N", help="number of poles (default: automatic)"),
         *output("the results (default: outputs/<name of the file>)"),
         NO_FIGURES,
         QUIET,

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import argparse
 
 
-# Drops that the screen shows.
+# Maximum number of drops that are printed.
 SHOWN = 50
 
 
@@ -41,7 +41,7 @@ def measure(options: argparse.Namespace) -> int:
     files = results_of(options, Path(options.drops[0]).stem, [*options.drops, options.config])
     files.require(recording_files.file_names(figures=figures))
     folder = files.folder
-    # Drops stay until the results are written.
+    # Measured drops are kept until the results are written.
     with Checkpoint(folder) as checkpoint:
         recording = read_recording(
             options.drops,
@@ -121,12 +121,12 @@ MEASURE = Command(
         QUIET,
     ),
     measure,
-    "drops of an interrupted measurement are taken up by the same command",
+    "run the command again to continue: measured drops are kept",
 )
 
 
 def run_calibrate(options: argparse.Namespace) -> int:
-    """Print the lines of a configuration that a calibration record gives; return the exit code."""
+    """Print the configuration lines of a calibration record; return the exit code."""
     from thud.recordings.calibration import calibrate
 
     result = calibrate(
@@ -147,7 +147,7 @@ def run_calibrate(options: argparse.Namespace) -> int:
 
 
 CALIBRATE = Command(
-    "N per unit from a record in which a known force is put on or taken off the plate",
+    "calibration from a record of a known force applied to or removed from the plate",
     (
         argument("record", metavar="FILE", help="record of the known force"),
         argument("--mass", type=float, metavar="KG", help="known mass"),

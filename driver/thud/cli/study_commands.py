@@ -11,7 +11,7 @@ from tqdm import tqdm
 from thud.base.display import left_out
 from thud.base.errors import NumericalError, ThudError
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output, print_notes
-from thud.studies.directory import take
+from thud.studies.directory import open_results
 from thud.studies.kinds import KINDS, get_kind
 
 if TYPE_CHECKING:
@@ -61,22 +61,22 @@ def run_study(options: argparse.Namespace) -> int:
     """Run a study, print its results, save files and figures; return the exit code."""
     kind = get_kind(options.name)
     study = kind.read_study(options.study)
-    how: RunOptions = {"progress": not options.quiet, "replace": options.replace}
+    run_options: RunOptions = {"progress": not options.quiet, "replace": options.replace}
     if KINDS[options.name].has_samples:
-        how |= {
+        run_options |= {
             "backend": options.backend,
             "workers": options.workers,
             "scheduler": options.scheduler,
             "allow_large": options.yes,
         }
-    kind.require(study, **how)
+    kind.require(study, **run_options)
     folder = Path(options.output or Path("outputs", study.name))
     if not options.quiet:
         print(kind.describe(study), file=sys.stderr)
     drawn = not options.no_figures
-    with take(folder, kind, study, replace=options.replace, figures=drawn) as results:
+    with open_results(folder, kind, study, replace=options.replace, figures=drawn) as results:
         try:
-            result = kind.compute(study, results, **how)
+            result = kind.compute(study, results, **run_options)
         except ThudError as error:
             message = f"{options.study}: {error}"
             raise type(error)(message) from error

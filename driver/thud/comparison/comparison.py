@@ -46,7 +46,7 @@ class Comparison(Displayed, Page):
     Attributes
     ----------
     impacts : dict of str to Impact or Recording
-        What is compared, by its name.
+        Impacts and recordings by their names.
     run_times : dict of str to float
         Computing time of each model, s.
     force : str or None
@@ -73,7 +73,7 @@ class Comparison(Displayed, Page):
     def rows(self) -> list[tuple[str, ...]]:
         """Return rows of text: names, force, method, criteria, quantities, times, verdicts.
 
-        Columns are the impacts and, in the last, the limits.
+        There is a column for each impact, and a last one for the limits.
         """
         impacts = self.impacts.values()
         verdicts = [impact.assess(self.source, self.force) for impact in impacts]
@@ -116,7 +116,7 @@ def _criterion_row(criteria: tuple[Criterion, ...]) -> tuple[str, ...]:
 
 
 def _cell(criterion: Criterion, quantity: Quantity) -> str:
-    """Return the value of a criterion, and how it misses its limits."""
+    """Return the value of a criterion, and in which way it misses its limits."""
     if np.isnan(criterion.value):
         return "not known"
     if criterion.conforms:
@@ -129,7 +129,7 @@ def _cell(criterion: Criterion, quantity: Quantity) -> str:
 
 
 def _quantity_rows(impacts: Iterable[ImpactResult]) -> list[tuple[str, ...]]:
-    """Return the rows of the quantities that have no row yet, where one of them is known."""
+    """Return the rows of the known quantities that have no other row."""
     other_rows = {"peak_force", "peak_elastic_force", *(name for name, *_ in LIMITS[SOURCES[0]])}
     rows = []
     for name in SAMPLE_QUANTITIES:
@@ -168,8 +168,8 @@ def compare(
     Parameters
     ----------
     impacts
-        Cases (which are solved), impacts and recordings, one or more: by name, or in a row, where
-        impacts have the names of their cases.
+        One or more cases (which are solved), impacts and recordings, by name or in a list; in a
+        list, impacts have the names of their cases.
     force
         ``"floor"`` or ``"elastic"``; by default that of each case.
     source
@@ -186,13 +186,13 @@ def compare(
     Raises
     ------
     InputError
-        Where there is nothing to compare, or the drops or the limits differ; the height of a
-        recording counts where it is known.
+        If there is nothing to compare, or the drops or the limits differ; the height of a recording
+        counts if it is known.
 
     Warns
     -----
     PlausibilityWarning
-        As `Comparison.warnings`.
+        For each of `Comparison.warnings`.
     """
     if force is not None:
         require_choice("force", force, FORCES)
@@ -220,7 +220,7 @@ def compare(
 
 
 def _require_same_drop(impacts: Mapping[str, ImpactResult]) -> None:
-    """Raise InputError where drops differ; measured heights differ within their tolerance."""
+    """Raise InputError if drops differ by more than the tolerance of measured heights."""
     known = {n: i for n, i in impacts.items() if not math.isnan(i.impact_velocity)}
     for first, second in combinations(known.values(), 2):
         tolerance = max(first.velocity_tolerance, second.velocity_tolerance)
@@ -235,7 +235,7 @@ def _require_same_drop(impacts: Mapping[str, ImpactResult]) -> None:
 
 
 def _named(impacts: object) -> dict[str, Case | ImpactResult]:
-    """Return what is compared by name, checked."""
+    """Return cases and impacts by name, checked."""
     allowed = (
         "one or more cases, impacts or recordings, by name or in a list "
         "(files: read_case, read_recording)"
@@ -243,10 +243,10 @@ def _named(impacts: object) -> dict[str, Case | ImpactResult]:
     if isinstance(impacts, Mapping):
         pairs = list(impacts.items())
     else:
-        row = [impacts] if isinstance(impacts, Case | ImpactResult) else impacts
-        if not isinstance(row, Iterable) or isinstance(row, str | bytes | os.PathLike):
-            refuse_value("impacts", row, allowed)
-        pairs = [(getattr(item, "name", type(item).__name__.lower()), item) for item in row]
+        items = [impacts] if isinstance(impacts, Case | ImpactResult) else impacts
+        if not isinstance(items, Iterable) or isinstance(items, str | bytes | os.PathLike):
+            refuse_value("impacts", items, allowed)
+        pairs = [(getattr(item, "name", type(item).__name__.lower()), item) for item in items]
     if not pairs:
         refuse("impacts is empty", allowed)
     named: dict[str, Case | ImpactResult] = {}
@@ -265,7 +265,7 @@ def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Impact
     Raises
     ------
     InputError
-        Names the file; also raised where two have the same name.
+        If a file cannot be read, or two have the same name.
     """
     items: dict[str, Case | ImpactResult] = {}
     for path in map(Path, paths):

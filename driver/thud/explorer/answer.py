@@ -1,4 +1,4 @@
-"""What the page shows of a case or of a recording, as plain data."""
+"""Results of a case or of a recording for the page, as plain data."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from thud.impact.ensemble import get_cost
 from thud.impact.floor_impact import FloorImpact
 from thud.level.levels import get_bands
 from thud.plot.impact_figures import contact_force
-from thud.plot.style import FORCE_WORDS
+from thud.plot.style import FORCE_NAMES
 from thud.recordings.read_recording import read_recording
 
 if TYPE_CHECKING:
@@ -43,9 +43,9 @@ MAX_INSTANTS = 60
 SNAPSHOT_INTERVAL = 1e-3
 # Maximum number of samples of a record.
 MAX_SAMPLES = 200_000
-# Estimated time above which a case is computed only when the sliders rest, s.
+# Maximum estimated time of a case that is computed while a slider moves, s.
 QUICK = 0.1
-# End of the time that is shown, in contact times.
+# End of the displayed time, in contact times.
 MARGIN = 1.05
 # Significant digits of curves.
 DIGITS = 6
@@ -64,7 +64,7 @@ def new_case(values: Mapping[str, Mapping[str, object]]) -> Case:
 
 
 def answer_quickly(case: Case) -> Answer | None:
-    """Return the answer of a case that is computed while a slider moves; None of another.
+    """Return the answer of a case that is quick enough to compute while a slider moves, or None.
 
     Raise InputError if it is invalid.
     """
@@ -72,14 +72,14 @@ def answer_quickly(case: Case) -> Answer | None:
 
 
 def answer_case(case: Case) -> Answer:
-    """Return force, levels, verdict, warnings and, where there are, motion, floor and room."""
+    """Return force, levels, verdict, warnings and, if the case has them, motion, floor and room."""
     start = time.perf_counter()
     if isinstance(case.model, FiniteElement):
         case = replace(case, model=replace(case.model, snapshot_interval=SNAPSHOT_INTERVAL))
     impact = compute(case)
     force = case.levels.force
     answer = _answer(impact, *contact_force(impact, force))
-    answer["force"]["words"] = FORCE_WORDS[force]
+    answer["force"]["words"] = FORCE_NAMES[force]
     answer["warnings"] += impact.warnings
     on_floor = impact.on_floor
     answer["motion"] = _motion(on_floor or impact)
@@ -93,16 +93,9 @@ def answer_case(case: Case) -> Answer:
 
 
 def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answer:
-    """Return the answer of a recording.
+    """Return the answer of a recording, from the path of a copy and the name of the original.
 
-    Parameters
-    ----------
-    path
-        Path of a copy of the file.
-    name
-        Its name, as the user knows it.
-    settings
-        Arguments of `read_recording`.
+    The settings are arguments of `read_recording`.
     """
     start = time.perf_counter()
     try:
@@ -113,12 +106,12 @@ def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answe
         curve = 1e3 * times[contact], 1e-3 * force[contact]
         answer = _answer(recording, *curve)
     except ThudError as error:
-        # The user does not know the copy.
+        # The user knows the original, not the copy.
         raise type(error)(str(error).replace(path, shown(name))) from error
     answer["seconds"] = time.perf_counter() - start
     answer["drops"] = len(recording.drops)
     copy = Path(path).name
-    # The page says whose the warnings are.
+    # The page shows the name of the recording beside its warnings.
     answer["warnings"] += [
         warning.removeprefix(f"{copy}: ").replace(copy, name) for warning in recording.warnings
     ]
@@ -126,13 +119,13 @@ def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answe
 
 
 def _answer(source: ImpactResult, times: NDArray[np.float64], force: NDArray[np.float64]) -> Answer:
-    """Return the common part of answers; times in ms, the force in kN."""
+    """Return the common entries of answers; times in ms, the force in kN."""
     verdict = source.assess()
     return {
         "force": _curve(times, 1e3 * force),
         "levels": {
-            "frequency": _plain(get_bands().nominal),
-            "level": _plain(source.levels()),
+            "frequency": _to_json(get_bands().nominal),
+            "level": _to_json(source.levels()),
         },
         "criteria": [_criterion(criterion) for criterion in verdict.criteria],
         "conforms": bool(verdict.conforms),
@@ -143,7 +136,7 @@ def _answer(source: ImpactResult, times: NDArray[np.float64], force: NDArray[np.
 
 
 def _numbers(source: ImpactResult) -> list[list[Any]]:
-    """Return title, value and unit of the quantities that are known, of the peaks the assessed."""
+    """Return title, value and unit of the known quantities, and the peak of the assessed force."""
     other = "peak_force" if source.assessed_force() == "elastic" else "peak_elastic_force"
     rows: list[list[Any]] = []
     for name in SAMPLE_QUANTITIES:
@@ -173,16 +166,15 @@ def _criterion(criterion: Criterion) -> Answer:
 def _motion(impact: Impact) -> Answer | None:
     """Return the surfaces of the ball over the floor, and the floor, against time, mm and ms.
 
-    None for models without a shape. The shell of the paper is a sphere that its deflection
-    flattens.
+    None for models without a shape. The shell of the paper is a sphere flattened by its deflection.
     """
     until = impact.touch_time + MARGIN * impact.contact_time
     motion = impact.motion
     if motion is None and "shell_force" not in impact.components:
         return None
     times = impact.time if motion is None else motion.time
-    chosen = _some(np.flatnonzero(times <= until), MAX_INSTANTS)
-    answer: Answer = {"time": _plain(1e3 * (times[chosen] - impact.touch_time))}
+    chosen = _thin_out(np.flatnonzero(times <= until), MAX_INSTANTS)
+    answer: Answer = {"time": _to_json(1e3 * (times[chosen] - impact.touch_time))}
     if motion is not None:
         depth = motion.floor_displacement[chosen]
         over = motion.position[chosen] + np.stack([0 * depth, depth], -1)[:, None, None]
@@ -194,9 +186,9 @@ def _motion(impact: Impact) -> Answer | None:
         moving = impact.floor_displacement if isinstance(impact, FloorImpact) else 0 * impact.time
         depth = moving[chosen]
         ball = impact.case.ball
-        answer["deflection"] = _plain(1e3 * impact.deflection[chosen])
+        answer["deflection"] = _to_json(1e3 * impact.deflection[chosen])
         answer |= {"radius": 1e3 * ball.outer_radius, "wall": 1e3 * ball.wall_thickness}
-    answer["floor"] = _plain(1e3 * depth)
+    answer["floor"] = _to_json(1e3 * depth)
     return answer
 
 
@@ -229,8 +221,8 @@ def _room(impact: Impact) -> Answer:
     """Return the levels in the room below."""
     prediction = predict_level(impact)
     return {
-        "frequency": _plain(prediction.frequency),
-        "level": _plain(prediction.level),
+        "frequency": _to_json(prediction.frequency),
+        "level": _to_json(prediction.level),
         "rating": prediction.rating.rounded,
         "standardized": prediction.standardized_rating.rounded,
         "warnings": list(prediction.warnings),
@@ -238,18 +230,18 @@ def _room(impact: Impact) -> Answer:
 
 
 def _curve(times: NDArray[np.float64], values: NDArray[np.float64]) -> Answer:
-    """Return some points of a curve, the last among them."""
-    chosen = _some(np.arange(len(times)), MAX_POINTS)
-    return {"time": _plain(times[chosen]), "value": _plain(values[chosen])}
+    """Return at most `MAX_POINTS` points of a curve."""
+    chosen = _thin_out(np.arange(len(times)), MAX_POINTS)
+    return {"time": _to_json(times[chosen]), "value": _to_json(values[chosen])}
 
 
-def _some(indices: NDArray[np.intp], count: int) -> NDArray[np.intp]:
-    """Return at most so many of some indices, evenly, the first and the last among them."""
+def _thin_out(indices: NDArray[np.intp], count: int) -> NDArray[np.intp]:
+    """Return at most `count` of the indices, evenly spaced, with the first and the last."""
     chosen = np.linspace(0, len(indices) - 1, min(len(indices), count)).astype(int)
     result: NDArray[np.intp] = indices[np.unique(chosen)]
     return result
 
 
-def _plain(values: Iterable[float]) -> list[float | None]:
+def _to_json(values: Iterable[float]) -> list[float | None]:
     """Return numbers for JSON, which has no NaN and no infinity."""
     return [float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None for value in values]

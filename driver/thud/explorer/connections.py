@@ -28,16 +28,10 @@ HEAD_TIME = 10
 LOG_INTERVAL = 60.0
 
 
-def _max_connections() -> int:
-    """Return the maximum number of connections at a time.
-
-    As many again may be open before the surplus is closed, and tasks open files, too.
-    """
-    files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
-    return 500 if files == resource.RLIM_INFINITY else min(500, files // 4)
-
-
-MAX_CONNECTIONS = _max_connections()
+# Maximum number of connections at a time: as many again may be open before the surplus is closed,
+# and tasks open files, too.
+_FILES, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+MAX_CONNECTIONS = 500 if _FILES == resource.RLIM_INFINITY else min(500, _FILES // 4)
 
 
 def run_server(application: Starlette, listener: socket.socket, folder: Path) -> None:

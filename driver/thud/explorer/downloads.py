@@ -1,4 +1,4 @@
-"""Files that the page offers: case, force, report, and a study over the moved sliders."""
+"""Files to download from the page: case, force, report, and a study of the moved sliders."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
     Values = dict[str, dict[str, Any]]
 
-# Points of a grid along one parameter, and samples of a design with more than two.
+# Points of a grid along each of up to two parameters, and samples of a design with more.
 POINTS = 11
 SAMPLES = 256
-# Group of a request beside those of the case: ends of the moves of sliders, by group.key.
+# Group of a request for the ranges over which sliders were moved, by group.key.
 MOVED = "moved"
 
 
@@ -53,7 +53,7 @@ def force(values: Values) -> bytes:
 
 
 def report(values: Values) -> bytes:
-    """Return the page of a comparison with the case alone."""
+    """Return the comparison page of the case alone."""
     impact = compute(new_case(values))
     comparison = compare({impact.case.name: impact})
     source = impact.case.limits.source
@@ -61,14 +61,14 @@ def report(values: Values) -> bytes:
 
 
 def study(values: Values) -> bytes:
-    """Return the file of a sweep over the moved keys, between the ends of their moves."""
+    """Return the file of a sweep over the ranges in which sliders were moved."""
     moved = _moves(values.pop(MOVED, {}))
     case = new_case(values)
     check_case(case)
     names = {f"{key.group}.{key.name}": name for name, key in known_keys(key_owners(case)).items()}
     ranges = {names[key]: ends for key, ends in moved.items() if key in names and ends[0] < ends[1]}
     if not ranges:
-        refuse("move a slider first", "a study of one or more")
+        refuse("move a slider first", "a study of one or more parameters")
     lines = ["# A sweep over the moved keys: thud-driver sweep <this file>"]
     for group, keys in case.to_namelist().items():
         if group in values:
@@ -87,7 +87,7 @@ def study(values: Values) -> bytes:
 
 
 def _moves(moved: object) -> dict[str, tuple[float, float]]:
-    """Return the smallest and the largest value of each key that was moved."""
+    """Return the minimum and maximum of each key that was moved."""
     if not isinstance(moved, dict):
         refuse(f"{MOVED} = {shown(moved)} holds no keys", "the ends of the moves by group.key")
     for key, ends in moved.items():
@@ -112,7 +112,7 @@ def _toml(value: object) -> str:
     return repr(value)
 
 
-# Function that makes a file of the values, and media type, by the name of the request.
+# Function that makes the file, and its media type, by the name of the request.
 DOWNLOADS: dict[str, tuple[Callable[[Values], bytes], str]] = {
     "case.nml": (namelist, "text/plain"),
     "force.csv": (force, "text/csv"),

@@ -1,4 +1,4 @@
-"""The fields of the page, made from the declarations of the keys."""
+"""Form fields of the page, from the declarations of the keys."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 # A logarithmic slider spans its initial value divided and multiplied by this.
 SPAN = 3.0
-# A linear slider spans an allowed range that is positive and up to this long, if its initial value
-# lies above this fraction of it.
+# A linear slider spans the allowed range if that is positive and up to this long, and the initial
+# value lies above this fraction of it.
 MAX_LENGTH, MIN_FRACTION = 3.0, 0.1
 # Fraction of such a range that is left out at its ends.
 INSET = 0.01
 _RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
-# Groups without fields on the page: name, free modes, quasi-static compression, files.
+# Groups without fields on the page.
 LEFT_OUT = ("case", "modes", "compression", "output")
 
 
@@ -33,8 +33,8 @@ def form() -> list[dict[str, Any]]:
     """Return the groups of fields: name, title, owner, and the fields.
 
     A field has the group and the name of its key, label, kind, help, choices and default. A number
-    also has a unit, the power of ten that brings it to that of the key, limits of the allowed range
-    (None: open) and ends and scale of a slider, all in its unit.
+    also has a unit, the power of ten that converts it to that of the key, limits of the allowed
+    range (None: open) and ends and scale of a slider, all in its unit.
     """
     groups = [
         _group(name, name, kind(), [key for key in KEYS if key.group == name and not key.owner])
@@ -62,7 +62,7 @@ def _group(part: str, name: str, values: Group, keys: Iterable[Key]) -> dict[str
 
 def _field(key: Key, default: object) -> dict[str, Any]:
     """Return the field of a key."""
-    label, meaning = _title(key.name), _begun(humanize(key.meaning))
+    label, meaning = _title(key.name), _capitalize(humanize(key.meaning))
     field = {
         "group": key.group,
         "name": key.name,
@@ -93,21 +93,21 @@ def _field(key: Key, default: object) -> dict[str, Any]:
 
 
 def _title(name: str) -> str:
-    return _begun(humanize(name))
+    return _capitalize(humanize(name))
 
 
-def _begun(words: str) -> str:
-    """Return words with a capital at the beginning."""
+def _capitalize(words: str) -> str:
+    """Return words with a capital first letter."""
     return words[:1].upper() + words[1:]
 
 
 def _typeset(unit: str) -> str:
-    """Return a unit with its powers raised."""
+    """Return a unit with superscript powers."""
     return re.sub(r"(?<=[a-z])[23]", lambda digit: digit[0].translate(_RAISED), unit)
 
 
 def _shown(value: float | str, power: int) -> float | None:
-    """Return a number in the unit of the page; None for an end that is open or other keys."""
+    """Return a number in the unit of the page; None for an end that is open or another key."""
     return None if isinstance(value, str) or math.isinf(value) else scaled(value, -power)
 
 
@@ -126,7 +126,7 @@ def _slider(
     if lower is not None and upper is not None and lower >= 0:
         length = upper - lower
         if length <= MAX_LENGTH and (value <= 0 or value >= lower + MIN_FRACTION * length):
-            # Only the default shows that an end itself is allowed.
+            # The ends themselves may be excluded, but the default is allowed.
             inner = lower + INSET * length, upper - INSET * length
             return {"ends": [min(value, inner[0]), max(value, inner[1])], "log": False}
     if value <= 0:

@@ -78,10 +78,6 @@ def new_application(
         Maximum number of slow tasks, and of copies of recordings, at a time; of quick tasks twice
         as many.
 
-    Raises
-    ------
-    InputError
-        If the token is empty: requests without one would carry it.
     """
     if not token:
         refuse("the token is empty", "one that nobody can guess")
@@ -199,8 +195,8 @@ def _guarded(endpoint: Endpoint) -> Endpoint:
     """Return an endpoint that refuses requests of other pages, and those without the token."""
 
     async def answer(request: Request) -> Response:
-        own = f"{request.url.scheme}://{request.headers.get('host')}"
-        if request.headers.get("origin") not in {None, own}:
+        origin = f"{request.url.scheme}://{request.headers.get('host')}"
+        if request.headers.get("origin") not in {None, origin}:
             raise HTTPException(403, "the request comes from another page")
         token = request.headers.get(TOKEN, "").encode()
         if not secrets.compare_digest(token, request.app.state.token.encode()):
@@ -277,10 +273,7 @@ async def _values(request: Request) -> dict[str, dict[str, Any]]:
 def start_with(path: Path | None) -> dict[str, Any]:
     """Return the values of a case that the page starts with, by group.
 
-    Parameters
-    ----------
-    path
-        Namelist file, or directory of results; without it the default case.
+    The path is a namelist file or a directory of results; None is the default case.
     """
     if path is None:
         return {}

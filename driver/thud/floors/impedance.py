@@ -39,10 +39,10 @@ _SLOW_FRACTION = 0.25
 class BallImpedance(Displayed):
     """Impedance of a source during its impact, and the floors on which it matters.
 
-    A linear source that stays in contact acts on a floor of the impedance Z as a force F_b, that on
-    a rigid floor, over its own impedance Z_B: F = F_b/(1 + Z_B/Z). An impact is neither linear nor
-    endless; its Z_B solves this equation in bands, for F on a resistance Z, and tends to a limit as
-    Z grows.
+    A linear source in permanent contact acts on a floor of impedance Z with the force
+    F = F_b/(1 + Z_B/Z); F_b is its force on a rigid floor, Z_B its own impedance. An impact is
+    nonlinear and ends. Its effective Z_B solves this equation in bands, F being the force on a
+    floor that is a resistance Z; it tends to a limit as Z grows.
 
     Attributes
     ----------

@@ -16,11 +16,11 @@ from thud.base.bridge import compiler, version
 from thud.case.keys import find_key, key_owners
 from thud.impact.quantities import (
     ALL_QUANTITIES,
-    FLOOR_QUANTITIES,
+    DIMENSIONS,
     LEVELS,
     ROOM_BAND,
-    ROOM_LEVEL,
     SAMPLE_RESULTS,
+    sample_results,
 )
 from thud.level.levels import BANDWIDTHS, get_bands
 from thud.level.rating import rated_bands
@@ -89,25 +89,10 @@ def recording_dataset(recording: ImpactResult) -> xr.Dataset:
 def ensemble_dataset(ensemble: Ensemble) -> xr.Dataset:
     """Return the dataset of many drops, along the dimension ``sample``."""
     assert ensemble.case.model is not None  # noqa: S101 - `solve_many` has set it
-    coordinates: dict[str, Any] = band_coordinates(bands for _, bands in ensemble.levels)
+    coordinates, variables = sample_variables(sample_results(ensemble))
     for name, values in ensemble.parameters.items():
         key, _ = find_key(name, key_owners(ensemble.case))
         coordinates[coordinate(name, key)] = ("sample", values, attributes(key))
-    variables: dict[str, Any] = {}
-    for name, quantity in SAMPLE_RESULTS.items():
-        if name not in LEVELS:
-            variables[name] = ("sample", getattr(ensemble, name), attributes(quantity))
-        elif LEVELS[name] in ensemble.levels:
-            values = ensemble.levels[LEVELS[name]]
-            variables[name] = (("sample", LEVELS[name][1]), values, attributes(quantity))
-    for bands, level in ensemble.contact_levels.items():
-        name = f"contact_{bands}_level"
-        variables[name] = (("sample", bands), level, attributes(ALL_QUANTITIES[name]))
-    for name, quantity in FLOOR_QUANTITIES.items():
-        if (values := getattr(ensemble, name)) is not None:
-            dimensions = ("sample", ROOM_BAND) if name == ROOM_LEVEL else ("sample",)
-            variables[name] = (dimensions, values, attributes(quantity))
-            coordinates |= room_coordinates() if name == ROOM_LEVEL else {}
     for force in ("elastic", "floor"):
         if (values := getattr(ensemble, f"{force}_force")) is not None:
             seconds = np.arange(values.shape[1]) / ensemble.sample_rate
@@ -115,6 +100,17 @@ def ensemble_dataset(ensemble: Ensemble) -> xr.Dataset:
             attrs = _attributes("N", f"{force} force")
             variables[f"{force}_force"] = (("sample", "time"), values, attrs)
     return xr.Dataset(variables, coordinates, origin(ensemble.case)).copy(deep=True)
+
+
+def sample_variables(results: Mapping[str, NDArray[Any]]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the coordinates of the bands, and the variables of `sample_results`."""
+    variables: dict[str, Any] = {}
+    for name, values in results.items():
+        dimensions = ("sample", DIMENSIONS[name]) if name in DIMENSIONS else ("sample",)
+        variables[name] = (dimensions, values, attributes(ALL_QUANTITIES[name]))
+    used = {DIMENSIONS[name] for name in results if name in DIMENSIONS}
+    coordinates = band_coordinates(bands for bands in BANDWIDTHS if bands in used)
+    return coordinates | (room_coordinates() if ROOM_BAND in used else {}), variables
 
 
 def _time(seconds: NDArray[np.float64]) -> tuple[str, NDArray[np.float64], dict[str, str]]:

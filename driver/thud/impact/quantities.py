@@ -1,8 +1,17 @@
 """The table of quantities with levels, and the quantities of each kind of result."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 from thud.base._schema import QUANTITIES, SAMPLE_QUANTITIES
 from thud.base.quantity import Quantity
 from thud.level.levels import BANDWIDTHS, FORCES
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from thud.impact.outcomes import Ensemble
 
 ROOM_LEVEL = "room_level"
 RATING = "standardized_rating"
@@ -16,6 +25,10 @@ LEVELS = {
 }
 # Bands of the levels of the contact force, by name.
 CONTACT_LEVELS = {f"contact_{bands}_level": bands for bands in BANDWIDTHS}
+# Dimension that a result has beside that of the samples.
+DIMENSIONS: dict[str, str] = {
+    **{name: bands for name, (_, bands) in LEVELS.items()}, **CONTACT_LEVELS, ROOM_LEVEL: ROOM_BAND
+}  # fmt: skip
 
 
 def _level(name: str, force: str) -> Quantity:
@@ -54,6 +67,18 @@ ALL_QUANTITIES = {
     **SAMPLE_RESULTS,
     **{name: _level(name, "contact") for name in CONTACT_LEVELS},
     **FLOOR_QUANTITIES,
-    "doubtful": _number("doubtful", "the verdict could change by the errors of the surrogate"),
+    "undecided": _number("undecided", "the verdict could change by the errors of the surrogate"),
     "peaks": QUANTITIES["peak_count"],
 }
+
+
+def sample_results(ensemble: Ensemble) -> dict[str, NDArray[Any]]:
+    """Return the results of all samples by their names in `ALL_QUANTITIES`."""
+    results: dict[str, NDArray[Any]] = {}
+    for name in SAMPLE_RESULTS:
+        if name not in LEVELS:
+            results[name] = getattr(ensemble, name)
+        elif LEVELS[name] in ensemble.levels:
+            results[name] = ensemble.levels[LEVELS[name]]
+    results |= {f"contact_{bands}_level": v for bands, v in ensemble.contact_levels.items()}
+    return results | {n: v for n in FLOOR_QUANTITIES if (v := getattr(ensemble, n)) is not None}

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from thud.base._schema import FiniteElement
     from thud.impact.motion import Motion
 
-# More are not readable at column width.
+# Maximum number of panels that are readable at column width.
 MAX_PANELS = 30
 # Instants of the paper's figure 5.
 INSTANTS = 9
@@ -77,7 +77,7 @@ def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
     Returns
     -------
     Figure
-        Half sections on the floor where it is; displacement since first touch in mm, time in ms.
+        Half sections over the floor; displacement since first touch in mm, time in ms.
 
     Raises
     ------
@@ -139,9 +139,9 @@ def animate(impact: Impact, path: str | os.PathLike[str]) -> None:
 
     animation = FuncAnimation(figure, draw, frames=count, blit=False)
     with TemporaryDirectory() as folder:
-        whole = Path(folder, "motion.gif")
-        animation.save(whole, dpi=120, writer=PillowWriter(fps=FRAMES_PER_SECOND))
-        replace_file(path, whole.read_bytes())
+        file = Path(folder, "motion.gif")
+        animation.save(file, dpi=120, writer=PillowWriter(fps=FRAMES_PER_SECOND))
+        replace_file(path, file.read_bytes())
 
 
 def _snapshots(impact: Impact) -> Motion:
@@ -168,17 +168,14 @@ def _displacement(shown: Motion, i: int) -> NDArray[np.float64]:
 
 
 def _draw_instant(axes: Axes, impact: Impact, i: int, scale: Normalize, depth: float) -> Quiver:
-    """Draw the ball, its velocities and the floor at one instant; return the arrows.
-
-    The floor is shown down to a depth in m, and a little further.
-    """
+    """Draw the ball, its velocities and the floor, down to a depth, m; return the arrows."""
     radius = impact.case.ball.outer_radius
     shown = _snapshots(impact)
     position = shown.position[i]
     floor = -shown.floor_displacement[i]
     _draw_section(axes, position, 1e3 * _displacement(shown, i), scale)
-    some = (slice(None, None, ARROWS[0]), slice(None, None, ARROWS[1]))
-    start, velocity = (field[some].reshape(-1, 2) for field in (position, shown.velocity[i]))
+    shown_nodes = (slice(None, None, ARROWS[0]), slice(None, None, ARROWS[1]))
+    start, velocity = (field[shown_nodes].reshape(-1, 2) for field in (position, shown.velocity[i]))
     # At first touch an arrow is as long as a third of the radius.
     unit = 3 * impact.impact_velocity / radius
     above = start[:, 1] + velocity[:, 1] / unit >= floor

@@ -1,4 +1,4 @@
-"""Figures of the paper and of the documentation, computed and drawn by `thud-driver figures`."""
+"""Figures of the paper and of the documentation, drawn by `thud-driver figures`."""
 
 from __future__ import annotations
 

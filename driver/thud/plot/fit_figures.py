@@ -9,9 +9,9 @@ from matplotlib.ticker import MaxNLocator, NullLocator
 
 from thud.case.keys import humanize
 from thud.plot.style import (
-    BAND_WORDS,
+    BAND_NAMES,
     COLORS,
-    FORCE_WORDS,
+    FORCE_NAMES,
     GREY,
     LEVEL,
     WIDTH,
@@ -22,8 +22,6 @@ from thud.plot.style import (
 from thud.studies.fitting.misfit import SHIFT
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
@@ -33,7 +31,7 @@ if TYPE_CHECKING:
     from thud.studies.fitting.level_target import LevelMisfit
 
 
-# More names of bands are rotated.
+# Maximum number of bands whose names are not rotated.
 MAX_UPRIGHT = 5
 # Names that are too long for the axis.
 BROKEN = {"contact time": "contact\ntime", "restitution": "resti-\ntution"}
@@ -44,16 +42,13 @@ BEFORE, AFTER = 0.15, 0.4
 
 
 @own_style()
-def draw_fit(fit: Fit, units: Mapping[str, tuple[str, float]]) -> dict[str, Figure]:
-    """Draw a fit: ``"fit"``, or ``"fit_1"`` and so on, and of several parameters ``"confidence"``.
-
-    Units are given by name and size in SI units.
-    """
+def draw_fit(fit: Fit) -> dict[str, Figure]:
+    """Draw ``"fit"``, or ``"fit_1"`` and so on, and for several parameters ``"confidence"``."""
     figures = {
         f"fit{end}": target_and_fit(fit, number) for number, end in enumerate(fit.ends, start=1)
     }
     if len(fit.names) > 1:
-        figures["confidence"] = confidence(fit, units)
+        figures["confidence"] = confidence(fit)
     return figures
 
 
@@ -95,11 +90,11 @@ def _draw_force(fitted: FittedTarget, deviation: float, above: Axes, below: Axes
     begin, end = touch - BEFORE * contact, touch + (1 + AFTER) * contact
     below.set_xlim(1e3 * max(begin, misfit.time[0]), 1e3 * min(end, misfit.time[-1]))
     below.set_xlabel("Time, ms")
-    above.set_ylabel(f"{FORCE_WORDS[misfit.kind].capitalize()}, kN")
+    above.set_ylabel(f"{FORCE_NAMES[misfit.kind].capitalize()}, kN")
     below.set_ylabel("Fit − target, N")
     limit = 1.1 * max(np.abs(column["residual_N"]).max(), width)
     below.set_ylim(-limit, limit)
-    # Below, it would cover the curve.
+    # A label in the lower panel would cover the curve.
     above.fill_between([], [], color=GREY, linewidth=0, label=f"Noise {band}, ±2σ")
     legend_above(above)
 
@@ -138,24 +133,23 @@ def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: Axes) -
     below.set_xlim(-0.6, len(names) - 0.4)
     if count > MAX_UPRIGHT:
         below.tick_params(axis="x", labelrotation=90)
-    below.set_xlabel(f"{BAND_WORDS[misfit.bands]}, Hz")
-    above.set_ylabel(f"{LEVEL}\n({FORCE_WORDS[fitted.impact.assessed_force(misfit.kind)]})")
+    below.set_xlabel(f"{BAND_NAMES[misfit.bands]}, Hz")
+    above.set_ylabel(f"{LEVEL}\n({FORCE_NAMES[fitted.impact.assessed_force(misfit.kind)]})")
     below.set_ylabel("(Fit − target)\n/ uncertainty")
     legend_above(above)
 
 
-# More parameters have a table of correlations.
+# Maximum number of parameters with confidence regions; more have a table of correlations.
 MAX_PARAMETERS = 5
 # Characters of a label along all panels.
 LINE = 44
 
 
 @own_style()
-def confidence(fit: Fit, units: Mapping[str, tuple[str, float]]) -> Figure:
+def confidence(fit: Fit) -> Figure:
     """Draw joint confidence regions of two or more parameters, or their correlations.
 
-    There is one panel for each pair; more than five parameters have a table of correlations. Units
-    are given by name and size in SI units.
+    There is one panel for each pair; more than five parameters have a table of correlations.
     """
     count = len(fit.names)
     known = np.isfinite(np.diag(fit.covariance)).all()
@@ -170,22 +164,21 @@ def confidence(fit: Fit, units: Mapping[str, tuple[str, float]]) -> Figure:
             if column >= row:
                 axes.remove()
                 continue
-            _draw_pair(fit, axes, (column, row), units)
+            _draw_pair(fit, axes, (column, row))
     letters = LINE / (count - 1)
+    labels = [_label(name, unit, letters) for name, (unit, _) in fit.display_units.items()]
     for row in range(1, count):
-        panels[row - 1, 0].set_ylabel(_label(fit.names[row], units, letters))
+        panels[row - 1, 0].set_ylabel(labels[row])
     for column in range(count - 1):
-        panels[-1, column].set_xlabel(_label(fit.names[column], units, letters))
+        panels[-1, column].set_xlabel(labels[column])
     legend_above(panels[0, 0])
     figure.align_labels()
     return figure
 
 
-def _draw_pair(
-    fit: Fit, axes: Axes, pair: tuple[int, int], units: Mapping[str, tuple[str, float]]
-) -> None:
+def _draw_pair(fit: Fit, axes: Axes, pair: tuple[int, int]) -> None:
     """Draw the joint confidence region of two parameters around their values."""
-    factor = np.array([units[fit.names[i]][1] for i in pair])
+    factor = np.array([fit.display_units[fit.names[i]][1] for i in pair])
     center = fit.estimate[list(pair)] / factor
     block = fit.covariance[np.ix_(pair, pair)] / np.outer(factor, factor)
     square = _squared_radius(fit)
@@ -225,7 +218,7 @@ def _add_ellipse(
     axes: Axes, center: NDArray[np.float64], block: NDArray[np.float64], label: str
 ) -> None:
     """Draw the ellipse (x - center) block^-1 (x - center) = 1."""
-    # In units of its deviations an ellipse has its axes on the diagonals: no loss of digits.
+    # Scaled by its deviations, an ellipse has its axes on the diagonals: no loss of digits.
     x, y = np.sqrt(np.diag(block))
     angle = np.linspace(0, 2 * np.pi, 181)
     share = block[0, 1] / (x * y)
@@ -260,9 +253,8 @@ def _draw_correlation(fit: Fit) -> Figure:
     return figure
 
 
-def _label(name: str, units: Mapping[str, tuple[str, float]], letters: float) -> str:
+def _label(name: str, unit: str, letters: float) -> str:
     """Return a parameter with its unit, on two lines where it does not fit on one."""
-    unit = units[name][0]
     text = humanize(name).capitalize()
     if not unit:
         return text

@@ -39,11 +39,11 @@ if TYPE_CHECKING:
 
 
 THIRDS = BANDWIDTHS[1]
-# Contact times that are drawn.
+# Drawn time, in contact times.
 _SHOWN = 1.5
 # Maximum number of mode shapes, and points along a side of the plate.
 MAX_SHAPES, POINTS = 30, 60
-# Frequencies per octave of the mobility: peaks of lightly damped floors are narrow.
+# Frequencies per octave of a drawn mobility: peaks of lightly damped floors are narrow.
 _DENSITY = 400
 
 

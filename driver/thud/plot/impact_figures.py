@@ -19,7 +19,7 @@ from thud.level.levels import low_pass
 from thud.plot.style import (
     empty_axes,
     escape_label,
-    force_words,
+    force_name,
     iterate_curves,
     legend_above,
     level_label,
@@ -97,7 +97,7 @@ def contact_force(
 
 def force_label(impacts: Mapping[str, Curve], force: LevelsForce | None) -> str:
     """Return the label of an axis of forces."""
-    return f"{force_words(impacts, force).capitalize()},\nlow-passed at 1.25 kHz, kN"
+    return f"{force_name(impacts, force).capitalize()},\nlow-passed at 1.25 kHz, kN"
 
 
 @own_style()
@@ -159,14 +159,9 @@ def draw_levels(
 
 
 def common_source(impacts: Mapping[str, Curve], source: LimitsSource | None = None) -> LimitsSource:
-    """Return a source of limits, or without it that of the cases and recordings.
+    """Return a source of limits, by default that of the cases and recordings.
 
-    The default source of a recording was not stated: it counts only if no other does.
-
-    Raises
-    ------
-    InputError
-        If they differ in it.
+    A recording without a stated source follows the others. Raises InputError if the sources differ.
     """
     if source is not None:
         return source
@@ -183,7 +178,7 @@ def common_source(impacts: Mapping[str, Curve], source: LimitsSource | None = No
 def draw_tolerance(
     axes: Axes, lower: NDArray[np.float64], upper: NDArray[np.float64], name: str
 ) -> None:
-    """Draw the range of each octave as a grey box with its nominal value."""
+    """Draw the tolerance of each octave as a grey box with its nominal value."""
     octave_boxes(axes, lower, upper, f"Tolerance, {name}")
     i = np.arange(len(lower))
     axes.hlines((lower + upper) / 2, i - 0.4, i + 0.4, color="0.45", linewidth=0.8, label="Nominal")

@@ -25,7 +25,7 @@ from thud.plot.impact_figures import (
     force_label,
 )
 from thud.plot.style import (
-    BAND_WORDS,
+    BAND_NAMES,
     COLORS,
     LEVEL,
     WIDTH,
@@ -65,9 +65,9 @@ _LINE = 30
 def html_page(
     title: str, text: str, table: Sequence[Sequence[str]], plots: Sequence[dict[str, Any]]
 ) -> str:
-    """Return a page: title, text, table (its head first), and plots, the first of full width.
+    """Return a page of title, text, table (header row first) and plots, the first of full width.
 
-    A click on the legend of the first plot hides the curve of the same number in all of them.
+    A click on the legend of the first plot hides the curve with the same index in all plots.
     """
     head, *body = table
     return _PAGE.substitute(
@@ -83,7 +83,7 @@ def html_page(
 
 
 def curve_style(i: int, label: str) -> dict[str, Any]:
-    """Return name, line and marker of a curve by its number."""
+    """Return name, line and marker of a curve by its index."""
     return {
         "name": "<br>".join(html.escape(line) for line in wrap(label, _LINE)),
         "line": {"color": COLORS[i % len(COLORS)], "dash": styled(i, _DASHES)},
@@ -92,12 +92,12 @@ def curve_style(i: int, label: str) -> dict[str, Any]:
 
 
 def curve_points(x: Iterable[Any], y: Iterable[float]) -> dict[str, list[Any]]:
-    """Return a curve, its values with as many digits as can be seen."""
+    """Return a curve, its values with six digits."""
     return {"x": list(x), "y": [float(f"{value:.6g}") + 0.0 for value in y]}
 
 
 def plot_layout(x: str, y: str, kind: str = "linear", scale: str = "linear") -> dict[str, Any]:
-    """Return labels and x of the axes; the page has the colors."""
+    """Return the layout of a plot, without colors, which are those of the page."""
     return {
         "xaxis": {"title": {"text": x}, "type": kind, "zeroline": False, "automargin": True},
         "yaxis": {
@@ -119,7 +119,7 @@ def _row(cells: Sequence[str], tag: str) -> str:
     return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
 
 
-# The colors of the page override the styles that plotly writes into the plots.
+# The colors of the page override the styles that Plotly writes into the plots.
 _PAGE = Template("""<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -198,7 +198,7 @@ def comparison_page(
 ) -> Figure:
     """Draw forces, octave and one-third-octave levels of impacts, and a table, on one page.
 
-    The table is rows of text, first the head; the tolerance band is that of the source. Other
+    The table is rows of text, header row first; the tolerance band is that of the source. Other
     arguments are those of `thud.compare`.
     """
     figure = new_figure(5.8, 2 * WIDTH)
@@ -215,7 +215,7 @@ def comparison_page(
 
 
 def _add_table(figure: Figure, grid: GridSpec, rows: Sequence[Sequence[str]]) -> None:
-    """Add a table in the last row of a figure, which becomes as wide and high as it needs."""
+    """Add a table in the last row of a figure; enlarge the figure for it."""
     axes = figure.add_subplot(grid[-1, :])
     axes.set_axis_off()
     cells = [[escape_label(cell) for cell in row] for row in rows]
@@ -229,8 +229,8 @@ def _add_table(figure: Figure, grid: GridSpec, rows: Sequence[Sequence[str]]) ->
     for (row, column), cell in table.get_celld().items():
         cell.set(width=widths[column], height=heights[row], linewidth=0.5)
         cell.set_text_props(ha="right" if column else "left")
-    above, rest = figure.get_figheight(), grid.nrows - 1
-    grid.set_height_ratios([*([above / rest] * rest), heights.sum()])
+    above, others = figure.get_figheight(), grid.nrows - 1
+    grid.set_height_ratios([*([above / others] * others), heights.sum()])
     width = widths.sum() + _AXIS
     figure.set_size_inches(max(figure.get_figwidth(), width), above + heights.sum())
 
@@ -256,7 +256,7 @@ def comparison_html(
     plots = [
         {"data": forces, "layout": plot_layout(TIME_LABEL, force_label(impacts, force))},
         *(
-            {"data": traces, "layout": plot_layout(f"{BAND_WORDS[bands]}, Hz", level, "category")}
+            {"data": traces, "layout": plot_layout(f"{BAND_NAMES[bands]}, Hz", level, "category")}
             for bands, traces in levels.items()
         ),
     ]
@@ -274,7 +274,7 @@ def _names(bands: BandSet) -> list[str]:
 
 
 def _tolerance(source: LimitsSource) -> dict[str, Any]:
-    """Return the range of each octave as a grey box."""
+    """Return the tolerance of each octave as a grey box."""
     lower, upper = octave_limits(source)
     return {
         "type": "bar",
@@ -337,21 +337,22 @@ def floors_html(comparison: FloorComparison) -> str:
         {
             "data": data,
             "layout": plot_layout(
-                f"{BAND_WORDS['third']}, Hz", label, "category", "log" if logarithmic else "linear"
+                f"{BAND_NAMES['third']}, Hz", label, "category", "log" if logarithmic else "linear"
             ),
         }
         for data, (label, logarithmic) in zip(traces, _STEPS.items(), strict=True)
     ]
     text = (
         "Levels in the room below, and the chain that leads to them: force, energy, floor, room. "
-        "Statistical means over positions, floors and rooms: see the warnings of each prediction."
+        "They are statistical means over positions, floors and rooms; see the warnings of each "
+        "prediction."
     )
     # The level in the room, of full width, comes first.
     return html_page("Comparison of floors", text, comparison.rows(), [plots[-1], *plots[:-1]])
 
 
 def _chain(prediction: RoomPrediction) -> tuple[NDArray[np.float64], ...]:
-    """Return what is drawn of a prediction, in the order of the steps."""
+    """Return the values of each step of a prediction."""
     force = 10 * np.log10(prediction.energy / prediction.conductance)
     return force, prediction.energy, 100 * prediction.radiated_share, prediction.level
 

@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 
 # Height without the legend, inch: two of them stand side by side on a report.
 HEIGHT = 2.15
-# Maximum number of drops that have a line each; of more, their range is filled.
+# Maximum number of drops drawn as lines; of more, the range is filled.
 MAX_LINES = 40
-# Force on both sides of the times that are drawn, s: more than its low-pass spreads.
+# Margin of the filtered force beyond the drawn times, s: longer than the filter's response.
 ROOM = 2e-2
 # Points of a force.
 POINTS = 400
-# Backgrounds further below the lowest level than this, dB, are not drawn: they change nothing.
+# Backgrounds further below the lowest level, dB, are not drawn: they do not matter.
 DEEPEST = 20.0
 THIN: dict[str, Any] = {"color": "0.55", "linewidth": 0.5}
 DEVIANT: dict[str, Any] = {"color": COLORS[1], "linewidth": 0.7, "linestyle": (0, (3, 1))}
@@ -135,7 +135,7 @@ def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
 
 
 def _background_label(background: NDArray[np.float64], drawn: NDArray[np.float64]) -> str:
-    """Return the label of the background, which says how high it is where it is not drawn."""
+    """Return the label of the background, with its maximum if it is not drawn."""
     if np.isfinite(drawn).any() or not np.isfinite(background).any():
         return "background"
     return f"background, up to {np.nanmax(background):.0f} dB".replace("-", "−")
@@ -144,7 +144,7 @@ def _background_label(background: NDArray[np.float64], drawn: NDArray[np.float64
 def _draw_drops(
     axes: Axes, x: NDArray[np.float64], curves: NDArray[np.float64], recording: Recording
 ) -> None:
-    """Draw the curves of the drops, shape (n_drop, n), or their range; outliers in their style."""
+    """Draw the curves of the drops, shape (n_drop, n), or their range, and mark outliers."""
     deviant = {outlier.name for outlier in recording.outliers}
     marked = np.array([drop.name in deviant for drop in recording.drops])
     count = len(curves)

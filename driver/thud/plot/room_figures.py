@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from thud.floors.prediction import RoomPrediction
     from thud.floors.survey import RoomLevels
 
-# Range of a decay below the lowest maximum, dB.
+# Drawn range of a decay below the lowest maximum, dB.
 DECAY = 30
 
 
@@ -65,7 +65,7 @@ def room_levels(room: RoomLevels) -> Figure:
 def draw_prediction(prediction: RoomPrediction, measured: RoomLevels | None = None) -> Figure:
     """Draw the components of the level in the room below, and measured levels beside it.
 
-    Hollow marks are bands of few modes, where the statistical answer may be wrong.
+    Hollow marks are bands of few modes, where the statistical level may be wrong.
     """
     figure = new_figure(4.2, WIDTH)
     above, middle, below = figure.subplots(3, 1, sharex=True, height_ratios=(1, 1, 1.6))
@@ -158,7 +158,7 @@ def draw_modal_room(room: ModalRoom) -> Figure:
 
 @own_style()
 def draw_positions(prediction: RoomPrediction) -> Figure | None:
-    """Draw the levels of positions below a plate, if its modes can be counted."""
+    """Draw the levels of positions below a plate; None if its modes cannot be counted."""
     # SciPy takes its time.
     from thud.floors.modal_room import ModeCountError, positions_below
 
@@ -166,5 +166,5 @@ def draw_positions(prediction: RoomPrediction) -> Figure | None:
         return None
     try:
         return draw_modal_room(positions_below(prediction, balls=8, microphones=16))
-    except ModeCountError:  # the statistical answer stands alone
+    except ModeCountError:
         return None

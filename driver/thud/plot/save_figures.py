@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-# The first is the default: the smallest and the fastest to write.
+# The first, the default, is the smallest and the fastest to write.
 FORMATS = ("svg", "png", "pdf")
 
 
@@ -58,10 +58,7 @@ def _content(figure: Figure, name: str, kind: str) -> bytes:
 
 
 def figure_files(figures: Mapping[str, Figure], kind: str = FORMATS[0]) -> dict[str, bytes]:
-    """Return the contents of figures by the names of their files.
-
-    Those that cannot be drawn are left out, with a `ReportWarning`.
-    """
+    """Return the contents of figures by file name; warn of those that cannot be drawn."""
     contents = {}
     for name, figure in figures.items():
         with left_out(f"{name}.{kind}"):
@@ -105,8 +102,6 @@ def save_all(
     return Results(Path(directory), "plot", replace=replace).write(figure_files(figures, kind))
 
 
-def page_files(
-    name: str, draw: Callable[[], Figure], html: str, kind: str = FORMATS[0]
-) -> dict[str, bytes]:
-    """Return the contents of a figure and of the page of the same name by the names of files."""
-    return {**figure_files(draw_all({name: draw}), kind), f"{name}.html": html.encode()}
+def page_files(name: str, draw: Callable[[], Figure], html: str) -> dict[str, bytes]:
+    """Return the contents of a figure and of the page of the same name by file name."""
+    return {**figure_files(draw_all({name: draw})), f"{name}.html": html.encode()}

@@ -21,7 +21,7 @@ from thud.level.assessment import octave_limits
 from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 from thud.plot.style import (
     COLORS,
-    FORCE_WORDS,
+    FORCE_NAMES,
     empty_axes,
     legend_above,
     line_style,
@@ -52,9 +52,9 @@ if TYPE_CHECKING:
 
 
 Which = Literal["x", "y"]
-# Of bars; in print they tell colors apart.
+# Hatches of bars, which distinguish colors in print.
 HATCHES = (None, "//////", "......", "\\\\\\\\\\\\", "xxxxxx", "------", "||||||", "++++++")
-# Outside of these, numbers in the unit of the key are shown in a handier unit.
+# Range of numbers that are shown in the unit of the key; others have a display unit.
 _PLAIN = (1e-2, 1e4)
 # Maximum over minimum from which logarithmic ticks are 1, 2, 5, and powers of ten.
 _HALF_DECADE, _DECADES = 5.0, 200.0
@@ -72,7 +72,7 @@ def show_parameter(axes: Axes, which: Which, parameter: xr.DataArray) -> float:
         unit, size = display_unit(unit, maximum)
         factor = 1 / size
     shown = unit.replace("degC", "°C")
-    label = words(parameter) if unit == "1" else f"{words(parameter)}, {shown}"
+    label = parameter_label(parameter) if unit == "1" else f"{parameter_label(parameter)}, {shown}"
     axes.set(**{f"{which}label": label})
     axis: Axis = getattr(axes, f"{which}axis")
     if parameter.attrs.get("scale") == "log":
@@ -96,18 +96,19 @@ def _mark_decades(axis: Axis, values: NDArray[np.float64]) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def words(parameter: xr.DataArray) -> str:
+def parameter_label(parameter: xr.DataArray) -> str:
     """Return the name of a parameter in words, as a label begins."""
     return humanize(str(parameter.name)).capitalize()
 
 
-# More values of a parameter are grouped in classes.
+# Maximum number of values of a parameter that are not grouped in classes.
 _MAX_VALUES = 32
 _CLASSES = 16
 # Maximum number of markers of a line; half of it in half the width.
 _MAX_MARKS = 16
 # Maximum number of values of a text parameter that have a panel each.
 _MAX_PANELS = 6
+# Smallest range that is drawn, dB.
 _TINY = 0.05
 
 
@@ -151,8 +152,8 @@ def draw_sweep(result: Sweep) -> Figure:
         axes.xaxis.label.set_visible(lowest)
     for axes in panels[len(parts) :]:
         axes.remove()
-    words = "assessed force" if "force" in columns else FORCE_WORDS[dataset.attrs["assessed_force"]]
-    figure.supylabel(f"Level − nominal, dB\n({words})")
+    force = "assessed force" if "force" in columns else FORCE_NAMES[dataset.attrs["assessed_force"]]
+    figure.supylabel(f"Level − nominal, dB\n({force})")
     others = [n for n in varied if n not in {name, split}]
     legend_above(panels[0], title=_meaning(excess, split, others))
     return figure
@@ -204,11 +205,12 @@ def _draw_octaves(
     else:
         axes.set_xticks(positions, names)
         axes.tick_params(axis="x", labelrotation=20)
-        axes.set_xlabel(words(parameter))
+        axes.set_xlabel(parameter_label(parameter))
     for i, band in enumerate(get_bands().nominal):
         groups = [levels[chosen, i] for chosen in members]
         middle, lower, upper = (
-            np.array([_of(group, f) for group in groups]) for f in (np.median, np.min, np.max)
+            np.array([_of_finite(group, f) for group in groups])
+            for f in (np.median, np.min, np.max)
         )
         marks = marker_style(i, 3) if len(positions) <= max_marks else {}
         axes.plot(positions, middle, label=f"{band:g} Hz", **line_style(i), **marks)
@@ -232,14 +234,14 @@ def _classes(
     return np.array([np.median(values[chosen]) for chosen in members]), members, None
 
 
-def _of(part: NDArray[np.float64], function: Any) -> float:  # noqa: ANN401 - of NumPy
-    """Return a function of the finite numbers; NaN where there are none."""
+def _of_finite(part: NDArray[np.float64], function: Any) -> float:  # noqa: ANN401 - of NumPy
+    """Return a function of the finite numbers; NaN if there are none."""
     known = part[np.isfinite(part)]
     return float(function(known)) if known.size else np.nan
 
 
 def _meaning(excess: _Excess, split: str | None, others: list[str]) -> str:
-    """Return what panels, lines, shades and grey mean."""
+    """Return the explanation of panels, lines, shades and grey."""
     minimum, maximum = excess.tolerance
     lines = [f"Grey: tolerances of the octaves, ±{minimum:g} to ±{maximum:g} dB"]
     if others:
@@ -250,15 +252,12 @@ def _meaning(excess: _Excess, split: str | None, others: list[str]) -> str:
     return "\n".join(lines)
 
 
-_TINY = 0.05
-
-
 @own_style()
 def draw_design(result: Design) -> Figure:
     """Draw the margin of a design map, dB, its zero as a line, and the samples that conform.
 
-    The margin is positive where all octave levels lie within their limits. Of a case with a room
-    draw the rating of the standardized levels there.
+    The margin is positive where all octave levels lie within their limits. For a case with a room
+    draw the rating of its standardized levels instead.
     """
     dataset = result.dataset
     figure, axes = empty_axes(2.9)
@@ -277,13 +276,13 @@ def draw_design(result: Design) -> Figure:
     conforms = dataset["conforms"].transpose(*result.axes).values.T
     if margin.count():
         bar = _draw_margin(figure, axes, (x, y), margin)
-        bar.set_label(f"Margin ({FORCE_WORDS[dataset.attrs['assessed_force']]}), dB")
-    doubtful = np.zeros_like(conforms)
-    if "doubtful" in dataset:
-        doubtful = dataset["doubtful"].transpose(*result.axes).values.T
+        bar.set_label(f"Margin ({FORCE_NAMES[dataset.attrs['assessed_force']]}), dB")
+    undecided = np.zeros_like(conforms)
+    if "undecided" in dataset:
+        undecided = dataset["undecided"].transpose(*result.axes).values.T
     marks = {
-        "All criteria met": (conforms & ~doubtful, "."),
-        "Undecided by surrogate": (doubtful, "x"),
+        "All criteria met": (conforms & ~undecided, "."),
+        "Undecided by surrogate": (undecided, "x"),
     }
     for label, (chosen, marker) in marks.items():
         row, column = np.nonzero(chosen)
@@ -324,7 +323,7 @@ def _draw_margin(
 ) -> Colorbar:
     """Draw the margin as colors, white at 0, with lines at 0 and at round values."""
     lower, upper = min(float(margin.min()), 0.0), max(float(margin.max()), 0.0)
-    # The colors of the smaller side, usually of what conforms, change up to four times faster.
+    # On the smaller side, usually that of conforming samples, colors change up to 4 times faster.
     norm = TwoSlopeNorm(0, min(lower, -upper / 4, -_TINY), max(upper, -lower / 4, _TINY))
     steps = np.asarray(MaxNLocator(7).tick_values(lower, max(upper, lower + _TINY)))
     # Five colors from one line to the next.
@@ -344,10 +343,7 @@ def _draw_margin(
 
 @own_style()
 def draw_sensitivity(result: Sensitivity) -> Figure:
-    """Draw total Sobol indices as bars, first orders as marks on them, both with intervals.
-
-    There is one group of bars for each output.
-    """
+    """Draw total Sobol indices of each output as bars, first orders as marks, with intervals."""
     indices = result.indices
     parameters = [str(name) for name in indices["parameter"].values]
     outputs = [str(name) for name in indices["output"].values]
@@ -375,8 +371,8 @@ def draw_sensitivity(result: Sensitivity) -> Figure:
     axes.set_yticks(position, outputs)
     axes.set_ylim(len(outputs) - 0.5, -0.5)
     axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
-    words = FORCE_WORDS[result.dataset.attrs["assessed_force"]]
-    axes.set_xlabel(f"Sobol index, with its interval of 95 %\n({words})")
+    force = FORCE_NAMES[result.dataset.attrs["assessed_force"]]
+    axes.set_xlabel(f"Sobol index, with its interval of 95 %\n({force})")
     legend_above(axes)
     return figure
 
@@ -404,8 +400,8 @@ def draw_surrogate(result: Surrogate) -> Figure:
         np.zeros(len(labels)), position, xerr=result.errors[result.assessed], fmt="none",
         color="black", elinewidth=0.8, capsize=3, label="95 % of drops",
     )  # fmt: skip
-    words = [label.replace("floor ", "").replace("elastic ", "") for label in labels]
-    axes.set_yticks(position, [word[0].upper() + word[1:] for word in words])
+    names = [label.replace("floor ", "").replace("elastic ", "") for label in labels]
+    axes.set_yticks(position, [name[0].upper() + name[1:] for name in names])
     axes.set_ylim(len(labels) - 0.5, -0.5)
     axes.set_xlabel("Surrogate − model, dB")
     legend_above(axes)
@@ -436,8 +432,8 @@ def draw_uncertainty(result: Uncertainty) -> Figure:
         elinewidth=0.8, capsize=2, label="Median, 95 % of samples",
     )  # fmt: skip
     octave_axis(axes)
-    words = FORCE_WORDS[result.dataset.attrs["assessed_force"]]
-    axes.set_ylabel(f"Level − nominal, dB\n({words})")
+    force = FORCE_NAMES[result.dataset.attrs["assessed_force"]]
+    axes.set_ylabel(f"Level − nominal, dB\n({force})")
     low, high = result.interval
     share = f"{100 * result.probability:.1f} % ({100 * low:.1f} to {100 * high:.1f} %)"
     title = f"All criteria met: {share}"

@@ -38,8 +38,8 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 GREY = "0.85"
 # Width of a column, inch.
 WIDTH = 3.5
-FORCE_WORDS = {"elastic": "elastic force", "floor": "force on the floor"}
-BAND_WORDS = {"octave": "Octave band", "third": "One-third-octave band"}
+FORCE_NAMES = {"elastic": "elastic force", "floor": "force on the floor"}
+BAND_NAMES = {"octave": "Octave band", "third": "One-third-octave band"}
 LEVEL = "Force exposure level, dB re 1 N"
 # Maximum number of characters in a line of a legend.
 _LINE = 44
@@ -50,13 +50,13 @@ del _STYLE["backend"]
 
 @contextmanager
 def own_style() -> Iterator[None]:
-    """Draw in the style of thud; the settings of the user neither act nor change."""
+    """Draw in the style of thud, independent of the settings of the user."""
     with mpl.rc_context(_STYLE):
         yield
 
 
 class StyledFigure(Figure):
-    """Figure that keeps the style of thud where a user draws or saves it."""
+    """Figure that keeps the style of thud when a user draws or saves it."""
 
     def draw(self, *arguments: Any, **options: Any) -> None:  # noqa: ANN401 - of matplotlib
         """Draw the figure."""
@@ -73,7 +73,7 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
     """Return an empty figure; lengths in inches."""
     with own_style():
         figure = StyledFigure(figsize=(width, height))
-    # Its renderer is kept: each measurement of a text would make a new one.
+    # Keep one renderer: each measurement of a text would make a new one.
     FigureCanvasAgg(figure)
     return figure
 
@@ -87,10 +87,7 @@ def empty_axes(height: float) -> tuple[Figure, Axes]:
 
 @own_style()
 def legend_above(axes: Axes, *others: Axes, title: str = "") -> Legend:
-    """Put one legend of axes above their figure, in as few rows as its width allows.
-
-    The figure becomes higher by the legend.
-    """
+    """Put one legend of axes above their figure, which grows by it, in as few rows as fit."""
     figure = axes.get_figure(root=True)
     if figure is None:
         message = "the axes are removed from their figure; allowed: axes of a figure"
@@ -154,32 +151,28 @@ def iterate_curves(
 ) -> Iterator[tuple[str, Curve, LevelsForce]]:
     """Yield label, impact and kind of force of each curve.
 
-    Without `force` each case has the force that it assesses. Labels say which where they differ.
-
-    Raises
-    ------
-    InputError
-        If `impacts` is not a mapping of names to impacts, or empty.
+    Without `force` each case has its assessed force, which labels name if they differ. Raises
+    InputError if `impacts` is not a mapping of names to impacts, or empty.
     """
     require_mapping("impacts", impacts, "impacts")
     for name, impact in impacts.items():
         require_kind(name, impact, ImpactResult)
     kinds = [impact.assessed_force(force) for impact in impacts.values()]
     for (name, impact), kind in zip(impacts.items(), kinds, strict=True):
-        which = f", {FORCE_WORDS[kind]}" if len(set(kinds)) > 1 else ""
+        which = f", {FORCE_NAMES[kind]}" if len(set(kinds)) > 1 else ""
         yield f"{name}{which}", impact, kind
 
 
-def force_words(impacts: Mapping[str, Curve], force: LevelsForce | None) -> str:
-    """Return the words for the force of all curves, those for any where labels say which."""
+def force_name(impacts: Mapping[str, Curve], force: LevelsForce | None) -> str:
+    """Return the name of the force of all curves, or "force" if the curves differ in it."""
     kinds = {kind for _, _, kind in iterate_curves(impacts, force)}
-    return FORCE_WORDS[kinds.pop()] if len(kinds) == 1 else "force"
+    return FORCE_NAMES[kinds.pop()] if len(kinds) == 1 else "force"
 
 
 def level_label(impacts: Mapping[str, Curve], force: LevelsForce | None, label: str = LEVEL) -> str:
-    """Return the label of an axis of levels, with their force where labels do not say which."""
-    words = force_words(impacts, force)
-    return label if words == "force" else f"{label}\n({words})"
+    """Return the label of an axis of levels, with their force if the curves share it."""
+    name = force_name(impacts, force)
+    return label if name == "force" else f"{label}\n({name})"
 
 
 def octave_axis(axes: Axes, bands: BandSet = "octave") -> None:
@@ -193,7 +186,7 @@ def band_axis(axes: Axes, nominal: NDArray[np.float64], bands: BandSet) -> None:
     """Label the axis with some of the bands of a set, by their nominal mid-band frequencies, Hz."""
     axes.set_xticks(np.arange(len(nominal)), [f"{frequency:g}" for frequency in nominal])
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.set_xlabel(f"{BAND_WORDS[bands]}, Hz")
+    axes.set_xlabel(f"{BAND_NAMES[bands]}, Hz")
     if bands == "third":
         axes.tick_params(axis="x", labelrotation=90)
 

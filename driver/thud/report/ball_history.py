@@ -1,4 +1,4 @@
-"""One ball over its life: the criteria of its calibration reports against their dates."""
+"""History of one ball: the criteria of its calibration reports against their dates."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ if TYPE_CHECKING:
 YEAR = timedelta(days=365.25)
 # Probability of a reported trend in any criterion of a ball that does not change.
 SIGNIFICANCE = 0.05
-# Reports that make a trend: two lie on any line.
+# Minimum number of reports for a trend: a line fits any two.
 MIN_REPORTS = 3
-# Later dates are not reported, years after the last report.
-FARTHEST = 100.0
-# Reports in the table: the first, and the last ones.
+# Maximum time between the last report and a date that is reported, years.
+MAX_YEARS = 100.0
+# Maximum number of reports in the table: the first, and the last ones.
 MAX_COLUMNS = 8
 # Marks of values in the table.
 WORDS = {RESULTS[0]: "", RESULTS[1]: " no", RESULTS[2]: " ?"}
-# Largest report, bytes.
-LARGEST = 2**28
-# What a point of a chart needs of a report.
+# Maximum size of a report, bytes.
+MAX_SIZE = 2**28
+# Entries of a report, and of its criteria, that a chart needs.
 KEYS = ("ball", "serial", "source", "date", "verdict", "criteria")
 CRITERION_KEYS = (
     "name", "unit", "band", "value", "uncertainty", "expanded_uncertainty", "upper_bound", "lower",
@@ -55,11 +55,11 @@ class Trend(Immutable):
     slope, expanded : float
         Change per year and its expanded uncertainty (95 %).
     significant : bool
-        Whether it is more than chance, at 5 % for all criteria together.
+        Whether it is significant, at 5 % for all criteria together.
     time, value : ndarray, shape (2,)
         Times of the first and the last report, years since the first, and the line there.
     reached, earliest, latest : float
-        Time at which the line reaches a limit, and between what (95 %), years since the first
+        Time at which the line reaches a limit, and its interval (95 %), years since the first
         report; NaN if there is no such time or the trend is not significant.
     """
 
@@ -110,14 +110,14 @@ class History:
         series = [(entries, self._known(entries)) for entries in self.criteria()]
         able = [len(set(years)) >= MIN_REPORTS and np.ptp(v) > 0 for _, (years, v, _) in series]
         return [
-            _trend(*known, limits_of(entries[-1]), SIGNIFICANCE / sum(able)) if is_able else None
-            for (entries, known), is_able in zip(series, able, strict=True)
+            _trend(*columns, limits_of(entries[-1]), SIGNIFICANCE / sum(able)) if is_able else None
+            for (entries, columns), is_able in zip(series, able, strict=True)
         ]
 
     def _known(
         self, entries: list[dict[str, Any]]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return times, values and standard uncertainties; upper bounds are no values."""
+        """Return times, values and standard uncertainties, without upper bounds."""
         rows = [
             (year, entry["value"], entry["uncertainty"] or 0.0)
             for year, entry in zip(self.years, entries, strict=True)
@@ -127,7 +127,7 @@ class History:
         return columns[:, 0], columns[:, 1], columns[:, 2]
 
     def table(self) -> list[tuple[str, ...]]:
-        """Return rows of text: values of each report, the last ones of many, drifts and limits."""
+        """Return rows of text: values of the first and the last reports, drifts and limits."""
         criteria, last = self.criteria(), len(self.dates) - 1
         styles = [style_of(entries[0]) for entries in criteria]
         columns = [("", *(style.title for style in styles), "verdict")]
@@ -154,8 +154,8 @@ class History:
             date = self._date(trend.reached)
             if date:
                 ends = [self._date(end) or "later" for end in (trend.earliest, trend.latest)]
-                word = "reached" if trend.reached < self.years[-1] else "reaches"
-                text += f"; {word} a limit on {date} (95 %: {ends[0]} to {ends[1]})"
+                verb = "reached" if trend.reached < self.years[-1] else "reaches"
+                text += f"; {verb} a limit on {date} (95 %: {ends[0]} to {ends[1]})"
             warnings.append(text)
         return warnings
 
@@ -165,7 +165,7 @@ class History:
     def _date(self, years: float) -> str:
         """Return the date of a time; empty if unknown or far."""
         last = float(self.years[-1])
-        if not -FARTHEST < years - last < FARTHEST:
+        if not -MAX_YEARS < years - last < MAX_YEARS:
             return ""
         try:
             return self.day(years).date().isoformat()
@@ -241,8 +241,8 @@ def _read(path: Path) -> tuple[datetime, dict[str, Any]]:
     """Return the date and the content of a report."""
     allowed = "report.json of thud-driver measure"
     try:
-        if path.stat().st_size > LARGEST:
-            refuse(f"{path}: is larger than {LARGEST >> 20} MiB", allowed)
+        if path.stat().st_size > MAX_SIZE:
+            refuse(f"{path}: is larger than {MAX_SIZE >> 20} MiB", allowed)
         report = json.loads(read_input(path))
     except (OSError, ValueError, RecursionError) as error:
         reason = error.strerror if isinstance(error, OSError) else "no JSON"
@@ -295,8 +295,8 @@ def _trend(
 ) -> Trend:
     """Return the line of least squares, weighted by 1/uncertainty2, with its uncertainty.
 
-    Its uncertainty is the larger of that which the values state and that which they show by their
-    scatter, of n - 2 degrees of freedom: a line that only one of them supports is not reported.
+    Its uncertainty is the larger of the stated one and that of the scatter, with n - 2 degrees of
+    freedom: a trend must be significant by both.
     """
     count = len(time)
     stated = bool((uncertainty > 0).all())
@@ -304,8 +304,8 @@ def _trend(
     middle, mean = (float(weight @ column / weight.sum()) for column in (time, value))
     spread = float(weight @ (time - middle) ** 2)
     slope = float(weight @ ((time - middle) * (value - mean))) / spread
-    rest = value - mean - slope * (time - middle)
-    scatter = math.sqrt(float(weight @ rest**2) / (count - 2))
+    residual = value - mean - slope * (time - middle)
+    scatter = math.sqrt(float(weight @ residual**2) / (count - 2))
 
     def factor(probability: float) -> float:
         """Return the half width of an interval over 1/sqrt(sum of weights)."""
@@ -329,7 +329,7 @@ def _trend(
 def _reach(
     distance: float, slope: float, factor: float, weights: float, spread: float
 ) -> tuple[float, float, float]:
-    """Return when a line reaches a limit, and between what, since the weighted mean time.
+    """Return when a line reaches a limit, and the interval, since the weighted mean time.
 
     Fieller: the times at which the limit lies on the edge of the interval of the line,
     (distance - slope t)2 = factor2 (1/weights + t2/spread).
@@ -345,7 +345,7 @@ def _reach(
 
 
 def _slope(style: Style, trend: Trend | None) -> str:
-    """Return a drift with its expanded uncertainty, marked where it is more than chance."""
+    """Return a drift with its expanded uncertainty, marked if it is significant."""
     if trend is None:
         return "–"
     slope, expanded = trend.slope / style.unit, trend.expanded / style.unit

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from thud.report.ball_history import History, Trend
 
-# Marker and its filling by verdict: distinct in grey as well.
+# Marker and its fill by verdict: distinct in grey as well.
 MARKS = {
     "conforms": ("o", COLORS[0]),
     "inconclusive": ("s", "white"),
@@ -32,8 +32,8 @@ ROOM, MIN_ROOM = 0.06, timedelta(days=15)
 def draw_history(history: History) -> Figure:
     """Draw each criterion of a ball against the date of its reports.
 
-    Grey is what the limits allow, bars are expanded uncertainties (95 %), markers show the verdict;
-    trends that are more than chance have a line.
+    The range of the limits is grey, bars are expanded uncertainties (95 %), markers show the
+    verdict; significant trends have a line.
     """
     criteria, trends = history.criteria(), history.trends()
     rows = -(-len(criteria) // 2)
@@ -60,7 +60,7 @@ def _draw_criterion(
     """Draw one criterion."""
     style = style_of(entries[0])
     bounds = np.array([limits_of(entry) for entry in entries]) / style.unit
-    # A count has one value that is allowed, and its area no width.
+    # A count has one allowed value, whose area would have no height.
     is_count = bounds[0, 0] == bounds[0, 1]
     bounds += is_count * np.array([-0.4, 0.4])
     # Beyond both ends of the axis.

@@ -110,7 +110,7 @@ def read_date(text: str) -> datetime | None:
 
 
 def _dates(texts: Iterable[str]) -> str:
-    """Return the date of a measurement, or the first and the last, if files state it."""
+    """Return the date of a measurement, or the first and the last one; empty if not stated."""
     stated = [text for text in dict.fromkeys(texts) if text.strip()]
     dates = [read_date(text) for text in stated]
     days = sorted({date.date().isoformat() for date in dates if date})

@@ -49,7 +49,7 @@ def _path(weight: str) -> Path:
 def _subset(weight: str, text: str) -> str:
     """Return the font of the characters of a text, in base 64."""
     options = Options(flavor="woff", notdef_outline=True, hinting=False)
-    # Times of the font's making, which it cannot subset.
+    # Time stamps of FontForge, which cannot be subset.
     options.drop_tables.append("FFTM")
     with TTFont(_path(weight)) as font:
         subsetter = Subsetter(options)

@@ -38,7 +38,7 @@ def netcdf(data: dict[str, Any]) -> bytes:
 
 
 def recording_dataset(data: dict[str, Any]) -> xr.Dataset:
-    """Return drops, levels and files of what `thud.report.contents.report_data` returns."""
+    """Return drops, levels and files of the result of `thud.report.contents.report_data`."""
     drops, files = data["drops"], data["files"]
     onset = {"units": "s", "long_name": "time of first touch in the file"}
     variables: dict[str, Any] = {"onset": ("drop", _numbers(d["onset"] for d in drops), onset)}
@@ -58,7 +58,7 @@ def recording_dataset(data: dict[str, Any]) -> xr.Dataset:
         for key, (name, meaning) in LEVELS.items():
             about = {"units": "dB", "long_name": meaning}
             variables[f"{bands}_{name}"] = (bands, _numbers(levels[key]), about)
-        flag = {"long_name": "corrected for the background, an upper bound in it, or no level"}
+        flag = {"long_name": "corrected for the background, upper bound, or no level"}
         variables[f"{bands}_flag"] = (bands, _texts(levels["flag"]), flag)
         about = {"units": "dB", "long_name": "force exposure level of each drop"}
         of_drops = np.array([_numbers(row) for row in levels["drops"]])

@@ -1,4 +1,4 @@
-"""Messages about many drops, those that are alike as one."""
+"""Messages about many drops, similar ones merged."""
 
 from __future__ import annotations
 
@@ -12,16 +12,10 @@ NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 
 
 def group_messages(messages: Iterable[tuple[str, str]], count: int, kind: str) -> list[str]:
-    """Return messages that differ in numbers only as one, with the range of each number.
+    """Merge messages that differ only in numbers, with the range of each number.
 
-    Parameters
-    ----------
-    messages
-        Name of a drop or a file, and its message.
-    count
-        Number of all drops or files.
-    kind
-        Plural of what has a name, such as ``"drops"``.
+    `messages` are names of drops or files with their messages, `count` is the number of all drops
+    or files, `kind` their plural.
 
     >>> group_messages([("a", "an offset of 3 N"), ("b", "an offset of 4.5 N")], 2, "drops")
     ['an offset of 3 to 4.5 N (2 of 2 drops)']

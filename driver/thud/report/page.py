@@ -26,27 +26,21 @@ if TYPE_CHECKING:
 
 # Maximum number of instruments, of files, and of notes in a list.
 INSTRUMENTS, FILES, NOTES = 6, 5, 7
-# Two drops have no outlier.
+# Number of drops up to which none can be an outlier.
 MIN_DROPS = 2
 STANDARDS = {
     "rubber_ball": "JIS A 1418-2, ISO 10140-5 and ISO 16283-2",
     "tyre": "JIS A 1418-2",
 }
-# Ends of the limits in the picture of a criterion, of 100.
+# Position of the limits in the picture of a criterion, of 100.
 LOW, HIGH = 25.0, 75.0
 
 
 def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) -> str:
     """Return the page as self-contained HTML.
 
-    Parameters
-    ----------
-    data
-        The result of `thud.report.contents.report_data`.
-    figures
-        Two figures of column width, fewer if one cannot be drawn.
-    checksum
-        SHA-256 of ``report.json``.
+    `data` is from `thud.report.contents.report_data`, `figures` are up to two of column width,
+    `checksum` is the SHA-256 of ``report.json``.
     """
     source = data["source"].replace("_", " ")
     body = BODY.substitute(
@@ -105,7 +99,7 @@ def _reason(criteria: Sequence[dict[str, Any]]) -> str:
 
 
 def _about(data: dict[str, Any]) -> list[tuple[str, str]]:
-    """Return what the ball is."""
+    """Return laboratory, ball and conditions."""
     temperature = data["temperature"]
     return [
         ("Laboratory", data["laboratory"]),
@@ -117,7 +111,7 @@ def _about(data: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _measured(data: dict[str, Any]) -> list[tuple[str, str]]:
-    """Return how it was measured."""
+    """Return recordings, calibration and instruments."""
     files, drops = data["files"], len(data["drops"])
     rates = sorted({file["sample_rate"] for file in files})
     listed = " to ".join(dict.fromkeys(f"{rate / 1e3:.4g}" for rate in (rates[0], rates[-1])))
@@ -216,7 +210,7 @@ def _results(data: dict[str, Any]) -> list[str]:
     averaged = "energy average of the drops" if len(drops) > 1 else "of one drop"
     results.append(
         f"levels: {averaged}, method exact (band energy of the contact and at least "
-        f"{1e3 * MARGIN:g} ms of silence around it)"
+        f"{1e3 * MARGIN:g} ms of background around it)"
     )
     flags = {entry["flag"] for entry in data["criteria"]}
     if "corrected" in flags:
@@ -286,7 +280,7 @@ def _cells(figures: Sequence[Figure]) -> list[str]:
 
 @own_style()
 def _svg(figure: Figure, prefix: str) -> str:
-    """Return a figure as a part of a page, its names with a prefix."""
+    """Return a figure as inline SVG; the prefix makes its identifiers unique on the page."""
     content = io.StringIO()
     figure.savefig(content, format="svg", metadata={"Date": None})
     text = content.getvalue()

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from thud.base.files import Results
     from thud.recordings.recording import Recording
 
-# Columns of the page that the screen leaves out.
+# Columns of the page that are not printed.
 _HIDDEN = ("Spread", "Background")
 _PLURALS = {RESULTS[0]: "conform", RESULTS[1]: "do not conform"}
 DATASET = "recording.nc"
@@ -72,7 +72,7 @@ def messages(recording: Recording, kind: str) -> list[str]:
 
 
 def table(recording: Recording) -> list[tuple[str, ...]]:
-    """Return the table of the page as rows of text, without what differs from drop to drop."""
+    """Return the criteria as rows of text, without spread and background."""
     shown = [i for i, title in enumerate(HEAD) if title not in _HIDDEN]
     rows = criterion_rows(criteria_data(recording))
     return [tuple(row[i] for i in shown) for row in rows]
@@ -85,7 +85,7 @@ def _with_u(estimate: Estimate, unit: float, decimals: int) -> str:
 
 
 def verdict_text(recording: Recording) -> str:
-    """Return the verdict in words, with a note if limits are the laboratory's."""
+    """Return the verdict as a sentence, with a note on limits of the laboratory."""
     assessment = recording.assess()
     name = assessment.source.replace("_", " ")
     sentence = {
@@ -131,7 +131,7 @@ def levels_csv(data: dict[str, Any]) -> str:
 
 
 def criteria_csv(data: dict[str, Any]) -> str:
-    """Return value, uncertainty, limits and verdict of each criterion of a report, SI units."""
+    """Return value, uncertainty, limits and verdict of each criterion of a report as text."""
     keys = ("expanded_uncertainty", "lower", "upper", "margin", "verdict")
     rows = [
         [
@@ -163,8 +163,8 @@ def file_names(*, figures: bool = True) -> list[str]:
 def save(recording: Recording, results: Results, *, figures: bool = True) -> None:
     """Write levels, criteria and data, and, with figures, these and the page to a directory.
 
-    All contents are there before the first file is written. Files of an earlier recording that
-    this one does not have are removed.
+    All contents are made before the first file is written. Files of an earlier recording that this
+    one does not have are removed.
 
     Raises
     ------
@@ -176,7 +176,7 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
     Warns
     -----
     ReportWarning
-        If a file is left out, or the results of another recording are replaced.
+        If a file is not written, or the results of another recording are replaced.
     """
     data = report_data(recording)
     contents = {

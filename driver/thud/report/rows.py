@@ -73,7 +73,7 @@ def limits_of(criterion: dict[str, Any]) -> tuple[float, float]:
 
 
 def expanded_text(criterion: dict[str, Any]) -> str:
-    """Return the expanded uncertainty; a dash where there is none, words if it is not stated."""
+    """Return the expanded uncertainty; a dash if there is none, "not stated" if unknown."""
     if criterion["name"] == COUNT or criterion["value"] is None:
         return "–"
     if not criterion["contributions"]:
@@ -82,7 +82,7 @@ def expanded_text(criterion: dict[str, Any]) -> str:
 
 
 def number(value: float, decimals: int) -> str:
-    """Return a number with a minus sign of its own, and no minus before zero.
+    """Return a number with a typographic minus sign, and none before zero.
 
     >>> number(-1.004, 1)
     '−1.0'
@@ -91,5 +91,5 @@ def number(value: float, decimals: int) -> str:
 
 
 def _width(style: Style, value: float | None, unknown: str) -> str:
-    """Return the width of an interval, with a decimal more than values have."""
+    """Return the width of an interval, with one decimal more than a value."""
     return style._replace(decimals=style.decimals + 1).text(value, unknown)

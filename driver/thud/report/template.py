@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from string import Template
 
-# What the page says, between the places of its parts.
+# Body of the page.
 BODY = Template("""<header>
 <div class="verdict"><b>$verdict</b><br>$reason</div>
 <h1>Calibration report</h1>
@@ -36,7 +36,7 @@ $figures
 <footer>$footer</footer>
 """)
 
-# The page around it.
+# The page around the body.
 PAGE = Template("""<!DOCTYPE html>
 <html lang="en">
 <head>

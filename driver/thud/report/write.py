@@ -36,7 +36,7 @@ def write_report(
     recording
         The recording.
     directory
-        Directory of the files; it is made where there is none.
+        Directory of the files; created if missing.
     replace
         Replace also files that thud has not written.
 
@@ -50,8 +50,8 @@ def write_report(
     Warns
     -----
     ReportWarning
-        If WeasyPrint is missing, so that there is no PDF, or a font for some letters; and
-        where the report of another recording is replaced.
+        If WeasyPrint (needed for the PDF) or a font is missing, or the report of another recording
+        is replaced.
     """
     # SciPy takes its time.
     from thud.report.contents import report_data
@@ -70,9 +70,9 @@ def json_bytes(data: dict[str, Any]) -> bytes:
 def page_contents(
     data: dict[str, Any], figures: Sequence[Figure], folder: Path
 ) -> dict[str, bytes]:
-    """Return the page as HTML and, where it can be made, PDF, by the names of the files.
+    """Return the page as HTML and, if possible, PDF, by file name.
 
-    Warn where there is no PDF, or no font for some letters; the folder is for the message.
+    Warn if there is no PDF, or no font for some characters; the folder is for the message.
     """
     from thud.report.fonts import missing_characters
     from thud.report.page import page_text, report_page
@@ -90,7 +90,7 @@ def page_contents(
     missing = missing_characters(page_text(data))
     if missing:
         message = (
-            f"{folder}: no installed font has {missing}, of the names in {PDF}; allowed: "
+            f"{folder}: no installed font has {missing}, used in {PDF}; allowed: "
             "a font that has them, such as that of Debian's fonts-noto-cjk"
         )
         warnings.warn(message, ReportWarning, stacklevel=3)
@@ -100,10 +100,9 @@ def page_contents(
 def write_files(
     results: Results, data: dict[str, Any], contents: Mapping[str, bytes], names: Iterable[str] = ()
 ) -> list[Path]:
-    """Write the files of a recording; warn where they replace those of another one.
+    """Write the files of a recording; warn if they replace those of another one.
 
-    Files of `names` that have no content are of an earlier recording: they are removed. So is the
-    PDF of a page that has none.
+    Earlier files of `names` without new content are removed, as is an earlier PDF.
     """
     earlier = _earlier(results.folder)
     paths = results.write(contents, stale=[*names, *([PDF] if HTML in contents else [])])
@@ -118,7 +117,7 @@ def _checksums(data: dict[str, Any]) -> list[str]:
 
 
 def _earlier(folder: Path) -> list[str] | None:
-    """Return the checksums of the recording whose report is in a directory; None of none."""
+    """Return the checksums of the recording of an earlier report; None without one."""
     from thud.report.contents import FORMAT
 
     try:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Keep = Callable[[Block, dict[str, NDArray[Any]]], None]
 
 BACKENDS = ("threads", "processes", "dask")
-# Time limit for a scheduler to answer, and without any worker, s.
+# Time limits, s: for an answer of the scheduler, and without any worker.
 SCHEDULER_TIMEOUT = 5.0
 WORKER_TIMEOUT = 60.0
 # Time between two checks of the workers, s.
@@ -42,8 +42,8 @@ def run_blocks(
 ) -> None:
     """Compute blocks in any order; `keep` takes each with its results as soon as it is done.
 
-    For backend, workers and scheduler see `thud.studies.kind.RunOptions`. Raises NumericalError
-    where the backend loses a block.
+    For the other arguments see `thud.studies.kind.RunOptions`. Raises NumericalError if the
+    backend loses a block.
     """
     backend, workers, scheduler = checked_backend(backend, workers, scheduler)
     with _open(backend, workers, scheduler) as (executor, width, check):
@@ -57,7 +57,7 @@ def run_blocks(
             while running:
                 _collect(running, keep, check)
         except BaseException as error:
-            # Running blocks are waited for and kept. After an interrupt the backend ends them.
+            # Running blocks are completed and kept; after an interrupt the backend ends them.
             interrupted = isinstance(error, KeyboardInterrupt)
             for future in [] if interrupted else list(running):
                 if future.cancel():
@@ -84,7 +84,7 @@ def checked_backend(
         )
     if workers is not None:
         if scheduler:
-            refuse(f"workers = {shown(workers)} is not allowed for dask", "those it has")
+            refuse(f"workers = {shown(workers)} is not allowed for dask", "none: Dask has its own")
         require_whole("workers", workers, 1, MAX_THREADS)
     return backend, workers, scheduler
 
@@ -127,18 +127,14 @@ def _open(
     if backend == "threads":
         with ThreadPoolExecutor(width) as threads:
             try:
-                yield threads, width, _no_check
+                yield threads, width, lambda: None
             except KeyboardInterrupt:
                 threads.shutdown(wait=False, cancel_futures=True)
                 api.end_calls()
                 raise
         return
     with process_pool(width) as processes:
-        yield processes, width, _no_check
-
-
-def _no_check() -> None:
-    """Threads and processes of this machine are waited for."""
+        yield processes, width, lambda: None
 
 
 @contextmanager
@@ -149,7 +145,7 @@ def _dask(address: str) -> Iterator[tuple[Executor, int, Callable[[], None]]]:
         from distributed.comm.registry import get_backend
     with _silent("distributed", "tornado", "asyncio"):
         try:
-            # A client of an unknown kind of address would fail again when deleted.
+            # A client for an unknown kind of address would fail again when it is deleted.
             get_backend(parse_address(address)[0])
             client = _connected(Client, address)
         except (OSError, ValueError, TypeError) as error:
@@ -176,17 +172,17 @@ def _dask(address: str) -> Iterator[tuple[Executor, int, Callable[[], None]]]:
 def _connected(kind: type, address: str) -> Any:  # noqa: ANN401 - of an optional package
     """Return a client of a scheduler; raise OSError where it does not answer in time.
 
-    The client's own limit does not count the time after the connection, so that another thread
-    waits for it, which closes a client that comes too late.
+    The time limit of the client does not cover the time after the connection. Another thread
+    therefore waits for the client, and closes one that comes too late.
     """
     connection: Future[Any] = Future()
     late = Event()
 
     def connect() -> None:
         try:
-            # The default client would also manage locks of files, which stay in this process.
+            # The default client would also manage file locks, which belong to this process.
             client = kind(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
-        except Exception as error:  # noqa: BLE001 - for the one who waits
+        except Exception as error:  # noqa: BLE001 - raised by `result`
             connection.set_exception(error)
             return
         if late.is_set():
@@ -202,12 +198,12 @@ def _connected(kind: type, address: str) -> Any:  # noqa: ANN401 - of an optiona
 
 
 def _cores(client: Any) -> int:  # noqa: ANN401 - of an optional package
-    """Return how many cores the workers have; raise OSError where the scheduler does not answer."""
+    """Return the number of cores of all workers; raise OSError if the scheduler does not answer."""
     return sum(client.sync(client.scheduler.ncores, callback_timeout=SCHEDULER_TIMEOUT).values())
 
 
 def _wait_for_cores(client: Any) -> int:  # noqa: ANN401 - of an optional package
-    """Return how many cores the workers have, 0 where none is there in time."""
+    """Return the number of cores of all workers, 0 if none starts in time."""
     end = time.monotonic() + SCHEDULER_TIMEOUT
     cores = 0
     with suppress(OSError):
@@ -217,9 +213,9 @@ def _wait_for_cores(client: Any) -> int:  # noqa: ANN401 - of an optional packag
 
 
 def _new_check(client: Any) -> Callable[[], None]:  # noqa: ANN401 - of an optional package
-    """Return a check that raises NumericalError where scheduler or all workers are lost.
+    """Return a check that raises NumericalError if the scheduler or all workers are lost.
 
-    The scheduler gives up workers that it does not hear of: `distributed.scheduler.worker-ttl`.
+    The scheduler drops unresponsive workers, see `distributed.scheduler.worker-ttl`.
     """
     last_seen = time.monotonic()
 
@@ -239,12 +235,12 @@ def _new_check(client: Any) -> Callable[[], None]:  # noqa: ANN401 - of an optio
 
 
 def _lost(cause: str) -> str:
-    return f"{cause}; what was finished is kept; allowed: run the study again"
+    return f"{cause}; finished samples are kept; allowed: run the study again"
 
 
 @contextmanager
 def _silent(*packages: str) -> Iterator[None]:
-    """Silence the loggers of packages: one message reports what fails."""
+    """Silence the loggers of packages: their failures are raised as one message."""
     names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] in packages]
     loggers = [logger for name in names if not (logger := logging.getLogger(name)).disabled]
     for logger in loggers:

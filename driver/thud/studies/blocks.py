@@ -39,11 +39,11 @@ if TYPE_CHECKING:
 
 # Results that need more bytes than this are written as Zarr.
 LARGE = 256 * 2**20
-# The file with the identity of the blocks.
-MARK = "study"
-# The names of all finished files.
-_OWN = re.compile(rf"{MARK}|block_\d+\.nc")
-# Separates a NetCDF file from its checksum, which HDF5 ignores.
+# Name of the file with the identity of the blocks.
+IDENTITY = "study"
+# Names of all complete files.
+_FILES = re.compile(rf"{IDENTITY}|block_\d+\.nc")
+# Separates a NetCDF file from its checksum; HDF5 ignores both.
 _SEAL = b"thud sha256 "
 
 
@@ -62,12 +62,12 @@ class Blocks:
             self._require_space()
             self._partial.mkdir(exist_ok=True)
             if block_paths(self._partial):
-                before = json.loads(read_input(self._partial / MARK))
+                before = json.loads(read_input(self._partial / IDENTITY))
                 if before != self._identity:
-                    # Blocks of another size have gaps or overlap.
+                    # Blocks of another size would overlap or leave gaps.
                     remove(self._partial)
                     self._partial.mkdir()
-            replace_file(self._partial / MARK, json.dumps(self._identity).encode())
+            replace_file(self._partial / IDENTITY, json.dumps(self._identity).encode())
 
     @property
     def complete(self) -> bool:
@@ -109,9 +109,9 @@ class Blocks:
         shutil.rmtree(self._partial, ignore_errors=True)
 
     def _write_zarr(self, paths: list[Path]) -> None:
-        """Write a Zarr group, some variables at a time: only these have to fit into memory."""
+        """Write a Zarr group, some variables at a time: only these have to fit in memory."""
         part = self.path.with_name(f".{self.path.name}.part")
-        # An interrupted removal leaves it.
+        # An interrupted removal may have left one.
         shutil.rmtree(part, ignore_errors=True)
         part = own_path(part)
         with _open(paths[0]) as first:
@@ -144,14 +144,14 @@ def block_paths(partial: Path) -> list[Path]:
 
 
 def read_identity(path: Path) -> dict[str, str] | None:
-    """Return what results depend on; None where they have no finished block."""
+    """Return the identity of results; None if they have no finished block."""
     if path.suffix == ".partial":
         for file in path.iterdir():
-            if not is_regular(file) or not (_OWN.fullmatch(file.name) or is_temporary(file.name)):
-                refuse(f"{file} is not of a study", "finished blocks of a study")
-        if not block_paths(path) and not (path / MARK).exists():
+            if not is_regular(file) or not (_FILES.fullmatch(file.name) or is_temporary(file.name)):
+                refuse(f"{file} does not belong to a study", "finished blocks of a study")
+        if not block_paths(path) and not (path / IDENTITY).exists():
             return None
-        content = json.loads(read_input(path / MARK))
+        content = json.loads(read_input(path / IDENTITY))
         del content["samples in a block"]
         if not block_paths(path):
             return None
@@ -179,9 +179,9 @@ def read_dataset(path: Path) -> xr.Dataset:
 def _join(
     paths: list[Path], names: list[str] | None = None, *, known_intact: bool = False
 ) -> xr.Dataset:
-    """Return blocks as one dataset, or some variables of them with all coordinates.
+    """Return blocks as one dataset, or some of its variables with all coordinates.
 
-    Of blocks that are known to be intact only these are read.
+    Blocks that are known to be intact are not read as a whole.
     """
     parts = []
     for path in paths:
@@ -194,7 +194,7 @@ def _join(
 
 
 def _loaded(dataset: xr.Dataset) -> xr.Dataset:
-    """Load a dataset; its texts have any length again."""
+    """Load a dataset, its texts as objects of any length."""
     texts: dict[Any, Any] = {
         name: variable.astype(object)
         for name, variable in dataset.variables.items()
@@ -208,16 +208,16 @@ def _open(path: Path, *, known_intact: bool = False) -> Iterator[xr.Dataset]:
     with _readable(path):
         with uninterrupted():
             if path.suffix == ".zarr":
-                # To open a pipe could block.
+                # Opening a pipe could block.
                 if any(not (entry.is_dir() or is_regular(entry)) for entry in path.rglob("*")):
-                    message = "holds other than files"
+                    message = "holds something that is not a file"
                     raise ValueError(message)
                 dataset = _open_zarr(path)
             else:
                 if not known_intact:
                     _require_intact(path)
-                # Whole files are renamed to this name, so that no lock is needed; some file
-                # systems have none.
+                # No lock is needed, because complete files are renamed to this name; some file
+                # systems have no locks.
                 dataset = xr.open_dataset(
                     path, engine="h5netcdf", driver_kwds={"locking": False}, phony_dims="access"
                 )
@@ -250,7 +250,7 @@ def _write(dataset: xr.Dataset, path: Path) -> None:
 
 
 def _require_intact(path: Path) -> None:
-    """Raise ValueError for a damaged NetCDF file: HDF5 may never return from one."""
+    """Raise ValueError for a damaged NetCDF file: HDF5 may hang on one."""
     content, _, digest = read_input(path).rpartition(_SEAL)
     if sha256(content).digest() != digest:
         message = "wrong checksum"
@@ -259,18 +259,18 @@ def _require_intact(path: Path) -> None:
 
 @contextmanager
 def _named(path: Path) -> Iterator[None]:
-    """Give errors of the disk the requested path."""
+    """Name the requested path in errors of the disk."""
     try:
         yield
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(error.filename or path)) from error
 
 
-def compute_samples(study: SampleStudy, folder: Path | None, how: RunOptions) -> xr.Dataset:
+def compute_samples(study: SampleStudy, folder: Path | None, options: RunOptions) -> xr.Dataset:
     """Compute or continue a study; without a folder its results are not written.
 
-    Raises InputError where they cannot fit in memory, and NumericalError where the backend loses
-    samples; samples that fail have a status and a reason.
+    Raises InputError if they do not fit in memory, NumericalError if the backend loses samples.
+    Samples that fail have a status and a reason.
     """
     if not folder and disk_space(study) > os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"):
         refuse(
@@ -293,16 +293,16 @@ def compute_samples(study: SampleStudy, folder: Path | None, how: RunOptions) ->
         starts = range(0, study.count, size)
         open_starts = [start for start in starts if not (blocks and blocks.has(start))]
         done = study.count - sum(min(size, study.count - start) for start in open_starts)
-        hidden = not how.get("progress", False)
+        hidden = not options.get("progress", False)
         with tqdm(total=study.count, initial=done, unit="sample", disable=hidden) as bar:
-            backend = how.get("backend"), how.get("workers"), how.get("scheduler")
+            backend = options.get("backend"), options.get("workers"), options.get("scheduler")
             run_blocks(_blocks(study, open_starts, size), keep, *backend)
     if blocks:
         blocks.finish()
         return read_dataset(blocks.path)
     parts = [memory[start] for start in sorted(memory)]
-    whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    return grid_of(study, new_dataset(study, study.parameter_columns(0, study.count), whole))
+    results = {name: np.concatenate([block[name] for block in parts]) for name in parts[0]}
+    return grid_of(study, new_dataset(study, study.parameter_columns(0, study.count), results))
 
 
 def _blocks(study: SampleStudy, starts: list[int], size: int) -> Iterator[Block]:

@@ -38,8 +38,8 @@ _MIN_DATA = 5
 class CompressionFit(Estimates):
     """Modulus of elasticity and first touch that fit a measured compression best.
 
-    The ``youngs_modulus``, Pa, is the storage modulus of materials with Maxwell branches, whose
-    long-term modulus the press finds; of a fractional law it is its modulus at about 1 Hz.
+    The ``youngs_modulus``, Pa, is the storage modulus of materials with Maxwell branches (the press
+    measures their long-term modulus), and the modulus at about 1 Hz of a fractional damping law.
     ``touch`` is the deflection at which the plates touch the ball, m. See `Estimates` for the rest.
 
     Attributes
@@ -60,10 +60,7 @@ class CompressionFit(Estimates):
         return f"<CompressionFit: E {modulus / 1e6:.4g} MPa +- {error / 1e6:.2g} MPa>"
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return the measured curve and the force of the model.
-
-        Raise InputError where pandas is not installed.
-        """
+        """Return the measured curve and the force of the model."""
         with require_extra("studies"):
             import pandas as pd
 
@@ -98,8 +95,8 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
     """Estimate the modulus of elasticity of a ball from a compression between two plates.
 
     Least squares of the force; the deflection at which the plates touch the ball is estimated too.
-    Residuals count as independent and of one variance; where their signs are not those of noise,
-    the model does not explain the curve, and a warning says so.
+    Residuals are taken as independent and of equal variance; a warning says where their signs are
+    not random, so that the model does not explain the curve.
 
     Parameters
     ----------
@@ -122,9 +119,9 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
     Raises
     ------
     InputError
-        Where the data or the model cannot be used.
+        If the data or the model cannot be used.
     NumericalError
-        Where the ball of the search cannot be pressed so far, or the curve does not depend on the
+        If a ball of the search cannot be compressed that far, or the curve does not depend on the
         modulus.
     """
     start = Ball() if ball is None else ball
@@ -148,7 +145,7 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
         model_force = PchipInterpolator(result.deflection, result.force)(np.maximum(depth, 0))
         return np.asarray(model_force - measured_force)
 
-    # The plates may touch a little before the first point.
+    # The plates may touch the ball a little before the first point.
     bounds = ([-np.inf, -0.04], [np.inf, 0.9])
     first = np.array([np.log(_ratio(curve(start.youngs_modulus), measured, measured_force)), 0.0])
     best = least_squares(residuals, first, bounds=bounds, x_scale=(1.0, 0.1), xtol=1e-10)
@@ -182,7 +179,7 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
 
 
 def _data(deflection: ArrayLike, force: ArrayLike) -> tuple[Array, Array]:
-    """Return both columns; raise InputError where they are no curve."""
+    """Return both columns; raise InputError if they are no curve."""
     measured, measured_force = (
         require_real(name, require_array(name, values, {1}))
         for name, values in (("deflection", deflection), ("force", force))
@@ -198,15 +195,12 @@ def _data(deflection: ArrayLike, force: ArrayLike) -> tuple[Array, Array]:
     if falling.size:
         refuse(f"deflection does not rise at point {falling[0] + 2}", "the branch of loading")
     if not measured_force[-1] > max(0.0, measured_force[0]):
-        refuse("force does not rise with the deflection", "pressure is positive")
+        refuse("force does not rise with the deflection", "forces that are positive in compression")
     return measured, measured_force
 
 
 def _ratio(curve: CompressionCurve, measured: Array, measured_force: Array) -> float:
-    """Return the factor that brings the work of a curve to the measured one.
-
-    Raise InputError where the model has no force at such deflections.
-    """
+    """Return the measured work over that of a curve; raise InputError if that is 0."""
     work = float(np.trapezoid(measured_force, measured))
     shown = np.interp(measured - measured[0], curve.deflection, curve.force)
     model_work = float(np.trapezoid(shown, measured))
@@ -221,7 +215,7 @@ def _ratio(curve: CompressionCurve, measured: Array, measured_force: Array) -> f
 def _warnings(
     residuals: Array, relative_touch: float, bounds: tuple[list[float], list[float]]
 ) -> list[str]:
-    """Return why the intervals may be wrong."""
+    """Return the warnings of a fit."""
     result = []
     if min(relative_touch - bounds[0][1], bounds[1][1] - relative_touch) < 1e-6:  # noqa: PLR2004 - of the span
         result.append(

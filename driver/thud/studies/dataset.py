@@ -7,17 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from thud.impact.datasets import attributes, band_coordinates, origin, room_coordinates
-from thud.impact.quantities import (
-    ALL_QUANTITIES,
-    BANDS,
-    CONTACT_LEVELS,
-    LEVELS,
-    ROOM_BAND,
-    ROOM_LEVEL,
-)
-from thud.level.levels import BANDWIDTHS, get_bands
-from thud.studies.samples import level_names
+from thud.impact.datasets import attributes, origin, sample_variables
+from thud.impact.quantities import ALL_QUANTITIES, BANDS
+from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 from thud.studies.sampling import sampler_versions
 
 if TYPE_CHECKING:
@@ -26,10 +18,6 @@ if TYPE_CHECKING:
     from thud.studies.parameter import Parameter
     from thud.studies.samples import Columns, SampleStudy
 
-# Dimension of each result that has one beside the sample.
-_DIMENSIONS = {
-    **{name: bands for name, (_, bands) in LEVELS.items()}, **CONTACT_LEVELS, ROOM_LEVEL: ROOM_BAND
-}  # fmt: skip
 # Bytes of a sample on disk without its levels and parameters, and of an empty file.
 _SAMPLE_BYTES = 95
 _FILE_BYTES = 27_000
@@ -39,28 +27,25 @@ def disk_space(study: SampleStudy) -> int:
     """Return the estimated bytes of the results of a study, blocks included."""
     total = study.count
     files = 1 - (-total // study.block_size)
-    levels = sum(len(get_bands(bands).nominal) for _, bands in level_names(study.case).values())
+    # The verdict needs octaves.
+    extra = study.case.levels.bands
+    names = BANDWIDTHS if extra == "both" else {BANDWIDTHS[0], extra}
+    levels = len(FORCES) * sum(len(get_bands(bands).nominal) for bands in names)
     return files * _FILE_BYTES + 2 * total * (_SAMPLE_BYTES + 8 * (levels + len(study.parameters)))
 
 
 def new_dataset(study: SampleStudy, columns: Columns, results: Columns) -> xr.Dataset:
-    """Return the results of some samples, along the dimension ``sample``, levels also along bands.
+    """Return the results of samples along the dimension ``sample``, levels also along bands.
 
-    `columns` holds their parameters by name, `results` what `evaluate` returns.
+    `columns` are their parameters by name, `results` those of `evaluate`.
     """
-    used = {_DIMENSIONS[name] for name in results if name in _DIMENSIONS}
-    coordinates: dict[str, Any] = band_coordinates(bands for bands in BANDWIDTHS if bands in used)
-    coordinates |= room_coordinates() if ROOM_BAND in used else {}
+    coordinates, variables = sample_variables(results)
     for parameter in study.parameters:
         values = _objects(columns[parameter.name])
         coordinates[parameter.coordinate] = ("sample", values, _attributes(study, parameter))
-    variables = {}
-    for name, values in results.items():
-        dimensions = ("sample", _DIMENSIONS[name]) if name in _DIMENSIONS else ("sample",)
-        words: dict[str, Any] = {**attributes(ALL_QUANTITIES[name])}
-        if study.surrogate and name in study.surrogate.outputs:
-            words["surrogate_error"] = study.surrogate.error_of(name)
-        variables[name] = (dimensions, values, words)
+    if study.surrogate:
+        for name in study.surrogate.outputs:
+            variables[name][-1]["surrogate_error"] = study.surrogate.error_of(name)
     return in_order(xr.Dataset(variables, coordinates, provenance(study)))
 
 
@@ -82,7 +67,7 @@ def _attributes(study: SampleStudy, parameter: Parameter) -> dict[str, Any]:
 
 
 def provenance(study: SampleStudy) -> dict[str, str]:
-    """Return where results come from."""
+    """Return the provenance of results as attributes of a dataset."""
     return {
         "title": f"{study.kind} {study.name}",
         "study": study.text,
@@ -98,7 +83,7 @@ def provenance(study: SampleStudy) -> dict[str, str]:
 
 
 def in_order(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a dataset with variables in their order, which Zarr does not keep."""
+    """Return a dataset with its variables in order, which Zarr does not keep."""
     results = {
         name: dataset.variables[name] for name in ALL_QUANTITIES if name in dataset.data_vars
     }

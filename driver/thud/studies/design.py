@@ -37,13 +37,13 @@ class Design(SampleResult):
     Attributes
     ----------
     dataset : Dataset
-        Every sample, on a grid of the two parameters in ascending order; ``margin`` is the minimum
-        distance of an octave level to its limits, dB, and ``conforms`` the whole verdict; of a case
-        with a room ``standardized_rating`` is drawn, dB.
+        Every sample, on a grid of the two parameters in ascending order. ``margin`` is the minimum
+        distance of an octave level to its limits, dB; ``conforms`` is the verdict by all criteria.
+        With a room, the figure shows ``standardized_rating``, dB.
     axes : tuple of str
         The two parameters.
     mark : tuple of float or None
-        Where the ball of the paper, or else the case, lies; None where that is outside the map.
+        Position of the ball of the paper, or else of the case; None if it is outside the map.
     mark_name : str
         ``"paper's ball"`` or ``"case"``.
     """
@@ -54,25 +54,25 @@ class Design(SampleResult):
     mark_name: str
 
     def __repr__(self) -> str:
-        """Return the axes, and how much conforms."""
+        """Return the axes, and how many samples conform."""
         conforms = self.dataset["conforms"]
         count = f"{int(conforms.sum())} of {conforms.size} samples conform"
         return f"<Design, {' and '.join(self.axes)}: {count}>"
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text: how much conforms, and the best sample."""
+        """Return header and rows of text: how many samples conform, and the best one."""
         margin = self.dataset["margin"]
         rows: list[tuple[str, ...]] = [("quantity", "value"), ("samples", f"{margin.size}")]
         rows.append(("octave levels conform", f"{int((margin >= 0).sum())}"))
         rows.append(("all criteria conform", f"{int(self.dataset['conforms'].sum())}"))
-        if "doubtful" in self.dataset:
-            rows.append(("in doubt by the surrogate", f"{int(self.dataset['doubtful'].sum())}"))
-        words, sign, quantity = "largest margin, dB", 1, margin
+        if "undecided" in self.dataset:
+            rows.append(("undecided by the surrogate", f"{int(self.dataset['undecided'].sum())}"))
+        label, sign, quantity = "largest margin, dB", 1, margin
         if RATING in self.dataset:
-            words, sign, quantity = "lowest standardized rating, dB", -1, self.dataset[RATING]
+            label, sign, quantity = "lowest standardized rating, dB", -1, self.dataset[RATING]
         if quantity.notnull().any():
             best = quantity.isel((sign * quantity).argmax(...))
-            rows.append((words, f"{float(best):z.2f}"))
+            rows.append((label, f"{float(best):z.2f}"))
             for name in self.axes:
                 power = self.dataset[name].attrs["shown_power"]
                 unit = self.dataset[name].attrs["shown_unit"]
@@ -96,10 +96,10 @@ class DesignKind(SampleKind[Design]):
         """Return a study of two numeric parameters."""
         result = super().complete(study, content, folder)
         if len(result.parameters) != _AXES or not all(map(_is_axis, result.parameters)):
-            refuse("[parameters] do not make a map", "two numeric ones of two values or more")
+            refuse("[parameters] do not make a map", "two numeric parameters of two or more values")
         return result
 
-    def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> Design:
+    def new_result(self, study: SampleStudy, dataset: xr.Dataset) -> Design:
         """Return the map of all samples."""
         first, second = (parameter.coordinate for parameter in study.parameters)
         return Design(dataset.load().sortby([first, second]), (first, second), *_mark(study))
@@ -109,14 +109,14 @@ KIND = DesignKind()
 
 
 def design(
-    study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[RunOptions]
+    study: Source, output: str | os.PathLike[str] | None = None, **options: Unpack[RunOptions]
 ) -> Design:
     """Compute which geometry and material conform to the standards.
 
     The study has two numeric parameters with two values or more; arguments and errors are those of
     `sweep`.
     """
-    return KIND.run(study, output, **how)
+    return KIND.run(study, output, **options)
 
 
 def _is_axis(parameter: Parameter) -> bool:
@@ -124,7 +124,7 @@ def _is_axis(parameter: Parameter) -> bool:
 
 
 def _mark(study: SampleStudy) -> tuple[tuple[float, float] | None, str]:
-    """Return the position of the paper's ball if all else is as in the paper, else of the case."""
+    """Return position and name of the paper's ball if all else is as there, else of the case."""
     names = [parameter.name for parameter in study.parameters]
     paper, ours = _ball_and_drop(Case(), None), _ball_and_drop(study.case, study.density)
     by_density = study.density is not None or DENSITY.name in names

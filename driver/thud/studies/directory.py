@@ -24,7 +24,7 @@ _MAX_SHOWN = 3
 
 
 @contextmanager
-def take(
+def open_results(
     folder: str | os.PathLike[str],
     kind: Kind[Any, Any],
     study: Study,
@@ -34,8 +34,8 @@ def take(
 ) -> Iterator[Results]:
     """Yield a results directory, locked for one run.
 
-    Raises InputError where another run uses it, it holds results of another version of the study or
-    a file is in the way (both only without `replace`), OSError where nothing can be written.
+    Raises InputError if another run uses it or, without `replace`, if it holds results of another
+    version of the study or a file is in the way; OSError if nothing can be written.
     """
     directory = Path(folder)
     names = kind.identity_files(study)
@@ -62,10 +62,10 @@ def require_version(
     results: Results,
     others: Iterable[str] = (),
 ) -> None:
-    """Raise InputError where results belong to another study, or else remove them.
+    """Raise InputError if results belong to another version of a study, or remove them to replace.
 
-    `readers` return the identity of results by their paths; `others` are names of files that are
-    removed with them. Nothing is removed before all results are known.
+    `readers` return the identity of the results at a path; `others` are names of files that are
+    removed with them. All results are checked before any is removed.
     """
     outdated: list[Path] = []
     for path, identity_in in readers.items():
@@ -95,7 +95,7 @@ def require_version(
 
 
 def _changes(path: Path, identity_in: Callable[[Path], dict[str, str] | None], study: Study) -> str:
-    """Return the differences of a study from that of results; raise where these are none."""
+    """Return the differences of a study from that of results; raise if these are no results."""
     if path.is_symlink():
         message = f"{path} is a link"
         raise ValueError(message)

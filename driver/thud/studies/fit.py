@@ -23,7 +23,7 @@ from thud.studies.fitting.read_target import Target, read_target
 from thud.studies.fitting.search import search
 from thud.studies.kind import Kind
 from thud.studies.study import Study, fix_keys, table_of, with_density
-from thud.studies.surrogate_levels import answered, confirmed, within_region
+from thud.studies.surrogate_levels import recompute, surrogate_misfit, within_region
 from thud.studies.trained_surrogate import Surrogate, get_surrogate, read_plan
 
 if TYPE_CHECKING:
@@ -68,25 +68,25 @@ def fit(  # noqa: PLR0913 - options of a search
     Parameters
     ----------
     target
-        What is fitted; a recording, an impact or arrays of time, s, and force, N, are the record
-        of a `ForceTarget`. A list of targets is fitted jointly, each with what is `fixed` for it.
+        The data; a recording, an impact or arrays of time, s, and force, N, are the record of a
+        `ForceTarget`. A list of targets is fitted jointly, each with its own `fixed` keys.
     parameters
-        Names of keys of ball, drop or model that take real numbers; as a mapping, with their
-        starts or `Parameter`.
+        Names of keys of ball, drop or model that take real numbers; in a mapping each with its
+        start or a `Parameter`.
     case
         Everything else; by default the ball of the paper in the model of the paper.
     confidence
         Confidence of the intervals.
     starts
-        Number of starts: the given one, and others spread over the limits (over a factor of 2 to
-        both sides where a limit is not given). The best end counts.
+        Number of starts: the start of the parameters, and others spread over their limits, or
+        within a factor of 2 of it without limits. The best result counts.
     seed
         Seed of the other starts.
     max_steps
         Maximum number of steps from each start.
     surrogate
-        What answers the drops of the search instead of the model, or the path of its file; for
-        levels. Its errors add to the given uncertainties; the impact at the result is the model's.
+        A surrogate, or the path of its file, that predicts the levels of the search instead of the
+        model. Its errors add to the uncertainties of the target; the model computes the result.
     progress
         Show how many impacts were computed.
 
@@ -98,9 +98,9 @@ def fit(  # noqa: PLR0913 - options of a search
     Raises
     ------
     InputError
-        Where target or parameters cannot be used.
+        If target or parameters cannot be used.
     NumericalError
-        Where the model cannot be computed around the best point.
+        If the model cannot be computed around the best point.
 
     Examples
     --------
@@ -113,16 +113,16 @@ def fit(  # noqa: PLR0913 - options of a search
     require_kind("case", case, Case)
     options = {"confidence": confidence, "starts": starts, "seed": seed, "max_steps": max_steps}
     _require_options(options)
-    known = bound_parameters(case, parameters)
-    pairs = _pairs(case, _targets(target), {parameter.name for parameter in known})
+    bound = bound_parameters(case, parameters)
+    pairs = _pairs(case, _targets(target), {parameter.name for parameter in bound})
     trained = None if surrogate is None else get_surrogate(surrogate)
-    result = _search(pairs, get_ranges(case, known), options, trained, progress=progress)
+    result = _search(pairs, get_ranges(case, bound), options, trained, progress=progress)
     for message in result.warnings:
         warnings.warn(message, FitWarning, stacklevel=3)
     return result
 
 
-def _targets(target: Any) -> tuple[Target, ...]:  # noqa: ANN401 - that is the question
+def _targets(target: Any) -> tuple[Target, ...]:  # noqa: ANN401 - checked here
     """Return the targets of a call of `fit`."""
     if not isinstance(target, list):
         target = [target if isinstance(target, Target) else ForceTarget(target)]
@@ -134,7 +134,7 @@ def _targets(target: Any) -> tuple[Target, ...]:  # noqa: ANN401 - that is the q
 def _pairs(
     case: Case, targets: Sequence[Target], names: AbstractSet[str]
 ) -> list[tuple[Case, Misfit]]:
-    """Return the case of each target and what the fit needs of it."""
+    """Return the case and the misfit of each target."""
     result: list[tuple[Case, Misfit]] = []
     for number, target in enumerate(targets, start=1):
         label = "target" if len(targets) == 1 else f"target {number}"
@@ -145,12 +145,12 @@ def _pairs(
                     f"{label}: fixed {name} is not allowed",
                     "keys of ball, drop and model that are not among [parameters]",
                 )
-        own, density = fix_keys(case, target.fixed, f"{label}: fixed")
-        own = own if density is None else with_density(own, density)
+        target_case, density = fix_keys(case, target.fixed, f"{label}: fixed")
+        target_case = target_case if density is None else with_density(target_case, density)
         try:
             if target.fixed:
-                check_case(replace(own, modes=None))
-            result.append((own, target.misfit()))
+                check_case(replace(target_case, modes=None))
+            result.append((target_case, target.misfit()))
         except InputError as error:
             if len(targets) == 1:
                 raise
@@ -167,20 +167,20 @@ def _search(
     *,
     progress: bool,
 ) -> Fit:
-    """Return the best fit by the model or, where there is one, by a surrogate."""
+    """Return the best fit by the model, or by a surrogate if there is one."""
     if surrogate is None:
         return search(pairs, ranges, options, progress=progress)
-    by_answers = _answered(pairs, surrogate, ranges)
+    pairs = _with_surrogate(pairs, surrogate, ranges)
     inside = [within_region(entry, surrogate) for entry in ranges]
-    return confirmed(search(by_answers, inside, options, progress=progress))
+    return recompute(search(pairs, inside, options, progress=progress))
 
 
-def _answered(
+def _with_surrogate(
     pairs: list[tuple[Case, Misfit]], surrogate: Surrogate, parameters: Iterable[Range | Parameter]
 ) -> list[tuple[Case, Misfit]]:
-    """Return pairs whose impacts a surrogate answers."""
+    """Return pairs whose levels a surrogate predicts."""
     names = [parameter.name for parameter in parameters]
-    return [(case, answered(misfit, surrogate, case, names)) for case, misfit in pairs]
+    return [(case, surrogate_misfit(misfit, surrogate, case, names)) for case, misfit in pairs]
 
 
 def _require_options(options: Mapping[str, Any]) -> None:
@@ -192,7 +192,7 @@ def _require_options(options: Mapping[str, Any]) -> None:
 
 @dataclass(frozen=True)
 class FitStudy(Study):
-    """A fit as a file describes it: targets, the file as JSON holds it, options of the search."""
+    """A fit as a file describes it: targets, the tables of the file, options of the search."""
 
     targets: tuple[Target, ...] = ()
     tables: dict[str, Any] = field(default_factory=dict)
@@ -215,7 +215,7 @@ class FitStudy(Study):
         return result | {name: f"{value!r}" for name, value in self.options.items()}
 
     def pairs(self) -> list[tuple[Case, Misfit]]:
-        """Return the case of each target and what the fit needs of it."""
+        """Return the case and the misfit of each target."""
         return _pairs(self.case, self.targets, {parameter.name for parameter in self.parameters})
 
 
@@ -259,18 +259,23 @@ class FitKind(Kind[FitStudy, Fit]):
         return self.with_surrogate(result, trained)
 
     def with_surrogate(self, study: FitStudy, trained: Surrogate) -> FitStudy:
-        """Return a study whose drops a surrogate answers. Raises InputError where it cannot."""
-        _answered(study.pairs(), trained, study.parameters)
+        """Return a study whose levels a surrogate predicts; raise InputError if it cannot."""
+        _with_surrogate(study.pairs(), trained, study.parameters)
         return replace(study, surrogate=trained)
 
-    def compute(self, study: FitStudy, results: Results | None, **how: Unpack[RunOptions]) -> Fit:  # noqa: ARG002
+    def compute(
+        self,
+        study: FitStudy,
+        results: Results | None,  # noqa: ARG002
+        **options: Unpack[RunOptions],
+    ) -> Fit:
         """Return the fit."""
         return _search(
             study.pairs(),
             get_ranges(study.case, study.parameters),
             study.options,
             study.surrogate,
-            progress=how.get("progress", False),
+            progress=options.get("progress", False),
         )
 
     def identity_files(self, study: FitStudy) -> list[str]:  # noqa: ARG002

@@ -1,4 +1,4 @@
-"""What a kind of study is: how it is read, computed and saved."""
+"""Kinds of studies: how they are read, computed and saved."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypedDict, TypeVar, Unpack
 
 from thud.base.checks import refuse, require_words
-from thud.studies.directory import take
+from thud.studies.directory import open_results
 from thud.studies.study import Study, named_files, read_common, read_tables
 from thud.studies.study_result import StudyResult
 from thud.studies.trained_surrogate import get_surrogate
@@ -39,14 +39,13 @@ class RunOptions(TypedDict, total=False):
     scheduler : str or None
         Address of a Dask scheduler.
     allow_large : bool
-        Start also with more samples than have to be confirmed.
+        Allow any number of samples.
     progress : bool
         Show a progress bar.
     replace : bool
-        Replace what is in the way: results of another version of the study, and files that thud
-        has not written.
+        Replace results of another version of the study, and files that thud has not written.
     surrogate : Surrogate or str or None
-        What answers the samples instead of the model, or the path of its file.
+        Predicts the samples instead of the model; or the path of its file.
     """
 
     backend: Literal["threads", "processes", "dask"] | None
@@ -59,10 +58,10 @@ class RunOptions(TypedDict, total=False):
 
 
 class Kind(ABC, Generic[S, R]):
-    """A kind of study: what its file may hold, how it is computed, what it writes."""
+    """A kind of study: how its file is read, how it is computed, which files it writes."""
 
     name: ClassVar[str]
-    # What its file may hold in addition to what every study has.
+    # Keys and tables of its file beside those of every study.
     words: ClassVar[tuple[str, ...]]
 
     def read_study(self, source: Source) -> S:
@@ -82,21 +81,21 @@ class Kind(ABC, Generic[S, R]):
         self,
         source: Source,
         output: str | os.PathLike[str] | None = None,
-        **how: Unpack[RunOptions],
+        **options: Unpack[RunOptions],
     ) -> R:
         """Return the result of a study, also written to an output directory."""
-        require_words("keywords", how, RunOptions.__annotations__)
+        require_words("keywords", options, RunOptions.__annotations__)
         study = self.read_study(source)
-        if (surrogate := how.get("surrogate")) is not None:
+        if (surrogate := options.get("surrogate")) is not None:
             study = self.with_surrogate(study, get_surrogate(surrogate))
             if isinstance(surrogate, str | os.PathLike):
                 study = dataclasses.replace(study, inputs=(*study.inputs, surrogate))
-        self.require(study, **how)
+        self.require(study, **options)
         if output is None:
-            return self.compute(study, None, **how)
-        replace = how.get("replace", False)
-        with take(output, self, study, replace=replace, figures=False) as results:
-            result = self.compute(study, results, **how)
+            return self.compute(study, None, **options)
+        replace = options.get("replace", False)
+        with open_results(output, self, study, replace=replace, figures=False) as results:
+            result = self.compute(study, results, **options)
             results.write(self.files(result, study))
             return result
 
@@ -104,34 +103,34 @@ class Kind(ABC, Generic[S, R]):
     def new_parameter(
         self, name: str, entry: object, case: Case, density: float | None
     ) -> Parameter:
-        """Return a parameter of its name and table; the density of the wall where it is fixed."""
+        """Return a parameter from its name and table; `density` is that of the wall if fixed."""
 
     @abstractmethod
     def complete(self, study: Study, content: Mapping[str, Any], folder: Path) -> S:
-        """Return a study with what only this kind has."""
+        """Return a study with the keys and tables of this kind."""
 
     def with_surrogate(self, study: S, trained: Surrogate) -> S:  # noqa: ARG002
-        """Return a study whose drops a surrogate answers."""
+        """Return a study whose drops a surrogate predicts."""
         refuse(f"surrogate is not allowed for a {self.name} study", "studies of samples of drops")
 
-    def require(self, study: S, **how: Unpack[RunOptions]) -> None:
-        """Raise InputError where a study cannot be computed this way."""
+    def require(self, study: S, **options: Unpack[RunOptions]) -> None:
+        """Raise InputError if a study cannot be computed with these options."""
 
     def describe(self, study: S) -> str:
         """Return a study in one line."""
         return f"{study.name}: {', '.join(p.name for p in study.parameters)} of {study.model}"
 
     @abstractmethod
-    def compute(self, study: S, results: Results | None, **how: Unpack[RunOptions]) -> R:
+    def compute(self, study: S, results: Results | None, **options: Unpack[RunOptions]) -> R:
         """Return the result, kept in a directory if given."""
 
     @abstractmethod
     def identity_files(self, study: S) -> list[str]:
-        """Return the names of files that hold an identity; the first exists once it is done."""
+        """Return the names of files with an identity; the first exists once the study is done."""
 
     @abstractmethod
     def identity_in(self, path: Path) -> dict[str, str] | None:
-        """Return the identity of results; None where no result would be lost."""
+        """Return the identity of results; None if there is no result to lose."""
 
     @abstractmethod
     def listed_files(self, study: S) -> list[str]:

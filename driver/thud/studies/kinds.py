@@ -1,4 +1,4 @@
-"""The list of kinds of studies; what they need is imported when one is asked for."""
+"""The list of kinds of studies; the module of a kind is imported when it is used."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ KINDS = {
     "sensitivity": KindInfo("Sobol indices: which parameter matters for what"),
     "design": KindInfo("which geometry and material conform to the standards"),
     "uncertainty": KindInfo("how tolerances spread levels and conformity"),
-    "surrogate": KindInfo("what other studies ask instead of a slow model"),
+    "surrogate": KindInfo("train a fast approximation of a slow model for other studies"),
     "fit": KindInfo("parameters of a model from a force or from levels", has_samples=False),
 }
 
@@ -34,7 +34,7 @@ KINDS = {
 def get_kind(name: str) -> Kind[Any, Any]:
     """Return a kind of study by name.
 
-    Raises InputError for an unknown one, and where its dependencies are missing.
+    Raises InputError if it is unknown or its dependencies are missing.
     """
     require_choice("kind", name, KINDS)
     with require_extra("studies"):
@@ -48,7 +48,7 @@ def read_study(source: Source, kind: str = "sweep") -> Study:
     Parameters
     ----------
     source
-        Path of a TOML file, or what would stand in it; see docs/studies.md.
+        Path of a TOML file, or its content as a mapping; see docs/studies.md.
     kind
         ``"sweep"``, ``"sensitivity"``, ``"design"``, ``"uncertainty"``, ``"surrogate"`` or
         ``"fit"``.

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 # Maximum number of values of a parameter, or of base samples: memory.
 MAX_VALUES = 2**30
-# Words of a parameter that varies, by its form, and of one that is fitted; all take `unit` too.
+# Keys of a parameter that varies, by its form, and of one that is fitted; all take `unit` too.
 FORMS = {"values": ("values",), "low": ("low", "high", "count", "scale"), "std": ("mean", "std")}
 FITTED = ("start", "low", "high")
 NUMBERS = ("real", "whole", "list")
@@ -50,13 +50,13 @@ class Parameter(Plain):
     start : float or None
         Where a fit starts; by default the value of the case.
     low, high : float or None
-        Ends of the values, or of the search of a fit; of a search by default those of the key.
+        Ends of the values, or limits of the search of a fit, by default those of the key.
     values : sequence or None
-        The values one by one; where they are drawn, each is as likely.
+        The values; a random design draws each with equal probability.
     count : int
         Number of values from `low` to `high` in a grid.
     scale : str
-        ``"linear"`` or ``"log"``: the values lie evenly, or evenly in their logarithms.
+        ``"linear"`` or ``"log"``: spacing of the values.
     mean, std : float or None
         Of a normal distribution; the mean is by default the value of the case.
     unit : str or None
@@ -81,7 +81,7 @@ class Parameter(Plain):
     key: Key = field(default=Key("", "", ""), repr=False)
 
     def __new__(cls, *_: object, **words: object) -> Self:
-        """Raise InputError where a word is not known."""
+        """Raise InputError for an unknown keyword."""
         require_words("Parameter()", words, (option.name for option in fields(cls)))
         return super().__new__(cls)
 
@@ -103,7 +103,7 @@ class Parameter(Plain):
 
     @property
     def shown_unit(self) -> tuple[str, int]:
-        """Unit for tables and figures, and the power of ten that brings it to that of the key."""
+        """Unit for tables and figures, and the power of ten that converts it to that of the key."""
         unit = self.unit or self.key.unit or "1"
         return unit, power_of(unit, self.key.unit, self.name)
 
@@ -125,16 +125,16 @@ class Parameter(Plain):
         return np.unique(np.rint(values).astype(int)) if self.key.kind == "whole" else values
 
     def quantile(self, fraction: NDArray[np.float64]) -> NDArray[np.generic]:
-        """Return the values below which a share of all values lies."""
+        """Return the values below which a fraction of all values lies."""
         if self.values is not None:
             return np.take(self.grid(), (fraction * len(self.values)).astype(int))
         if self.std is not None and self.mean is not None:
-            # The quantile of a share of 0 is infinite.
+            # The quantile of 0 is infinite.
             return np.asarray(self.mean + self.std * ndtri(np.maximum(fraction, 2.0**-54)))
         assert self.low is not None  # noqa: S101 - see `varied`
         assert self.high is not None  # noqa: S101
         whole = self.key.kind == "whole"
-        # Every whole number has the share between itself and the next.
+        # A whole number has the probability of the interval up to the next one.
         high = self.high + 1 if whole else self.high
         if self.scale == "log":
             result = self.low * (high / self.low) ** fraction
@@ -143,7 +143,7 @@ class Parameter(Plain):
         return np.minimum(np.floor(result), self.high).astype(int) if whole else result
 
     def trial(self, fraction: float) -> Value | None:
-        """Return a value to try a case with: the start, or a quantile, or None."""
+        """Return a value for a trial case: the start, a quantile, or None."""
         if self.start is not None:
             return self.start
         if self.values is None and self.std is None and None in {self.low, self.high}:
@@ -234,7 +234,7 @@ def _begin(
 
 
 def checked(label: str, key: Key, value: object, power: int) -> Value:
-    """Return a value in the unit of its key. Raises InputError where it is not of its kind."""
+    """Return a value in the unit of its key; raise InputError if it is of another kind."""
     number = math.nan
     if isinstance(value, int | float) and not isinstance(value, bool):
         number = scaled(value, power) if -LARGEST < value < LARGEST else math.inf
@@ -255,7 +255,7 @@ def _between(
         refuse(f"{label} has no high end", "high beside low")
     low, high = read("low"), read("high")
     whole = key.kind == "whole"
-    # Ends that are other keys depend on the sample.
+    # Limits that are other keys depend on the sample.
     lower = -math.inf if isinstance(key.lower, str) else key.lower
     upper = math.inf if isinstance(key.upper, str) else key.upper
     if whole and not lower <= low <= high <= upper:

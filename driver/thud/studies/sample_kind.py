@@ -37,15 +37,15 @@ if TYPE_CHECKING:
 
 R = TypeVar("R", bound=StudyResult)
 
-# More samples than this have to be confirmed.
+# More samples are computed only with `allow_large`.
 MAX_SAMPLES = 100_000
 _FILE_FORMATS = ("auto", "netcdf", "zarr")
 
 
 def _require_no_floor(case: Case) -> None:
-    """Raise InputError where a surrogate would have to know a floor."""
+    """Raise InputError for a case with a floor, which surrogates do not model."""
     if case.floor:
-        refuse("[surrogate] knows no floors", "a case without &floor")
+        refuse("[surrogate] is not allowed with a floor", "a case without &floor")
 
 
 class DropsKind(Kind[SampleStudy, R]):
@@ -90,19 +90,19 @@ class DropsKind(Kind[SampleStudy, R]):
         return replace(result, plan=plan)
 
     def with_surrogate(self, study: SampleStudy, trained: Surrogate) -> SampleStudy:
-        """Return a study whose samples a surrogate answers. Raises InputError where it cannot."""
+        """Return a study whose samples a surrogate predicts; raise InputError if it cannot."""
         _require_no_floor(study.case)
         trained.require(study.case, study.key_columns(study.parameter_columns(0, 1)))
         return replace(study, plan=None, surrogate=trained)
 
-    def require(self, study: SampleStudy, **how: Unpack[RunOptions]) -> None:
-        """Raise InputError where there are too many samples, or no such backend."""
-        if study.count > MAX_SAMPLES and not how.get("allow_large"):
+    def require(self, study: SampleStudy, **options: Unpack[RunOptions]) -> None:
+        """Raise InputError for too many samples or an unknown backend."""
+        if study.count > MAX_SAMPLES and not options.get("allow_large"):
             refuse(
                 self.describe(study),
                 f"up to {MAX_SAMPLES} samples, or allow_large=True (--yes)",
             )
-        checked_backend(how.get("backend"), how.get("workers"), how.get("scheduler"))
+        checked_backend(options.get("backend"), options.get("workers"), options.get("scheduler"))
 
     def listed_files(self, study: SampleStudy) -> list[str]:
         """Return the names of the figures, and of the surrogate that is trained."""
@@ -114,7 +114,7 @@ class SampleKind(DropsKind[R]):
     """A kind of study that computes samples of drops."""
 
     def describe(self, study: SampleStudy) -> str:
-        """Return how many samples a study has and how much disk it needs."""
+        """Return the number of samples of a study and its size on disk."""
         space = disk_space(study) / 1e6
         amount = f"{space / 1e3:.3g} GB" if space > 1e3 else f"{space:.2g} MB"  # noqa: PLR2004
         by = ""
@@ -124,18 +124,20 @@ class SampleKind(DropsKind[R]):
             by = f" by a surrogate of {len(study.surrogate.points)} drops"
         return f"{study.name}: {study.count} samples of {study.model}{by}, about {amount} on disk"
 
-    def compute(self, study: SampleStudy, results: Results | None, **how: Unpack[RunOptions]) -> R:
+    def compute(
+        self, study: SampleStudy, results: Results | None, **options: Unpack[RunOptions]
+    ) -> R:
         """Return the result of all samples, computed or continued."""
         try:
             if study.plan:
-                study = replace(study, surrogate=train(study, results, how))
+                study = replace(study, surrogate=train(study, results, options))
             folder = results.folder if results else None
-            return self.conclude(study, compute_samples(study, folder, how))
+            return self.new_result(study, compute_samples(study, folder, options))
         except MemoryError as error:
             refuse(f"{study.count} samples do not fit in memory", "fewer samples", error)
 
     @abstractmethod
-    def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> R:
+    def new_result(self, study: SampleStudy, dataset: xr.Dataset) -> R:
         """Return the result of all samples."""
 
     def identity_files(self, study: SampleStudy) -> list[str]:

@@ -12,15 +12,14 @@ from thud.base.bridge import version
 from thud.base.checks import refuse
 from thud.case.keys import DENSITY
 from thud.impact.ensemble import get_cost, solve_many
-from thud.impact.quantities import FLOOR_QUANTITIES, LEVELS, SCALAR_QUANTITIES
-from thud.level.levels import BANDWIDTHS, peak_count
+from thud.impact.quantities import sample_results
+from thud.level.levels import peak_count
 from thud.studies.sampling import sampler_versions, unit_samples
 from thud.studies.study import Study, wall_volume
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.base._schema import BandSet, LevelsForce
     from thud.case.case import Case
     from thud.studies.temperature import Temperature
     from thud.studies.trained_surrogate import Plan, Surrogate
@@ -30,8 +29,8 @@ if TYPE_CHECKING:
 
 # A block of samples should take about this time, s.
 _BLOCK_TIME = 0.5
-# Samples of a block that a surrogate answers, in about this time.
-_ANSWERED = 2**16
+# Samples of a block that a surrogate predicts in about this time.
+_SURROGATE_BLOCK = 2**16
 
 
 @dataclass(frozen=True)
@@ -45,13 +44,13 @@ class SampleStudy(Study):
     size, seed : int
         Number of samples that are drawn (of base samples for ``"saltelli"``), and the seed.
     temperature : Temperature or None
-        Law of the material where the temperature varies.
+        Effect of a temperature that varies on the material.
     format : str
         ``"netcdf"``, ``"zarr"``, or ``"auto"``: Zarr for what is large.
     plan : Plan or None
         How a surrogate is trained for its samples.
     surrogate : Surrogate or None
-        What answers its samples instead of the model.
+        Predicts its samples instead of the model.
     """
 
     design: str = "grid"
@@ -66,7 +65,7 @@ class SampleStudy(Study):
     counts_peaks: ClassVar[bool] = False
 
     def own_identity(self) -> dict[str, str]:
-        """Return design and temperature law."""
+        """Return design, temperature law and surrogate."""
         result = sampler_versions(self.design) | {"[design] kind": self.design}
         if self.size:
             result |= {"[design] size": f"{self.size}", "[design] seed": f"{self.seed}"}
@@ -98,9 +97,9 @@ class SampleStudy(Study):
     def block_size(self) -> int:
         """Number of samples that are computed together, the same for all backends."""
         if self.plan or self.surrogate:
-            return _ANSWERED
+            return _SURROGATE_BLOCK
         if self.design in {"grid", "list"}:
-            # A grid may be larger than the memory; its ends do.
+            # A grid may be larger than the memory; its ends suffice.
             first = {p.name: replace(p, count=min(p.count, 2)).grid()[:1] for p in self.parameters}
         else:
             first = self.parameter_columns(0, 1)
@@ -135,10 +134,10 @@ class SampleStudy(Study):
 
 @dataclass(frozen=True)
 class Block:
-    """Samples from number `start` on that are computed together.
+    """Samples from index `start` on that are computed together.
 
-    They differ from the case in the columns, shape (n_sample,), by names of keys; `version` is that
-    of thud which has to compute them. A surrogate answers instead of the model if there is one.
+    They differ from the case in the columns, shape (n_sample,), by names of keys. `version` is the
+    version of thud that has to compute them, `surrogate` what predicts them instead of the model.
     """
 
     start: int
@@ -152,7 +151,7 @@ class Block:
 def evaluate(block: Block) -> Columns:
     """Return the results of a block by their names in `ALL_QUANTITIES`; NaN where a sample fails.
 
-    Raises InputError where this is another version of thud.
+    Raises InputError in another version of thud.
     """
     if block.version != version():
         refuse(
@@ -162,31 +161,11 @@ def evaluate(block: Block) -> Columns:
     if block.surrogate:
         return block.surrogate.predict(block.case, block.columns)
     result = solve_many(block.columns, block.case, threads=1, forces=block.counts_peaks)
-    columns: Columns = {name: getattr(result, name) for name in SCALAR_QUANTITIES}
-    for name, (force, bands) in level_names(block.case).items():
-        columns[name] = result.levels[force, bands]
-    columns |= {f"contact_{bands}_level": level for bands, level in result.contact_levels.items()}
-    columns |= {n: v for n in FLOOR_QUANTITIES if (v := getattr(result, n)) is not None}
+    columns = sample_results(result)
+    columns["status"] = columns["status"].astype("int8")
     if block.counts_peaks:
         forces = getattr(result, f"{block.case.levels.force}_force")
         columns["peaks"] = np.array(
             [peak_count(f, result.sample_rate) if np.isfinite(f).all() else np.nan for f in forces]
         )
-    return columns | {
-        "margin": result.margin,
-        "conforms": result.conforms,
-        "status": result.status.astype("int8"),
-        "reason": result.reason,
-    }
-
-
-def level_names(case: Case) -> dict[str, tuple[LevelsForce, BandSet]]:
-    """Return force and bands of the levels of each sample, by name.
-
-    Octaves are always among them: the verdict needs them.
-    """
-    bandwidths = {
-        BANDWIDTHS[0],
-        *(BANDWIDTHS if case.levels.bands == "both" else [case.levels.bands]),
-    }
-    return {name: entry for name, entry in LEVELS.items() if entry[1] in bandwidths}
+    return columns

@@ -26,7 +26,7 @@ _MAX_SAMPLES = 2**63 - 1
 
 
 def sampler_versions(design: str) -> dict[str, str]:
-    """Return the versions of the packages that sample a design; others may give other points."""
+    """Return the versions of the packages that sample a design, on which its points depend."""
     names = {"saltelli": ("scipy", "SALib")}.get(design, ("scipy",) if design in SAMPLED else ())
     return {f"{name.lower()}_version": version(name) for name in names}
 
@@ -43,7 +43,7 @@ def read_design(
     for parameter in parameters:
         if design in SAMPLED and parameter.count:
             refuse(
-                f"[parameters] {parameter.name}: count has no use in a {design} design",
+                f"[parameters] {parameter.name}: count is not used by a {design} design",
                 "low, high and scale",
             )
         if design not in SAMPLED and not parameter.size:
@@ -84,7 +84,7 @@ def unit_samples(  # noqa: PLR0913, PLR0917 - the numbers of a design
         if start:
             points.fast_forward(start)
         with warnings.catch_warnings():
-            # The whole is a power of 2; its parts need not be.
+            # The size of the design is a power of 2, that of a block need not be.
             warnings.simplefilter("ignore", UserWarning)
             return _float(points.random(stop - start))
     return _all_points(design, dimension, size, seed)[start:stop]
@@ -92,7 +92,7 @@ def unit_samples(  # noqa: PLR0913, PLR0917 - the numbers of a design
 
 @lru_cache(maxsize=1)
 def _all_points(design: str, dimension: int, size: int, seed: int) -> NDArray[np.float64]:
-    """Return all points of a design that cannot be sampled in parts."""
+    """Return all points of a design that cannot be sampled block by block."""
     try:
         if design == "latin_hypercube":
             from scipy.stats import qmc

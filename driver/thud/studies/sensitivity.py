@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from thud.studies.study import Source
 
 INDICES = {
-    "first_order": "share of the variance by this parameter alone",
+    "first_order": "fraction of the variance by this parameter alone",
     "first_order_interval": "half width of its confidence interval",
-    "total": "share of the variance by this parameter, interactions included",
+    "total": "fraction of the variance by this parameter, interactions included",
     "total_interval": "half width of its confidence interval",
 }
 CONFIDENCE = 0.95
@@ -48,10 +48,10 @@ class Sensitivity(SampleResult):
         Every sample of the study.
     indices : Dataset
         ``first_order`` and ``total`` index of each ``output`` and ``parameter``, and half widths
-        of their confidence intervals of 95 %. Outputs that do not vary have none: NaN. Of a
-        surrogate also ``surrogate``, the variance of its errors over that of each output.
+        of their confidence intervals of 95 %; NaN for outputs that do not vary. With a surrogate
+        also ``surrogate``, the variance of its errors over that of each output.
     left_out : int
-        Base samples left out because one of their samples has no result.
+        Number of base samples left out because one of their samples has no result.
     """
 
     dataset: xr.Dataset
@@ -72,9 +72,9 @@ class Sensitivity(SampleResult):
         for output in self.indices["output"].to_numpy():
             row = self.indices.sel(output=output)
             pairs = zip(row["total"].to_numpy(), row["total_interval"].to_numpy(), strict=True)
-            rest = [f"{float(row['surrogate']):.3f}"] if "surrogate" in row else []
+            error = [f"{float(row['surrogate']):.3f}"] if "surrogate" in row else []
             rows.append(
-                (str(output), *(f"{total:.3f} ± {half:.3f}" for total, half in pairs), *rest)
+                (str(output), *(f"{total:.3f} ± {half:.3f}" for total, half in pairs), *error)
             )
         return rows
 
@@ -95,7 +95,7 @@ class SensitivityKind(SampleKind[Sensitivity]):
     name = "sensitivity"
     designs = ("saltelli",)
 
-    def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
+    def new_result(self, study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
         """Return the Sobol indices of all samples."""
         return _indices(study, dataset.load())
 
@@ -114,15 +114,15 @@ KIND = SensitivityKind()
 
 
 def sensitivity(
-    study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[RunOptions]
+    study: Source, output: str | os.PathLike[str] | None = None, **options: Unpack[RunOptions]
 ) -> Sensitivity:
     """Compute Sobol indices of the octave levels, the contact time and the peak of the force.
 
     ``[design] size`` of the study is the number of base samples N, a power of 2 from 4; N (d + 2)
     samples are computed for d parameters. Arguments and errors are those of `sweep`; InputError is
-    also raised where too few samples have results.
+    also raised if too few samples have results.
     """
-    return KIND.run(study, output, **how)
+    return KIND.run(study, output, **options)
 
 
 def _indices(study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
@@ -131,9 +131,9 @@ def _indices(study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
     peak = "peak_elastic_force" if force == "elastic" else "peak_force"
     outputs = {f"level {band:g} Hz": levels[:, i] for i, band in enumerate(get_bands().nominal)}
     outputs |= {name.replace("_", " "): dataset[name].to_numpy() for name in ("contact_time", peak)}
-    # On a floor, what comes below it.
-    further = (name for name in FLOOR_QUANTITIES if name in dataset and dataset[name].ndim == 1)
-    outputs |= {name.replace("_", " "): dataset[name].to_numpy() for name in further}
+    # Quantities of drops on a floor.
+    below = (name for name in FLOOR_QUANTITIES if name in dataset and dataset[name].ndim == 1)
+    outputs |= {name.replace("_", " "): dataset[name].to_numpy() for name in below}
     dimension = len(study.parameters)
     usable = (dataset["status"].to_numpy() == 0).reshape(-1, dimension + 2).all(axis=1)
     if usable.sum() < MIN_BASE_SAMPLES:
@@ -150,7 +150,7 @@ def _indices(study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
     }
     if study.surrogate:
         meaning = {"units": "1", "long_name": "variance of the surrogate's errors over that of all"}
-        known = np.concatenate(
+        errors = np.concatenate(
             [study.surrogate.mean_square(name) for name in (f"{force}_level", "contact_time", peak)]
         )
         # Levels are in dB; other quantities are compared in dB too.
@@ -160,9 +160,9 @@ def _indices(study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
                 for i, v in enumerate(outputs.values())
             ]
         )
-        # As the indices, none where nothing varies.
+        # NaN for outputs that do not vary, as the indices.
         spread[spread <= _ROUNDING] = np.nan
-        variables["surrogate"] = ("output", known / spread, meaning)
+        variables["surrogate"] = ("output", errors / spread, meaning)
     names = {
         "output": list(outputs),
         "parameter": [parameter.coordinate for parameter in study.parameters],
@@ -177,11 +177,11 @@ def sobol_indices(
     """Return first order and total Sobol indices of a quantity, each with its half interval.
 
     `values`, shape (n (dimension + 2),), belong to the points of a ``"saltelli"`` design; `seed` is
-    that of the resampling. Indices have shape (dimension,), and are NaN where nothing varies.
+    that of the resampling. Indices have shape (dimension,); NaN if the values do not vary.
     """
     from SALib.analyze import sobol
 
-    # Rounding errors are not variance; a surrogate may withhold a quantity.
+    # Rounding errors are no variance; quantities that a surrogate withholds are NaN.
     if not np.ptp(values) > 1e-12 * np.abs(values).max():
         return tuple(np.full((4, dimension), np.nan))
     cube = {"num_vars": dimension, "names": list(map(str, range(dimension)))}

@@ -30,11 +30,11 @@ if TYPE_CHECKING:
 # What studies are read from.
 Source: TypeAlias = "str | os.PathLike[str] | Mapping[str, object] | Study"
 
-# What every study may hold.
+# Keys and tables that every study may have.
 WORDS = ("name", "case", "fixed", "parameters")
-# Longer texts are shortened to their beginning and a checksum.
-_LONG = 300
-# Quantiles of the parameters at which a case is tried.
+# Maximum length of a text before it is shortened to its beginning and a checksum.
+_MAX_LENGTH = 300
+# Quantiles of the parameters for trial cases.
 TRIAL_QUANTILES = (0.01, 0.5, 0.99)
 _NAMED_KEY = re.compile(r"&\w+: (\w+)")
 
@@ -50,11 +50,11 @@ class Study:
     kind : str
         Kind of study, see `thud.studies.kinds.KINDS`.
     case : Case
-        Everything that neither varies nor is fitted.
+        The case, with the fixed keys.
     parameters : tuple of Parameter
-        What varies or is fitted, in the units of the keys.
+        The parameters that vary or are fitted, in the units of the keys.
     density : float or None
-        Density of the wall where it is fixed instead of the mass, kg/m3.
+        Density of the wall if it is fixed instead of the mass, kg/m3.
     text : str
         The text of the study.
     inputs : tuple of path-like
@@ -76,7 +76,7 @@ class Study:
 
     @property
     def identity(self) -> dict[str, str]:
-        """What its results depend on, as texts by group and key."""
+        """Everything that its results depend on, as texts by group and key."""
         result = {"thud": version(), "kind": self.kind, **self.own_identity()}
         result["[parameters]"] = ", ".join(p.name for p in self.parameters)
         result |= {f"[parameters] {p.name}": str(p) for p in self.parameters}
@@ -87,7 +87,7 @@ class Study:
         return {key: _shortened(value) for key, value in result.items()}
 
     def trial_case(self, quantile: float) -> Case:
-        """Return the case with its parameters at a quantile; InputError where there is none."""
+        """Return the case with its parameters at a quantile; raise InputError if it is invalid."""
         acting = (p for p in self.parameters if p.key not in {DENSITY, TEMPERATURE})
         result = {p.name: p.trial(quantile) for p in acting}
         case = with_values(self.case, {name: v for name, v in result.items() if v is not None})
@@ -99,9 +99,9 @@ class Study:
 
 
 def _shortened(text: str) -> str:
-    if len(text) <= _LONG:
+    if len(text) <= _MAX_LENGTH:
         return text
-    return f"{text[:_LONG]}... ({sha256(text.encode()).hexdigest()[:16]})"
+    return f"{text[:_MAX_LENGTH]}... ({sha256(text.encode()).hexdigest()[:16]})"
 
 
 @contextmanager
@@ -126,7 +126,7 @@ def read_tables(
 
 
 def named_files(value: object, folder: Path) -> Iterator[Path]:
-    """Yield the files that the texts of a study name, relative to its folder."""
+    """Yield the files whose paths, relative to a folder, are texts of a study."""
     if isinstance(value, str):
         with suppress(OSError, ValueError):
             if (folder / value).is_file():
@@ -150,11 +150,15 @@ def _text(source: Mapping[str, object]) -> str:
     try:
         return json.dumps(source, default=_plain)
     except (TypeError, ValueError, RecursionError) as error:
-        refuse(f"the study is not a text ({error})", "tables, lists, numbers and text", error)
+        refuse(
+            f"the study cannot be written as JSON ({error})",
+            "tables, lists, numbers and text",
+            error,
+        )
 
 
 def _plain(value: object) -> object:
-    """Return tables, paths, numbers and arrays of NumPy in types of JSON."""
+    """Return tables, paths, and NumPy numbers and arrays in types of JSON."""
     if isinstance(value, Parameter):
         return value.table
     if isinstance(value, Mapping):
@@ -174,7 +178,7 @@ def read_common(
     words: Iterable[str],
     new_parameter: Callable[[str, object, Case, float | None], Parameter],
 ) -> Study:
-    """Read what all kinds share; `words` are those that this kind has in addition to `WORDS`."""
+    """Read the part that all kinds share; `words` are the kind's own keys beside `WORDS`."""
     require_words("the study", content, (*WORDS, *words))
     fixed, parameters = (table_of(content, name) for name in ("fixed", "parameters"))
     name = content["name"]
@@ -239,20 +243,20 @@ def fix_keys(
 
 
 def _require_use(fixed: Mapping[str, Any], parameters: Mapping[str, Any]) -> None:
-    """Raise InputError where one key overrules another."""
+    """Raise InputError if one key overrides another."""
     if {"mass", DENSITY.name} <= {*fixed, *parameters}:
         refuse("mass and density are both given", "one of them")
     for name in fixed:
-        # A fixed value may be the middle of a normal distribution.
+        # A fixed value may be the mean of a normal distribution.
         if name in parameters and ("std" not in parameters[name] or "mean" in parameters[name]):
             refuse(
-                f"[fixed] {name} has no use beside [parameters] {name}",
+                f"[fixed] {name} has no effect beside [parameters] {name}",
                 "one of them, or std without mean in [parameters]",
             )
 
 
 def _require_valid(study: Study, fixed: Mapping[str, Any]) -> None:
-    """Raise InputError where the library refuses a fixed value for all values of the parameters."""
+    """Raise InputError if the library refuses a fixed value for all values of the parameters."""
     keys = {name.partition("(")[0] for name in fixed} | ({"mass"} if study.density else set())
     refusals = []
     for quantile in TRIAL_QUANTILES:
@@ -273,8 +277,8 @@ def with_density(case: Case, density: float) -> Case:
 
 
 def wall_volume(outer_radius: Any, wall_thickness: Any) -> Any:  # noqa: ANN401 - or arrays
-    """Return the volume of the wall of a ball, m3, from its measures, m."""
+    """Return the volume of the wall of a ball, m3; lengths in m."""
     inner = outer_radius - wall_thickness
-    # Powers of absurd radii raise OverflowError, their products are infinite.
+    # Powers of extreme radii would raise OverflowError; their products are infinite.
     outer_cube, inner_cube = (radius * radius * radius for radius in (outer_radius, inner))
     return 4 / 3 * np.pi * (outer_cube - inner_cube)

@@ -20,14 +20,14 @@ class StudyResult(Displayed):
     Attributes
     ----------
     warnings : tuple of str
-        Why numbers may be wrong or missing, a sentence each.
+        Why numbers may be wrong or missing.
     """
 
     warnings: tuple[str, ...]
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was done, a sentence each."""
+        """Notes on what was done."""
         return ()
 
     @property
@@ -61,7 +61,7 @@ class SampleResult(StudyResult):
 
     @property
     def warnings(self) -> tuple[str, ...]:  # type: ignore[override]
-        """How many samples have no results, and why."""
+        """Number of samples without results, and a reason."""
         failed = self.dataset["status"].values != 0
         if not failed.any():
             return ()
@@ -70,11 +70,11 @@ class SampleResult(StudyResult):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """How close the surrogate is, and how many verdicts it leaves in doubt."""
+        """Accuracy of the surrogate, and how many verdicts it leaves undecided."""
         if "surrogate" not in self.dataset.attrs:
             return ()
-        doubtful = self.dataset["doubtful"]
-        share = f"{int(doubtful.sum())} of {doubtful.size} verdicts in doubt"
+        undecided = self.dataset["undecided"]
+        share = f"{int(undecided.sum())} of {undecided.size} verdicts undecided"
         return (f"{self.dataset.attrs['surrogate']}; it leaves {share}",)
 
     @property

@@ -1,4 +1,4 @@
-"""Surrogates as a kind of study: a region of the parameters, learned once and used by others."""
+"""Surrogates as a kind of study: trained in a region of the parameters, used by other studies."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ class SurrogateKind(DropsKind[Surrogate]):
         return result
 
     def compute(
-        self, study: SampleStudy, results: Results | None, **how: Unpack[RunOptions]
+        self, study: SampleStudy, results: Results | None, **options: Unpack[RunOptions]
     ) -> Surrogate:
         """Return the surrogate, trained or read."""
-        return train(study, results, how)
+        return train(study, results, options)
 
     def describe(self, study: SampleStudy) -> str:
-        """Return what is learned."""
+        """Return what the surrogate is trained on, in one line."""
         names = ", ".join(p.name for p in study.parameters)
         size = study.plan.size if study.plan else 0
         return f"{study.name}: {study.model} by {names}, up to {size} drops"
@@ -72,13 +72,13 @@ KIND = SurrogateKind()
 
 
 def surrogate(
-    study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[RunOptions]
+    study: Source, output: str | os.PathLike[str] | None = None, **options: Unpack[RunOptions]
 ) -> Surrogate:
-    """Train a surrogate: what studies may ask instead of the model.
+    """Train a surrogate: a fast approximation of the model, which studies take as `surrogate`.
 
-    Each parameter of the study has low and high. Arguments and errors are those of `sweep`, which
-    takes the result as `surrogate`, and so do the others. The drops are kept; an interrupted
-    training is continued. InputError is also raised where a drop has no result or the number of
-    peaks differs among drops, NumericalError where the error exceeds its bound with all drops.
+    Each parameter of the study has low and high. Arguments and errors are those of `sweep`. The
+    drops are kept; an interrupted training is continued. InputError is also raised if a drop has no
+    result or drops differ in their number of peaks, NumericalError if the error exceeds its bound
+    with all drops.
     """
-    return KIND.run(study, output, **how)
+    return KIND.run(study, output, **options)

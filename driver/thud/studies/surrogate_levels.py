@@ -1,4 +1,4 @@
-"""Levels as the target of a fit whose impacts a surrogate answers."""
+"""Levels as the target of a fit whose search a surrogate predicts."""
 
 from __future__ import annotations
 
@@ -27,17 +27,16 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
-    """What a surrogate says of one drop, in the units of a target, shape (size,)."""
+class PredictedLevels:
+    """What a surrogate predicts of one drop, in the units of a target, shape (size,)."""
 
     values: NDArray[np.float64]
 
 
 class SurrogateLevels(LevelMisfit):
-    """How far a surrogate's levels are from a target.
+    """How far the levels that a surrogate predicts are from a target.
 
-    Where the uncertainties of the target are given, the mean square of the surrogate's held-out
-    errors is added to their variances.
+    The mean squares of its held-out errors add to the variances of the target, where known.
     """
 
     def __init__(self, misfit: LevelMisfit, surrogate: Surrogate, case: Case) -> None:
@@ -54,14 +53,14 @@ class SurrogateLevels(LevelMisfit):
         own = [np.array([r * s]) for r, s in zip(ratios, sizes, strict=True)]
         for i, quantity in enumerate(self.extra):
             if quantity == "contact_time":
-                # Many drops have it to the next sample.
+                # Many drops have a contact time rounded to the next sample.
                 own[i] = np.hypot(own[i], 1 / case.sampling.sample_rate)
         self.model_error = freeze(np.concatenate([missed, *own]))
         if self.known_noise:
             self.deviation = freeze(np.hypot(self.deviation, self.model_error))
 
     def solve(self, case: Case) -> Impact:
-        """Return the answer for a case, which only `values` reads."""
+        """Return the prediction for a case, which only `values` reads."""
         columns: dict[str, Any] = {
             name: np.array([value_in(case, name)]) for name in self.surrogate.keys
         }
@@ -71,18 +70,20 @@ class SurrogateLevels(LevelMisfit):
         levels = result[self.name][0][self.indices]
         values = np.concatenate([levels, *(result[name] for name in self.extra)])
         if not np.isfinite(values).all():
-            refuse("the surrogate does not answer all quantities of the target", "others")
-        return cast("Impact", Answer(values))
+            refuse("the surrogate withholds a quantity of the target", "other quantities")
+        return cast("Impact", PredictedLevels(values))
 
     def values(self, impact: Impact) -> NDArray[np.float64]:
-        """Return what is compared, dB, s and 1, of an answer or an impact, shape (size,)."""
-        return impact.values if isinstance(impact, Answer) else super().values(impact)
+        """Return what is compared, dB, s and 1, of a prediction or an impact, shape (size,)."""
+        return impact.values if isinstance(impact, PredictedLevels) else super().values(impact)
 
 
-def answered(misfit: Misfit, surrogate: Surrogate, case: Case, names: list[str]) -> SurrogateLevels:
-    """Return the comparison of a target with answers of a surrogate."""
+def surrogate_misfit(
+    misfit: Misfit, surrogate: Surrogate, case: Case, names: list[str]
+) -> SurrogateLevels:
+    """Return the misfit of a target with the predictions of a surrogate."""
     if not isinstance(misfit, LevelMisfit):
-        refuse("surrogate is not allowed for a force", "levels as target: it knows no histories")
+        refuse("surrogate is not allowed for a force", "levels as target")
     surrogate.require(case, names)
     return SurrogateLevels(misfit, surrogate, case)
 
@@ -101,15 +102,15 @@ def within_region(entry: Range, surrogate: Surrogate) -> Range:
     return replace(entry, low=low, high=high, spread=spread)
 
 
-def confirmed(fit: Fit) -> Fit:
-    """Return a fit with the impacts of the model itself, and what these say of the surrogate."""
+def recompute(fit: Fit) -> Fit:
+    """Return a fit with the impacts of the model, and warnings where the surrogate differs."""
     targets = []
     missed = share = 0.0
     for target in fit.targets:
         misfit = cast("SurrogateLevels", target.misfit)
         impact = compute(target.case)
         off = np.abs(misfit.values(impact) - misfit.values(target.impact))
-        # What all training drops share has no error.
+        # Quantities that are equal in all training drops have no error.
         known = misfit.model_error > 0
         missed = max(missed, float((off[known] / misfit.model_error[known]).max(initial=0.0)))
         if misfit.known_noise:
@@ -121,10 +122,10 @@ def confirmed(fit: Fit) -> Fit:
             f"the errors of the surrogate are up to {100 * share:.2g} % of the variances of the "
             "residuals"
         )
-    # One in 15 000 of a normal distribution; held-out errors have longer tails.
+    # Exceeded by 1 in 15 000 normal errors; held-out errors have longer tails.
     if missed > 4:  # noqa: PLR2004
         messages.append(
-            f"the model itself differs at the result from the surrogate by {missed:.2g} standard "
+            f"at the result the model differs from the surrogate by {missed:.2g} standard "
             "deviations of the surrogate's errors"
         )
     return replace(fit, targets=tuple(targets), warnings=(*fit.warnings, *messages))

@@ -34,9 +34,9 @@ if TYPE_CHECKING:
 
     Values = NDArray[np.float64]
 
-# Samples that are scanned together for the extent of their keys.
+# Samples that are scanned together for the ranges of their keys.
 _SCANNED = 2**17
-# Variations of this part of a mean are rounding errors.
+# Variations below this fraction of the mean are rounding errors.
 _ROUNDING = 1e-10
 _GROUPS_OF_RECORDS = ("sampling", "levels", "limits")
 
@@ -63,11 +63,11 @@ class TrainingStudy(SampleStudy):
         return super().parameter_columns(self.first + start, self.first + stop)
 
 
-def train(study: SampleStudy, results: Results | None, how: RunOptions) -> Surrogate:
+def train(study: SampleStudy, results: Results | None, options: RunOptions) -> Surrogate:
     """Return the surrogate of all samples of a study, trained or read from its directory.
 
-    Its drops are kept there, as samples of a study of their own. Raises InputError where a key
-    cannot be learned or a drop has no result, NumericalError where the error exceeds its bound.
+    Its drops are kept there, as samples of a study of their own. Raises InputError if a key cannot
+    be learned or a drop has no result, NumericalError if the error exceeds its bound.
     """
     plan = study.plan
     assert plan is not None  # noqa: S101 - see `SampleKind.compute`
@@ -75,7 +75,7 @@ def train(study: SampleStudy, results: Results | None, how: RunOptions) -> Surro
     name = surrogate_name(study)
     folder = results.folder if results else None
     if folder:
-        # Anything else of this name is replaced, see `take`.
+        # Any other file of this name is replaced, see `open_results`.
         with suppress(InputError):
             saved = read_surrogate(folder / name)
             if saved.identity == study.identity:
@@ -90,7 +90,7 @@ def train(study: SampleStudy, results: Results | None, how: RunOptions) -> Surro
         if results:
             paths = {results.folder / file: read_identity for file in result_names(drops)}
             require_version(paths, drops, results)
-        stages.append(compute_samples(drops, folder, how).load())
+        stages.append(compute_samples(drops, folder, options).load())
         surrogate = _learn(drops, stages, plan, study.identity)
         label, error = surrogate.worst
         errors.append(f"{error:.3g} dB with {stop}")
@@ -112,7 +112,7 @@ def surrogate_name(study: SampleStudy) -> str:
 
 
 def _ranges(study: SampleStudy) -> tuple[Parameter, ...]:
-    """Return the keys of the library that differ among the samples, from minimum to maximum."""
+    """Return the keys that vary among the samples, each with its minimum and maximum."""
     low: dict[str, float] = {}
     high: dict[str, float] = {}
     for start in range(0, study.count, _SCANNED):
@@ -136,16 +136,18 @@ def _ranges(study: SampleStudy) -> tuple[Parameter, ...]:
 def _learn(
     drops: TrainingStudy, stages: list[xr.Dataset], plan: Plan, identity: dict[str, str]
 ) -> Surrogate:
-    """Return the surrogate of some drops."""
-    whole = {name: np.concatenate([s[name].values for s in stages]) for name in stages[0].data_vars}
-    failed = whole["status"] != 0
+    """Return the surrogate trained on the drops of some stages."""
+    results = {
+        name: np.concatenate([s[name].values for s in stages]) for name in stages[0].data_vars
+    }
+    failed = results["status"] != 0
     if failed.any():
-        reason = whole["reason"][failed][0]
+        reason = results["reason"][failed][0]
         refuse(
             f"{failed.sum()} of {failed.size} drops of the surrogate have no result ({reason})",
             "ranges in which all drops have results",
         )
-    peaks, counts = np.unique(whole["peaks"], return_counts=True)
+    peaks, counts = np.unique(results["peaks"], return_counts=True)
     if peaks.size > 1:
         listed = ", ".join(f"{p:.0f} in {n}" for p, n in zip(peaks, counts, strict=True))
         refuse(
@@ -153,13 +155,13 @@ def _learn(
             "ranges in which it is the same: a count cannot be interpolated",
         )
     quantities = {
-        str(n): _decibels(str(n), v) for n, v in whole.items() if n in SCALAR_QUANTITIES | LEVELS
+        str(n): _decibels(str(n), v) for n, v in results.items() if n in SCALAR_QUANTITIES | LEVELS
     }
     region = np.array([(p.low, p.high) for p in drops.parameters])
     points = unit_samples(drops.design, len(region), drops.size, drops.seed, 0, drops.size)
     points[:, region[:, 0] == region[:, 1]] = 0.0
     values = np.concatenate(list(quantities.values()), axis=1)
-    outputs = {name: part.shape[1] for name, part in quantities.items()}
+    outputs = {name: columns.shape[1] for name, columns in quantities.items()}
     blank = np.full((1, values.shape[1]), np.nan)
     surrogate = Surrogate(
         case=drops.case, keys=tuple(p.name for p in drops.parameters), region=region,
@@ -174,7 +176,7 @@ def _learn(
     ]
     if assessed:
         refuse(
-            f"{assessed[0]} is 0 or not known in some drops", "a model and ranges in which it is"
+            f"{assessed[0]} is 0 or not known in some drops", "a model and ranges where it is known"
         )
     return replace(surrogate, **regress(points, values, surrogate.assessed))
 
@@ -192,25 +194,25 @@ def _decibels(name: str, values: Values) -> Values:
 def regress(points: Values, values: Values, assessed: NDArray[np.bool_]) -> dict[str, Any]:
     """Return a Gaussian process through values at points in the unit cube.
 
-    The lengths of correlation and the noise (steps of the time integration, contacts node by
-    node) maximize the likelihood of what is assessed; all other quantities share them. Parts of a
-    `Surrogate`: length, weights, mean, scale, residuals.
+    Correlation lengths and noise (steps of the time integration, contacts node by node) maximize
+    the likelihood of the assessed quantities; all others share them. Returns the fields length,
+    weights, mean, scale and residuals of a `Surrogate`.
     """
     with require_extra("surrogate"):
         from sklearn.exceptions import ConvergenceWarning
         from sklearn.gaussian_process import GaussianProcessRegressor
         from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
     mean, scale = values.mean(axis=0), values.std(axis=0)
-    # Such as a contact time that was asked for.
+    # Constant quantities, such as a prescribed contact time.
     scale[scale <= _ROUNDING * np.maximum(np.abs(mean), 1.0)] = 0.0
-    varies = scale > 0  # false where there is no value
+    varies = scale > 0  # false for NaN
     normal = np.where(varies, (values - mean) / np.where(varies, scale, 1.0), 0.0)
     chosen = assessed & varies if (assessed & varies).any() else assessed
     shape = Matern(np.full(points.shape[1], 2.0), (0.05, 50.0), nu=SMOOTHNESS)
     kernel = ConstantKernel(10.0, (1e-2, 1e6)) * shape + WhiteKernel(1e-2, (1e-10, 10.0))
     process = GaussianProcessRegressor(kernel)
     with warnings.catch_warnings(), threadpool_limits(1, "blas"):
-        # A parameter without effect ends at the longest length.
+        # A parameter without effect ends at the maximum length.
         warnings.simplefilter("ignore", ConvergenceWarning)
         process.fit(points, normal[:, chosen])
         inverse = cho_solve((process.L_, True), np.eye(len(points)))

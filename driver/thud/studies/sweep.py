@@ -74,7 +74,7 @@ class SweepKind(SampleKind[Sweep]):
     name = "sweep"
     designs = ("grid", "list", "random", "latin_hypercube", "sobol")
 
-    def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> Sweep:  # noqa: ARG002
+    def new_result(self, study: SampleStudy, dataset: xr.Dataset) -> Sweep:  # noqa: ARG002
         """Return the results of all samples as they are."""
         return Sweep(dataset)
 
@@ -83,17 +83,17 @@ KIND = SweepKind()
 
 
 def sweep(
-    study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[RunOptions]
+    study: Source, output: str | os.PathLike[str] | None = None, **options: Unpack[RunOptions]
 ) -> Sweep:
     """Compute every sample of a study.
 
     Parameters
     ----------
     study
-        Path of a TOML file, or what would stand in it; see docs/studies.md.
+        Path of a TOML file, or its content as a mapping; see docs/studies.md.
     output
         Directory of the results; an interrupted study is continued. None: they are not written.
-    **how
+    **options
         Keywords `backend`, `workers`, `scheduler`, `allow_large`, `progress`, `replace`; see
         `thud.studies.kind.RunOptions`.
 
@@ -105,11 +105,11 @@ def sweep(
     Raises
     ------
     InputError
-        Names what cannot be used and what is allowed.
+        If the study or an option cannot be used.
     NumericalError
-        Where the backend loses samples; samples that fail have a status and a reason instead.
+        If the backend loses samples; samples that fail have a status and a reason instead.
     OSError
-        Where the results cannot be written.
+        If the results cannot be written.
 
     Examples
     --------
@@ -117,7 +117,7 @@ def sweep(
     >>> result.dataset["contact_time"].round(4).values.tolist()
     [0.0211, 0.0204]
     """
-    return KIND.run(study, output, **how)
+    return KIND.run(study, output, **options)
 
 
 def read_sweep(path: str | os.PathLike[str]) -> Sweep:
@@ -137,8 +137,8 @@ def read_sweep(path: str | os.PathLike[str]) -> Sweep:
     Raises
     ------
     InputError
-        Where there are no results of a study.
+        If there are no results of a study.
     OSError
-        Where they cannot be read for now.
+        If they cannot be read for now.
     """
     return Sweep(read_dataset(Path(path)))

@@ -1,4 +1,4 @@
-"""What the temperature of the ball does to its rubber, by the constants of the user."""
+"""Effect of the temperature of the ball on its rubber, with constants of the user."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _ORDERS = {"kelvin_voigt": 1.0, "rising": 1.0}
 
 @dataclass(frozen=True)
 class Temperature:
-    """Law of the temperature T: the modulus of elasticity, and the shift of the loss.
+    """Modulus of elasticity and shift of the loss factor as functions of the temperature T.
 
     The modulus E is E (1 + coefficient (T - reference)) at every frequency. With `c1` and `c2` the
     material behaves at T and a frequency f as at `reference` and a f, log10 a =
@@ -35,7 +35,7 @@ class Temperature:
     Attributes
     ----------
     reference : float
-        Temperature at which the case holds, degC.
+        Temperature at which the keys of the case hold, degC.
     coefficient : float or None
         Of the modulus, 1/K.
     c1, c2 : float or None
@@ -49,7 +49,7 @@ class Temperature:
 
     @property
     def table(self) -> dict[str, float]:
-        """Its table, without what is left out."""
+        """Its table in a study."""
         return {word: value for word, value in vars(self).items() if value is not None}
 
     @property
@@ -58,7 +58,7 @@ class Temperature:
         return ("youngs_modulus", "loss_factor") if self.c1 else ("youngs_modulus",)
 
     def shift(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the factor a of the frequency; not a number where c2 + T - reference <= 0."""
+        """Return the factor a of the frequency; NaN where c2 + T - reference <= 0."""
         if self.c1 is None or self.c2 is None:
             return np.ones_like(temperature)
         above = np.asarray(temperature, dtype=float) - self.reference
@@ -69,8 +69,9 @@ class Temperature:
     def act(self, case: Case, samples: dict[str, Any]) -> dict[str, Any]:
         """Return samples with the values of keys at their ``temperature``, shape (n_sample,).
 
-        Modulus and loss factor stay those at the `loss_frequency` of the case: of the fractional
-        law 1 + p (cos + i sin) (a**order - 1) with the angle pi order/2 and p = loss factor/sin.
+        Modulus and loss factor are those at the `loss_frequency` of the case: the complex modulus
+        of the fractional law changes by the factor 1 + p (cos + i sin) (a**order - 1) with the
+        angle pi order/2 and p = loss factor/sin.
         """
         result = dict(samples)
         temperature = result.pop(TEMPERATURE.name)
@@ -96,7 +97,7 @@ def _loss_law(case: Case) -> str:
 def read_temperature(
     table: object, case: Case, parameters: tuple[Parameter, ...]
 ) -> Temperature | None:
-    """Return the law in the table ``[temperature]``."""
+    """Return the temperature law of the table ``[temperature]``."""
     varies = any(parameter.key == TEMPERATURE for parameter in parameters)
     if varies != (table is not None):
         refuse(
@@ -122,12 +123,12 @@ def read_temperature(
 
 
 def _require_shift(case: Case, parameters: tuple[Parameter, ...]) -> None:
-    """Raise InputError where the damping law cannot be shifted."""
+    """Raise InputError if the damping law cannot be shifted."""
     law = _loss_law(case)
     names = {parameter.name for parameter in parameters}
     varied = next((key for key in _LAW_KEYS if key in names), None)
     if varied:
-        refuse(f"[temperature] c1 has no use where {varied} varies", f"{varied} in [fixed]")
+        refuse(f"[temperature] c1 is not allowed where {varied} varies", f"{varied} in [fixed]")
     if law not in {"fractional", *_ORDERS}:
         refuse(
             f"[temperature] c1 cannot shift the loss of {case.model.name} ({law})",  # type: ignore[union-attr]

@@ -1,4 +1,4 @@
-"""A surrogate: the results of a model by interpolation, with their errors."""
+"""A surrogate: results of a model by interpolation, with their errors."""
 
 from __future__ import annotations
 
@@ -42,27 +42,27 @@ if TYPE_CHECKING:
     Columns = dict[str, NDArray[Any]]
     Values = NDArray[np.float64]
 
-# Share of the held-out drops within the error that is stated, and the confidence of that.
+# Fraction of held-out drops within the stated error, and the confidence of that statement.
 COVERAGE = 0.95
 # Samples that are computed together: their kernel stays in the cache.
 _CHUNK = 250
-# Values beyond the region by this part of its width are rounding.
+# Values beyond the region by this fraction of its width are rounding.
 _ROUNDING = 1e-9
-# Smoothness of the kernel of Matern: responses that can be differentiated twice.
+# Smoothness of the Matern kernel: functions that are twice differentiable.
 SMOOTHNESS = 2.5
 # Fewer drops have no order statistic that bounds 95 % of all with a confidence of 95 %.
 MIN_DROPS = 64
-# Training takes the third power of their number.
+# The time of the training grows with the third power of their number.
 MAX_DROPS = 8192
 _ARRAYS = ("region", "points", "length", "weights", "mean", "scale", "residuals")
 
 
 @dataclass(frozen=True, eq=False)
 class Surrogate(StudyResult):
-    """What has been learned from some drops of a model, for others of the same region.
+    """Prediction of drops of a model from training drops of the same region.
 
-    A Gaussian process interpolates all quantities, in dB: levels, and 20 lg of what has another
-    unit. Each quantity has an error: 95 % of drops that it was not trained on lie within it, with a
+    A Gaussian process interpolates all quantities, in dB: levels, and 20 lg of other quantities.
+    Each has an error: that of 95 % of drops which it was not trained on is smaller, with a
     confidence of 95 % (order statistic of the leave-one-out residuals).
 
     Attributes
@@ -74,17 +74,17 @@ class Surrogate(StudyResult):
     region : ndarray, shape (n_key, 2)
         Minimum and maximum of each key.
     outputs : dict of str to int
-        Quantities, and how many numbers each has: levels one per band.
+        Quantities, and the number of values of each: levels have one per band.
     bound : float
-        Maximum error of what is answered, dB; other quantities are NaN.
+        Maximum error of a predicted quantity, dB; quantities with larger errors are NaN.
     peaks : int
         Number of peaks of the assessed force, the same in all drops.
     identity : dict of str to str
-        What the drops and their choice depend on.
+        Everything that the drops depend on, as texts by group and key.
     points : ndarray, shape (n_drop, n_key)
         The drops, in the unit cube.
     length : ndarray, shape (n_key,)
-        Lengths of correlation there.
+        Correlation lengths in the unit cube.
     weights : ndarray, shape (n_drop, n_number)
         Weights of the kernels of the drops.
     mean, scale : ndarray, shape (n_number,)
@@ -129,7 +129,7 @@ class Surrogate(StudyResult):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """How close it is, and what it does not answer."""
+        """Its accuracy."""
         return (self.accuracy,)
 
     def plot(self) -> Figure:
@@ -150,7 +150,7 @@ class Surrogate(StudyResult):
 
     @property
     def assessed(self) -> NDArray[np.bool_]:
-        """Which numbers the verdict depends on, shape (n_number,)."""
+        """Whether the verdict depends on each number, shape (n_number,)."""
         names = {f"{self.case.levels.force}_level", "contact_time", "restitution"}
         return np.repeat([name in names for name in self.outputs], list(self.outputs.values()))
 
@@ -158,7 +158,7 @@ class Surrogate(StudyResult):
     def errors(self) -> Values:
         """Error of each number, dB, shape (n_number,); NaN where the model has no such result."""
         count = len(self.points)
-        # With 58 drops or fewer there is no such order statistic.
+        # There is no such order statistic for 58 drops or fewer.
         rank = int(binom.ppf(COVERAGE, count, COVERAGE))
         result: Values = np.sort(np.abs(self.residuals), axis=0)[rank]
         return result
@@ -171,20 +171,20 @@ class Surrogate(StudyResult):
 
     @property
     def accuracy(self) -> str:
-        """How it was trained, its largest assessed error, and what it does not answer."""
+        """Number of training drops, maximum assessed error, and quantities that it withholds."""
         label, error = self.worst
         result = (
             f"surrogate of {len(self.points)} drops: 95 % of held-out drops within {error:.2g} dB "
-            f"({label}; the rest of the verdict closer)"
+            f"({label}; other quantities of the verdict have smaller errors)"
         )
         if self.withheld:
-            result += f"; not answered, with errors above {self.bound:g} dB: "
+            result += f"; withheld, with errors above {self.bound:g} dB: "
             result += ", ".join(self.withheld)
         return result
 
     @property
     def withheld(self) -> list[str]:
-        """Numbers that are not answered because their errors exceed the bound."""
+        """Names of the numbers that are not predicted because their errors exceed the bound."""
         pairs = zip(self.labels, self.errors, strict=True)
         return [label for label, error in pairs if error > self.bound]
 
@@ -204,13 +204,13 @@ class Surrogate(StudyResult):
         return dict(zip(self.outputs, np.split(numbers, ends, axis=1), strict=True))
 
     def require(self, case: Case, names: Iterable[str]) -> None:
-        """Raise InputError where a study of a case, with some parameters, needs another."""
+        """Raise InputError if it cannot predict a case in which the named keys vary."""
         require_kind("surrogate", self, Surrogate)
         if (trained := self.identity["thud"]) != version():
             refuse(f"the surrogate was trained by thud {trained}", f"training by thud {version()}")
         if more := [name for name in names if name not in self.keys]:
             refuse(
-                f"{', '.join(more)}: the surrogate was not trained on it",
+                f"the surrogate was not trained on {', '.join(more)}",
                 f"parameters among {', '.join(self.keys)}",
             )
         middle = dict(zip(self.keys, self.region.mean(axis=1).tolist(), strict=True))
@@ -221,14 +221,14 @@ class Surrogate(StudyResult):
         now = keys_of(with_values(case, middle))
         if changed := [key for key in before if before[key] != now.get(key)]:
             key = changed[0]
-            refuse(f"{key} = {now.get(key)}: the surrogate was trained with {before[key]}", "that")
+            refuse(f"{key} = {now.get(key)} differs from that of the surrogate", before[key])
 
     def predict(self, case: Case, columns: Columns) -> Columns:
         """Return the results of samples of a case that differ in some keys, shape (n_sample,) each.
 
-        They are those of `thud.studies.samples.evaluate`, and ``doubtful``: the verdict could
-        change by the errors. Samples outside the region have a status and a reason instead. Raises
-        InputError as `require`.
+        They are those of `thud.studies.samples.evaluate`, and ``undecided``: whether the errors
+        could change the verdict. Samples outside the region have a status and a reason instead.
+        Raises InputError as `require`.
         """
         self.require(case, columns)
         with require_extra("surrogate"):
@@ -247,13 +247,13 @@ class Surrogate(StudyResult):
         kernel = Matern(self.length, nu=SMOOTHNESS)
         numbers = np.empty((count, len(self.mean)))
         for start in range(0, count, _CHUNK):
-            some = slice(start, start + _CHUNK)
-            numbers[some] = kernel(points[some], self.points) @ self.weights
+            chunk = slice(start, start + _CHUNK)
+            numbers[chunk] = kernel(points[chunk], self.points) @ self.weights
         numbers = numbers * self.scale + self.mean
         numbers[:, ~(self.errors <= self.bound)] = np.nan
         failed = outside.any(axis=1)
         numbers[failed] = np.nan
-        return self._answer(case, numbers, samples, self._reasons(values, outside))
+        return self._results(case, numbers, samples, self._reasons(values, outside))
 
     def _reasons(self, values: Values, outside: NDArray[np.bool_]) -> NDArray[np.object_]:
         reasons = np.full(len(values), "", dtype=object)
@@ -266,18 +266,20 @@ class Surrogate(StudyResult):
             )
         return reasons
 
-    def _answer(
+    def _results(
         self, case: Case, numbers: Values, samples: Columns, reasons: NDArray[np.object_]
     ) -> Columns:
         parts = self._split(numbers)
-        levels = {name: part for name, part in parts.items() if self.outputs[name] > 1}
-        result: Columns = {n: 10 ** (part[:, 0] / 20) for n, part in parts.items()} | levels
+        levels = {name: columns for name, columns in parts.items() if self.outputs[name] > 1}
+        result: Columns = {n: 10 ** (columns[:, 0] / 20) for n, columns in parts.items()} | levels
         names = ("contact_time", "restitution")
         level = f"{case.levels.force}_level"
-        rest = [samples.get(n, np.asarray(value_in(case, n))) for n in ("mass", "height")]
+        mass_and_height = [
+            samples.get(n, np.asarray(value_in(case, n))) for n in ("mass", "height")
+        ]
         exact = [np.zeros(1)] * 3
         verdicts = assess_many(
-            (result[level], *(result[n] for n in names), np.array([self.peaks]), *rest),
+            (result[level], *(result[n] for n in names), np.array([self.peaks]), *mass_and_height),
             (
                 self.error_of(level)[np.newaxis],
                 *(result[n] * (10 ** (self.error_of(n) / 20) - 1) for n in names),
@@ -285,13 +287,13 @@ class Surrogate(StudyResult):
             ),
             case.limits.source,
         )
-        verdicts["doubtful"] &= reasons == ""
+        verdicts["undecided"] &= reasons == ""
         status = np.where(reasons == "", 0, 1).astype("int8")
         return result | verdicts | {"status": status, "reason": reasons}
 
     @property
     def is_complete(self) -> bool:
-        """Whether its parts fit together, and what is assessed has numbers."""
+        """Whether shapes and values are consistent, and assessed quantities are finite."""
         drops, keys, numbers = len(self.points), len(self.keys), sum(self.outputs.values())
         shapes = {
             "region": (keys, 2), "points": (drops, keys), "length": (keys,),
@@ -345,27 +347,21 @@ class Surrogate(StudyResult):
         return file.getvalue()
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write it to a file ``.npz``, completely or not at all; `read_surrogate` reads it."""
+        """Write it atomically to a file ``.npz``, which `read_surrogate` reads."""
         replace_file(path, self.to_bytes())
 
 
 def assess_many(
     values: tuple[Values, ...], errors: tuple[Values, ...], source: LimitsSource
 ) -> dict[str, NDArray[Any]]:
-    """Return margin, verdict, and whether errors could change it, of many drops.
+    """Return margin and verdict of many drops, and whether errors could change the verdict.
 
-    Parameters
-    ----------
-    values
-        Octave levels, dB, shape (n, 5); contact time, s; restitution; number of peaks; mass, kg;
-        height, m, as in `thud.assess`, shape (n,) or of one value.
-    errors
-        The same of their errors, in the same units.
-    source
-        Source whose limits apply.
+    The values are octave levels, dB, shape (n, 5); contact time, s; restitution; number of peaks;
+    mass, kg; height, m, as in `thud.assess`, shape (n,) or (1,). Errors have the same order and
+    units. The limits are those of the source.
     """
     count, bands = values[0].shape
-    assessed, deviation = (_columns(part, count) for part in (values, errors))
+    assessed, deviation = (_columns(columns, count) for columns in (values, errors))
     criteria = get_criteria(source)
     lower = np.array([criterion.lower for criterion in criteria])
     upper = np.array([criterion.upper for criterion in criteria])
@@ -374,7 +370,7 @@ def assess_many(
     return {
         "margin": inside[:, :bands].min(axis=1),
         "conforms": (inside >= 0).all(axis=1),
-        "doubtful": perhaps & ~surely,
+        "undecided": perhaps & ~surely,
     }
 
 
@@ -385,7 +381,7 @@ def _columns(parts: tuple[Values, ...], count: int) -> Values:
 
 
 def keys_of(case: Case) -> dict[str, str]:
-    """Return what the results of a surrogate depend on in a case, as texts by group and key."""
+    """Return the keys of a case that matter for a surrogate, as texts by group and key."""
     groups = case.to_namelist()
     return {
         f"&{group}: {key}": f"{value!r}"
@@ -396,19 +392,19 @@ def keys_of(case: Case) -> dict[str, str]:
 
 
 def get_surrogate(surrogate: Surrogate | str | os.PathLike[str]) -> Surrogate:
-    """Return a surrogate, read where the path of its file is given."""
+    """Return a surrogate, or read it from the path of its file."""
     return surrogate if isinstance(surrogate, Surrogate) else read_surrogate(surrogate)
 
 
 def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
-    """Read a surrogate that was saved. It holds numbers and text only, nothing that is executed.
+    """Read a surrogate from its file, which holds numbers and text only, no code.
 
     Raises
     ------
     InputError
-        Where there is none, or the file is damaged.
+        If the file is damaged or no surrogate.
     OSError
-        Where it cannot be read for now.
+        If it cannot be read for now.
     """
     require_kind("surrogate", path, str | Path)
     try:
@@ -446,7 +442,7 @@ class Plan:
 
     @property
     def identity(self) -> dict[str, str]:
-        """What a surrogate depends on besides its drops, as texts by group and key."""
+        """What a surrogate depends on beside its drops, as texts by group and key."""
         with require_extra("surrogate"):
             import sklearn
         return {
@@ -456,10 +452,10 @@ class Plan:
 
     @property
     def stages(self) -> list[tuple[int, int]]:
-        """First and one past the last drop of each stage: steps of half, of at most `size`."""
+        """First drop and stop (exclusive) of each stage; each adds about a half, up to `size`."""
         ends = [min(MIN_DROPS, self.size)]
         while ends[-1] < self.size:
-            # 64, 96, 128, 192, ...: whole parts of the sequence.
+            # 64, 96, 128, 192, ...: balanced parts of Sobol's sequence.
             power = 1 << (ends[-1].bit_length() - 1)
             step = power // 2 if ends[-1] == power else 2 * power - ends[-1]
             ends.append(min(ends[-1] + step, self.size))

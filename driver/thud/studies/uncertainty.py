@@ -62,7 +62,7 @@ class Uncertainty(SampleResult):
 
     @property
     def probability(self) -> float:
-        """Share of the computed samples that conform."""
+        """Fraction of the computed samples that conform."""
         return self.conforming / self.computed
 
     @property
@@ -72,20 +72,20 @@ class Uncertainty(SampleResult):
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Wilson's score interval of the probability, of 95 %; valid for none and for all too."""
+        """Wilson's score interval of the probability, 95 %; valid also if none or all conform."""
         result = binomtest(self.conforming, self.computed).proportion_ci(CONFIDENCE, "wilson")
         return result.low, result.high
 
     @property
     def surrogate_range(self) -> tuple[float, float] | None:
-        """Probability where the errors of the surrogate are all adverse, and all favourable.
+        """Probability if all errors of the surrogate are adverse, and if all are favorable.
 
-        None where the model itself was asked.
+        None if the model computed the samples.
         """
-        if "doubtful" not in self.dataset:
+        if "undecided" not in self.dataset:
             return None
-        conforms, doubtful = (self.dataset[name].values for name in ("conforms", "doubtful"))
-        counts = (conforms & ~doubtful).sum(), (conforms | doubtful).sum()
+        conforms, undecided = (self.dataset[name].values for name in ("conforms", "undecided"))
+        counts = (conforms & ~undecided).sum(), (conforms | undecided).sum()
         return float(counts[0] / self.computed), float(counts[1] / self.computed)
 
     def rows(self) -> list[tuple[str, ...]]:
@@ -140,7 +140,7 @@ class UncertaintyKind(SampleKind[Uncertainty]):
             )
         return super().new_parameter(name, entry, case, density)
 
-    def conclude(self, study: SampleStudy, dataset: xr.Dataset) -> Uncertainty:
+    def new_result(self, study: SampleStudy, dataset: xr.Dataset) -> Uncertainty:
         """Return the distribution over all samples."""
         dataset = dataset.load()
         good = dataset["status"].values == 0
@@ -161,11 +161,11 @@ KIND = UncertaintyKind()
 
 
 def uncertainty(
-    study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[RunOptions]
+    study: Source, output: str | os.PathLike[str] | None = None, **options: Unpack[RunOptions]
 ) -> Uncertainty:
     """Compute how tolerances spread the levels, and the probability of conformity.
 
     The parameters of the study are independent. Arguments and errors are those of `sweep`;
-    InputError is also raised where fewer than two samples have results.
+    InputError is also raised if fewer than two samples have results.
     """
-    return KIND.run(study, output, **how)
+    return KIND.run(study, output, **options)

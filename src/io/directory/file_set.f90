@@ -9,7 +9,7 @@ module thud_file_set
    use thud_interrupt, only: check_interrupt
    use thud_system, only: close_descriptor, exchange_directories, get_file_checksum, get_file_size, get_system_message, &
       is_missing, is_regular_file, link_file, list_directory, name_length, open_end, remove_file, rename_file, write_text
-   use thud_text, only: newline
+   use thud_text, only: newline, tab
    implicit none (type, external)
    private
 
@@ -26,10 +26,7 @@ module thud_file_set
    !> Prefix of the names of old files that are set aside in the workspace.
    character(len=*), parameter :: aside = manifest//'~'
 
-   !> Separates name, checksum and command.
-   character(len=*), parameter :: tab = achar(9)
-
-   !> A line of a manifest.
+   !> A line of a manifest: name, checksum and command, separated by tabs.
    type :: entry_type
       !> Name of the file.
       character(len=name_length) :: name = ''
@@ -50,13 +47,12 @@ contains
       yes = size(names) == 0 .or. any(index(names, manifest) == 1)
    end function is_workspace
 
-   !> Manifest entries of files.
+   !> Manifest entries of files: [n_file].
    pure function new_entries(names, sums) result(entries)
       !> The names: [n_file].
       character(len=*), intent(in) :: names(:)
       !> Checksums of their contents: [n_file].
       integer(int32), intent(in) :: sums(:)
-      !> The entries: [n_file].
       type(entry_type) :: entries(size(names))
       integer :: i
 

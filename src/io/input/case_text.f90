@@ -157,7 +157,6 @@ contains
    pure function distinct(texts) result(once)
       !> The texts: [n].
       character(len=*), intent(in) :: texts(:)
-      !> The texts without repetition.
       character(len=len(texts)), allocatable :: once(:)
       logical :: first(size(texts))
       integer :: i

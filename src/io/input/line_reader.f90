@@ -1,6 +1,7 @@
 !> Reads files and pipes of any size line by line. Fortran's `read` would load a whole line into memory, however long.
 module thud_line_reader
    use thud_system, only: close_descriptor, open_descriptor, read_bytes
+   use thud_text, only: newline
    implicit none (type, external)
    private
 
@@ -65,7 +66,7 @@ contains
          if (reader%filled < 0) length = -2
          if (reader%filled <= 0) exit
          length = max(length, 0)
-         stop = index(reader%buffer(reader%taken + 1:reader%filled), achar(10))
+         stop = index(reader%buffer(reader%taken + 1:reader%filled), newline)
          n = merge(stop - 1, reader%filled - reader%taken, stop > 0)
          if (length < line_length) line(length + 1:) = reader%buffer(reader%taken + 1:reader%taken + n)
          length = min(length + n, line_length + 1)

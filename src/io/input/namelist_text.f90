@@ -2,11 +2,11 @@
 !> alone it could not distinguish a missing group from an unterminated one, nor name the key of a bad value.
 module thud_namelist_text
    use thud_error, only: error_type, input_error
-   use thud_text, only: lower_case, newline, replaced, shortened, to_text
+   use thud_text, only: lower_case, newline, replaced, shortened, tab, to_text
    implicit none (type, external)
    private
 
-   public :: assignment_type, group_type, parse_groups
+   public :: group_type, parse_groups
 
    !> One `key = value`.
    type :: assignment_type
@@ -32,7 +32,7 @@ module thud_namelist_text
    character(len=*), parameter :: name_characters = 'abcdefghijklmnopqrstuvwxyz0123456789_'
 
    !> Blank characters.
-   character(len=*), parameter :: blanks = ' '//achar(9)//achar(10)//achar(13)
+   character(len=*), parameter :: blanks = ' '//tab//newline//achar(13)
 
 contains
 
@@ -215,12 +215,11 @@ contains
       if (first > 0 .and. last >= first) value = replaced(text(first:last), blanks, ' ')
    end subroutine get_value
 
-   !> Line number of a position.
+   !> Line number of a position, from 1.
    pure function line_of(text, position) result(line)
       character(len=*), intent(in) :: text
       !> Position of a character.
       integer, intent(in) :: position
-      !> Line number, from 1.
       integer :: line
       integer :: i
 

@@ -11,7 +11,7 @@ module thud_sample_table
    use thud_line_reader, only: close_lines, line_length, line_reader_type, open_lines, read_line
    use thud_suggestion, only: get_suggestion
    use thud_system, only: directory_exists, path_length
-   use thud_text, only: is_number, join_quoted, lower_case, newline, quoted, replaced, to_text
+   use thud_text, only: is_number, join_quoted, lower_case, newline, quoted, replaced, tab, to_text
    implicit none (type, external)
    private
 
@@ -152,7 +152,7 @@ contains
       character(len=*), intent(in) :: line
       !> The separator; for a single column a line feed, which no line holds.
       character(len=1) :: separator
-      character(len=*), parameter :: known = achar(9)//';, '
+      character(len=*), parameter :: known = tab//';, '
       character(len=len(line)) :: structure
       integer :: i
 

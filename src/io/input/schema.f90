@@ -13,7 +13,7 @@ module thud_schema
    use thud_registry, only: floor_names, model_names
    use thud_source_limits, only: criterion_count, criterion_type, get_criteria, get_source_limits, source_limits_type, &
       source_names
-   use thud_text, only: newline, to_text
+   use thud_text, only: join, newline, to_text
    implicit none (type, external)
    private
 
@@ -39,14 +39,14 @@ contains
          //'"band_sets": {'
       do i = 1, size(band_set_names)
          bands = get_bands(band_set_names(i))
-         text = text//newline//text_value(band_set_names(i))//': {"nominal": '//numbers(bands%nominal)//', "center": ' &
-            //numbers(bands%center)//', "lower": '//numbers(bands%lower)//', "upper": '//numbers(bands%upper)//'}' &
+         text = text//newline//text_value(band_set_names(i))//': {"nominal": ['//join(bands%nominal)//'], "center": [' &
+            //join(bands%center)//'], "lower": ['//join(bands%lower)//'], "upper": ['//join(bands%upper)//']}' &
             //trim(merge(',', ' ', i < size(band_set_names)))
       end do
       text = text//'},'//newline//'"rated_bands": {'
       do i = 1, size(rated_set_names)
          call find_rated_bands(rated_set_names(i), bands, error)
-         text = text//newline//text_value(rated_set_names(i))//': '//numbers(bands%nominal) &
+         text = text//newline//text_value(rated_set_names(i))//': ['//join(bands%nominal)//']' &
             //trim(merge(',', ' ', i < size(rated_set_names)))
       end do
       text = text//'},'//newline//'"limits": {'
@@ -54,7 +54,7 @@ contains
          call describe_limits(source_names(i), entry)
          text = text//newline//entry//trim(merge(',', ' ', i < size(source_names)))
       end do
-      text = text//'},'//newline//'"class_limits": '//numbers(class_limits)//','//newline//'"quantities": ['
+      text = text//'},'//newline//'"class_limits": ['//join(class_limits)//'],'//newline//'"quantities": ['
       do i = 1, size(quantities)
          call describe_quantity(quantities(i), entry)
          text = text//newline//entry//trim(merge(',', ' ', i < size(quantities)))
@@ -160,21 +160,6 @@ contains
       end do
       value = value//'"'
    end function text_value
-
-   !> Numbers as a JSON list.
-   function numbers(values) result(list)
-      !> The numbers: [n].
-      real(wp), intent(in) :: values(:)
-      character(len=:), allocatable :: list
-      integer :: i
-
-      list = '['
-      do i = 1, size(values)
-         if (i > 1) list = list//', '
-         list = list//to_text(values(i))
-      end do
-      list = list//']'
-   end function numbers
 
    !> Words as a JSON list.
    pure function list_of(words) result(list)

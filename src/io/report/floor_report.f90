@@ -64,10 +64,9 @@ contains
       end associate
    end subroutine get_floor_levels_csv
 
-   !> Levels of the force on a rigid floor.
+   !> Levels of the force on a rigid floor in the bands of the case, dB: [n_band].
    pure function get_blocked_levels(impact) result(level)
       type(impact_type), intent(in) :: impact
-      !> Levels in the bands that the case asks for, dB: [n_band].
       real(wp), allocatable :: level(:)
 
       level = impact%assessment%level(impact%assessment%first_band:, findloc(force_names, 'floor', dim=1))

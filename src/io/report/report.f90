@@ -9,7 +9,7 @@ module thud_report
    use thud_kinds, only: wp
    use thud_quantities, only: get_quantities, history_quantity_count, quantities
    use thud_source_limits, only: conforms, criterion_type
-   use thud_text, only: join_quoted, newline, quoted, to_text
+   use thud_text, only: join, join_quoted, newline, quoted, to_text
    implicit none (type, external)
    private
 
@@ -71,10 +71,9 @@ contains
       text = get_history_csv(header, get_times(history), history%model_history)
    end function get_model_histories_csv
 
-   !> Times of the samples.
+   !> Times of the samples, s: [n_time].
    pure function get_times(history) result(times)
       type(force_history_type), intent(in) :: history
-      !> Times, s: [n_time].
       real(wp) :: times(size(history%floor_force))
       integer :: i
 
@@ -131,10 +130,10 @@ contains
       associate (criteria => assessment%criteria(:, get_assessed_force(case)))
          text = text//line('criterion', join_quoted(criteria%name), '') &
             //line('unit', join_quoted(criteria%unit), '') &
-            //line('value', joined(criteria%value), '') &
-            //line('lower', joined(criteria%lower), '') &
-            //line('upper', joined(criteria%upper), '') &
-            //line('met', joined_logicals(conforms(criteria)), '')//'/'//newline
+            //line('value', join(criteria%value), '') &
+            //line('lower', join(criteria%lower), '') &
+            //line('upper', join(criteria%upper), '') &
+            //line('met', join(merge('.true. ', '.false.', conforms(criteria))), '')//'/'//newline
       end associate
    end function get_summary
 
@@ -207,31 +206,5 @@ contains
       if (note /= '') text = text//' ! '//note
       text = text//newline
    end function line
-
-   !> Numbers separated by commas.
-   pure function joined(values) result(text)
-      !> The numbers: [n].
-      real(wp), intent(in) :: values(:)
-      character(len=:), allocatable :: text
-      integer :: i
-
-      text = to_text(values(1))
-      do i = 2, size(values)
-         text = text//', '//to_text(values(i))
-      end do
-   end function joined
-
-   !> Logical values separated by commas.
-   pure function joined_logicals(values) result(text)
-      !> The values: [n].
-      logical, intent(in) :: values(:)
-      character(len=:), allocatable :: text
-      integer :: i
-
-      text = to_text(values(1))
-      do i = 2, size(values)
-         text = text//', '//to_text(values(i))
-      end do
-   end function joined_logicals
 
 end module thud_report

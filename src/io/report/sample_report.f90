@@ -7,6 +7,7 @@ module thud_sample_report
    use thud_sample_table, only: sample_table_type
    use thud_sweep, only: sweep_type
    use thud_text, only: newline, replaced, to_text
+   use thud_text_buffer, only: text_buffer_type
    implicit none (type, external)
    private
 
@@ -61,10 +62,9 @@ contains
       character(len=*), parameter :: numbers_form = '(*(:,",",es24.16e3))'
       character(len=number_width*(size(table%names) + sample_quantity_count + size(sweep%level(:, :, 1)) &
          + size(sweep%floor_column)) + get_rest_width(sweep)) :: row
-      integer :: i, j, at, end_of_text
+      type(text_buffer_type) :: buffer
+      integer :: i, j, at
 
-      allocate (character(len=(len(row) - get_rest_width(sweep) + 64)*max(0, last - first + 1)) :: text)
-      end_of_text = 0
       do i = first, last
          row = to_text(before + i)
          do j = 1, size(table%names)
@@ -91,12 +91,9 @@ contains
                + size(sweep%floor_column) + 3) &
                //to_text(sweep%status(i))//','//trim(in_quotes(sweep%reason(i)%text))//newline
          end if
-         at = index(row, newline)
-         if (end_of_text + at > len(text)) text = text//repeat(' ', len(text) + len(row))
-         text(end_of_text + 1:end_of_text + at) = row(:at)
-         end_of_text = end_of_text + at
+         call buffer%append(row(:index(row, newline)))
       end do
-      text = text(:end_of_text)
+      text = buffer%get_text()
    end subroutine get_sample_rows
 
    !> Width sufficient for all cells of a row except numbers: choices, verdicts, and the longest reason in quotes.

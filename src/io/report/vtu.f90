@@ -83,11 +83,10 @@ contains
       if (mod(n, 3) > 0) text(len(text) - 2 + mod(n, 3):) = repeat('=', 3 - mod(n, 3))
    end function encode
 
-   !> Numbers as bytes.
+   !> Numbers as bytes: [8*n].
    pure function get_bytes(numbers) result(bytes)
       !> The numbers: [n].
       real(wp), intent(in) :: numbers(:)
-      !> The bytes: [8*n].
       integer(c_int8_t) :: bytes(8*size(numbers))
 
       bytes = transfer(numbers, bytes)

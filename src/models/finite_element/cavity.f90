@@ -37,13 +37,12 @@ contains
       cavity%exponent = ball%heat_capacity_ratio
    end function new_cavity
 
-   !> Volume inside a surface of frustums.
+   !> Volume inside a surface of frustums, m3.
    pure function get_volume(r, z) result(volume)
       !> Distances of the nodes from the axis, m: [0:n].
       real(wp), intent(in) :: r(0:)
       !> Heights of the nodes, from the lowest to the highest pole, m: [0:n].
       real(wp), intent(in) :: z(0:)
-      !> Volume, m3.
       real(wp) :: volume
       integer :: n
 
@@ -62,12 +61,11 @@ contains
       pressure = cavity%pressure*(cavity%volume/volume)**cavity%exponent - cavity%ambient
    end function get_gas_pressure
 
-   !> Work that changes the volume of the gas, including that on the air around the ball.
+   !> Work that changes the volume of the gas, including that on the air around the ball, J.
    pure function get_gas_energy(cavity, volume) result(energy)
       type(cavity_type), intent(in) :: cavity
       !> Volume, above 0, m3.
       real(wp), intent(in) :: volume
-      !> The work, J.
       real(wp) :: energy
       real(wp) :: ratio
 

@@ -113,12 +113,11 @@ contains
       if (options%snapshot_interval > 0.0_wp) n_frame = 1 + get_sample_count(sampling)/get_stride(options, sampling)
    end function get_frame_count
 
-   !> Number of samples between two snapshots.
+   !> Number of samples between two snapshots, at least 1.
    pure function get_stride(options, sampling) result(stride)
       !> Options that ask for snapshots.
       class(finite_element_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> The number, at least 1.
       integer :: stride
 
       stride = max(1, nint(options%snapshot_interval*sampling%sample_rate))

@@ -220,29 +220,26 @@ contains
       run%shortest_interval = min(run%shortest_interval, interval)
    end subroutine update_position
 
-   !> Energy of the latest step, including all losses; it should stay constant.
+   !> Energy of the latest step, including all losses, J; it should stay constant.
    pure function get_energy(run) result(energy)
       type(impact_run_type), intent(in) :: run
-      !> The energy, J.
       real(wp) :: energy
 
       energy = run%kinetic + run%state%strain_energy + run%state%gas_energy + run%potential + run%contact_energy + &
          run%dissipated + run%contact_loss + run%friction_loss + run%floor%work
    end function get_energy
 
-   !> Height of the center of mass.
+   !> Height of the center of mass, m.
    pure function get_mean_height(run) result(height)
       type(impact_run_type), intent(in) :: run
-      !> The height, m.
       real(wp) :: height
 
       height = sum(run%mass(:, :, 2)*run%position(:, :, 2))/sum(run%mass(:, :, 2))
    end function get_mean_height
 
-   !> Velocity of the center of mass.
+   !> Upward velocity of the center of mass, m/s.
    pure function get_mean_velocity(run) result(velocity)
       type(impact_run_type), intent(in) :: run
-      !> The velocity upwards, m/s.
       real(wp) :: velocity
 
       velocity = sum(run%mass(:, :, 2)*run%velocity(:, :, 2))/sum(run%mass(:, :, 2))

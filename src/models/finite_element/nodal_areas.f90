@@ -9,13 +9,12 @@ module thud_nodal_areas
 
 contains
 
-   !> Nodal areas of a surface: integrals of the shape functions over the adjacent frustums, as for forces of a pressure.
+   !> Nodal areas of a surface, m2: integrals of the shape functions over the adjacent frustums, as for a pressure: [0:n].
    pure function get_nodal_areas(r, z) result(area)
       !> Distances of the nodes from the axis, m: [0:n].
       real(wp), intent(in) :: r(0:)
       !> Their heights, m: [0:n].
       real(wp), intent(in) :: z(0:)
-      !> The areas, m2: [0:n].
       real(wp) :: area(0:ubound(r, 1))
       real(wp) :: width
       integer :: j

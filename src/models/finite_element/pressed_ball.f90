@@ -201,12 +201,11 @@ contains
       pressed%force = -sum(force(:, last, 2), mask=pressed%touches(:, 1))
    end subroutine find_rest
 
-   !> Distances of the nodes of the outer surface from a plate.
+   !> Distances of the nodes of the outer surface from a plate, m: [0:n_polar].
    pure function get_heights(pressed, plate) result(height)
       type(pressed_ball_type), intent(in) :: pressed
       !> 1 for the lower plate, 2 for the upper one.
       integer, intent(in) :: plate
-      !> Distances, m: [0:n_polar].
       real(wp) :: height(0:pressed%body%mesh%n_polar)
 
       height = pressed%position(:, pressed%body%mesh%n_radial, 2)

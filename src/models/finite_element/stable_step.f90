@@ -22,10 +22,9 @@ module thud_stable_step
 
 contains
 
-   !> First estimate of the fastest mode: contains every mode, the fastest ones most.
+   !> First estimate of the fastest mode, which contains every mode, the fastest ones most: [0:n_polar, 0:n_radial, 2].
    pure function get_first_direction(body) result(direction)
       type(elastic_body_type), intent(in) :: body
-      !> The estimate: [0:n_polar, 0:n_radial, 2].
       real(wp), allocatable :: direction(:, :, :)
       integer :: i, j, k
 

@@ -71,10 +71,9 @@ contains
       fields = [in_group('ball', get_ball_fields(sample%ball)), in_group('drop', get_drop_fields(sample%drop))]
    end function get_sample_fields
 
-   !> The numbers of a sample, in the order of their keys: ball and drop contain nothing else.
+   !> The numbers of a sample, in the order of their keys: ball and drop contain nothing else: [n_key].
    pure function get_numbers(sample) result(values)
       type(sample_type), intent(in) :: sample
-      !> The numbers: [n_key].
       real(wp) :: values((storage_size(sample%ball) + storage_size(sample%drop))/storage_size(1.0_wp))
 
       values = [transfer(sample%ball, values), transfer(sample%drop, values)]
@@ -147,7 +146,6 @@ contains
    !> oscillator by harmonic balance. Accurate to 10 %, and similar for similar samples.
    pure function get_rough_contact_time(sample) result(time)
       type(sample_type), intent(in) :: sample
-      !> The time, s.
       real(wp) :: time
       real(wp) :: linear, cubic, speed
 

@@ -80,12 +80,11 @@ contains
       end do
    end subroutine advance
 
-   !> Kinetic and elastic energy of each mode, J.
+   !> Kinetic and elastic energy of each mode, J: [n_mode].
    pure function get_energies(step, motion) result(energy)
       type(mode_step_type), intent(in) :: step
       !> The motion: [n_mode, 2 + n_branch].
       real(wp), intent(in) :: motion(:, :)
-      !> The energies: [n_mode].
       real(wp) :: energy(size(step%omega))
       integer :: k
 

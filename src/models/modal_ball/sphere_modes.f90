@@ -143,13 +143,12 @@ contains
 
    contains
 
-      !> Integrals over the wall of products of columns.
+      !> Integrals over the wall of products of columns: [n, n].
       function product_of(a, b) result(matrix)
          !> Values at the radii: [n_node, n].
          real(wp), intent(in) :: a(:, :)
          !> Values at the radii: [n_node, n].
          real(wp), intent(in) :: b(:, :)
-         !> The integrals: [n, n].
          real(wp) :: matrix(size(a, 2), size(b, 2))
 
          matrix = matmul(transpose(a), spread(basis%weight, 2, size(b, 2))*b)
@@ -302,11 +301,10 @@ contains
       surface(1, :) = basis%at_end(1, :n, 1)
    end subroutine assemble_breathing
 
-   !> Vector times its transpose.
+   !> Vector times its transpose: [n, n].
    pure function outer(vector) result(matrix)
       !> The vector: [n].
       real(wp), intent(in) :: vector(:)
-      !> The matrix: [n, n].
       real(wp) :: matrix(size(vector), size(vector))
 
       matrix = spread(vector, 2, size(vector))*spread(vector, 1, size(vector))

@@ -7,9 +7,9 @@ const REACH = 0.12;
 let motion = null;
 let playing = 0;
 
-/** Show the motion of an answer; without one the section is hidden. */
-export function showBall(found) {
-  motion = found ?? null;
+/** Show the motion of an answer; hide the section if there is none. */
+export function showBall(newMotion) {
+  motion = newMotion ?? null;
   byId("ball_section").hidden = !motion;
   if (motion) render();
 }
@@ -65,7 +65,7 @@ function magnification(top) {
   if (!(most > 0)) return 1;
   const free = (REACH * top) / most;
   const power = 10 ** Math.floor(Math.log10(free));
-  return Math.max(1, power * [5, 2, 1].find((one) => one * power <= free));
+  return Math.max(1, power * [5, 2, 1].find((factor) => factor * power <= free));
 }
 
 /** Return the surfaces of a sphere whose lower part, and the wall on it, lies flat on the floor. */

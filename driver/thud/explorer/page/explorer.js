@@ -1,11 +1,11 @@
-// The page: the form asks the server, the latest values win.
+// The page: requests the values of the form from the server; the latest request wins.
 import { build, caseValues, changedWords, isCase, mark, startWith, state, titleOf } from "./form.js";
 import { byId, element } from "./page.js";
 import { listenToBall } from "./ball.js";
 import { Loss, Refusal, ask, follow, linkedCase, takeToken } from "./request.js";
 import { show } from "./results.js";
 
-// Rest before a slow case is asked for, and time between two tries to reach a server that is gone, ms.
+// Pause of the changes before a slow case is requested, and time between tries to reach the server, ms.
 const REST = 120;
 const RETRY = 1500;
 const pinned = [];
@@ -15,10 +15,10 @@ let job = null;
 let timer = 0;
 let tries = 0;
 
-// ---- Sentences.
+// ---- Messages.
 
-function say(sentence) {
-  byId("message").textContent = sentence;
+function say(message) {
+  byId("message").textContent = message;
   byId("message").hidden = false;
 }
 
@@ -28,7 +28,7 @@ function hush() {
   mark(null);
 }
 
-/** Say what went wrong; where the server is gone, wait for it. */
+/** Show an error; if the server is gone, wait for it. */
 function fail(error) {
   if (error.name === "AbortError") return;
   if (!(error instanceof Loss || error instanceof Refusal)) throw error;
@@ -40,20 +40,20 @@ function fail(error) {
   }
 }
 
-// ---- Works that the server reports on.
+// ---- Tasks of the server.
 
-/** Follow a work; it is shown with a button that ends it, by default as soon as it reports. */
-async function work(name, path, body, stop, { atOnce = false, reported = () => {} } = {}) {
+/** Follow a task; show it with a button to cancel it, by default from its first report. */
+async function runTask(name, path, body, stop, { atOnce = false, reported = () => {} } = {}) {
   const bar = element("progress", { max: 1, "aria-label": name });
   const button = element("button", { type: "button" }, "Cancel");
   button.addEventListener("click", () => stop.abort());
-  const line = element("div", { class: "work" }, element("span", {}, name), bar, button);
-  const appear = () => { if (!line.isConnected) byId("works").append(line); };
+  const line = element("div", { class: "task" }, element("span", {}, name), bar, button);
+  const appear = () => { if (!line.isConnected) byId("tasks").append(line); };
   if (atOnce) appear();
   try {
-    return await follow(path, body, stop.signal, (part) => {
+    return await follow(path, body, stop.signal, (fraction) => {
       appear();
-      if (part > 0) bar.value = part;
+      if (fraction > 0) bar.value = fraction;
       reported();
     });
   } finally {
@@ -61,7 +61,7 @@ async function work(name, path, body, stop, { atOnce = false, reported = () => {
   }
 }
 
-/** Ask for the case; a slow one that is asked for again is ended, a quick one is awaited. */
+/** Request the case; a new request cancels a slow one and waits for a quick one. */
 async function solve() {
   clearTimeout(timer);
   if (job && !job.slow) { job.again = true; return; }
@@ -69,7 +69,7 @@ async function solve() {
   const own = { stop: new AbortController(), slow: false, again: false, start: performance.now() };
   job = own;
   try {
-    const answer = await work("Computing", "solve", JSON.stringify(caseValues()), own.stop, { reported: () => { own.slow = true; } });
+    const answer = await runTask("Computing", "solve", JSON.stringify(caseValues()), own.stop, { reported: () => { own.slow = true; } });
     hush();
     current = { name: titleOf("model", state.model), short: titleOf("model", state.model), words: changedWords(), answer, slow: own.slow };
     refresh();
@@ -86,7 +86,7 @@ async function solve() {
   }
 }
 
-/** Ask for the case after a change of the form; a slow one only when the change rests. */
+/** Request the case after a change of the form; a slow case only when changes pause. */
 function changed() {
   if (!(job ?? current)?.slow) return solve();
   job?.stop.abort();
@@ -98,11 +98,11 @@ async function measure(file) {
   if (file.size > about.largest) return say(`${file.name} is longer than ${about.largest / 1e6} MB; allowed: shorter`);
   const query = new URLSearchParams({ name: file.name });
   for (const key of ["height", "mass", "calibration", "unit", "channel"]) {
-    const given = byId(`recording_${key}`).value;
-    if (given) query.set(key, given);
+    const value = byId(`recording_${key}`).value;
+    if (value) query.set(key, value);
   }
   try {
-    const answer = await work(`Measuring ${file.name}`, `measure?${query}`, file, new AbortController(), { atOnce: true });
+    const answer = await runTask(`Measuring ${file.name}`, `measure?${query}`, file, new AbortController(), { atOnce: true });
     hush();
     const name = `${file.name}, ${answer.drops} drop${answer.drops === 1 ? "" : "s"}`;
     pinned.push({ name, short: name, words: answer.verdict, answer, pinned: true });
@@ -123,14 +123,14 @@ async function download(name) {
 }
 
 function refresh() {
-  show(current ? [current, ...pinned] : pinned, (one) => { pinned.splice(pinned.indexOf(one), 1); refresh(); });
+  show(current ? [current, ...pinned] : pinned, (variant) => { pinned.splice(pinned.indexOf(variant), 1); refresh(); });
 }
 
 // ---- Events.
 
 function pin() {
   if (!current) return;
-  const letter = String.fromCharCode(65 + (pinned.filter((one) => one.letter).length % 26));
+  const letter = String.fromCharCode(65 + (pinned.filter((variant) => variant.letter).length % 26));
   pinned.push({ ...current, name: `${letter}: ${current.name}`, short: `${letter}: ${current.name}`, letter, pinned: true });
   refresh();
 }
@@ -146,7 +146,7 @@ async function link() {
 function listen() {
   byId("form").addEventListener("submit", (event) => event.preventDefault());
   const rebuild = () => {
-    // What is being typed counts before its field is replaced.
+    // Take the text being typed before its field is replaced.
     if (byId("form").contains(document.activeElement) && document.activeElement.matches("input")) document.activeElement.blur();
     build(changed);
     changed();

@@ -1,7 +1,7 @@
 // Fields of the case, made from the declarations of the keys.
-import { begun, byId, element, scaled } from "./page.js";
+import { byId, capitalize, element, scaled } from "./page.js";
 
-/** What the page knows of the case: values that differ from their defaults, and what was moved. */
+/** State of the case: values that differ from their defaults, and ranges of moved sliders. */
 export const state = { form: [], values: {}, model: "", floor: "", room: false, moved: {} };
 
 const part = (name) => state.form.filter((group) => group.part === name);
@@ -14,25 +14,25 @@ export function titleOf(name, which) {
   return chosen(name, which)?.title ?? which;
 }
 
-/** Return the groups of keys that count. */
+/** Return the groups of keys in use. */
 function used() {
-  const found = [...own(), chosen("model", state.model)];
-  if (state.floor) found.push(chosen("floor", state.floor));
-  if (state.room) found.push(...part("room"));
-  return found;
+  const groups = [...own(), chosen("model", state.model)];
+  if (state.floor) groups.push(chosen("floor", state.floor));
+  if (state.room) groups.push(...part("room"));
+  return groups;
 }
 
 /** Return the case as groups of keys. */
 export function caseValues() {
-  const found = { case: { name: "explored" }, model: { name: state.model } };
-  if (state.floor) found.floor = { name: state.floor };
+  const values = { case: { name: "explored" }, model: { name: state.model } };
+  if (state.floor) values.floor = { name: state.floor };
   for (const { fields } of used())
-    for (const { group } of fields) if (state.values[group]) found[group] = state.values[group];
-  if (state.room) found.room ??= {};
-  return structuredClone(found);
+    for (const { group } of fields) if (state.values[group]) values[group] = state.values[group];
+  if (state.room) values.room ??= {};
+  return structuredClone(values);
 }
 
-/** Return floor, room and what differs from the defaults, in words. */
+/** Return floor, room and the values that differ from their defaults, in words. */
 export function changedWords() {
   const words = [];
   if (state.floor) words.push(`Floor: ${titleOf("floor", state.floor)}`);
@@ -41,8 +41,8 @@ export function changedWords() {
     for (const field of fields) {
       const value = state.values[field.group]?.[field.name];
       if (value === undefined) continue;
-      const said = field.choices[value] ?? (typeof value === "number" ? scaled(value, -field.power) : String(value));
-      words.push(`${field.label} ${said} ${field.unit}`.trim());
+      const shown = field.choices[value] ?? (typeof value === "number" ? scaled(value, -field.power) : String(value));
+      words.push(`${field.label} ${shown} ${field.unit}`.trim());
     }
   }
   return words.join(", ");
@@ -81,7 +81,7 @@ function put(field, value) {
   if (!Object.keys(group).length) delete state.values[field.group];
 }
 
-/** Fill the form for the chosen model, floor and room; `changed` is told of each change. */
+/** Fill the form for the chosen model, floor and room; `changed` is called on each change. */
 export function build(changed) {
   const open = (names) => own().filter((group) => names.includes(group.name));
   const shown = (groups, isOpen) => groups.filter((group) => group?.fields.length).map((group) => groupElement(group, isOpen, changed));
@@ -91,7 +91,7 @@ export function build(changed) {
   byId("further_groups").replaceChildren(...shown(own().filter((group) => !["ball", "drop"].includes(group.name)), false));
   const options = (name) => part(name).map((group) => element("option", { value: group.name }, group.title));
   byId("model").replaceChildren(...options("model"));
-  byId("floor").replaceChildren(element("option", { value: "" }, "Rigid test floor"), ...options("floor").filter((one) => one.value !== "rigid"));
+  byId("floor").replaceChildren(element("option", { value: "" }, "Rigid test floor"), ...options("floor").filter((option) => option.value !== "rigid"));
   byId("model").value = state.model;
   byId("floor").value = state.floor;
   byId("has_room").checked = state.room;
@@ -113,7 +113,7 @@ function fieldElement(field, changed) {
 }
 
 function choiceInput(field, id, take) {
-  const options = Object.entries(field.choices).map(([value, words]) => element("option", { value }, begun(words)));
+  const options = Object.entries(field.choices).map(([value, words]) => element("option", { value }, capitalize(words)));
   const select = element("select", { id }, ...options);
   select.value = current(field);
   select.addEventListener("change", () => take(select.value));
@@ -141,23 +141,23 @@ function numberInput(field, id, take) {
   const value = scaled(current(field), -field.power);
   const whole = field.kind === "whole";
   const number = element("input", { id, type: "number", step: whole ? 1 : "any", min: field.lower, max: field.upper, value });
-  const send = (given) => {
+  const send = (entered) => {
     const key = `${field.group}.${field.name}`;
-    const found = scaled(given, field.power);
+    const converted = scaled(entered, field.power);
     const ends = (state.moved[key] ??= [current(field), current(field)]);
-    state.moved[key] = [Math.min(ends[0], found), Math.max(ends[1], found)];
-    take(found);
+    state.moved[key] = [Math.min(ends[0], converted), Math.max(ends[1], converted)];
+    take(converted);
   };
-  const slider = field.slider ? sliderInput(field, value, (given) => {
-    number.value = given;
+  const slider = field.slider ? sliderInput(field, value, (entered) => {
+    number.value = entered;
     number.setAttribute("aria-invalid", "false");
-    send(given);
+    send(entered);
   }) : null;
   number.addEventListener("change", () => {
     const bad = number.value === "" || !Number.isFinite(Number(number.value));
     number.setAttribute("aria-invalid", String(bad));
     if (bad) return;
-    slider?.place(Number(number.value));
+    slider?.moveTo(Number(number.value));
     send(Number(number.value));
   });
   return slider ? [number, slider] : [number];
@@ -170,22 +170,22 @@ function sliderInput(field, value, moved) {
   const to = log ? Math.log : (x) => x;
   const from = log ? Math.exp : (x) => x;
   const slider = element("input", { type: "range", "aria-label": field.label, min: to(low), max: to(high), step: whole ? 1 : "any" });
-  const say = (given) => slider.setAttribute("aria-valuetext", `${given} ${field.unit}`.trim());
-  slider.place = (given) => { slider.value = to(given); say(given); };
-  slider.place(value);
+  const announce = (selected) => slider.setAttribute("aria-valuetext", `${selected} ${field.unit}`.trim());
+  slider.moveTo = (selected) => { slider.value = to(selected); announce(selected); };
+  slider.moveTo(value);
   slider.addEventListener("input", () => {
-    const found = from(Number(slider.value));
+    const exact = from(Number(slider.value));
     // The ends themselves, not numbers that are rounded beyond them.
-    const given = Math.min(high, Math.max(low, whole ? Math.round(found) : Number(found.toPrecision(4))));
-    say(given);
-    moved(given);
+    const selected = Math.min(high, Math.max(low, whole ? Math.round(exact) : Number(exact.toPrecision(4))));
+    announce(selected);
+    moved(selected);
   });
   return slider;
 }
 
-/** Mark the field that a sentence of the server names, and no other. */
-export function mark(sentence) {
+/** Mark the field that a message of the server names, and no other. */
+export function mark(message) {
   for (const input of document.querySelectorAll("#form [aria-invalid=true]")) input.setAttribute("aria-invalid", "false");
-  const [, group, name] = sentence?.match(/&(\w+): (\w+)/) ?? [];
+  const [, group, name] = message?.match(/&(\w+): (\w+)/) ?? [];
   byId(`${group}.${name}`)?.setAttribute("aria-invalid", "true");
 }

@@ -44,6 +44,6 @@ export function minus(value) {
   return String(value).replace("-", "−");
 }
 
-export function begun(words) {
+export function capitalize(words) {
   return words.charAt(0).toUpperCase() + words.slice(1);
 }

@@ -1,4 +1,4 @@
-// Plots: curves over numbers or bands, with bars of tolerance; drawn at the size of their place.
+// Plots: curves over numbers or bands, with bars of tolerance; drawn at the size of their element.
 import { drawn, element, minus, rounded } from "./page.js";
 
 const MARKS = [
@@ -17,9 +17,9 @@ const watcher = new ResizeObserver((entries) => entries.forEach((entry) => rende
  * `curves` have name, style, x, y, `marks` and `thin`; `x` and `y` have a title and a unit, bands
  * a list of names in `x.bands`; `limits` are [lower, upper] of each band.
  */
-export function plot(host, given) {
+export function plot(host, content) {
   if (!shown.has(host)) watcher.observe(host);
-  shown.set(host, given);
+  shown.set(host, content);
   render(host);
 }
 
@@ -30,42 +30,42 @@ export function swatch(style) {
 }
 
 function render(host) {
-  const given = shown.get(host);
+  const content = shown.get(host);
   const [width, height] = [host.clientWidth, host.clientHeight];
-  if (!given || !width || !height) return;
+  if (!content || !width || !height) return;
   const small = width < 260 || height < 160;
-  const across = given.x.bands ? [-0.5, given.x.bands.length - 0.5] : range(given.curves.map((one) => one.x));
-  const up = padded(range([...given.curves.map((one) => one.y), (given.limits ?? []).flat(), given.y.zero ? [0] : []]));
+  const across = content.x.bands ? [-0.5, content.x.bands.length - 0.5] : range(content.curves.map((curve) => curve.x));
+  const up = padded(range([...content.curves.map((curve) => curve.y), (content.limits ?? []).flat(), content.y.zero ? [0] : []]));
   const marksUp = ticks(up, height < 180 ? 4 : 6);
   const letter = small ? 6 : 7.5;
-  const left = (small ? 6 : 26) + letter * Math.max(...marksUp.map((one) => minus(one).length));
+  const left = (small ? 6 : 26) + letter * Math.max(...marksUp.map((mark) => minus(mark).length));
   const box = { left, right: width - 8, top: 8, bottom: height - (small ? 18 : 38) };
   const toX = (value) => box.left + ((value - across[0]) / (across[1] - across[0])) * (box.right - box.left);
   const toY = (value) => box.bottom - ((value - up[0]) / (up[1] - up[0])) * (box.bottom - box.top);
-  const image = drawn("svg", { width, height, role: "img", "aria-label": describe(given), class: small ? "small" : "" });
-  for (const [i, [lower, upper]] of (given.limits ?? []).entries())
+  const image = drawn("svg", { width, height, role: "img", "aria-label": describe(content), class: small ? "small" : "" });
+  for (const [i, [lower, upper]] of (content.limits ?? []).entries())
     image.append(drawn("rect", { class: "limits", x: toX(i - 0.38), width: toX(0.76) - toX(0), y: toY(upper), height: toY(lower) - toY(upper) }));
   for (const value of marksUp) {
     image.append(drawn("line", { class: "grid", x1: box.left, x2: box.right, y1: toY(value), y2: toY(value) }));
     image.append(drawn("text", { x: box.left - 5, y: toY(value) + 4, "text-anchor": "end" }, minus(value)));
   }
-  const marksAcross = given.x.bands ? given.x.bands.map((_, i) => i) : ticks(across, (box.right - box.left) / 60);
+  const marksAcross = content.x.bands ? content.x.bands.map((_, i) => i) : ticks(across, (box.right - box.left) / 60);
   // Names of bands that would touch each other are left out, every other one.
   const room = (box.right - box.left) / marksAcross.length;
-  const every = given.x.bands ? Math.ceil((letter * Math.max(...given.x.bands.map((one) => one.length)) + 4) / room) : 1;
+  const every = content.x.bands ? Math.ceil((letter * Math.max(...content.x.bands.map((name) => name.length)) + 4) / room) : 1;
   for (const [i, value] of marksAcross.entries()) {
-    if (!given.x.bands) image.append(drawn("line", { class: "grid", x1: toX(value), x2: toX(value), y1: box.top, y2: box.bottom }));
-    if (i % every === 0) image.append(drawn("text", { x: toX(value), y: box.bottom + (small ? 13 : 16), "text-anchor": "middle" }, given.x.bands?.[i] ?? minus(value)));
+    if (!content.x.bands) image.append(drawn("line", { class: "grid", x1: toX(value), x2: toX(value), y1: box.top, y2: box.bottom }));
+    if (i % every === 0) image.append(drawn("text", { x: toX(value), y: box.bottom + (small ? 13 : 16), "text-anchor": "middle" }, content.x.bands?.[i] ?? minus(value)));
   }
   if (!small) {
-    image.append(drawn("text", { x: (box.left + box.right) / 2, y: height - 4, "text-anchor": "middle" }, `${given.x.title}, ${given.x.unit}`));
-    image.append(drawn("text", { transform: `translate(12 ${(box.top + box.bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, `${given.y.title}, ${given.y.unit}${given.y.reference ?? ""}`));
+    image.append(drawn("text", { x: (box.left + box.right) / 2, y: height - 4, "text-anchor": "middle" }, `${content.x.title}, ${content.x.unit}`));
+    image.append(drawn("text", { transform: `translate(12 ${(box.top + box.bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, `${content.y.title}, ${content.y.unit}${content.y.reference ?? ""}`));
   }
-  for (const one of given.curves) {
-    const points = one.x.map((x, i) => [x, one.y[i]]).filter(([, y]) => y !== null);
+  for (const curve of content.curves) {
+    const points = curve.x.map((x, i) => [x, curve.y[i]]).filter(([, y]) => y !== null);
     const line = points.map(([x, y]) => `${toX(x).toFixed(1)} ${toY(y).toFixed(1)}`).join("L");
-    const group = drawn("g", { class: `curve style${one.style % STYLES}${one.thin ? " thin" : ""}` }, drawn("path", { d: `M${line}` }));
-    if (one.marks) for (const [x, y] of points) group.append(MARKS[one.style % MARKS.length](toX(x), toY(y)));
+    const group = drawn("g", { class: `curve style${curve.style % STYLES}${curve.thin ? " thin" : ""}` }, drawn("path", { d: `M${line}` }));
+    if (curve.marks) for (const [x, y] of points) group.append(MARKS[curve.style % MARKS.length](toX(x), toY(y)));
     image.append(group);
   }
   const reading = drawn("line", { class: "reading", y1: box.top, y2: box.bottom, visibility: "hidden" });
@@ -73,8 +73,8 @@ function render(host) {
   const words = element("div", { class: "readout", hidden: true });
   image.addEventListener("pointermove", (event) => {
     const at = across[0] + ((event.offsetX - box.left) / (box.right - box.left)) * (across[1] - across[0]);
-    read(given, at, words);
-    const x = given.x.bands ? toX(Math.round(at)) : event.offsetX;
+    read(content, at, words);
+    const x = content.x.bands ? toX(Math.round(at)) : event.offsetX;
     reading.setAttribute("x1", x);
     reading.setAttribute("x2", x);
     const inside = event.offsetX >= box.left && event.offsetX <= box.right;
@@ -87,23 +87,23 @@ function render(host) {
   host.replaceChildren(image, words);
 }
 
-/** Show the values of all curves at one place. */
-function read(given, at, words) {
-  const place = given.x.bands ? given.x.bands[Math.round(at)] : rounded(at);
-  const lines = given.curves.map((one) => {
-    const near = one.x.reduce((best, x, i) => (Math.abs(x - at) < Math.abs(one.x[best] - at) ? i : best), 0);
-    return element("div", {}, swatch(one.style), ` ${rounded(one.y[near], given.y.unit)}`);
+/** Show the values of all curves at a position. */
+function read(content, at, words) {
+  const position = content.x.bands ? content.x.bands[Math.round(at)] : rounded(at);
+  const lines = content.curves.map((curve) => {
+    const near = curve.x.reduce((best, x, i) => (Math.abs(x - at) < Math.abs(curve.x[best] - at) ? i : best), 0);
+    return element("div", {}, swatch(curve.style), ` ${rounded(curve.y[near], content.y.unit)}`);
   });
-  words.replaceChildren(`${place} ${given.x.unit}`, ...lines);
+  words.replaceChildren(`${position} ${content.x.unit}`, ...lines);
 }
 
 /** Return what a plot shows, for those who do not see it. */
-function describe(given) {
-  const lines = given.curves.map((one) => {
-    if (given.x.bands) return `${one.name}: ${one.y.map((y, i) => `${given.x.bands[i]} ${given.x.unit} ${rounded(y)}`).join(", ")}`;
-    return `${one.name}: maximum ${rounded(Math.max(...one.y))}`;
+function describe(content) {
+  const lines = content.curves.map((curve) => {
+    if (content.x.bands) return `${curve.name}: ${curve.y.map((y, i) => `${content.x.bands[i]} ${content.x.unit} ${rounded(y)}`).join(", ")}`;
+    return `${curve.name}: maximum ${rounded(Math.max(...curve.y))}`;
   });
-  return `${given.y.title}, ${given.y.unit}. ${lines.join("; ")}`;
+  return `${content.y.title}, ${content.y.unit}. ${lines.join("; ")}`;
 }
 
 function range(lists) {
@@ -120,8 +120,8 @@ function padded([low, high]) {
 function ticks([low, high], count) {
   const rough = (high - low) / Math.max(2, Math.floor(count));
   const power = 10 ** Math.floor(Math.log10(rough));
-  const step = power * [1, 2, 5, 10].find((one) => one * power >= rough * (1 - 1e-9));
-  const found = [];
-  for (let i = Math.ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i += 1) found.push(Number((i * step).toPrecision(12)));
-  return found;
+  const step = power * [1, 2, 5, 10].find((factor) => factor * power >= rough * (1 - 1e-9));
+  const values = [];
+  for (let i = Math.ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i += 1) values.push(Number((i * step).toPrecision(12)));
+  return values;
 }

@@ -1,21 +1,21 @@
 // Requests to the server: each carries the token, long answers are streams of reports.
 
-/** What the server refuses; its message is a sentence. */
+/** An error that the server reports. */
 export class Refusal extends Error {}
 
-/** The server is not there, or another one with another token is. */
+/** The server is not running, or is another one with another token. */
 export class Loss extends Error {}
 
 const parameters = () => new URLSearchParams(location.hash.slice(1));
 
-/** Keep the token of the address, and take it out of the address. */
+/** Store the token of the address and remove it from there. */
 export function takeToken() {
-  const given = parameters();
-  const found = given.get("token");
-  if (!found) return;
-  localStorage.setItem("token", found);
-  given.delete("token");
-  history.replaceState(null, "", given.size ? `#${given}` : location.pathname);
+  const fragment = parameters();
+  const token = fragment.get("token");
+  if (!token) return;
+  localStorage.setItem("token", token);
+  fragment.delete("token");
+  history.replaceState(null, "", fragment.size ? `#${fragment}` : location.pathname);
 }
 
 /** Return the text of the case that the address holds. */
@@ -23,9 +23,9 @@ export function linkedCase() {
   return parameters().get("case");
 }
 
-/** Return the answer to a request; raise Refusal, Loss or, where it was ended, AbortError. */
+/** Return the answer to a request; raise Refusal, Loss or, if it was cancelled, AbortError. */
 export async function ask(path, options = {}) {
-  // Another page of this browser may have brought the token of a new server.
+  // Another page of this browser may have stored the token of a new server.
   const headers = { "X-Thud-Token": localStorage.getItem("token") ?? "" };
   let response = null;
   try {
@@ -35,11 +35,11 @@ export async function ask(path, options = {}) {
     throw new Loss(`the server does not answer; start it again with: thud-driver explore --port ${location.port}`);
   }
   if (response.ok) return response;
-  const sentence = await response.text();
-  throw response.status === 403 ? new Loss(sentence) : new Refusal(sentence);
+  const message = await response.text();
+  throw response.status === 403 ? new Loss(message) : new Refusal(message);
 }
 
-/** Return the answer at the end of a stream of reports; `report` is told what part is done. */
+/** Return the answer at the end of a stream of reports; `report` gets the fraction that is done. */
 export async function follow(path, body, signal, report) {
   const response = await ask(path, { method: "POST", body, signal });
   const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
@@ -52,10 +52,10 @@ export async function follow(path, body, signal, report) {
     const lines = (rest + (value ?? "")).split("\n");
     rest = done ? "" : lines.pop();
     for (const line of lines.filter(Boolean)) {
-      const found = JSON.parse(line);
-      if ("answer" in found) return found.answer;
-      if ("error" in found) throw new Refusal(found.error);
-      report(found.done);
+      const message = JSON.parse(line);
+      if ("answer" in message) return message.answer;
+      if ("error" in message) throw new Refusal(message.error);
+      report(message.done);
     }
     if (done) throw new Loss(`the server has stopped; start it again with: thud-driver explore --port ${location.port}`);
   }

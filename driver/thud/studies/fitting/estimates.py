@@ -1,4 +1,4 @@
-"""Estimated parameters and their uncertainty, of fits of impacts and of compressions."""
+"""Estimated parameters and their uncertainty, for fits to impacts and to compressions."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Estimates(StudyResult):
     residuals : ndarray, shape (n_residual,)
         Model minus measured values.
     warnings : tuple of str
-        Why estimates or intervals may be wrong, a sentence each.
+        Why estimates or intervals may be wrong.
     """
 
     names: tuple[str, ...]
@@ -85,7 +85,7 @@ class Estimates(StudyResult):
     def intervals(self, confidence: float | None = None) -> dict[str, tuple[float, float]]:
         """Return confidence intervals by name, see `interval_freedom`.
 
-        They end at the limits of the search. `confidence` is by default that of the fit.
+        They are cut at the limits of the search. `confidence` is by default that of the fit.
         """
         confidence = self.confidence if confidence is None else confidence
         factor = coverage_factor(confidence, self.interval_freedom)
@@ -119,7 +119,7 @@ class Estimates(StudyResult):
 
 
 def _digits(value: float, error: float) -> int:
-    """Return the number of digits that shows a value to two digits of its error."""
+    """Return the number of digits of a value that resolves its error to two digits."""
     if not (np.isfinite(error) and error > 0 and value):
         return 6
     return int(np.clip(np.ceil(np.log10(abs(value) / error)) + 2, 3, 12))

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class FittedTarget(Immutable):
-    """One target of a fit and what was found for it.
+    """One target of a fit, with its case, impact and own parameters.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class FittedTarget(Immutable):
     misfit : Misfit
         The comparison of target and impact.
     own : ndarray
-        The parameters of this target alone: time of first touch, s, and gain where they are fitted.
+        The parameters of this target alone, if fitted: time of first touch, s, and gain.
     """
 
     case: Case
@@ -74,28 +74,28 @@ class Fit(Estimates):
     Attributes
     ----------
     names : tuple of str
-        The parameters; last those of the records, where they are free: ``"time_shift"``, the time
-        of first touch, and ``"gain"``, of several records with their number, as ``"gain(2)"``.
+        The parameters; then those of the records, if fitted: ``"time_shift"``, the time of first
+        touch, and ``"gain"``, of several records with their number, as ``"gain(2)"``.
     noise : float
-        Standard deviation of one residual of the first target: for forces that of white noise with
-        the same power in the compared band, N, for levels in units of their uncertainties, or dB
-        where none were given.
+        Standard deviation of one residual of the first target: of forces that of white noise with
+        the same power in the compared band, N; of levels in units of their uncertainties, or in dB
+        without any.
     residuals : ndarray, shape (n_residual,)
         Model minus target over its standard deviation.
     known_noise : bool
-        The standard deviations were given, or are those of the background of the records.
+        The standard deviations are stated, or those of the background of the records.
     singular_values : ndarray, shape (n,)
         Singular values of the Jacobian with columns of unit length, in descending order.
     evaluations, failures : int
-        Impacts that were computed, and that could not be.
+        Number of impacts computed, and of those that failed.
     converged : bool
         The search has converged.
     identifiability : tuple of str
-        How well the parameters can be separated, as sentences.
+        How well the parameters can be separated.
     targets : tuple of FittedTarget
         Case, impact and comparison of each target.
     given_units : dict of str to tuple
-        Units in which parameters were given, and how many SI units they are.
+        Units of the parameters in the study, and their sizes in SI units.
     """
 
     known_noise: bool
@@ -109,7 +109,7 @@ class Fit(Estimates):
 
     @property
     def ends(self) -> list[str]:
-        """What the names of the files of each target end with."""
+        """Endings of the file names of each target."""
         return file_ends(len(self.targets))
 
     @property
@@ -137,7 +137,7 @@ class Fit(Estimates):
     def interval_freedom(self) -> int | None:
         """Degrees of freedom of Student's t in the intervals; None: they are normal.
 
-        Those of the residuals where the noise is estimated from them, or of the background.
+        They are those of the residuals or of the background, whichever determines the noise.
         """
         if not self.known_noise:
             return self.degrees_of_freedom
@@ -163,7 +163,7 @@ class Fit(Estimates):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is not plausible in the impacts at the result."""
+        """Warnings of the impacts at the result."""
         return tuple(dict.fromkeys(r for target in self.targets for r in target.impact.warnings))
 
     @property
@@ -181,7 +181,7 @@ class Fit(Estimates):
         return "\n".join([super().table(), "", *self._quality()])
 
     def _quality(self) -> list[str]:
-        """Return the quality of the fit, one sentence per line."""
+        """Return the quality of the fit in lines of text."""
         freedom = self.degrees_of_freedom
         quality = f", reduced chi-square {self.reduced_chi_square:.3g}" if freedom else ""
         failures = f", {self.failures} of them impossible" if self.failures else ""
@@ -217,7 +217,7 @@ class Fit(Estimates):
         return f"standard deviation {size:.3g} {unit}, {source}"
 
     def summary(self) -> dict[str, object]:
-        """Return the numbers of the fit for JSON: None where they are not finite."""
+        """Return the numbers of the fit for JSON; None for those that are not finite."""
         intervals = self.intervals()
         return {
             "version": version(),
@@ -255,10 +255,7 @@ class Fit(Estimates):
         }
 
     def to_dataframe(self, number: int = 1) -> pd.DataFrame:
-        """Return a target, by its number, and the model side by side; SI units, dB.
-
-        Raise InputError where pandas is not installed.
-        """
+        """Return a target, by its number, and the model side by side; SI units, dB."""
         with require_extra("studies"):
             import pandas as pd
 
@@ -274,12 +271,12 @@ class Fit(Estimates):
         """Return the figures of all targets, and confidence regions, by the names of files."""
         from thud.plot import draw_fit
 
-        return draw_fit(self, self.display_units)
+        return draw_fit(self)
 
     def files(self, **extra: object) -> dict[str, bytes]:
         """Return ``fit.json``, with further entries, ``fit.csv`` and ``fitted.nml`` by name.
 
-        Of several targets, table and case have the number of the target, as in ``fit_2.csv``.
+        The last two have a number if there are several targets, as in ``fit_2.csv``.
         """
         content = json.dumps({**self.summary(), **extra}, indent=2, allow_nan=False, default=str)
         files = {"fit.json": f"{content}\n".encode()}
@@ -294,10 +291,10 @@ class Fit(Estimates):
     def save(
         self, directory: str | os.PathLike[str], *, figures: bool = True, replace: bool = False
     ) -> list[Path]:
-        """Write the files of `files`, and figures as PNG and SVG; return their paths.
+        """Write the files of `files`, and the figures; return their paths.
 
-        Files that thud has not written are replaced with `replace` only. Raises InputError where a
-        file is in the way, OSError where one cannot be written.
+        `replace` also replaces files that thud has not written. Raises InputError if a file is in
+        the way, OSError if one cannot be written.
         """
         contents = self.files()
         if figures:
@@ -309,7 +306,7 @@ class Fit(Estimates):
 
 
 def file_ends(count: int) -> list[str]:
-    """Return what the names of the files of targets end with."""
+    """Return the endings of the file names of targets."""
     return [""] if count == 1 else [f"_{number}" for number in range(1, count + 1)]
 
 

@@ -32,13 +32,13 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-# Rounded times leave this fraction of the highest frequency open.
-SAME = 1e-5
-# Minimum number of independent values of contact and of background that are compared, and of the
-# residual over the peak force that is tested, which exceeds sampling errors.
+# Relative tolerance of the highest frequency, because times are rounded.
+ROUNDING = 1e-5
+# Minimum number of independent values of contact and of background for a comparison, and minimum
+# residual over peak force for a test: smaller ones are sampling errors.
 MIN_FREEDOM = 5
 NUMERICAL = 1e-4
-# Standard errors of hum from which it is stated; noise alone reaches them with UNLIKELY.
+# Standard errors above which hum is reported; noise exceeds them with the probability UNLIKELY.
 NOTABLE = float(np.sqrt(-2 * np.log(UNLIKELY)))
 # Scale of a shift in time, s.
 SHIFT_SCALE = 1e-3
@@ -59,7 +59,7 @@ class ForceMisfit(Misfit):
             source.assessed_force() if isinstance(source, Impact) else "floor"
         )
         self.period = len(self.time) / self.sample_rate
-        count = int(self.below * self.period * (1 + SAME)) + 1
+        count = int(self.below * self.period * (1 + ROUNDING)) + 1
         self.frequency = freeze(np.arange(count) / self.period)
         self.count = 2 * len(self.frequency) - 1
         self.spectrum = freeze(np.fft.rfft(self.force, norm="ortho")[:count])
@@ -79,7 +79,7 @@ class ForceMisfit(Misfit):
             self.own[SHIFT] = "s", SHIFT_SCALE
         if target.gain is not None:
             self.own[GAIN] = "", 1.0
-        # What is known of the gain is one more residual.
+        # A known uncertainty of the gain adds one residual.
         self.prior = target.gain if target.gain is not None and target.gain < np.inf else None
         if self.prior is not None and not self.known_noise:
             refuse(
@@ -126,11 +126,11 @@ class ForceMisfit(Misfit):
 
     @cached_property
     def unit_deviation(self) -> float:
-        """Deviation of white noise with the power of the noise below `below`, N; 1: not known."""
+        """Deviation of white noise of the same power below `below`, N; 1 if it is not known."""
         return self.target.noise or (self.weights.deviation() if self.known_noise else 1.0)
 
     def model_spectrum(self, impact: Impact, own: Array) -> NDArray[np.complex128]:
-        """Return the transform of the force of an impact as the record would show it."""
+        """Return the Fourier transform of the force of an impact on the time axis of the record."""
         count = len(self.frequency)
         shape = len(impact.time), impact.sample_rate
         if shape not in self._transforms:
@@ -144,15 +144,15 @@ class ForceMisfit(Misfit):
         return result
 
     def value(self, name: str, own: Array) -> float:
-        """Return one of its own parameters, or what it is where it is not fitted."""
+        """Return one of its own parameters, or its fixed value if it is not fitted."""
         if name not in self.own:
             return {SHIFT: 0.0, GAIN: 1.0}[name]
         return float(own[list(self.own).index(name)])
 
     def residual(self, impact: Impact, own: Array) -> Array:
         """Return model minus target over standard deviation, shape (size,)."""
-        rest = self._grid(self.model_spectrum(impact, own) - self.spectrum)
-        return self._with_prior(self.weights.matrix @ rest, (self.value(GAIN, own) - 1))
+        difference = self._grid(self.model_spectrum(impact, own) - self.spectrum)
+        return self._with_prior(self.weights.matrix @ difference, (self.value(GAIN, own) - 1))
 
     def own_derivatives(self, impact: Impact, own: Array) -> Array:
         """Return the derivatives of the residual by its own parameters, shape (size, n_own)."""
@@ -171,7 +171,7 @@ class ForceMisfit(Misfit):
         return weighted if self.prior is None else np.append(weighted, gain / self.prior)
 
     def own_start(self, impact: Impact) -> Array:
-        """Return where impact and record correlate most, s, and a gain of 1."""
+        """Return the time shift of maximum correlation, s, and a gain of 1."""
         start = {SHIFT: self.time[0], GAIN: 1.0}
         own = np.array([start[name] for name in self.own])
         if SHIFT not in self.own:
@@ -207,7 +207,7 @@ class ForceMisfit(Misfit):
         }
 
     def nuisances(self, impact: Impact, own: Array) -> dict[str, tuple[float, float]]:
-        """Return offset and amplitude of hum where they are fitted, and their errors, N."""
+        """Return offset and amplitude of hum, if fitted, with their standard errors, N."""
         value, covariance = self.weights.estimates(
             self._grid(self.spectrum - self.model_spectrum(impact, own))
         )
@@ -224,16 +224,15 @@ class ForceMisfit(Misfit):
         return result
 
     def warnings(self, impact: Impact, own: Array, deviation: float, count: int) -> list[str]:
-        """Return what residuals of a deviation show that `count` parameters cannot explain.
+        """Return warnings where residuals are not noise of a deviation, after `count` parameters.
 
-        Noise is the same throughout and independent once it is weighted; what the model cannot
-        follow is there during the contact only.
+        Weighted noise is stationary and independent; errors of the model occur during contact only.
         """
-        rest = self._grid(self.spectrum - self.model_spectrum(impact, own))
-        unexplained = rest - self.weights.background(rest)
+        difference = self._grid(self.spectrum - self.model_spectrum(impact, own))
+        unexplained = difference - self.weights.background(difference)
         if np.sqrt(np.mean(unexplained**2)) < NUMERICAL * self.force.max():
             return []
-        weighted = self.weights.matrix @ rest / deviation
+        weighted = self.weights.matrix @ difference / deviation
         time = self.time[0] + np.arange(self.count) * self.period / self.count
         begin = self.value(SHIFT, own)
         inside = (time >= begin) & (time <= begin + impact.contact_time)
@@ -251,29 +250,29 @@ class ForceMisfit(Misfit):
 
     def history(self, spectrum: NDArray[np.complex128]) -> Array:
         """Return the history of a transform, N, shape (n_sample,)."""
-        whole: Array = np.fft.irfft(spectrum, len(self.time), norm="ortho")
-        return whole
+        result: Array = np.fft.irfft(spectrum, len(self.time), norm="ortho")
+        return result
 
     def _grid(self, spectrum: NDArray[np.complex128]) -> Array:
         """Return the history of a transform on the grid."""
-        grid: Array = np.fft.irfft(spectrum, self.count, norm="ortho")
-        return grid
+        result: Array = np.fft.irfft(spectrum, self.count, norm="ortho")
+        return result
 
 
 def _contact_warning(
     weighted: Array, inside: NDArray[np.bool_], count: int, unit: float
 ) -> list[str]:
-    """Return how residuals differ during contact from before and after, where they do."""
-    during, other = int(inside.sum()) - count, int((~inside).sum())
-    if min(during, other) < MIN_FREEDOM:
+    """Return a warning if residuals during contact exceed those before and after it."""
+    inside_count, outside_count = int(inside.sum()) - count, int((~inside).sum())
+    if min(inside_count, outside_count) < MIN_FREEDOM:
         return []
-    square = float((weighted[inside] ** 2).sum()) / during
-    outside = float((weighted[~inside] ** 2).sum()) / other
-    if square < stats.f.isf(UNLIKELY, during, other) * outside:
+    square = float((weighted[inside] ** 2).sum()) / inside_count
+    outside = float((weighted[~inside] ** 2).sum()) / outside_count
+    if square < stats.f.isf(UNLIKELY, inside_count, outside_count) * outside:
         return []
     text = (
         f"the residual is {unit * np.sqrt(square):.3g} N during the contact and "
-        f"{unit * np.sqrt(outside):.3g} N otherwise: the model does not follow the force to within "
+        f"{unit * np.sqrt(outside):.3g} N otherwise: the model differs from the force by more than "
         "the noise, and the intervals are too narrow"
     )
     return [text]
@@ -282,7 +281,7 @@ def _contact_warning(
 def _change_warning(
     weighted: Array, before: NDArray[np.bool_], after: NDArray[np.bool_]
 ) -> list[str]:
-    """Return how residuals before contact differ from those after it, where they do."""
+    """Return a warning if residuals before contact differ from those after it."""
     counts = int(before.sum()), int(after.sum())
     if min(counts) < MIN_FREEDOM:
         return []

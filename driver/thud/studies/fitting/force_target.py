@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 
     from thud.base._schema import LevelsForce
 
-# A record must hold the whole pulse: mean of its last millisecond over its peak.
+# A record must hold the whole pulse: maximum mean of its last millisecond over its peak.
 OPEN_END = 0.1
 END = 1e-3
-# Values that are compared at most: their covariances take memory with the square of it, 2 GB.
+# Maximum number of compared values: the memory of their covariance grows with its square, to 2 GB.
 MAX_COMPARED = 8000
 
 
@@ -36,21 +36,20 @@ MAX_COMPARED = 8000
 class ForceTarget(Immutable):
     """A force history to be fitted.
 
-    Model and record are compared in the frequencies up to `below`: their discrete Fourier
-    transforms over the time of the record, in which a shift in time is a phase. What lies above is
-    noise, or numerical ripple. The residuals are weighted by the covariance of the noise, white,
-    pink and brown, which the background before and after the pulse shows (generalized least
-    squares);
-    offset and hum are nuisance parameters. Background beyond 0.1 s on each side does not count.
+    Model and record are compared at the frequencies up to `below`, by their discrete Fourier
+    transforms over the time of the record, in which a shift in time is a phase. Above it there is
+    noise, or numerical ripple. The residuals are weighted by the covariance of the noise (white,
+    pink and brown), estimated from the background before and after the pulse (generalized least
+    squares); offset and hum are nuisance parameters. Only 0.1 s of background on each side counts.
 
     Attributes
     ----------
     record : Recording, Impact or pair of array_like
         The force; of arrays: time, s, and force, N, both of shape (n_sample,).
     noise : float or None
-        Standard deviation of the noise of one sample, white, N; None: the noise is that of the
-        background, or with less than 50 independent values of it estimated from the residual, as
-        white.
+        Standard deviation of white noise of one sample, N; None: the noise is that of the
+        background, or white and estimated from the residual if the background has less than 50
+        independent values.
     force : str or None
         ``"floor"`` (what a force plate measures) or ``"elastic"``: the force of the model, and
         of an impact as target.
@@ -59,19 +58,18 @@ class ForceTarget(Immutable):
     below : float
         Highest frequency that is compared, Hz.
     window : tuple of float or None
-        Begin and end, s, of the part of the record that counts; None: the pulse with 0.1 s on each
+        Begin and end, s, of the compared part of the record; None: the pulse with 0.1 s on each
         side. The time of a measured drop is 0 at first touch.
     drop : int
         Number of the drop of a recording that has several, from 1.
     offset : bool or None
         An offset is a nuisance parameter; None: where there is enough background.
     hum : float or None
-        Frequency, Hz, of hum whose first five harmonics are nuisance parameters; 0: there is none;
-        None: hum of 50 or 60 Hz, and tones of other frequencies, as far as the background shows
-        them.
+        Frequency, Hz, of hum whose first five harmonics are nuisance parameters; 0: no hum; None:
+        hum of 50 or 60 Hz and other tones as found in the background.
     gain : float or None
-        Relative standard uncertainty of the calibration: a factor of the record is fitted, known to
-        be 1 to this extent; infinite: not known; None: it is 1.
+        Relative standard uncertainty of the calibration: a factor of the record is fitted, which is
+        1 within this uncertainty; infinite: any factor; None: the factor is 1.
     fixed : mapping of str to object
         Keys of ball, drop and model that are different for this record, such as the drop height.
     """
@@ -89,7 +87,7 @@ class ForceTarget(Immutable):
     fixed: Mapping[str, object] = field(default_factory=dict)
 
     def misfit(self) -> ForceMisfit:
-        """Return what the fit needs of the target."""
+        """Return the misfit of the target."""
         if self.force is not None:
             require_choice("target: force", self.force, FORCES)
         self._require_numbers()
@@ -151,7 +149,7 @@ class ForceTarget(Immutable):
         record = self.record
         if isinstance(record, Recording):
             drop = record.drops[self.drop - 1]
-            # With what was removed: the fit weighs it itself.
+            # Hum and offset that were removed are added: the fit estimates them itself.
             return Record(drop.time, drop.force + drop.contact.removed, drop.sample_rate)
         if isinstance(record, Impact):
             return Record(record.time, record.force(self.force), record.sample_rate)

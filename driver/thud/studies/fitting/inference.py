@@ -28,15 +28,15 @@ MIN_RATIO = 1e-6
 ERRORS = 3.0
 # Entries of a unit vector below this are zero.
 NEGLIGIBLE = 1e-3
-# Correlations that are stated, and above which two parameters cannot be separated in practice: the
-# error of any model exceeds their difference.
+# Correlations that are reported, and above which two parameters cannot be separated in practice:
+# errors of the model exceed the difference of their effects.
 STRONG = 0.9
 INSEPARABLE = 0.998
 # Probability of a false warning by one test.
 UNLIKELY = 1e-3
 # Fewer residuals are not tested.
 MIN_TESTED = 20
-# Fraction of the maximum entry below which a sentence omits a parameter.
+# Fraction of the maximum entry below which a message omits a parameter.
 SMALL = 0.05
 
 
@@ -83,7 +83,7 @@ def infer(jacobian: Array, finer: Array, size: float) -> Inference:
 
 
 def _sparse(rows: Array) -> Array:
-    """Return another basis of the same space: in each of its pivot columns one entry is not 0."""
+    """Return another basis of the same space, with one entry that is not 0 in each pivot column."""
     if not len(rows):
         return rows
     # The parameters that vary most represent the directions.
@@ -107,33 +107,33 @@ def worst_directions(covariance: Array, maximum: float) -> list[tuple[float, Arr
 
 
 def null_message(names: Sequence[str], direction: Array) -> str:
-    """Return the meaning of a direction that is not identifiable."""
-    part = _parts(names, direction)
-    if len(part) == 1:
-        return f"{part[0][0]} has no effect on what is compared: it cannot be fitted to this target"
-    change = f"{_join([name for name, _ in part])} are not identifiable: {_change(part)} together"
-    return f"{change} leave what is compared as it is{_product(part)}"
-
-
-def weak_message(names: Sequence[str], direction: Array, width: float, confidence: float) -> str:
-    """Return the meaning of a direction with a relative half interval `width` that is wide."""
-    part = _parts(names, direction)
-    share = f"{100 * width * max(abs(value) for _, value in part):.0f} %"
-    if len(part) == 1:
-        return (
-            f"{part[0][0]} is hardly identifiable: its {confidence:.0%} interval is +-{share} of "
-            "its value"
-        )
+    """Return the message on a direction that is not identifiable."""
+    entries = _main_entries(names, direction)
+    listed = _join([name for name, _ in entries])
+    if len(entries) == 1:
+        return f"{listed} has no effect on the compared quantities: it cannot be fitted"
     return (
-        f"{_join([name for name, _ in part])} are hardly identifiable: along {_change(part)} "
-        f"the {confidence:.0%} interval is +-{share}{_product(part)}"
+        f"{listed} are not identifiable: {_change(entries)} together do not change the compared "
+        f"quantities{_product(entries)}"
     )
 
 
-def pair_messages(names: Sequence[str], correlation: Array, least: float) -> list[str]:
-    """Return the pairs of parameters whose correlation reaches a size, the strongest first."""
+def weak_message(names: Sequence[str], direction: Array, width: float, confidence: float) -> str:
+    """Return the message on a direction with a wide relative half interval, `width`."""
+    entries = _main_entries(names, direction)
+    listed = _join([name for name, _ in entries])
+    size = f"{confidence:.0%} interval is +-{100 * width * max(abs(v) for _, v in entries):.0f} %"
+    if len(entries) == 1:
+        return f"{listed} is hardly identifiable: its {size} of its value"
+    return (
+        f"{listed} are hardly identifiable: along {_change(entries)} the {size}{_product(entries)}"
+    )
+
+
+def pair_messages(names: Sequence[str], correlation: Array, minimum: float) -> list[str]:
+    """Return messages on pairs with at least a minimum correlation, the strongest first."""
     strong = np.triu(np.nan_to_num(np.abs(correlation)), 1)
-    pairs = sorted(np.argwhere(strong >= least).tolist(), key=lambda pair: -strong[*pair])
+    pairs = sorted(np.argwhere(strong >= minimum).tolist(), key=lambda pair: -strong[*pair])
     result = []
     for i, j in pairs:
         size = strong[i, j]
@@ -156,17 +156,17 @@ def identifiability(
     directions = worst_directions(covariance[:count, :count], 0.0)
     if len(directions) > 1:
         (worst, direction), (best, _) = directions[0], directions[-1]
-        part = _parts(names[:count], direction)
+        entries = _main_entries(names[:count], direction)
         size = 100 * worst * max(abs(float(value)) for value in direction)
-        change = _change(part) if len(part) > 1 else part[0][0]
+        change = _change(entries) if len(entries) > 1 else entries[0][0]
         result.append(
-            f"least determined: {change}, standard error {size:.2g} %; a direction that is "
-            f"{worst / best:.3g} times as uncertain as the best determined one"
+            f"weakest parameter combination: {change}, standard error {size:.2g} %, "
+            f"{worst / best:.3g} times that of the strongest"
         )
     return result + pair_messages(names, correlation, STRONG)
 
 
-def _parts(names: Sequence[str], direction: Array) -> list[tuple[str, float]]:
+def _main_entries(names: Sequence[str], direction: Array) -> list[tuple[str, float]]:
     """Return names and entries of a direction without negligible ones; the maximum is 1."""
     largest = np.abs(direction).max()
     result = [
@@ -179,18 +179,18 @@ def _parts(names: Sequence[str], direction: Array) -> list[tuple[str, float]]:
 
 
 def _join(words: Sequence[str]) -> str:
-    return f"{', '.join(words[:-1])} and {words[-1]}"
+    return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
 
 
-def _change(part: Sequence[tuple[str, float]]) -> str:
-    return _join([f"{name} {value:+.2g} %" for name, value in part])
+def _change(entries: Sequence[tuple[str, float]]) -> str:
+    return _join([f"{name} {value:+.2g} %" for name, value in entries])
 
 
-def _product(part: Sequence[tuple[str, float]]) -> str:
+def _product(entries: Sequence[tuple[str, float]]) -> str:
     """Return the product of powers that two parameters determine."""
-    if len(part) > 2:  # noqa: PLR2004 - a pair determines one product of powers
+    if len(entries) > 2:  # noqa: PLR2004 - a pair determines one product of powers
         return ""
-    (first, a), (second, b) = part
+    (first, a), (second, b) = entries
     power = -a / b
     return f"; only {first} * {second}^{power:.3g} is determined, close to these values"
 
@@ -212,7 +212,7 @@ def require_confidence(confidence: object) -> None:
 
 
 def residual_warnings(residual: Array, time: Array) -> list[str]:
-    """Return what the residuals of equally spaced times, s, show beside independent noise."""
+    """Return warnings if residuals at equally spaced times, s, are not independent noise."""
     if len(residual) < MIN_TESTED:
         return []
     result = (_color_warning(residual), _outlier_warning(residual, time), runs_warning(residual))
@@ -220,7 +220,7 @@ def residual_warnings(residual: Array, time: Array) -> list[str]:
 
 
 def _color_warning(residual: Array) -> str:
-    """Test the cumulative periodogram (Bartlett): of white noise it is that of uniform numbers."""
+    """Test the cumulative periodogram (Bartlett), which is uniform for white noise."""
     power = np.abs(np.fft.rfft(residual)[1:]) ** 2
     share = np.cumsum(power) / power.sum()
     result = stats.kstest(share[:-1], "uniform")
@@ -230,13 +230,13 @@ def _color_warning(residual: Array) -> str:
     side = "low" if fraction < 0.5 else "high"  # noqa: PLR2004 - halves
     return (
         f"the residuals are colored: half of their power lies in the {side}est "
-        f"{min(fraction, 1 - fraction):.0%} of the compared frequencies: noise or model differ "
-        "from what is assumed, and the intervals do not hold"
+        f"{min(fraction, 1 - fraction):.0%} of the compared frequencies: the noise is not as "
+        "assumed or the model is wrong, and the intervals do not hold"
     )
 
 
 def _outlier_warning(residual: Array, time: Array) -> str:
-    """Test the largest of n normal residuals: n times its probability (Bonferroni)."""
+    """Test the largest of n normal residuals by n times its probability (Bonferroni)."""
     index = int(np.argmax(np.abs(residual)))
     size = abs(float(residual[index]))
     if 2 * len(residual) * stats.norm.sf(size) > UNLIKELY:
@@ -248,7 +248,7 @@ def _outlier_warning(residual: Array, time: Array) -> str:
 
 
 def runs_warning(residual: Array) -> str:
-    """Return that residuals have too few or many runs of one sign (Wald and Wolfowitz), or ""."""
+    """Return a warning if residuals have too few or many runs of one sign (Wald, Wolfowitz)."""
     positive = residual > 0
     n, m = int(positive.sum()), int((~positive).sum())
     if not min(n, m):

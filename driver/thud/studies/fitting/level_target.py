@@ -14,8 +14,8 @@ from thud.base.immutable import Plain, freeze
 from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 from thud.studies.fitting.misfit import Misfit, numbers, require_positive
 
-# Relative step of the derivatives of a contact time: its end moves from ring to ring of the modal
-# ball, or from node to node, by 1e-3.
+# Relative step of the derivatives of a contact time, which changes in steps of 1e-3: from ring to
+# ring of the modal ball, or from node to node.
 CONTACT_STEP = 1e-2
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class LevelTarget(Plain):
-    """Levels to be fitted, and what else is known of the impact.
+    """Levels to be fitted, and other quantities of the impact.
 
     Attributes
     ----------
@@ -47,8 +47,8 @@ class LevelTarget(Plain):
         Value and standard deviation of other quantities by name, such as ``"contact_time"``, in SI
         units; see `SampleQuantities`.
     force : str or None
-        ``"floor"`` or ``"elastic"``: the force of the model whose levels are compared; None: that
-        which its case assesses.
+        ``"floor"`` or ``"elastic"``: the force of the model whose levels are compared; None: the
+        assessed force of the case.
     """
 
     levels: Sequence[float]
@@ -60,7 +60,7 @@ class LevelTarget(Plain):
     fixed: Mapping[str, object] = field(default_factory=dict)
 
     def misfit(self) -> LevelMisfit:
-        """Return what the fit needs of the target."""
+        """Return the misfit of the target."""
         require_choice("target: bands", self.bands, BANDWIDTHS)
         if self.force is not None:
             require_choice("target: force", self.force, FORCES)
@@ -83,15 +83,15 @@ class LevelTarget(Plain):
                 entries = [entries] * len(levels)
             deviation = numbers("uncertainty", entries, len(levels))
         require_words("target: quantities", self.quantities, SAMPLE_QUANTITIES)
-        known = {name: numbers(name, pair, 2) for name, pair in self.quantities.items()}
-        if known and self.uncertainty is None:
+        quantities = {name: numbers(name, pair, 2) for name, pair in self.quantities.items()}
+        if quantities and self.uncertainty is None:
             refuse("target: uncertainty of the levels is missing", "dB, above 0")
-        target = np.concatenate([levels, [pair[0] for pair in known.values()]])
-        deviation = np.concatenate([deviation, [pair[1] for pair in known.values()]])
+        target = np.concatenate([levels, [pair[0] for pair in quantities.values()]])
+        deviation = np.concatenate([deviation, [pair[1] for pair in quantities.values()]])
         for value in deviation.tolist():
             require_positive("uncertainty", value, "dB or SI units")
         return LevelMisfit(
-            self, [nominal.index(f) for f in frequencies], target, deviation, list(known)
+            self, [nominal.index(f) for f in frequencies], target, deviation, list(quantities)
         )
 
 
@@ -119,7 +119,7 @@ class LevelMisfit(Misfit):
             self.step = CONTACT_STEP
 
     def values(self, impact: Impact) -> Array:
-        """Return levels, dB, and what else is compared, s and 1, of an impact, shape (size,)."""
+        """Return levels, dB, and other quantities, s and 1, of an impact, shape (size,)."""
         levels = impact.levels(self.bands, force=self.kind)[self.indices]
         exact = {"contact_time": "exact_contact_time"}
         extra = [impact.quantity(exact.get(name, name)) for name in self.extra]

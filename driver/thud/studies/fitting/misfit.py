@@ -1,4 +1,4 @@
-"""What the fit needs of a target, and checks of what targets are given."""
+"""The misfit of an impact to a target, and checks of targets."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-# Relative step of the central differences. The forces are smooth to 1e-13, but have kinks where a
-# sample enters or leaves the contact: 1e-3 would step over these, 1e-5 rarely does, and derivatives
-# are accurate to 1e-7 (with a rising loss factor, where contact is intermittent, to 3e-3).
+# Relative step of the central differences. Forces are smooth to 1e-13, but have kinks where an
+# instant enters or leaves the contact: steps of 1e-3 would cross these, steps of 1e-5 rarely do.
+# Derivatives are accurate to 1e-7 (3e-3 for intermittent contact with a rising loss factor).
 STEP = 2e-5
 # Names of parameters that records may have of their own.
 SHIFT, GAIN = "time_shift", "gain"
@@ -40,11 +40,11 @@ class Misfit(ABC):
     known_noise : bool
         The standard deviations are known; else their common factor is estimated.
     noise_freedom : int or None
-        Degrees of freedom of the data which the noise is known from; None: it was given.
+        Degrees of freedom of the data that determine the noise; None: the noise is stated.
     deviation_unit : str
         Unit of an estimated standard deviation.
     deviation_source : str
-        What tells the standard deviations, for messages.
+        What states the standard deviations, for messages.
     own : dict of str to tuple
         Unit and scale of each parameter of its own, by name.
     step : float
@@ -61,12 +61,12 @@ class Misfit(ABC):
 
     @property
     def unit_deviation(self) -> float:
-        """Unit of the residuals: the noise of forces, N; 1 for levels."""
+        """Unit of the residuals: noise of forces, N; 1 for levels."""
         return 1.0
 
     @property
     def band_fraction(self) -> float:
-        """Part of the deviation of white noise that lies in the compared band."""
+        """Fraction of the deviation of white noise that lies in the compared band."""
         return 1.0
 
     @property
@@ -84,7 +84,7 @@ class Misfit(ABC):
 
     @abstractmethod
     def data(self) -> Array:
-        """Return the numbers of the target as they were given."""
+        """Return the numbers of the target."""
 
     @abstractmethod
     def columns(self, impact: Impact, own: Array) -> Mapping[str, Sequence[object] | Array]:
@@ -113,7 +113,7 @@ class Misfit(ABC):
         deviation: float,  # noqa: ARG002
         count: int,  # noqa: ARG002
     ) -> list[str]:
-        """Return what residuals of a deviation show that `count` parameters cannot explain."""
+        """Return warnings if residuals are not noise of a deviation, after `count` parameters."""
         return []
 
 
@@ -128,8 +128,8 @@ def numbers(name: str, values: object, count: int) -> Array:
     return array
 
 
-def require_positive(name: str, value: Any, unit: str) -> None:  # noqa: ANN401 - that is the question
-    """Raise InputError where a value is not a number above 0."""
+def require_positive(name: str, value: Any, unit: str) -> None:  # noqa: ANN401 - checked here
+    """Raise InputError if a value is not a number above 0."""
     require_number(f"target: {name}", value)
     if not value > 0:
         refuse_value(f"target: {name}", value, f"numbers above 0, {unit}")

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Term(NamedTuple):
-    """One target of a fit: its case, its comparison with an impact, its own parameters in x."""
+    """One target of a fit: its case, its misfit, and the indices of its own parameters in x."""
 
     case: Case
     misfit: Misfit
@@ -40,7 +40,7 @@ def new_terms(targets: list[tuple[Case, Misfit]], count: int) -> list[Term]:
 
 
 class Objective:
-    """Residuals and derivatives of cases; parameters are divided by their scales."""
+    """Residuals of all targets and their derivatives; parameters are divided by their scales."""
 
     def __init__(self, terms: list[Term], ranges: list[Range], bar: tqdm[Any]) -> None:
         self.terms, self.ranges, self.bar = terms, ranges, bar
@@ -61,7 +61,7 @@ class Objective:
         return with_values(term.case, dict(zip(names, values.tolist(), strict=True)))
 
     def impacts(self, x: Array) -> list[Impact]:
-        """Return the impacts of a point, one for each term; none where one is impossible."""
+        """Return the impacts of a point, one for each term; an empty list if one fails."""
         key = x[: self.count].tobytes()
         if self._last and self._last[0] == key:
             return self._last[1]
@@ -84,7 +84,7 @@ class Objective:
         return values
 
     def residual(self, x: Array) -> Array:
-        """Return the residuals of a point; infinite where there is no impact."""
+        """Return the residuals of a point; infinite if an impact fails."""
         impacts = self.impacts(x)
         if not impacts:
             return np.full(sum(term.misfit.size for term in self.terms), np.inf)
@@ -97,7 +97,7 @@ class Objective:
         here = self.residual(x)
         jacobian = np.zeros((len(here), len(x)))
         first = 0
-        # Before the columns, which compute other impacts.
+        # First these, because the other columns compute other impacts.
         for term, impact in zip(self.terms, self.impacts(x), strict=False):
             rows = slice(first, first + term.misfit.size)
             slopes = term.misfit.own_derivatives(impact, self.own_values(term, x))
@@ -108,14 +108,14 @@ class Objective:
         return jacobian
 
     def _column(self, x: Array, i: int, step: float, here: Array) -> Array:
-        """Return the derivative by one parameter; one-sided where the other side is impossible."""
+        """Return the derivative by one parameter; one-sided if the other side fails."""
         ends = []
-        for beside in (min(x[i] + step, self.high[i]), max(x[i] - step, self.low[i])):
-            other = x.copy()
-            other[i] = beside
-            value = self.residual(other)
+        for position in (min(x[i] + step, self.high[i]), max(x[i] - step, self.low[i])):
+            beside = x.copy()
+            beside[i] = position
+            value = self.residual(beside)
             possible = np.isfinite(value).all()
-            ends.append((beside, value) if possible else (x[i], here))
+            ends.append((position, value) if possible else (x[i], here))
         (above, high), (below, low) = ends
         if above == below:
             message = (

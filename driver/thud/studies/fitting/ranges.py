@@ -31,8 +31,8 @@ SPREAD = 2.0
 class Range:
     """Start and limits of a parameter of a fit, SI units.
 
-    `scale` divides it in the search: its start, or a tenth of the range where that is 0. Further
-    starts lie within `spread`. `given_unit` and its size in SI units are those of the study.
+    The search divides it by `scale`: its start, or a tenth of the range if that is 0. Other starts
+    lie within `spread`. `given_unit` is the unit in the study, with its size in SI units.
     """
 
     name: str
@@ -66,7 +66,7 @@ def known_parameters(case: Case) -> dict[str, tuple[Key, float]]:
 
 
 def fitted_parameter(name: str, entry: object, case: Case) -> Parameter:
-    """Return a parameter of a fit. Raises InputError where it cannot be fitted."""
+    """Return a parameter of a fit; raise InputError if it cannot be fitted."""
     known = known_parameters(case)
     if name not in known:
         model = case.model.name if case.model else ""
@@ -88,14 +88,14 @@ def bound_parameters(
     if not isinstance(parameters, Mapping):
         parameters = dict.fromkeys(parameters)
     if not parameters:
-        refuse("parameters: none is given", ", ".join(known_parameters(case)))
+        refuse("parameters is empty", ", ".join(known_parameters(case)))
     return tuple(fitted_parameter(name, entry, case) for name, entry in parameters.items())
 
 
 def get_ranges(case: Case, parameters: Iterable[Parameter]) -> list[Range]:
-    """Return ranges of parameters. Raises InputError where start and limits do not fit together."""
+    """Return ranges of parameters; raise InputError if a start is outside its limits."""
     result = list(parameters)
-    # Ends of ranges that are other keys are those at the start.
+    # Limits that are other keys take their values at the start.
     begin = with_values(case, {p.name: p.start for p in result if p.start is not None})
     return [_get_range(begin, parameter) for parameter in result]
 

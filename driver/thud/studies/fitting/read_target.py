@@ -46,12 +46,12 @@ def read_target(table: dict[str, Any], folder: Path) -> Target:
         for name, value in table.items()
     }
     if "levels" in table:
-        known = {
+        quantities = {
             name: _measured(f"[target] {name}", options.pop(name), QUANTITIES[name].unit)
             for name in SAMPLE_QUANTITIES
             if name in options
         }
-        return LevelTarget(**options, quantities=known)
+        return LevelTarget(**options, quantities=quantities)
     paths = {word: options.pop(word) for word in ("file", "config") if word in options}
     for word, name in paths.items():
         if not isinstance(name, str) or not name.strip():
@@ -71,11 +71,11 @@ def _read_record(
 ) -> Recording | tuple[ArrayLike, ArrayLike]:
     """Return the record of a file.
 
-    Tables of time and force are taken as they are unless they shall be measured; a model, or
-    another program, may have written them.
+    Tables of time and force, as written by models and other programs, are taken as they are unless
+    they are to be measured.
     """
-    others = {end for item in FORMATS if item.module != "text" for end in item.suffixes}
-    if measured or path.suffix.lower() in others:
+    suffixes = {end for item in FORMATS if item.module != "text" for end in item.suffixes}
+    if measured or path.suffix.lower() in suffixes:
         return read_recording(path, config=config)
     samples = read_table(path)
     read_record(samples, str(path))  # refuses what is not a record

@@ -1,7 +1,7 @@
-"""Noise of a record below a frequency, from its background, and how it weights residuals.
+"""Noise of a record below a frequency, from its background, and the weights of residuals.
 
-Records are compared on a grid of an odd number of points that holds their Fourier coefficients up
-to a frequency: `to_grid` is orthonormal, white noise stays white and keeps its deviation.
+Records are compared on a grid of an odd number of points with the same Fourier coefficients up to a
+frequency. `to_grid` is orthonormal: white noise stays white and keeps its deviation.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-# Background with fewer independent values in the band does not determine the noise.
+# Minimum number of independent values in the band that determine the noise.
 MIN_BACKGROUND = 50
-# Minimum frequency of hum, Hz: slower ones are drift within a pulse. Maximum number of its tones.
+# Minimum frequency of hum, Hz: below, it is drift within a pulse. Maximum number of its tones.
 MIN_HUM = 10.0
 MAX_TONES = 3
 # Harmonics of hum count up to this fraction of the highest frequency.
@@ -67,8 +67,8 @@ def grid_covariance(lags: Array, count: int) -> Array:
     turn = np.exp(-2j * np.pi * np.subtract.outer(order, order) / n)
     np.fill_diagonal(turn, 0)
     covariance = 2j * np.subtract.outer(half, half) / (n * (1 - turn))
-    whole = np.fft.fft((1 - np.arange(n) / n) * lags)[order].real
-    np.fill_diagonal(covariance, 2 * whole - lags[0])
+    diagonal = np.fft.fft((1 - np.arange(n) / n) * lags)[order].real
+    np.fill_diagonal(covariance, 2 * diagonal - lags[0])
     result: Array = np.fft.fft(np.fft.ifft(covariance, axis=0), axis=1).real
     return result
 
@@ -138,8 +138,8 @@ class BackgroundRecord:
     def _means(self) -> tuple[Cells, Array]:
         """Cells of the background, s from the middle of the pulse, and their means − median, N.
 
-        They are those of the band: wider ones would not show the noise of its upper end. Background
-        farther than 0.1 s away is left out, whatever the window.
+        Their width is that of the band: wider cells would not show the noise of its upper end.
+        Background farther than 0.1 s away is left out, whatever the window.
         """
         width = max(1, int(self.rate / (2 * self.below)))
         first, stop = self.pulse
@@ -170,7 +170,7 @@ class BackgroundRecord:
         residual = mean - waves @ np.linalg.lstsq(waves, mean)[0]
         peak = float(self.force.max() - np.median(self.force))
         result = fit_background(cells, residual, peak)
-        # What the waves have taken of the noise.
+        # The waves have absorbed part of the noise.
         scale = np.where(np.arange(5) < 3, len(mean) / (len(mean) - waves.shape[1] + 1), 1.0)  # noqa: PLR2004
         return replace(result, draws=scale * result.draws)
 
@@ -183,7 +183,7 @@ class BackgroundRecord:
         span = 2 * float(np.abs(cells).max())
         step = 1 / (4 * span)
         grid = np.arange(MIN_HUM, HARMONIC_EDGE * self.below, step)
-        # The noise has those of the mains.
+        # The noise includes hum of the mains.
         grid = grid[np.abs(grid[:, np.newaxis] - MAINS).min(axis=1) > 2 * step]
         min_gain = float(np.log(len(grid) / UNLIKELY))
         result: tuple[float, ...] = ()
@@ -256,7 +256,7 @@ def _strongest(cells: Cells, mean: Array, whiten: Array, grid: Array) -> tuple[f
 
 
 def _trendless(cells: Cells) -> Array:
-    """Return the projection that takes offset and drift of white noise out of cells."""
+    """Return the projection that removes offset and drift from cells of white noise."""
     middle = (cells[0] + cells[1]) / 2
     basis, _ = np.linalg.qr(np.column_stack([np.ones_like(middle), middle]))
     return np.asarray(np.eye(len(middle)) - basis @ basis.T, dtype=np.float64)
@@ -307,7 +307,7 @@ class Weights:
     def __init__(self, covariance: Array, nuisance: Array, predicted: Array) -> None:
         self.covariance, self.nuisance = freeze(covariance), freeze(nuisance)
         self.predicted = freeze(predicted)
-        # In the order of time, the factor leaves of each point what those before do not determine.
+        # Whitening leaves of each point in time what the points before it do not predict.
         factor = np.linalg.cholesky(covariance)
         self._whiten = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
         self._basis, self._triangle = np.linalg.qr(self._whiten @ nuisance)
@@ -320,15 +320,15 @@ class Weights:
         spread = np.trace(noise) - noise.sum() / count
         return float(np.sqrt(spread / (count - 1)))
 
-    def estimates(self, rest: Array) -> tuple[Array, Array]:
+    def estimates(self, difference: Array) -> tuple[Array, Array]:
         """Return the nuisance parameters of record − model, N, and their covariance, N2."""
         inverse = np.linalg.inv(self._triangle)
-        return inverse @ (self._basis.T @ (self._whiten @ rest)), inverse @ inverse.T
+        return inverse @ (self._basis.T @ (self._whiten @ difference)), inverse @ inverse.T
 
-    def background(self, rest: Array) -> Array:
+    def background(self, difference: Array) -> Array:
         """Return what offset, drift and hum add to the record, N: [n], from record − model."""
-        value, _ = self.estimates(rest)
-        weighted = self._whiten.T @ (self.matrix @ rest)
+        value, _ = self.estimates(difference)
+        weighted = self._whiten.T @ (self.matrix @ difference)
         result: Array = self.nuisance @ value + self.predicted @ weighted
         return result
 
@@ -339,7 +339,7 @@ def hum_harmonics(hum: float, below: float) -> tuple[float, ...]:
     return tuple(hum * order for order in range(1, 1 + count))
 
 
-def new_weights(  # noqa: PLR0913 - what the noise of a record is made of
+def new_weights(  # noqa: PLR0913 - components of the noise
     record: BackgroundRecord,
     count: int,
     *,
@@ -349,24 +349,11 @@ def new_weights(  # noqa: PLR0913 - what the noise of a record is made of
     tones: Sequence[float],
     mains: bool,
 ) -> Weights:
-    """Return the weights of a record.
+    """Return the weights of a record on a grid of `count` points.
 
-    Parameters
-    ----------
-    record
-        The record.
-    count
-        Number of points of the grid.
-    background
-        The noise of the background; None: not known.
-    noise
-        Standard deviation of white noise instead, N; without either it is 1 N.
-    offset
-        An offset is a nuisance parameter.
-    tones
-        Frequencies whose waves are nuisance parameters, Hz.
-    mains
-        Hum of 50 and 60 Hz counts as the background knows it.
+    `noise` is the standard deviation of white noise, N, instead of the noise of the background; if
+    neither is known, it is 1 N. Waves of the `tones`, Hz, and an `offset` are nuisance parameters;
+    with `mains`, hum of 50 and 60 Hz is included as found in the background.
     """
     n, rate = len(record.force), record.rate
     time = np.arange(n) / rate - record.middle

@@ -63,9 +63,9 @@ def search(
     _require_data(terms, len(ranges))
     with tqdm(unit="impact", disable=not progress, leave=False) as bar:
         objective = Objective(terms, ranges, bar)
-        starts = _spread(ranges, int(options["starts"]), options["seed"])
+        starts = _starts(ranges, int(options["starts"]), options["seed"])
         x, converged = _search(objective, starts, int(options["max_steps"]))
-        return _conclude(objective, x, options["confidence"], converged=converged)
+        return _new_fit(objective, x, options["confidence"], converged=converged)
 
 
 def _require_data(terms: list[Term], count: int) -> None:
@@ -87,7 +87,7 @@ def _require_data(terms: list[Term], count: int) -> None:
         )
 
 
-def _spread(ranges: list[Range], count: int, seed: int) -> Iterator[Array]:
+def _starts(ranges: list[Range], count: int, seed: int) -> Iterator[Array]:
     """Yield starts over their scales: the given one, then a Latin hypercube."""
     first = np.array([entry.start / entry.scale for entry in ranges])
     yield first
@@ -102,7 +102,7 @@ def _search(objective: Objective, starts: Iterator[Array], max_steps: int) -> tu
     failures: list[ThudError] = []
     for start in starts:
         try:
-            result = _descend(objective, start, max_steps)
+            result = _minimize(objective, start, max_steps)
         except ThudError as error:
             failures.append(error)
             continue
@@ -113,7 +113,7 @@ def _search(objective: Objective, starts: Iterator[Array], max_steps: int) -> tu
     return best.x, bool(best.status > 0)
 
 
-def _descend(objective: Objective, start: Array, max_steps: int) -> OptimizeResult:
+def _minimize(objective: Objective, start: Array, max_steps: int) -> OptimizeResult:
     first = objective.impacts(start)
     if not first:
         message = f"the start cannot be computed: {objective.error}"
@@ -131,14 +131,14 @@ def _descend(objective: Objective, start: Array, max_steps: int) -> OptimizeResu
         ftol=TOLERANCE,
         xtol=TOLERANCE,
         gtol=np.finfo(float).eps,  # ends a search that starts at a perfect fit
-        # LSMR is regularized: parameters without effect do not hold up the others. It searches
-        # a plane, which a single parameter does not span.
+        # LSMR is regularized: parameters without effect do not stop the others. It searches
+        # a plane, for which a single parameter is not enough.
         tr_solver="lsmr" if len(start) > 1 else "exact",
         max_nfev=max_steps,
     )
 
 
-def _conclude(objective: Objective, x: Array, confidence: float, *, converged: bool) -> Fit:
+def _new_fit(objective: Objective, x: Array, confidence: float, *, converged: bool) -> Fit:
     residual = objective.residual(x)
     impacts = objective.impacts(x)
     if not impacts:
@@ -148,7 +148,7 @@ def _conclude(objective: Objective, x: Array, confidence: float, *, converged: b
     terms, count = objective.terms, objective.count
     misfits = [term.misfit for term in terms]
     target_size = float(np.linalg.norm(np.concatenate([m.target_vector() for m in misfits])))
-    # Relative to the result, a change along a direction reads as one in per cent.
+    # Relative to the result, changes along a direction are in per cent.
     relative = np.where(np.abs(x) > AT_LIMIT, np.abs(x), 1.0)
     relative[count:] = 1.0
     inferred = infer(jacobian * relative, finer * relative, target_size)
@@ -163,7 +163,7 @@ def _conclude(objective: Objective, x: Array, confidence: float, *, converged: b
         for number, misfit in enumerate(misfits, start=1)
         for name, (unit, _) in misfit.own.items()
     }
-    answer = Fit(
+    fit = Fit(
         names=(*(entry.name for entry in objective.ranges), *own),
         units=(*(entry.unit for entry in objective.ranges), *own.values()),
         estimate=x * objective.scale,
@@ -188,29 +188,29 @@ def _conclude(objective: Objective, x: Array, confidence: float, *, converged: b
         ),
     )
     spread = inferred.covariance * deviation**2
-    texts = _warnings(objective, answer, x, inferred, spread)
-    text = identifiability(answer.names, spread, answer.correlation, count)
-    return replace(answer, warnings=tuple(texts), identifiability=tuple(text))
+    texts = _warnings(objective, fit, x, inferred, spread)
+    text = identifiability(fit.names, spread, fit.correlation, count)
+    return replace(fit, warnings=tuple(texts), identifiability=tuple(text))
 
 
 def _warnings(
-    objective: Objective, answer: Fit, x: Array, inferred: Inference, covariance: Array
+    objective: Objective, fit: Fit, x: Array, inferred: Inference, covariance: Array
 ) -> list[str]:
     """Return warnings of a fit; `covariance` is that of relative values."""
     result = []
-    if not answer.converged:
+    if not fit.converged:
         result.append("the search has not converged; allow more steps, or start elsewhere")
-    result += [null_message(answer.names, direction) for direction in inferred.null]
-    factor = coverage_factor(answer.confidence, answer.interval_freedom)
+    result += [null_message(fit.names, direction) for direction in inferred.null]
+    factor = coverage_factor(fit.confidence, fit.interval_freedom)
     count = objective.count
-    # Of a confidence below rounding the factor is 0, and no interval is wide.
+    # The factor is 0 for a confidence below rounding: no interval is wide then.
     wide = worst_directions(covariance[:count, :count], WIDE / factor) if factor else []
     for deviation, direction in wide:
         result.append(
-            weak_message(answer.names[:count], direction, factor * deviation, answer.confidence)
+            weak_message(fit.names[:count], direction, factor * deviation, fit.confidence)
         )
     if not inferred.null.size and not wide:
-        result += pair_messages(answer.names, answer.correlation, INSEPARABLE)
+        result += pair_messages(fit.names, fit.correlation, INSEPARABLE)
     for entry, value, low, high in zip(
         objective.ranges, x, objective.low, objective.high, strict=False
     ):
@@ -222,21 +222,21 @@ def _warnings(
                 + ": its interval is cut there, and all intervals hold inside the limits only"
             )
     first = 0
-    deviation = answer.noise / answer.targets[0].misfit.unit_deviation
-    for number, target in enumerate(answer.targets, start=1):
+    deviation = fit.noise / fit.targets[0].misfit.unit_deviation
+    for number, target in enumerate(fit.targets, start=1):
         misfit = target.misfit
-        residuals = answer.residuals[first : first + misfit.size]
+        residuals = fit.residuals[first : first + misfit.size]
         first += misfit.size
-        shared = len(answer.names) / len(answer.targets)
+        shared = len(fit.names) / len(fit.targets)
         own = _size_warning(misfit, residuals, misfit.size - misfit.absorbed - shared)
-        own += misfit.warnings(target.impact, target.own, deviation, len(answer.names))
-        prefix = "" if len(answer.targets) == 1 else f"target {number}: "
+        own += misfit.warnings(target.impact, target.own, deviation, len(fit.names))
+        prefix = "" if len(fit.targets) == 1 else f"target {number}: "
         result += [f"{prefix}{text}" for text in own]
     return result
 
 
 def _size_warning(misfit: Misfit, residuals: Array, freedom: float) -> list[str]:
-    """Return that residuals are too large for the noise, where they are."""
+    """Return a warning if residuals are too large for the noise."""
     if not misfit.known_noise or freedom <= 0:
         return []
     square = float(residuals @ residuals)
@@ -248,7 +248,7 @@ def _size_warning(misfit: Misfit, residuals: Array, freedom: float) -> list[str]
     if tail > UNLIKELY:
         return []
     text = (
-        f"the residuals are {np.sqrt(square / freedom):.3g} times what the given uncertainty lets "
-        "expect: the model does not explain the data"
+        f"the residuals are {np.sqrt(square / freedom):.3g} times as large as the uncertainty "
+        "of the target: the model does not explain the data"
     )
     return [text]
