@@ -127,11 +127,8 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     insert(quantities, "contains\n\n", example(page, "fortran function"))
     insert(quantities, "public :: ", "get_mid_peak, ")
     ensemble = root / "src/sweep/ensemble.f90"
-    insert(
-        ensemble,
-        "outcome%restitution, outcome%impulse",
-        example(page, "fortran batch").rstrip("\n"),
-    )
+    batch = example(page, "fortran batch").rstrip("\n")
+    insert(ensemble, "outcome%restitution, outcome%impulse", batch)
     insert(ensemble, "   use thud_power, only: not_a_number\n",
            "   use thud_quantities, only: get_mid_peak\n")  # fmt: skip
     drop = root / "driver/thud/recordings/measured_drop.py"
