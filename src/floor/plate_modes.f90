@@ -163,7 +163,7 @@ contains
       residual_terms = [sum(gain/omega**2, mask=.not. individual), residual_corner]
       ! The modes that are not summed cancel on average, except at the source.
       if (.not. present(max_across) .and. all(abs(source - point) < epsilon(1.0_wp))) then
-        residual_terms(1) = residual_terms(1) + get_far_compliance(plate)
+         residual_terms(1) = residual_terms(1) + get_far_compliance(plate)
       end if
       if (present(residual)) residual_terms = residual
       associate (omega => pack(omega, individual))
