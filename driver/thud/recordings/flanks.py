@@ -96,7 +96,7 @@ SEARCH_DEVIATIONS = 6.0
 # Number of draws of each kind of flank, and minimum posterior probability of a kind.
 N_DRAW = 128
 MIN_PROBABILITY = 1e-6
-# Weights that smooth the samples, which reduces the ringing of an anti-aliasing filter.
+# Weights that smooth samples, to reduce the ringing of an anti-aliasing filter.
 SMOOTHING = np.array([0.25, 0.5, 0.25])
 # The shapes are tabulated at ticks: step, and range before and after the touch, ms.
 TICK = 1e-3

@@ -68,10 +68,10 @@ def check_ringing(contact: Contact, plate: Plate | None = None) -> tuple[str, ..
     # Interpolation between the frequencies of the transform: the vertex of a parabola.
     low, top, high = np.log(energy[k, index - 1 : index + 2])
     resonance += (frequency[1] - frequency[0]) * (low - high) / (2 * (low - 2 * top + high))
-    stated = "differs from that in [plate]" if plate else "affects levels, peaks and contact time"
+    effect = "differs from that in [plate]" if plate else "affects levels, peaks and contact time"
     warning = (
         f"the plate keeps ringing after the contact, at {resonance:.0f} Hz with {amplitude:.2g} N: "
-        f"its resonance {stated}; state it in [plate]"
+        f"its resonance {effect}; state it in [plate]"
     )
     return (warning,)
 
