@@ -41,9 +41,9 @@ def band_functionals(count: int, rate: float, lower: float, upper: float) -> NDA
 def band_noise(drops: Sequence[Drop], bands: Bands) -> NDArray[np.float64]:
     """Return energies of the noise within the gates in bands, N2 s, [n_drop, n_band, 2].
 
-    The last axis holds the expected energy of the noise, and the standard deviation of the energy
-    of the force after its subtraction. Drops with equal rates share the functionals of the longest
-    gate; drops with equal gate lengths also share the products of the functionals.
+    The last axis holds the expected energy of the noise, and the standard deviation of the force's
+    energy after its subtraction. Drops with equal rates share the functionals of the longest gate;
+    drops with equal gate lengths also share the products of functionals.
     """
     groups: dict[float, dict[int, list[int]]] = {}
     for i, drop in enumerate(drops):

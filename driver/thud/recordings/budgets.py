@@ -131,7 +131,7 @@ def check_restitution(drops: Sequence[Drop], conditions: DropConditions) -> tupl
 def average_restitution(
     drops: Sequence[Drop], conditions: DropConditions
 ) -> tuple[Estimate, Estimate]:
-    """Return restitution, and its difference by impulse minus by bounces; NaN if unknown.
+    """Return the restitution, and that by impulse minus that by bounces; NaN if unknown.
 
     If the methods differ by more than the expanded uncertainty of the difference, either may be
     wrong: a rectangular distribution with the difference as half width enters the budget of the
@@ -152,7 +152,6 @@ def average_restitution(
 
 
 def _difference(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
-    """Return restitution by impulse minus that by bounces."""
     differences = []
     effects: dict[str, list[float]] = {}
     for drop in drops:

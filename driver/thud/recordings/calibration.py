@@ -103,7 +103,6 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
 def _source(
     record: Signal | str | os.PathLike[str], channel: int | str | None, unit: str | None
 ) -> tuple[str, str, Callable[[int, int], NDArray[np.float64]], int]:
-    """Return name, unit, samples and number of samples of a record."""
     if isinstance(record, Signal):
         if unit is None:
             refuse(f"{record.name}: the unit is not stated", f"unit = one of {ALLOWED}")
@@ -120,7 +119,6 @@ def _source(
 
 
 def _means(samples: Callable[[int, int], NDArray[np.float64]], count: int) -> NDArray[np.float64]:
-    """Return the means of sections of equal length of a record."""
     width = max(1, count // MEANS)
     # Blocks of complete sections, few because each read opens the file.
     step = width * max(1, BLOCK // width)
@@ -174,7 +172,6 @@ def _level_at(level: NDArray[np.float64], begin: int, end: int, edge: int) -> tu
 
 
 def _mean(steps: list[tuple[float, float]]) -> tuple[float, float]:
-    """Return the mean of steps and its standard uncertainty."""
     sizes, deviations = np.array(steps).T
     count = len(sizes)
     within = math.sqrt(float(deviations @ deviations)) / count

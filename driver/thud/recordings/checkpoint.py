@@ -98,7 +98,6 @@ class Checkpoint:
         return drops
 
     def _files(self, digest: str) -> list[Path]:
-        """Return the files of a signal and a configuration."""
         files = self.folder.glob(f"{PREFIX}{digest}-*{SUFFIX}") if self.folder else ()
         return sorted(filter(is_regular, files))
 
@@ -111,7 +110,6 @@ class Checkpoint:
             self._write()
 
     def _write(self) -> None:
-        """Write the new drops to a file of their own."""
         self._written = time.monotonic()
         if self.folder is None or not self._new:
             return

@@ -30,7 +30,6 @@ MAX_TEXT = 500
 
 
 def _number(low: float, high: float, value: object, key: str) -> float:
-    """Return a number within a range."""
     require_number(key, value)
     number = float(value)  # type: ignore[arg-type]
     if not low <= number <= high:
@@ -39,40 +38,34 @@ def _number(low: float, high: float, value: object, key: str) -> float:
 
 
 def _text(value: object, key: str) -> str:
-    """Return a text of one line."""
     if not isinstance(value, str) or len(value) > MAX_TEXT or not value.isprintable():
         refuse(f"{key} = {shown(value)} is not allowed", f"a line of up to {MAX_TEXT} characters")
     return value
 
 
 def _texts(value: object, key: str) -> tuple[str, ...]:
-    """Return a tuple of texts from one text or several."""
     return tuple(
         _text(text, key) for text in (value if isinstance(value, list | tuple) else [value])
     )
 
 
 def _choice(choices: Mapping[str, object] | tuple[str, ...], value: object, key: str) -> str:
-    """Return one of the choices."""
     require_choice(key, value, choices)
     return str(value)
 
 
 def _flag(value: object, key: str) -> bool:
-    """Return true or false."""
     if not isinstance(value, bool):
         refuse(f"{key} = {shown(value)} is not allowed", "true or false")
     return value
 
 
 def _channel(value: object, key: str) -> int | str:
-    """Return the number or the name of a channel."""
     is_number = isinstance(value, int) and not isinstance(value, bool)
     return int(_number(1, 1e6, value, key)) if is_number else _text(value, key)
 
 
 def _calibration(value: object, key: str) -> Calibration | str | float:
-    """Return a chain of factors or N per unit."""
     if isinstance(value, Calibration):
         return value
     if not isinstance(value, str):
@@ -86,21 +79,18 @@ def _calibration(value: object, key: str) -> Calibration | str | float:
 
 
 def _table(value: object, key: str) -> Mapping[str, object]:
-    """Return a table."""
     if not isinstance(value, Mapping):
         refuse(f"{key} = {shown(value)} is not allowed", "a table")
     return value
 
 
 def _pair(value: object, key: str, ends: str, low: float, high: float) -> tuple[float, float]:
-    """Return two numbers within a range."""
     if not isinstance(value, list | tuple) or len(value) != 2:  # noqa: PLR2004
         refuse(f"{key} = {shown(value)} is not allowed", f"[{ends}]")
     return _number(low, high, value[0], key), _number(low, high, value[1], key)
 
 
 def _linearity(value: object, key: str) -> tuple[tuple[float, float], ...]:
-    """Return pairs of the force applied and the force indicated, N."""
     pairs = value if isinstance(value, list | tuple) else []
     if len(pairs) < 2:  # noqa: PLR2004
         refuse(f"{key} = {shown(value)} is not allowed", "[[applied, indicated], ...], N")
@@ -108,7 +98,6 @@ def _linearity(value: object, key: str) -> tuple[tuple[float, float], ...]:
 
 
 def _limits(value: object, key: str) -> dict[str, tuple[float, float]]:
-    """Return limits by criterion."""
     table = _table(value, key)
     require_words(key, table, [criterion.name for criterion in get_criteria(SOURCES[0])])
     limits = {}
@@ -152,7 +141,6 @@ class PlateConfig:
 
 
 def _plate(value: object, key: str) -> PlateConfig:
-    """Return a force plate."""
     if isinstance(value, PlateConfig):
         return value
     table = _checked(_table(value, key), PlateConfig, f"{key}: ")

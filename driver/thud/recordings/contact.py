@@ -68,7 +68,7 @@ class Contact(Immutable):
         Times at which the force exceeds, and falls below, 1 % of its peak
         (`thud.impact.contact_time`).
     peak : float
-        Maximum of the force below 1.25 kHz without the offset, N, as a scale.
+        Approximate maximum of the force below 1.25 kHz without the offset, N.
     span : tuple of int
         First and stop index of `force`: the gate and up to MAX_BACKGROUND on either side.
     force, removed : ndarray, shape (span[1] - span[0],)
@@ -125,7 +125,6 @@ def cells_between(bounds: NDArray[np.intp], rate: float, middle: float) -> Cells
 
 
 def _means(force: NDArray[np.float64], bounds: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Return the means over cells."""
     total: NDArray[np.float64] = np.add.reduceat(force[: bounds[-1]], bounds[:-1])
     return total / np.diff(bounds)
 
@@ -151,7 +150,7 @@ class Edges:
     """Posteriors of first touch, and of release in reversed time, s from the first sample.
 
     `background_limits` are the stop index of the background before the contact and the first index
-    of the background after it; `offset` is their median, N, which `background` excludes.
+    of that after it. `offset` is the median of this background, N, subtracted before the fit.
     """
 
     touch: Posterior

@@ -37,7 +37,7 @@ MARGIN = 2
 # Background next to a pulse, in cells: distance from the points at half its height, and length.
 DISTANCE = 6
 LENGTH = 20
-# Maximum number of cells between two components of one pulse.
+# Maximum gap within one pulse, in cells.
 MAX_GAP = 4
 # Minimum height of a pulse as a fraction of the highest one of a signal.
 MIN_HEIGHT = 0.03
@@ -202,7 +202,7 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]
             continue
         if not DURATIONS[0] <= (high - low + 1) * width / rate <= DURATIONS[1]:
             continue
-        # Background next to the pulse: slow noise moves it away from the median of its segment.
+        # Slow noise moves the background next to the pulse away from the baseline.
         ahead, after = (
             level[max(free, low - LENGTH) : low - DISTANCE],
             level[high + DISTANCE :][:LENGTH],
@@ -247,7 +247,6 @@ def _double_peak_warning(envelope: NDArray[np.float64]) -> str:
 
 
 def _windows(signal: Signal, pulses: list[_Pulse]) -> Iterator[Window]:
-    """Yield the windows of drops with their bounces."""
     drops: list[_Pulse] = []
     flight = MAX_FLIGHT
     before: _Pulse | None = None

@@ -66,7 +66,6 @@ def _runs(force: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp
 
 
 def _refuse_clipped(window: Window, record: NDArray[np.float64]) -> None:
-    """Raise InputError if the top of the pulse is flat."""
     first, stop = window.contact
     force = record[first:stop]
     starts, lengths = _runs(force)

@@ -81,7 +81,6 @@ def filter_levels(
 
 
 def _require_rate(sample_rate: float) -> None:
-    """Raise InputError if a sample rate is not a positive number."""
     require_number("sample_rate", sample_rate)
     if sample_rate <= 0:
         refuse(f"sample_rate = {sample_rate} is not allowed", "sample_rate > 0")

@@ -39,14 +39,12 @@ class _Kind(NamedTuple):
     mean, spread : tuple of float
         Means and standard deviations of powers and steep rise.
     walk : float
-        Standard deviation of the walk: for smooth kinds that of a step as a fraction of the step of
-        the mean flank, for rough kinds that after 1 ms.
+        Standard deviation of the walk: for smooth kinds of a step, as a fraction of the mean
+        flank's step; for rough kinds after 1 ms.
     probability : tuple of float
-        Prior probability at touch and at release: a body may strike with a jump, but releases
-        softly.
+        Prior probability at touch and at release: only a strike is likely to have a jump.
     error : tuple of float
-        Standard uncertainty that the shapes cause in first touch, in release, and in begin or end
-        of the contact, s.
+        Standard uncertainty due to the shapes, s: of first touch, release, and begin or end.
     rough : bool
         Whether the force may fall during the flank.
     jump, filtered, parabola : float
@@ -89,8 +87,7 @@ MISFIT = (0.005, 0.1)
 MAX_FALL = 0.002
 FOOT = 0.03
 FOOT_TIME = 1.0
-# Number of times of one search, which covers SEARCH_DEVIATIONS standard deviations of the previous
-# result on either side.
+# Number of times in a search, which covers the previous result ± SEARCH_DEVIATIONS deviations.
 N_TIME = 33
 SEARCH_DEVIATIONS = 6.0
 # Number of draws of each kind of flank, and minimum posterior probability of a kind.
@@ -225,7 +222,6 @@ def find_touch(flank: Flank, low: float, high: float, searches: int) -> Posterio
 
 
 def _moments(time: NDArray[np.float64], weight: NDArray[np.float64]) -> tuple[float, float]:
-    """Return mean and standard deviation of uniform times with weights."""
     mean = float(weight @ time)
     return mean, float(np.sqrt(weight @ (time - mean) ** 2 + (time[1] - time[0]) ** 2 / 12))
 

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 
 def _words(text: str) -> frozenset[str]:
-    """Return the set of words in a text."""
     return frozenset(text.split())
 
 

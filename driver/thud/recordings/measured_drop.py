@@ -190,7 +190,6 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
 
 
 def _between(first: Estimate, last: Estimate) -> Estimate:
-    """Return the interval between two times, s."""
     return Estimate(last.value - first.value, math.hypot(last.uncertainty, first.uncertainty))
 
 
@@ -212,7 +211,6 @@ def _landings(window: Window, drop: Contact, count: int) -> list[tuple[Estimate,
 
 
 def _peak_above_background(window: Window) -> float:
-    """Return the maximum of a pulse above its background, N."""
     first, stop = window.contact
     force = window.force
     background = np.concatenate([force[:first], force[stop:]])
@@ -246,7 +244,6 @@ def _peak(contact: Contact) -> Estimate:
 
 
 def _noise(contact: Contact) -> Noise:
-    """Return the noise on both sides of the contact."""
     first, stop = (index - contact.span[0] for index in contact.gate)
     force = np.concatenate([contact.force[:first], contact.force[stop:]])
     deviation = 1.4826 * float(np.median(np.abs(force - np.median(force))))
@@ -255,7 +252,6 @@ def _noise(contact: Contact) -> Noise:
 
 
 def _removed(contact: Contact) -> tuple[str, ...]:
-    """Return notes on the removed offset, drift and hum."""
     first, stop = (index - contact.span[0] for index in contact.gate)
     offset = float(contact.removed[first:stop].mean())
     steps = [f"an offset of {offset:.3g} N was removed"]

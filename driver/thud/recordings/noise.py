@@ -118,10 +118,9 @@ def _waves(cells: Cells) -> NDArray[np.float64]:
 class Background(Immutable):
     """Background during the contact, predicted linearly from cells next to the contact.
 
-    `cells` has their begins and ends, s, and `mean` their mean forces, N, [n_cell]. `draws`,
-    [n_draw, 5], has densities of white, pink and brown noise, N2/Hz, and variances of hum of 50 and
-    of 60 Hz, N2; a single draw if they are known. The peak force, N, scales the priors of offset
-    and drift.
+    `cells` has their begins and ends, s, `mean` their mean forces, N, [n_cell], and `draws`,
+    [n_draw, 5], densities of white, pink and brown noise, N2/Hz, and variances of hum of 50 and of
+    60 Hz, N2; known ones are a single draw. The peak force, N, scales the priors.
     """
 
     cells: Cells
@@ -227,8 +226,7 @@ def covariances(cells: Cells) -> NDArray[np.float64]:
 def fit_background(cells: Cells, mean: NDArray[np.float64], peak: float) -> Background:
     """Return the background with variances drawn from their posterior.
 
-    Arguments are begins and ends of cells, s from about the middle of the contact, their mean
-    forces, N, shape (n_cell,), and the peak force, N.
+    Arguments as in `Background`; the times are from about the middle of the contact.
     """
     unit = covariances(cells)
     scale = np.array([np.mean(np.diagonal(unit[0])), 1.0, np.pi**2 * 0.02, 1.0, 1.0])

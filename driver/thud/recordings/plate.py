@@ -82,8 +82,8 @@ class Plate:
     def level_uncertainty(self, bands: BandSet = "octave") -> NDArray[np.float64]:
         """Return the standard uncertainty of corrected levels due to that of the resonance, dB.
 
-        It is the one at the upper edge of each band, at r times the resonance: an error of the
-        resonance changes the force by 2 r**2 / (1 - r**2) times its relative value.
+        At the upper edge of each band, r times the resonance, a relative error of the resonance
+        changes the force by 2 r**2 / (1 - r**2) times as much.
         """
         square = (get_bands(bands).upper / self.frequency) ** 2
         return np.asarray(
@@ -154,7 +154,6 @@ def correct_window(window: Window, plate: Plate) -> tuple[Window, tuple[str, ...
 
 
 def _read_corrected(signal: Signal, plate: Plate, start: int, stop: int) -> NDArray[np.float64]:
-    """Return the force that was applied to a plate, N, from start to before stop."""
     rate = signal.sample_rate
     margin = math.ceil(RINGING * plate.quality * rate / plate.frequency)
     first, last = max(start - margin, 0), min(stop + margin, signal.n_sample)
@@ -237,7 +236,6 @@ def _check_high(plate: Plate | None) -> PlateCheck:
 
 
 def _check_range(full_scale: float | None) -> PlateCheck:
-    """Check the largest force."""
     if full_scale is None:
         return PlateCheck("range", None, f"whether the plate reads up to {RANGE:g} N is not known")
     require_number("plate: full_scale", full_scale)

@@ -68,9 +68,8 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
         ``if __name__ == "__main__":``.
     checkpoint
         Directory, or `Checkpoint`, that stores measured drops while others are measured. After an
-        interrupt the same call measures only the remaining drops, if neither files nor
-        configuration have changed. The stored drops are removed at the end, or when the
-        `Checkpoint` is closed.
+        interrupt the same call measures the remaining drops only, if neither files nor
+        configuration have changed. The end, or that of the `Checkpoint`, removes them.
 
     Returns
     -------

@@ -85,8 +85,7 @@ class AverageLevels(Immutable):
     drops : ndarray, shape (n_drop, n_band)
         Level of each drop, dB.
     level, background : ndarray, shape (n_band,)
-        Level of the mean energy, corrected for the background, and level of the mean background
-        energy, dB.
+        Level of the mean energy, corrected for the background, and the mean background, dB.
     uncertainty : ndarray, shape (n_band,)
         Combined standard uncertainty, dB.
     flag : ndarray of str, shape (n_band,)
@@ -250,12 +249,10 @@ def _corrected(
 
 
 def _root_sum(contributions: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Return the combined standard uncertainty."""
     return np.asarray(np.sqrt(np.sum([value**2 for value in contributions.values()], axis=0)))
 
 
 def _background_steps(nominal: NDArray[np.float64], flag: NDArray[np.str_]) -> tuple[str, ...]:
-    """Return notes on the correction for the background."""
     texts = {
         "corrected": "corrected for the background, 6 to 15 dB below",
         "background": "less than 6 dB above the background, an upper bound",

@@ -327,8 +327,7 @@ class Recording(Displayed):
     def outliers(self) -> tuple[Outlier, ...]:
         """Drops that differ in a level, the contact time, the restitution or the peak force.
 
-        They are not excluded. The significance is 5 % for all levels together, and 5 % for the
-        other three quantities together.
+        They are not excluded. The significance is 5 % for all levels, and 5 % for all others.
         """
         return (*self.average().outliers, *find_deviant(self.drops))
 

@@ -207,7 +207,6 @@ def _signal(path: Path, channel: Channel, stated: _Stated, *, several: bool) -> 
 
 
 def _rate(channel: Channel, stated: _Stated, name: str) -> tuple[float, tuple[str, ...]]:
-    """Return the sample rate of a channel, Hz, and notes."""
     rate = channel.sample_rate if stated.sample_rate is None else float(stated.sample_rate)
     if rate is None:
         refuse(f"{name}: the sample rate is not known", "sample_rate in Hz, or a column of times")
@@ -220,7 +219,6 @@ def _rate(channel: Channel, stated: _Stated, name: str) -> tuple[float, tuple[st
 
 
 def _unit(channel: Channel, stated: _Stated, name: str) -> tuple[str, tuple[str, ...]]:
-    """Return the unit of the values of a channel, and notes."""
     file_unit = find_unit(channel.unit)
     if stated.unit is not None:
         if file_unit == "FS" and stated.unit not in {"FS", "counts"}:
@@ -246,6 +244,5 @@ def _unit(channel: Channel, stated: _Stated, name: str) -> tuple[str, tuple[str,
 def _read_scaled(
     samples: Callable[[int, int], NDArray[np.float64]], factor: float, start: int, stop: int
 ) -> NDArray[np.float64]:
-    """Return samples times a factor, from start to before stop."""
     values = samples(start, stop)
     return values if factor == 1.0 else values * factor

@@ -101,7 +101,7 @@ class History:
         return self.dates[0] + years * YEAR
 
     def criteria(self) -> list[list[dict[str, Any]]]:
-        """Return for each criterion its entries in the reports, in the order of the dates."""
+        """Return the entries of each criterion in the reports, in the order of the dates."""
         reports = (report["criteria"] for report in self.reports)
         return [list(entries) for entries in zip(*reports, strict=True)]
 
@@ -214,7 +214,6 @@ def _require_same(
     *,
     different_balls: bool,
 ) -> None:
-    """Raise InputError if a report is not of the same source or ball as the first report."""
     names, first_names = ([c["name"] for c in r["criteria"]] for r in (report, first))
     if report["source"] != first["source"] or names != first_names:
         refuse(
@@ -230,7 +229,6 @@ def _require_same(
 
 
 def _files(path: Path) -> list[Path]:
-    """Return the reports at a path: the file, or those in the directory."""
     if not path.is_dir():
         return [path]
     reports = sorted(path.rglob("report.json"))
@@ -240,7 +238,6 @@ def _files(path: Path) -> list[Path]:
 
 
 def _read(path: Path) -> tuple[datetime, dict[str, Any]]:
-    """Return the date and the content of a report."""
     allowed = "report.json of thud-driver measure"
     try:
         if path.stat().st_size > MAX_SIZE:
@@ -297,8 +294,8 @@ def _trend(
 ) -> Trend:
     """Return the least-squares line, weighted by 1/uncertainty**2, with its uncertainty.
 
-    The latter is the larger of the uncertainty by the stated ones and that by the scatter, with
-    n - 2 degrees of freedom: a trend must be significant by both.
+    It is the larger of two, by the stated uncertainties and by the scatter with n - 2 degrees of
+    freedom: a trend must be significant by both.
     """
     count = len(time)
     stated = bool((uncertainty > 0).all())

@@ -57,7 +57,6 @@ def draw_history(history: History) -> Figure:
 def _draw_criterion(
     axes: Axes, history: History, entries: list[dict[str, Any]], trend: Trend | None
 ) -> None:
-    """Draw one criterion."""
     style = style_of(entries[0])
     bounds = np.array([limits_of(entry) for entry in entries]) / style.unit
     # A count has a single allowed value: its area gets a height.
@@ -90,7 +89,6 @@ def _draw_criterion(
 
 
 def _add_legend(axes: Axes, trends: list[Trend | None]) -> None:
-    """Put a legend above the panels."""
     axes.fill_between([], [], color=GREY, linewidth=0, label="allowed")
     for verdict, (marker, color) in MARKS.items():
         axes.errorbar(

@@ -83,7 +83,7 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
 def criteria_data(recording: Recording, source: LimitsSource | None = None) -> list[dict[str, Any]]:
     """Return the criteria of a recording with their budgets, as in ``report.json``.
 
-    An uncertainty that is not stated is None; the margin of an upper bound or a count is None too.
+    None: an uncertainty that is not stated, and the margin of an upper bound or a count.
     """
     verdict = recording.assess(source)
     finite: list[dict[str, Any]] = _finite(_criteria(recording, verdict.source, verdict.criteria))
@@ -122,7 +122,6 @@ def _dates(texts: Iterable[str]) -> str:
 def _criteria(
     recording: Recording, source: LimitsSource, criteria: tuple[Criterion, ...]
 ) -> list[dict[str, Any]]:
-    """Return the criteria with their budgets."""
     average = recording.average()
     count = len(average.level)
     standard = get_criteria(source)
@@ -162,7 +161,6 @@ def _criteria(
 
 
 def _levels(recording: Recording, bands: BandSet) -> dict[str, Any]:
-    """Return the average levels and those of each drop."""
     average, budgets = recording.average(bands), recording.level_estimates(bands)
     columns = ("background", "spread", "flag", "drops")
     return {
@@ -176,7 +174,6 @@ def _levels(recording: Recording, bands: BandSet) -> dict[str, Any]:
 
 
 def _drop(drop: Drop) -> dict[str, Any]:
-    """Return the results of a drop."""
     return {
         "name": drop.name,
         "onset": drop.onset,
@@ -195,7 +192,6 @@ def _estimate(estimate: Estimate) -> dict[str, float]:
 
 
 def _spread(values: Iterable[float]) -> float:
-    """Return the standard deviation of the finite values; NaN for fewer than two."""
     known = [value for value in values if math.isfinite(value)]
     return float(np.std(known, ddof=1)) if len(known) > 1 else math.nan
 

@@ -38,7 +38,6 @@ def missing_characters(text: str) -> str:
 
 
 def _characters(path: str | Path) -> set[str]:
-    """Return the characters of a font."""
     return set(map(chr, ft2font.FT2Font(path).get_charmap()))
 
 
@@ -47,7 +46,6 @@ def _path(weight: str) -> Path:
 
 
 def _subset(weight: str, text: str) -> str:
-    """Return a font file with the characters of a text only, in base 64."""
     options = Options(flavor="woff", notdef_outline=True, hinting=False)
     # FontForge's time stamps: fontTools cannot subset this table.
     options.drop_tables.append("FFTM")

@@ -70,7 +70,6 @@ def recording_dataset(data: dict[str, Any]) -> xr.Dataset:
 
 
 def _attributes(data: dict[str, Any]) -> dict[str, Any]:
-    """Return the provenance as attributes."""
     known = {key: data[key] for key in PROVENANCE if data[key] not in (None, "")}
     notes = {
         kind: "\n".join(

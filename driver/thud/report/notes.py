@@ -55,6 +55,5 @@ def shorten(items: Sequence[str], count: int) -> list[str]:
 
 
 def _range(texts: Sequence[str]) -> str:
-    """Return the minimum and the maximum of numbers as text, each as it was written."""
     low, high = min(texts, key=float), max(texts, key=float)
     return low if float(low) == float(high) else f"{low} to {high}"

@@ -83,7 +83,6 @@ def _plain(text: str) -> str:
 
 
 def _text(text: str) -> str:
-    """Return a text as HTML."""
     return html.escape(_plain(text))
 
 
@@ -99,7 +98,6 @@ def _reason(criteria: Sequence[dict[str, Any]]) -> str:
 
 
 def _about(data: dict[str, Any]) -> list[tuple[str, str]]:
-    """Return labels and texts: laboratory, ball and conditions."""
     temperature = data["temperature"]
     return [
         ("Laboratory", data["laboratory"]),
@@ -111,7 +109,6 @@ def _about(data: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _measured(data: dict[str, Any]) -> list[tuple[str, str]]:
-    """Return labels and texts: recordings, calibration and instruments."""
     files, drops = data["files"], len(data["drops"])
     rates = sorted({file["sample_rate"] for file in files})
     listed = " to ".join(dict.fromkeys(f"{rate / 1e3:.4g}" for rate in (rates[0], rates[-1])))
@@ -131,7 +128,6 @@ def _measured(data: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _pairs(pairs: Iterable[tuple[str, str]]) -> str:
-    """Return labels and texts as rows of an HTML table."""
     rows = []
     for label, value in pairs:
         shown = "<br>".join(map(_text, value.split("\n"))) if value else NOT_KNOWN
@@ -145,14 +141,12 @@ def _columns(row: Sequence[str], picture: str) -> list[str]:
 
 
 def _row(criterion: dict[str, Any]) -> str:
-    """Return a criterion as a row of the table."""
     cells = _columns([_text(cell) for cell in criterion_row(criterion)], _range(criterion))
     style = criterion["verdict"].replace(" ", "-")
     return f'<tr class="{style}">' + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
 
 
 def _range(criterion: dict[str, Any]) -> str:
-    """Return a picture of the limits, the value and its expanded uncertainty."""
     (lower, upper), value = limits_of(criterion), criterion["value"]
     box = f'<rect x="{LOW}" y="1" width="{HIGH - LOW}" height="8" fill="#ccc"/>'
     if value is None or lower == upper:
@@ -175,7 +169,6 @@ def _range(criterion: dict[str, Any]) -> str:
 
 
 def _rule(data: dict[str, Any]) -> str:
-    """Return an explanation of limits and verdicts."""
     own = any(not criterion["limits_of_standard"] for criterion in data["criteria"])
     limits = f"Limits of {STANDARDS.get(data['source'], 'the standards')}"
     limits += ", those marked * of the laboratory. " if own else ". "
@@ -187,7 +180,6 @@ def _rule(data: dict[str, Any]) -> str:
 
 
 def _means(drops: Sequence[dict[str, Any]]) -> list[str]:
-    """Return notes on the means over the drops of quantities that are not criteria."""
     means = []
     for name in ESTIMATES:
         known = [drop[name]["value"] for drop in drops if drop[name]["value"] is not None]
@@ -204,7 +196,6 @@ def _means(drops: Sequence[dict[str, Any]]) -> list[str]:
 
 
 def _results(data: dict[str, Any]) -> list[str]:
-    """Return notes on drops, other quantities and methods."""
     drops, low, high = data["drops"], *BACKGROUND
     results = _means(drops)
     averaged = "energy average of the drops" if len(drops) > 1 else "of one drop"
@@ -231,7 +222,6 @@ def _results(data: dict[str, Any]) -> list[str]:
 
 
 def _outliers(outliers: Iterable[dict[str, Any]]) -> str:
-    """Return a note on the outliers among the drops."""
     names: dict[str, list[str]] = {}
     for outlier in outliers:
         names.setdefault(outlier["name"], []).append(outlier["quantity"].split(",")[0])
@@ -242,7 +232,6 @@ def _outliers(outliers: Iterable[dict[str, Any]]) -> str:
 
 
 def _messages(data: dict[str, Any], kind: str) -> list[str]:
-    """Return the steps or warnings of the recording, its files and its drops, grouped."""
     messages = {
         key: [(entry["name"], entry[kind]) for entry in data[key]] for key in ("files", "drops")
     }
@@ -250,13 +239,11 @@ def _messages(data: dict[str, Any], kind: str) -> list[str]:
 
 
 def _notes(title: str, messages: Sequence[str]) -> str:
-    """Return messages as an HTML list with a title."""
     items = "".join(f"<li>{_text(message)}</li>" for message in shorten(messages, NOTES))
     return f"<h2>{_text(title)}</h2><ul>{items}</ul>"
 
 
 def _files(files: Sequence[dict[str, Any]]) -> str:
-    """Return the names and checksums of the first files as rows of an HTML table."""
     names = shorten([_plain(file["name"]) for file in files], FILES)
     checksums = [*(file["sha256"] for file in files[: len(names) - (len(files) > FILES)]), ""]
     return "\n".join(
@@ -270,7 +257,6 @@ def _count(number_of: int, noun: str) -> str:
 
 
 def _cells(figures: Sequence[Figure]) -> list[str]:
-    """Return the figures that can be drawn as cells of an HTML table."""
     cells = []
     for i, figure in enumerate(figures):
         with left_out("a figure of the report"):

@@ -150,7 +150,6 @@ def criteria_csv(data: dict[str, Any]) -> str:
 
 
 def _csv(rows: Iterable[Iterable[object]]) -> str:
-    """Return rows as CSV; None is an empty cell."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()
@@ -170,7 +169,7 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
     Raises
     ------
     InputError
-        If a file that thud did not write would be replaced.
+        If a file or directory that thud did not write is in the way.
     OSError
         If a file cannot be written.
 
@@ -187,7 +186,7 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
         **_dataset(data, results.folder),
     }
     if figures and _has_matplotlib():
-        # Imported here because Matplotlib is slow to import.
+        # Matplotlib is slow to import.
         from thud.plot.save_figures import figure_files
 
         drawn = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
@@ -197,7 +196,6 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
 
 
 def _has_matplotlib() -> bool:
-    """Return whether figures can be drawn; warn if they cannot."""
     with left_out("the page"):
         import matplotlib as mpl
 
@@ -206,7 +204,6 @@ def _has_matplotlib() -> bool:
 
 
 def _dataset(data: dict[str, Any], folder: Path) -> dict[str, bytes]:
-    """Return the content of the NetCDF file by its name; warn if xarray is missing."""
     try:
         with require_extra("studies"):
             from thud.report.netcdf import netcdf

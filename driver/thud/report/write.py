@@ -1,4 +1,4 @@
-"""Write the calibration report of a recording: a page to be signed, and its data."""
+"""Write the calibration report of a recording: a page to sign, and its data."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def write_report(
     Raises
     ------
     InputError
-        If a file that thud did not write would be replaced.
+        If a file or directory that thud did not write is in the way.
     OSError
         If a file cannot be written.
 
@@ -53,7 +53,7 @@ def write_report(
         If WeasyPrint (needed for the PDF) or a font is missing, or the report of another recording
         is replaced.
     """
-    # Imported here because SciPy is slow to import.
+    # SciPy is slow to import.
     from thud.report.contents import report_data
 
     folder, data = Path(directory), report_data(recording)
@@ -117,7 +117,6 @@ def _checksums(data: dict[str, Any]) -> list[str]:
 
 
 def _earlier(folder: Path) -> list[str] | None:
-    """Return the checksums of the recording in an earlier report; None if there is none."""
     from thud.report.contents import FORMAT
 
     try:

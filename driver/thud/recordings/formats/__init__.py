@@ -94,7 +94,6 @@ def read_channels(path: Path) -> list[Channel]:
 
 
 def _read_ends(channels: list[Channel]) -> None:
-    """Read the first and the last sample of some channels."""
     for channel in channels[:MAX_PROBED]:
         channel.samples(0, 1)
         channel.samples(channel.n_sample - 1, channel.n_sample)

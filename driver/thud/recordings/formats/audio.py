@@ -36,7 +36,6 @@ CLOCK = slice(330, 338)
 
 
 def _read(path: Path, column: int, start: int, stop: int) -> NDArray[np.float64]:
-    """Return the samples of a channel from start to before stop."""
     soundfile = library("soundfile", "WAV and FLAC")
     with guarded(path, "an audio file"), soundfile.SoundFile(os.fsencode(path)) as file:
         file.seek(start)

@@ -69,7 +69,6 @@ def _read(  # noqa: PLR0913, PLR0917 - they identify a section of a channel
     start: int,
     stop: int,
 ) -> NDArray[np.float64]:
-    """Return the samples of a scaled row or column of a dataset from start to before stop."""
     h5py = library("h5py", "HDF5")
     with guarded(path, "HDF5"), _open(h5py, path) as file:
         piece: Any = slice(start, stop)
@@ -226,7 +225,6 @@ def _is_channel(data: Any, name: str, path: Path) -> bool:  # noqa: ANN401 - of 
 
 
 def _channels(path: Path, entry: _Vectors, times: list[_Vectors], before: int) -> list[Channel]:
-    """Return the channels of a dataset."""
     count = math.prod(entry.data.shape) // entry.n_sample
     rate, date = find_rate(entry.header), find_word(entry.header, DATE)
     steps: tuple[str, ...] = ()

@@ -43,7 +43,6 @@ def read_channels(path: Path) -> list[Channel]:
 
 
 def _require_size(size: int, name: str) -> None:
-    """Raise InputError if variables are too large."""
     if size > MAX_IN_MEMORY:
         refuse(
             f"{name}: the variables unpack to more than {MAX_IN_MEMORY // MIB} MiB",

@@ -73,7 +73,6 @@ def read_channels(path: Path) -> list[Channel]:
 
 
 def _channel(file: _OpenFile, number: int, group: Any, channel: Any) -> Channel:  # noqa: ANN401
-    """Return a channel of a TDMS file."""
     size = file.path.stat().st_size
     if len(channel) > size:  # a sample has one byte or more
         refuse(

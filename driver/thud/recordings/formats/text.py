@@ -121,7 +121,6 @@ def read_channels(path: Path) -> list[Channel]:
 
 
 def _lines_of_numbers(text: TextIO, table: _Table) -> Iterator[str]:
-    """Return the lines below the header of a text."""
     return itertools.islice(read_lines(text, table.name, ALLOWED), table.first - 1, None)
 
 
@@ -240,7 +239,6 @@ def _read_numbers(lines: Iterator[str], table: _Table) -> dict[int, NDArray[np.f
 
 
 def _require_words(block: list[str], first: int, words: list[int], table: _Table) -> None:
-    """Raise InputError if a column of words contains a number."""
     for number, line in enumerate(block, first):
         cells = table.cells(line)
         column = next((i for i in words if i < len(cells) and is_number(cells[i])), None)
@@ -292,7 +290,6 @@ def _convert_each(block: list[str], first: int, table: _Table) -> NDArray[np.flo
 
 
 def _channels(table: _Table, values: dict[int, NDArray[np.float64]]) -> list[Channel]:
-    """Return the columns of a table except the times."""
     numeric = list(values)
     rows = len(values[numeric[0]])
     if rows < MIN_SAMPLES:
@@ -336,12 +333,10 @@ def _are_times(column: NDArray[np.float64]) -> bool:
 
 
 def _is_time_unit(unit: str) -> bool:
-    """Whether a unit is a unit of time."""
     return bool(unit) and unit.casefold() in TIME_UNITS and not find_unit(unit)
 
 
 def _titles(table: _Table, width: int) -> tuple[list[str], list[str]]:
-    """Return the titles of the columns and their units."""
     titles, units = [""] * width, [""] * width
     for cells in table.titles:
         pairs = [split_title(cell) for cell in cells]

@@ -41,12 +41,10 @@ def read_channels(path: Path) -> list[Channel]:
 
 
 def _is_history(data_set: dict[str, Any]) -> bool:
-    """Whether a data set is a real time history."""
     return data_set.get("func_type") == TIME_RESPONSE and data_set.get("ord_data_type") in REAL
 
 
 def _channel(path: Path, number: int, data_set: dict[str, Any]) -> Channel:
-    """Return the channel of a data set."""
     name = f"{shown_path(path)}: data set {number}"
     data = np.asarray(data_set["data"], dtype=np.float64)
     expected = int(data_set["num_pts"])
