@@ -143,8 +143,8 @@ def average_restitution(
         _mean_effect(cause, [drop.shared_effects.get(cause, 0.0) for drop in known])
         for cause in causes
     ]
-    both = [drop for drop in known if {IMPULSE, BOUNCES} <= set(drop.restitutions)]
-    difference = _difference(both, conditions)
+    comparable = [drop for drop in known if {IMPULSE, BOUNCES} <= set(drop.restitutions)]
+    difference = _difference(comparable, conditions)
     if abs(difference.value) > difference.expanded:
         half_width = abs(difference.value)
         systematic.append(Contribution("impulse against bounces", half_width / math.sqrt(3)))
@@ -176,10 +176,13 @@ def average_mass(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
         return Estimate.unknown()
     value = float(np.mean([drop.effective_mass.value for drop in known]))
     # m = J / (v0 + g (t_f/2 + t_c)): the height changes v0 only.
-    change = float(np.mean([drop.impulse.value for drop in known])) / value
-    height = value * conditions.speed / change * conditions.height_uncertainty
-    height /= 2 * conditions.height
-    systematic = {"calibration": value * conditions.calibration_uncertainty, "drop height": height}
+    velocity_change = float(np.mean([drop.impulse.value for drop in known])) / value
+    height_effect = value * conditions.speed / velocity_change * conditions.height_uncertainty
+    height_effect /= 2 * conditions.height
+    systematic = {
+        "calibration": value * conditions.calibration_uncertainty,
+        "drop height": height_effect,
+    }
     return average_estimates(
         [drop.effective_mass for drop in known],
         *(Contribution(cause, value) for cause, value in systematic.items() if value),

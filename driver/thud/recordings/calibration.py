@@ -80,7 +80,7 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
     require_number("calibrate(): force", newtons)
     if not newtons > 0 or not 0 <= uncertainty < 1:
         refuse(
-            f"calibrate(): {newtons:g} N with a relative uncertainty of {uncertainty:g}",
+            f"calibrate(): force = {newtons:g} N, uncertainty = {uncertainty:g}",
             "a positive force, 0 <= uncertainty < 1",
         )
     name, symbol, samples, count = _source(record, channel, unit)
@@ -110,7 +110,7 @@ def _source(
     path = regular_file(record)
     channels = choose_channels(read_channels(path), channel, shown_path(path))
     if len(channels) != 1:
-        refuse(f"{shown_path(path)}: {len(channels)} channels fit", "channel = one of them")
+        refuse(f"{shown_path(path)}: {len(channels)} channels match", "channel = one of them")
     selected = channels[0]
     symbol = find_unit(selected.unit) if unit is None else require_unit(unit, path.name)
     if not symbol:

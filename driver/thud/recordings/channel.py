@@ -87,7 +87,7 @@ def guarded(path: Path, kind: str) -> Iterator[None]:
     except InputError:
         raise
     except MemoryError as error:
-        refuse(f"{shown_path(path)}: asks for too much memory", f"an undamaged {kind} file", error)
+        refuse(f"{shown_path(path)}: needs too much memory", f"an undamaged {kind} file", error)
     except Exception as error:  # noqa: BLE001 - libraries raise anything on damaged files
         # soundfile repeats the path.
         reason = shown_text(str(error).rpartition("': ")[2]) or type(error).__name__

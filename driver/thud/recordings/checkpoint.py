@@ -135,8 +135,8 @@ class _DataOnly(pickle.Unpickler):
     def find_class(self, module: str, name: str) -> Any:  # noqa: ANN401 - a class
         """Return a class; raise UnpicklingError if its instances are not data."""
         result = super().find_class(module, name) if module in sys.modules else None
-        ours = module.startswith("thud.") and dataclasses.is_dataclass(result)
-        if not ours and not (module.partition(".")[0] == "numpy" and name in NUMPY):
+        is_dataclass = module.startswith("thud.") and dataclasses.is_dataclass(result)
+        if not is_dataclass and not (module.partition(".")[0] == "numpy" and name in NUMPY):
             message = f"{module}.{name} is no data"
             raise pickle.UnpicklingError(message)
         return result

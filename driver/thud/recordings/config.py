@@ -252,7 +252,9 @@ def read_config(path: str | os.PathLike[str]) -> Config:
     except UnicodeDecodeError as error:
         refuse(f"{name}: byte {error.start + 1} is not UTF-8", "TOML, which is UTF-8", error)
     except (OSError, ValueError, RecursionError) as error:
-        refuse(f"{name}: is no TOML ({shown_text(error)})", 'lines such as unit = "V"', error)
+        refuse(
+            f"{name}: is not valid TOML ({shown_text(error)})", 'lines such as unit = "V"', error
+        )
     return Config(**_checked(table, Config, f"{name}: "))
 
 

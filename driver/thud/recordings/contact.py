@@ -278,12 +278,12 @@ def background_means(
     force: NDArray[np.float64], before_stop: int, after_start: int, rate: float, middle: float
 ) -> tuple[Cells, NDArray[np.float64]]:
     """Return the background cells on both sides of a contact, and their mean forces, N."""
-    both = (
+    sides = (
         before_stop - _background_bounds(before_stop, rate)[::-1],
         after_start + _background_bounds(len(force) - after_start, rate),
     )
-    begins, ends = zip(*(cells_between(side, rate, middle) for side in both), strict=True)
-    mean = [_means(force, side) for side in both if len(side) > 1]
+    begins, ends = zip(*(cells_between(side, rate, middle) for side in sides), strict=True)
+    mean = [_means(force, side) for side in sides if len(side) > 1]
     return (np.concatenate(begins), np.concatenate(ends)), np.concatenate(mean)
 
 
@@ -343,12 +343,13 @@ def flank_bounds(
 
     The interval, s, includes the touch; cells that are not fine have the maximum width.
     """
-    touch, half = (interval[0] + interval[1]) / 2 * rate, (interval[1] - interval[0]) / 2 * rate
+    touch = (interval[0] + interval[1]) / 2 * rate
+    half_width = (interval[1] - interval[0]) / 2 * rate
     bounds = [first]
     while bounds[-1] < end * rate:
-        distance = max(abs(bounds[-1] - touch) - half, 0)
+        distance = max(abs(bounds[-1] - touch) - half_width, 0)
         width = MAX_CELL * rate
         if fine:
-            width = max(MIN_CELL * rate, GROWTH * distance, min(half / 10, width))
+            width = max(MIN_CELL * rate, GROWTH * distance, min(half_width / 10, width))
         bounds.append(bounds[-1] + max(1, int(width)))
     return np.array(bounds)

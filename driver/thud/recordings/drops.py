@@ -185,16 +185,16 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]
     below = -level[level < 0]
     deviation = 1.4826 * float(np.median(below)) if below.size else 0.0
     highest = float(level.max(initial=0.0))
-    rise = min(RISE * deviation, RISE_FRACTION * highest)
+    threshold = min(RISE * deviation, RISE_FRACTION * highest)
     if highest <= max(MIN_DEVIATIONS * deviation, 1e-9):
         return []
-    above = np.flatnonzero(level > max(rise, 0.01 * highest))
+    above = np.flatnonzero(level > max(threshold, 0.01 * highest))
     groups = np.split(above, np.flatnonzero(np.diff(above) > MAX_GAP) + 1)
     pulses: list[_Pulse] = []
     for group in groups:
         top = int(group[0] + np.argmax(level[group[0] : group[-1] + 1]))
-        free = -(-(pulses[-1].stop - first) // width) if pulses else 0
-        if top < free:
+        earliest = -(-(pulses[-1].stop - first) // width) if pulses else 0
+        if top < earliest:
             continue
         low, high = (_find_edge(level, top, step, level[top] / 2) for step in (-1, 1))
         # Noise on the flank of a higher pulse is no pulse.
@@ -203,17 +203,17 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]
         if not DURATIONS[0] <= (high - low + 1) * width / rate <= DURATIONS[1]:
             continue
         # Slow noise moves the background next to the pulse away from the baseline.
-        ahead, after = (
-            level[max(free, low - LENGTH) : low - DISTANCE],
+        left, right = (
+            level[max(earliest, low - LENGTH) : low - DISTANCE],
             level[high + DISTANCE :][:LENGTH],
         )
-        beside = [np.quantile(side, 0.4) if side.size else 0.0 for side in (ahead, after)]
+        backgrounds = [np.quantile(side, 0.4) if side.size else 0.0 for side in (left, right)]
         fraction = np.clip((np.arange(len(level)) - low) / max(high - low, 1), 0, 1)
-        local = level - (beside[0] + fraction * (beside[1] - beside[0]))
-        peak = float(local[top])
-        start = max(_find_edge(local, low, -1, FOOT * peak) - MARGIN, free)
-        stop = _find_edge(local, high, 1, FOOT * peak) + 1 + MARGIN
-        warning = _double_peak_warning(local[max(group[0], free) : group[-1] + 1])
+        corrected = level - (backgrounds[0] + fraction * (backgrounds[1] - backgrounds[0]))
+        peak = float(corrected[top])
+        start = max(_find_edge(corrected, low, -1, FOOT * peak) - MARGIN, earliest)
+        stop = _find_edge(corrected, high, 1, FOOT * peak) + 1 + MARGIN
+        warning = _double_peak_warning(corrected[max(group[0], earliest) : group[-1] + 1])
         span = first + start * width, first + stop * width
         pulses.append(_Pulse(*span, peak, warnings=[warning] if warning else []))
     return pulses

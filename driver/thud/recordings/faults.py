@@ -75,9 +75,12 @@ def _refuse_clipped(window: Window, record: NDArray[np.float64]) -> None:
     start, length = int(starts[k]), int(lengths[k])
     changes = np.abs(np.diff(force))
     step = changes[changes > 0].min(initial=np.inf)
-    half = max(length // 2, 1)
-    beside = [force[max(start - half, 0)], force[min(start + length - 1 + half, len(force) - 1)]]
-    clipped = length >= MIN_CLIPPED and top - max(beside) > MIN_FALL * step
+    distance = max(length // 2, 1)
+    neighbors = [
+        force[max(start - distance, 0)],
+        force[min(start + length - 1 + distance, len(force) - 1)],
+    ]
+    clipped = length >= MIN_CLIPPED and top - max(neighbors) > MIN_FALL * step
     if window.signal.full_scale is not None:
         at_scale = np.count_nonzero(force >= CLIPPED_FRACTION * window.signal.full_scale)
         clipped, length = clipped or at_scale > 1, max(length, int(at_scale))
@@ -95,8 +98,8 @@ def _fill(
     """Return the force with dropouts interpolated, notes, and warnings."""
     first, stop = window.contact
     rate = window.sample_rate
-    guard = int(MIN_BACKGROUND * rate)
-    first, stop = first + guard, stop - guard
+    margin = int(MIN_BACKGROUND * rate)
+    first, stop = first + margin, stop - margin
     level = force - np.median(
         np.concatenate([force[: window.contact[0]], force[window.contact[1] :]])
     )

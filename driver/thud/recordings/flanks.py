@@ -143,27 +143,29 @@ class Posterior:
         Draws of kind, time and shape with an implausible flank are excluded.
         """
         kind = np.repeat(self.kinds, N_DRAW)
-        total = np.repeat(self.weight.sum(axis=1), N_DRAW)
+        kind_probability = np.repeat(self.weight.sum(axis=1), N_DRAW)
         quantiles = (np.arange(N_DRAW) + 0.5) / N_DRAW
-        at = np.ravel([np.searchsorted(w.cumsum(), quantiles * w.sum()) for w in self.weight])
-        at = np.minimum(at, len(self.time) - 1)
-        touch = self.time[at]
-        path = self._paths(kind, at)
+        index = np.ravel([np.searchsorted(w.cumsum(), quantiles * w.sum()) for w in self.weight])
+        index = np.minimum(index, len(self.time) - 1)
+        touch = self.time[index]
+        path = self._paths(kind, index)
         highest = np.where(kind[:, None] < N_SMOOTH, np.maximum.accumulate(path, axis=1), 0.0)
         delay = _crossing(path, THRESHOLD)
-        fast = (delay <= FOOT_TIME) & (_crossing(path, FOOT) <= delay + FOOT_TIME)
-        chance = total * ((highest - path).max(axis=1) <= MAX_FALL) * fast
-        if not chance.any():
-            chance = total
-        chance /= chance.sum()
-        jumps = chance @ (delay == 0)
+        plausible = (delay <= FOOT_TIME) & (_crossing(path, FOOT) <= delay + FOOT_TIME)
+        probability = kind_probability * ((highest - path).max(axis=1) <= MAX_FALL) * plausible
+        if not probability.any():
+            probability = kind_probability
+        probability /= probability.sum()
+        jump_probability = probability @ (delay == 0)
         results = []
         for value, cell, error in (
             (touch, self._cell, ERRORS[kind, int(self.release)]),
-            (touch + 1e-3 * delay, self._cell * jumps, ERRORS[kind, 2]),
+            (touch + 1e-3 * delay, self._cell * jump_probability, ERRORS[kind, 2]),
         ):
-            mean = float(chance @ value)
-            results.append((mean, float(np.sqrt(chance @ ((value - mean) ** 2 + error**2) + cell))))
+            mean = float(probability @ value)
+            results.append(
+                (mean, float(np.sqrt(probability @ ((value - mean) ** 2 + error**2) + cell)))
+            )
         return results[0], results[1]
 
     @property
@@ -171,10 +173,10 @@ class Posterior:
         """Variance of a time within its cell, s2."""
         return float((self.time[1] - self.time[0]) ** 2 / 12)
 
-    def _paths(self, kind: NDArray[np.intp], at: NDArray[np.intp]) -> NDArray[np.float64]:
+    def _paths(self, kind: NDArray[np.intp], index: NDArray[np.intp]) -> NDArray[np.float64]:
         """Return draws of the averaged force as a fraction of the peak: [n, n_delay]."""
         row = np.repeat(np.arange(len(self.kinds)), N_DRAW)
-        cells, cell = np.unique(row * len(self.time) + at, return_inverse=True)
+        cells, cell = np.unique(row * len(self.time) + index, return_inverse=True)
         lower = self.factors.reshape(-1, *self.factors.shape[2:])[cells]
         inverse = np.linalg.inv(lower[:, :-1, :-1])
         normal = np.tile(_normal_draws(lower.shape[-1] - 1), (len(self.kinds), 1))
@@ -186,18 +188,20 @@ class Posterior:
 
 def find_touch(flank: Flank, low: float, high: float, searches: int) -> Posterior:
     """Return the posterior of the first touch of a flank between two times, s, by searches."""
-    level = flank.force / flank.peak
+    relative_force = flank.force / flank.peak
     whitening = []
     for misfit in MISFIT:
-        covariance = flank.covariance / flank.peak**2 + np.diag((misfit * level) ** 2)
+        covariance = flank.covariance / flank.peak**2 + np.diag((misfit * relative_force) ** 2)
         factor = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
-        inverse = solve_triangular(factor, np.eye(len(level)), lower=True, check_finite=False)
+        inverse = solve_triangular(
+            factor, np.eye(len(relative_force)), lower=True, check_finite=False
+        )
         whitening.append(inverse)
     table = _table(1e3 * flank.interval, flank.plate)
     kinds = np.arange(len(KINDS))
     for search in range(searches):
         time = np.linspace(low, high, N_TIME)
-        columns = _columns(table, 1e3 * (flank.time - time[:, None]), level)
+        columns = _columns(table, 1e3 * (flank.time - time[:, None]), relative_force)
         evidence = [
             _evidence(columns, inverse, members)
             for inverse, members in zip(
@@ -246,8 +250,8 @@ def _evidence(
     information[..., shapes, shapes] += 1
     factors = np.asarray(np.linalg.cholesky(information), dtype=np.float64)
     diagonal = np.diagonal(factors, axis1=2, axis2=3)
-    size = np.log(np.diagonal(inverse)).sum()
-    return size - 0.5 * diagonal[..., -1] ** 2 - np.log(diagonal[..., :-1]).sum(axis=-1), factors
+    likelihood = np.log(np.diagonal(inverse)).sum() - 0.5 * diagonal[..., -1] ** 2
+    return likelihood - np.log(diagonal[..., :-1]).sum(axis=-1), factors
 
 
 def _crossing(path: NDArray[np.float64], level: float) -> NDArray[np.float64]:

@@ -107,11 +107,11 @@ def read_chain(text: object) -> list[Factor]:
         value = float(match["value"]) if match else 0.0
         if not match or not SIZES[0] < abs(value) < SIZES[1]:
             refuse(f"calibration: {term[:60]!r} is not a number with units", EXAMPLES)
-        (top, over), (bottom, under) = (
+        (top, top_factor), (bottom, bottom_factor) = (
             UNITS[require_unit(match[side], f"calibration {term[:60]!r}")]
             for side in ("top", "bottom")
         )
-        factors.append(Factor(value * over / under, top, bottom))
+        factors.append(Factor(value * top_factor / bottom_factor, top, bottom))
     if not 1 <= len(factors) <= MAX_FACTORS:
         refuse(f"calibration: {len(factors)} factors", f"1 to {MAX_FACTORS}, {EXAMPLES}")
     return factors
@@ -144,8 +144,8 @@ def newtons_per_unit(
     size = _follow(base, factors, scale)
     if size is None:
         refuse(
-            f"{label}: calibration {stated.chain!r} does not lead from {unit} to N by all its "
-            "factors",
+            f"{label}: calibration {stated.chain!r} does not convert {unit} to N with all of "
+            "its factors",
             EXAMPLES,
         )
     value = size * multiple

@@ -189,8 +189,8 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
     )
 
 
-def _between(first: Estimate, last: Estimate) -> Estimate:
-    return Estimate(last.value - first.value, math.hypot(last.uncertainty, first.uncertainty))
+def _between(start: Estimate, end: Estimate) -> Estimate:
+    return Estimate(end.value - start.value, math.hypot(end.uncertainty, start.uncertainty))
 
 
 def _landings(window: Window, drop: Contact, count: int) -> list[tuple[Estimate, Estimate]]:

@@ -107,8 +107,8 @@ def _waves(cells: Cells) -> NDArray[np.float64]:
     """
     middle, width = (cells[0] + cells[1]) / 2, cells[1] - cells[0]
     order = np.arange(1, N_HARMONIC + 1)
-    near = np.add.outer(MAINS, [-MAINS_DEVIATION, MAINS_DEVIATION])
-    frequency = (near[:, None] * order[:, None]).reshape(len(MAINS), 1, -1)
+    fundamentals = np.add.outer(MAINS, [-MAINS_DEVIATION, MAINS_DEVIATION])
+    frequency = (fundamentals[:, None] * order[:, None]).reshape(len(MAINS), 1, -1)
     weight = np.repeat(np.sqrt(0.5) / order, 2) * np.sinc(frequency * width[:, None])
     phase = 2 * np.pi * frequency * middle[:, None]
     return np.concatenate([weight * np.cos(phase), weight * np.sin(phase)], axis=-1)
@@ -233,11 +233,12 @@ def fit_background(cells: Cells, mean: NDArray[np.float64], peak: float) -> Back
     posterior = _Posterior(unit, _fixed(cells, peak), mean, (PRIOR_DEVIATION * peak) ** 2 / scale)
     # First guess of the variance: half the mean square difference of adjoining cells.
     adjoining = cells[0][1:] - cells[1][:-1] < 1e-3 * (cells[1] - cells[0])[1:]
-    changes = np.diff(mean)[adjoining]
-    rough = (np.mean(changes**2) / 2 if changes.size else 0.0) + (QUANTIZATION * peak) ** 2
-    first = np.log(rough * np.array([1, 0.1, 0.1, 0.05, 0.05]) / scale)
-    likely, curvature = posterior.maximum(first)
-    return Background(cells, mean, np.exp(posterior.draw(likely, curvature)), peak)
+    differences = np.diff(mean)[adjoining]
+    variance = np.mean(differences**2) / 2 if differences.size else 0.0
+    variance += (QUANTIZATION * peak) ** 2
+    guess = np.log(variance * np.array([1, 0.1, 0.1, 0.05, 0.05]) / scale)
+    maximum, curvature = posterior.maximum(guess)
+    return Background(cells, mean, np.exp(posterior.draw(maximum, curvature)), peak)
 
 
 @dataclass(frozen=True, eq=False)
@@ -298,13 +299,13 @@ class _Posterior:
         return phi, curvature
 
     def draw(
-        self, likely: NDArray[np.float64], curvature: NDArray[np.float64]
+        self, maximum: NDArray[np.float64], curvature: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Return draws from the posterior, [N_RESAMPLED, 5], by importance resampling."""
-        steps, logarithm = _student(len(likely))
+        steps, logarithm = _student(len(maximum))
         # Rows x with covariance inverse(curvature) = inverse(L)' inverse(L).
         lower = np.linalg.cholesky(curvature)
-        phi = likely + solve_triangular(lower, steps.T, lower=True, trans="T").T
+        phi = maximum + solve_triangular(lower, steps.T, lower=True, trans="T").T
         weight = np.array([self.logarithm(draw) for draw in phi]) - logarithm
         weight = np.exp(weight - weight.max())
         quantiles = (np.arange(N_RESAMPLED) + 0.5) / N_RESAMPLED * weight.sum()

@@ -259,11 +259,11 @@ def _check_linearity(linearity: Sequence[tuple[float, float]] | None) -> PlateCh
     slope = float(np.mean(indicated / applied))
     relative = indicated / (slope * applied) - 1
     worst = int(np.argmax(np.abs(relative)))
-    reach = "" if applied.max() >= RANGE else f"; above {applied.max():.4g} N it is not known"
+    restriction = "" if applied.max() >= RANGE else f"; above {applied.max():.4g} N it is not known"
     met = bool(abs(relative[worst]) <= TOLERANCE)
     return PlateCheck(
         requirement,
-        None if met and reach else met,
+        None if met and restriction else met,
         f"from {applied.min():.4g} to {applied.max():.4g} N the plate is linear within "
-        f"{100 * abs(relative[worst]):.2g} % (worst at {applied[worst]:.4g} N){reach}",
+        f"{100 * abs(relative[worst]):.2g} % (worst at {applied[worst]:.4g} N){restriction}",
     )

@@ -70,7 +70,7 @@ def scan(samples: Callable[[int, int], NDArray[np.float64]], count: int, name: s
 
 
 def find_sign(
-    seen: Extremes, scale: float, polarity: str | None, name: str
+    extremes: Extremes, scale: float, polarity: str | None, name: str
 ) -> tuple[float, tuple[str, ...]]:
     """Return the sign that makes a compression positive, and notes."""
     # `polarity` refers to the recorded values, before the calibration.
@@ -78,7 +78,7 @@ def find_sign(
         sign = POLARITIES[polarity] * float(np.sign(scale))
         changed = f"The sign was changed: polarity = {polarity!r}."
         return sign, (changed,) if sign * scale < 0 else ()
-    up, down = seen.peak(scale), seen.peak(-scale)
+    up, down = extremes.peak(scale), extremes.peak(-scale)
     if max(up, down) < MIN_PEAK_RATIO * min(up, down):
         refuse(
             f"{name}: the sign is not clear, the peaks are {up:.4g} N and {-down:.4g} N",
@@ -89,26 +89,28 @@ def find_sign(
     return -1.0, (f"The sign was changed: the largest peak, {-down:.4g} N, is negative.",)
 
 
-def check_peak(seen: Extremes, scale: float, name: str, *, assumed: bool) -> tuple[str, ...]:
+def check_peak(extremes: Extremes, scale: float, name: str, *, assumed: bool) -> tuple[str, ...]:
     """Return warnings about a peak force; `scale` is N per value, with its sign.
 
     Raise InputError if the unit must be wrong, or an assumed unit may be.
     """
     low, high = PEAKS
-    peak, other = seen.peak(scale), seen.peak(-scale)
+    peak, opposite_peak = extremes.peak(scale), extremes.peak(-scale)
     allowed = f"{low:g} to {high:g} N for heavy/soft sources"
     if assumed and not low <= peak <= high:
         refuse(f"{name}: the values are without a unit and reach {peak:.4g}", f"{allowed}, or unit")
-    for ratio, likely in ((THOUSAND, "kN instead of N"), (1 / THOUSAND, "mN instead of N")):
+    for ratio, cause in ((THOUSAND, "kN instead of N"), (1 / THOUSAND, "mN instead of N")):
         if low <= peak * ratio <= high:
             refuse(
-                f"{name}: the peak is {peak:.4g} N; the unit is probably wrong, {likely}", allowed
+                f"{name}: the peak is {peak:.4g} N; the unit is probably wrong, {cause}", allowed
             )
     if not low / MAX_FACTOR <= peak <= high * MAX_FACTOR:
-        refuse(f"{name}: the peak is {peak:.4g} N; unit or calibration are wrong", allowed)
+        refuse(f"{name}: the peak is {peak:.4g} N; unit or calibration is wrong", allowed)
     warnings: tuple[str, ...] = ()
     if not low <= peak <= high:
         warnings += (f"The peak is {peak:.4g} N; usual is {allowed}.",)
-    if other > MIN_PEAK_RATIO * peak:
-        warnings += (f"The peaks are {-other:.4g} N and {peak:.4g} N; the polarity may be wrong.",)
+    if opposite_peak > MIN_PEAK_RATIO * peak:
+        warnings += (
+            f"The peaks are {-opposite_peak:.4g} N and {peak:.4g} N; the polarity may be wrong.",
+        )
     return warnings

@@ -172,7 +172,10 @@ def average_levels(estimates: Sequence[DropLevels]) -> AverageLevels:
     Raise InputError if there are no drops, or their bands or methods differ.
     """
     if len({(e.bands, e.method) for e in estimates}) != 1:
-        refuse("the drops differ in bands or method, or there are none", "levels of one kind")
+        refuse(
+            "the drops differ in bands or method, or there are none",
+            "levels in the same bands by the same method",
+        )
     first, count = estimates[0], len(estimates)
     drops = np.array([e.level for e in estimates])
     energies = np.array([10 ** (e.measured / 10) for e in estimates])

@@ -49,8 +49,11 @@ class DropConditions:
         if self.height and self.mass:
             momentum = self.mass * speed
             value = impulse.value / momentum - 1 - GRAVITY * contact_time.value / speed
-            parts = (impulse.uncertainty / momentum, GRAVITY * contact_time.uncertainty / speed)
-            methods[IMPULSE] = Estimate(value, math.hypot(*parts))
+            uncertainties = (
+                impulse.uncertainty / momentum,
+                GRAVITY * contact_time.uncertainty / speed,
+            )
+            methods[IMPULSE] = Estimate(value, math.hypot(*uncertainties))
         if self.height and flights:
             scale = GRAVITY / (2 * speed)
             methods[BOUNCES] = Estimate(scale * flights[0].value, scale * flights[0].uncertainty)
@@ -113,11 +116,11 @@ class DropConditions:
         if restitution is None or not self.height:
             return Estimate.unknown()
         speed = self.speed
-        change = speed * (1 + restitution.value) + GRAVITY * contact_time.value
-        value = impulse.value / change
-        parts = (
-            impulse.uncertainty / change,
-            value * speed * restitution.uncertainty / change,
-            value * GRAVITY * contact_time.uncertainty / change,
+        velocity_change = speed * (1 + restitution.value) + GRAVITY * contact_time.value
+        value = impulse.value / velocity_change
+        uncertainties = (
+            impulse.uncertainty / velocity_change,
+            value * speed * restitution.uncertainty / velocity_change,
+            value * GRAVITY * contact_time.uncertainty / velocity_change,
         )
-        return Estimate(value, math.hypot(*parts))
+        return Estimate(value, math.hypot(*uncertainties))

@@ -137,7 +137,7 @@ def _stored(descriptor: int, size: int) -> int:
 
 def choose_channels(channels: list[Channel], channel: int | str | None, name: str) -> list[Channel]:
     """Return the selected channels; raise InputError if the selection is ambiguous."""
-    listed = ", ".join(
+    choices = ", ".join(
         f"{entry.number}" + (f" {shown_text(entry.name)!r}" if entry.name else "")
         for entry in channels[:20]
     )
@@ -146,7 +146,7 @@ def choose_channels(channels: list[Channel], channel: int | str | None, name: st
         if not forces and len(channels) > 1:
             refuse(
                 f"{name}: has {len(channels)} channels, none of them in a unit of force",
-                f"channel = one of {listed}",
+                f"channel = one of {choices}",
             )
         return forces or channels
     matching = [entry for entry in channels if channel in {entry.number, entry.name}]
@@ -160,7 +160,8 @@ def choose_channels(channels: list[Channel], channel: int | str | None, name: st
         ]
     if len(matching) != 1:
         refuse(
-            f"{name}: channel = {shown(channel)} fits {len(matching)} channels", f"one of {listed}"
+            f"{name}: channel = {shown(channel)} matches {len(matching)} channels",
+            f"one of {choices}",
         )
     return matching
 
@@ -214,8 +215,8 @@ def _rate(channel: Channel, stated: _Stated, name: str) -> tuple[float, tuple[st
         refuse(f"{name}: the sample rate is {rate:.6g} Hz", f"{RATES[0]:g} to {RATES[1]:g} Hz")
     if channel.sample_rate in {None, rate}:
         return rate, ()
-    was = f"{channel.sample_rate:.7g} Hz"
-    return rate, (f"The rate of the file, {was}, was replaced by {rate:.7g} Hz as stated.",)
+    file_rate = f"{channel.sample_rate:.7g} Hz"
+    return rate, (f"The rate of the file, {file_rate}, was replaced by {rate:.7g} Hz as stated.",)
 
 
 def _unit(channel: Channel, stated: _Stated, name: str) -> tuple[str, tuple[str, ...]]:
@@ -236,8 +237,8 @@ def _unit(channel: Channel, stated: _Stated, name: str) -> tuple[str, tuple[str,
     if not channel.unit and stated.calibration is None:
         return ASSUMED, ("The file states no unit; the values are assumed to be in N.",)
     if channel.unit or isinstance(stated.calibration, str | Calibration):
-        state = f"in {shown_text(channel.unit)!r}" if channel.unit else "without a unit"
-        refuse(f"{name}: the values are {state}", f"unit = one of {ALLOWED}")
+        description = f"in {shown_text(channel.unit)!r}" if channel.unit else "without a unit"
+        refuse(f"{name}: the values are {description}", f"unit = one of {ALLOWED}")
     return "", ()
 
 

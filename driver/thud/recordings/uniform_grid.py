@@ -60,7 +60,7 @@ def uniform_grid(time: NDArray[np.float64], name: str) -> tuple[float, float, tu
         refuse(
             f"{name}: the times are not uniformly spaced: row {worst + 1}, {time[worst]:.9g} s, is "
             f"{deviation[worst]:.2g} steps of {step:.4g} s off a uniform grid",
-            f"one sampling rate, to {allowed:.2g} steps",
+            f"a constant step, within {allowed:.2g} steps",
         )
     begin = float(time.mean() + index[0] * step)
     if deviation[worst] <= TOLERANCE:

@@ -220,10 +220,10 @@ def _require_same(
             f"{file}: its source {report['source']!r} or its criteria are not those of {origin}",
             "reports of one source",
         )
-    for key, words in (("serial", "serial number"), ("ball", "ball")):
+    for key, title in (("serial", "serial number"), ("ball", "ball")):
         if report[key] != first[key] and not different_balls:
             refuse(
-                f"{file}: its {words} {report[key]!r} is not that of {origin}, {first[key]!r}",
+                f"{file}: its {title} {report[key]!r} is not that of {origin}, {first[key]!r}",
                 "reports of one ball, or --different-balls",
             )
 

@@ -131,7 +131,7 @@ def _criteria(
     rows = []
     for i, (criterion, default) in enumerate(zip(criteria, standard, strict=True)):
         is_level, estimate = i < count, criterion.estimate
-        stated = bool(estimate.contributions)
+        has_budget = bool(estimate.contributions)
         limits = criterion.lower, criterion.upper
         is_count = criterion.lower == criterion.upper
         rows.append(
@@ -140,10 +140,10 @@ def _criteria(
                 "unit": criterion.unit,
                 "band": float(get_bands().nominal[i]) if is_level else None,
                 "value": criterion.value,
-                "uncertainty": estimate.uncertainty if stated else None,
+                "uncertainty": estimate.uncertainty if has_budget else None,
                 "freedom": estimate.freedom,
                 "coverage_factor": estimate.coverage_factor,
-                "expanded_uncertainty": estimate.expanded if stated else None,
+                "expanded_uncertainty": estimate.expanded if has_budget else None,
                 "upper_bound": estimate.upper_bound,
                 "lower": criterion.lower,
                 "upper": criterion.upper,

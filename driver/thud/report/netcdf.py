@@ -43,29 +43,29 @@ def recording_dataset(data: dict[str, Any]) -> xr.Dataset:
     onset = {"units": "s", "long_name": "time of first touch in the file"}
     variables: dict[str, Any] = {"onset": ("drop", _numbers(d["onset"] for d in drops), onset)}
     for name in ESTIMATES:
-        for key, suffix, of in (
+        for key, suffix, prefix in (
             ("value", "", ""),
             ("uncertainty", "_uncertainty", "standard uncertainty of the "),
         ):
             values = _numbers(drop[name][key] for drop in drops)
             quantity = QUANTITIES[name]
-            about = {"units": quantity.unit or "1", "long_name": of + quantity.meaning}
-            variables[name + suffix] = ("drop", values, about)
+            attributes = {"units": quantity.unit or "1", "long_name": prefix + quantity.meaning}
+            variables[name + suffix] = ("drop", values, attributes)
     coordinates: dict[str, Any] = {"drop": ("drop", _texts(drop["name"] for drop in drops))}
     for bands, levels in data["levels"].items():
-        words = {"units": "Hz", "long_name": "nominal frequency"}
-        coordinates[bands] = (bands, np.array(levels["band"]), words)
+        attributes = {"units": "Hz", "long_name": "nominal frequency"}
+        coordinates[bands] = (bands, np.array(levels["band"]), attributes)
         for key, (name, meaning) in LEVELS.items():
-            about = {"units": "dB", "long_name": meaning}
-            variables[f"{bands}_{name}"] = (bands, _numbers(levels[key]), about)
+            attributes = {"units": "dB", "long_name": meaning}
+            variables[f"{bands}_{name}"] = (bands, _numbers(levels[key]), attributes)
         flag = {"long_name": "corrected for the background, upper bound, or no level"}
         variables[f"{bands}_flag"] = (bands, _texts(levels["flag"]), flag)
-        about = {"units": "dB", "long_name": "force exposure level of each drop"}
+        attributes = {"units": "dB", "long_name": "force exposure level of each drop"}
         of_drops = np.array([_numbers(row) for row in levels["drops"]])
-        variables[f"{bands}_drop_level"] = (("drop", bands), of_drops, about)
+        variables[f"{bands}_drop_level"] = (("drop", bands), of_drops, attributes)
     for key, meaning in FILES.items():
-        words = {"long_name": f"{meaning} of the file"}
-        variables[f"file_{key}"] = ("file", _texts(file[key] for file in files), words)
+        attributes = {"long_name": f"{meaning} of the file"}
+        variables[f"file_{key}"] = ("file", _texts(file[key] for file in files), attributes)
     return xr.Dataset(variables, coordinates, _attributes(data))
 
 

@@ -60,10 +60,10 @@ def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) 
         footer=_text(f"thud {data['thud']} · report.json: SHA-256 {checksum}"),
     )
     title = f"Calibration report: {data['serial'] or data['name']}"
-    used = "".join(sorted(set(html.unescape(re.sub(r"<[^>]*>", "", body)))))
+    characters = "".join(sorted(set(html.unescape(re.sub(r"<[^>]*>", "", body)))))
     return PAGE.substitute(
         title=_text(title),
-        fonts=font_faces(used),
+        fonts=font_faces(characters),
         family=FAMILY,
         body=body,
     )
@@ -90,8 +90,8 @@ def _reason(criteria: Sequence[dict[str, Any]]) -> str:
     """Return the criteria that are inconclusive or not met, as text."""
     parts = []
     for verdict in RESULTS[1:]:
-        missed = [criterion for criterion in criteria if criterion["verdict"] == verdict]
-        names = [style_of(criterion).title.split(",")[0] for criterion in missed]
+        matching = [criterion for criterion in criteria if criterion["verdict"] == verdict]
+        names = [style_of(criterion).title.split(",")[0] for criterion in matching]
         if names:
             parts.append(f"{verdict}: {', '.join(names).lower().replace(' hz', ' Hz')}")
     return "; ".join(parts) or "all criteria are met"
@@ -111,8 +111,8 @@ def _about(data: dict[str, Any]) -> list[tuple[str, str]]:
 def _measured(data: dict[str, Any]) -> list[tuple[str, str]]:
     files, drops = data["files"], len(data["drops"])
     rates = sorted({file["sample_rate"] for file in files})
-    listed = " to ".join(dict.fromkeys(f"{rate / 1e3:.4g}" for rate in (rates[0], rates[-1])))
-    amount = f"{_count(drops, 'drop')} in {_count(len(files), 'file')}, {listed} kHz"
+    range_text = " to ".join(dict.fromkeys(f"{rate / 1e3:.4g}" for rate in (rates[0], rates[-1])))
+    amount = f"{_count(drops, 'drop')} in {_count(len(files), 'file')}, {range_text} kHz"
     calibrations = list(dict.fromkeys(file["calibration"] for file in files if file["calibration"]))
     relative = data["calibration_uncertainty"]
     uncertainty = (
@@ -169,9 +169,9 @@ def _range(criterion: dict[str, Any]) -> str:
 
 
 def _rule(data: dict[str, Any]) -> str:
-    own = any(not criterion["limits_of_standard"] for criterion in data["criteria"])
+    has_own_limits = any(not criterion["limits_of_standard"] for criterion in data["criteria"])
     limits = f"Limits of {STANDARDS.get(data['source'], 'the standards')}"
-    limits += ", those marked * of the laboratory. " if own else ". "
+    limits += ", those marked * of the laboratory. " if has_own_limits else ". "
     return limits + (
         "U: expanded uncertainty for 95 % (JCGM 100, Student's t). A criterion conforms if "
         "value ± U lies within its limits, does not conform if it lies outside, and is "
@@ -191,8 +191,13 @@ def _means(drops: Sequence[dict[str, Any]]) -> list[str]:
     for drop in drops:
         for method, estimate in drop["restitutions"].items():
             methods.setdefault(method, []).append(estimate["value"])
-    by = [f"by {name} {number(sum(values) / len(values), 3)}" for name, values in methods.items()]
-    return [f"mean: {', '.join(means)}", *([f"mean restitution: {', '.join(by)}"] if by else [])]
+    restitutions = [
+        f"by {name} {number(sum(values) / len(values), 3)}" for name, values in methods.items()
+    ]
+    return [
+        f"mean: {', '.join(means)}",
+        *([f"mean restitution: {', '.join(restitutions)}"] if restitutions else []),
+    ]
 
 
 def _results(data: dict[str, Any]) -> list[str]:

@@ -94,9 +94,11 @@ def verdict_text(recording: Recording) -> str:
         "does not conform": f"The source does not conform to the limits of the {name}",
         "inconclusive": f"The result is inconclusive by the limits of the {name}",
     }[assessment.result]
-    own = any(not criterion["limits_of_standard"] for criterion in criteria_data(recording))
-    more = " Limits marked * are those of the laboratory." if own else ""
-    return f"{sentence} at 95 %: {count_verdicts(d.result for d in assessment.criteria)}.{more}"
+    has_own_limits = any(
+        not criterion["limits_of_standard"] for criterion in criteria_data(recording)
+    )
+    note = " Limits marked * are those of the laboratory." if has_own_limits else ""
+    return f"{sentence} at 95 %: {count_verdicts(d.result for d in assessment.criteria)}.{note}"
 
 
 def count_verdicts(results: Iterable[str]) -> str:
@@ -145,8 +147,8 @@ def criteria_csv(data: dict[str, Any]) -> str:
         for criterion in data["criteria"]
     ]
     head = "criterion unit value upper_bound uncertainty lower upper margin verdict"
-    about = f"# thud {version()}; SI units, levels in dB re 1 N; uncertainty expanded, 95 %\n"
-    return about + _csv([head.split(), *rows])
+    comment = f"# thud {version()}; SI units, levels in dB re 1 N; uncertainty expanded, 95 %\n"
+    return comment + _csv([head.split(), *rows])
 
 
 def _csv(rows: Iterable[Iterable[object]]) -> str:
@@ -189,9 +191,9 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
         # Matplotlib is slow to import.
         from thud.plot.save_figures import figure_files
 
-        drawn = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
-        contents |= page_contents(data, list(drawn.values()), results.folder)
-        contents |= figure_files(drawn)
+        drawings = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
+        contents |= page_contents(data, list(drawings.values()), results.folder)
+        contents |= figure_files(drawings)
     write_files(results, data, contents, file_names())
 
 

@@ -84,7 +84,7 @@ def read_channels(path: Path) -> list[Channel]:
     if actual is None or (actual.module == "text" and expected not in {None, actual}):
         kinds = ", ".join(entry.name for entry in FORMATS)
         reason = f"is no {expected.name} file" if expected else "is of no known format"
-        refuse(f"{name}: {reason} by its first bytes", f"{kinds} files")
+        refuse(f"{name}: {reason} according to its first bytes", f"{kinds} files")
     module = importlib.import_module(f"{__name__}.{actual.module}")
     if actual.is_probed:
         probe_in_subprocess(lambda file: _read_ends(module.read_channels(file)), path, actual.name)

@@ -54,7 +54,7 @@ def read_channels(path: Path) -> list[Channel]:
         kind, count, columns = file.subtype, file.frames, file.channels
         rate = float(file.samplerate)
     if kind not in SUBTYPES:
-        refuse(f"{name}: samples of the kind {kind}", ", ".join(SUBTYPES))
+        refuse(f"{name}: samples of the format {kind}", ", ".join(SUBTYPES))
     if columns > MAX_CHANNELS:
         refuse(f"{name}: {columns} channels", f"up to {MAX_CHANNELS}")
     # Without a length the library cannot seek, and a file that is cut off is not detectable.
@@ -99,8 +99,10 @@ def _read_chunks(file: BinaryIO, name: str) -> str:
         if kind == b"bext":
             file.seek(begin)
             text = file.read(CLOCK.stop)
-            words = (text[at].strip(b"\0 ").decode("ascii", "replace") for at in (DATE, CLOCK))
-            date = " ".join(word for word in words if word.isprintable() and word)
+            texts = (
+                text[section].strip(b"\0 ").decode("ascii", "replace") for section in (DATE, CLOCK)
+            )
+            date = " ".join(word for word in texts if word.isprintable() and word)
     if missing is None:
         refuse(f"{name}: has no chunk of samples", "an undamaged WAV file")
     if missing > 0:

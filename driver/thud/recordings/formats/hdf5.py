@@ -136,11 +136,11 @@ def _walk(h5py: Any, file: Any, path: Path) -> list[_Vectors]:  # noqa: ANN401 -
     waiting: list[tuple[str, int, list[tuple[str, object]]]] = [("", 0, [])]
     seen = {h5py.h5o.get_info(file.id).addr}
     while waiting:
-        group_path, depth, above = waiting.pop()
+        group_path, depth, outer_header = waiting.pop()
         if depth > MAX_DEPTH:
             refuse(f"{shown_path(path)}: groups more than {MAX_DEPTH} deep", "a recording")
         group = file[group_path or "/"]
-        header = [*_attributes(h5py, group), *above]
+        header = [*_attributes(h5py, group), *outer_header]
         vectors = []
         for key, entry in _entries(h5py, group, seen, shown_path(path)):
             if isinstance(entry, h5py.Group):
@@ -208,7 +208,7 @@ def _is_channel(data: Any, name: str, path: Path) -> bool:  # noqa: ANN401 - of 
     if max(data.shape) < MIN_SAMPLES or math.prod(data.shape) // max(data.shape) > MAX_COLUMNS:
         return False
     if data.is_virtual or data.external:
-        refuse(f"{name}: lies in another file", "the other file")
+        refuse(f"{name}: is stored in another file", "the other file")
     size = math.prod(data.shape) * data.dtype.itemsize
     stored = data.id.get_storage_size() * (MAX_RATIO if data.chunks else 1)
     if size > stored or (not data.chunks and size > path.stat().st_size):
@@ -279,7 +279,8 @@ def _rate_of_times(path: Path, times: _Vectors) -> tuple[float, tuple[str, ...],
     values = np.asarray(times.data[()], dtype=np.float64).ravel()
     if unit.casefold() not in TIME_UNITS:
         refuse(
-            f"{name}: unit = {shown_text(unit)!r} is no time", ", ".join(filter(None, TIME_UNITS))
+            f"{name}: unit = {shown_text(unit)!r} is not a unit of time",
+            ", ".join(filter(None, TIME_UNITS)),
         )
     _, step, steps = uniform_grid(values * TIME_UNITS[unit.casefold()], name)
     return 1 / step, steps, since

@@ -221,10 +221,10 @@ def _read_numbers(lines: Iterator[str], table: _Table) -> dict[int, NDArray[np.f
         refuse(f"{table.name}: {table.width} columns", f"up to {MAX_COLUMNS}")
     blocks: list[NDArray[np.float64]] = []
     number, count = table.first, 0
-    words = sorted({*range(table.width)} - {*table.used})
+    word_columns = sorted({*range(table.width)} - {*table.used})
     while block := list(itertools.islice(lines, BLOCK)):
-        if words:
-            _require_words(block, number, words, table)
+        if word_columns:
+            _require_words(block, number, word_columns, table)
         values = _convert(block, table)
         if values is None:
             values = _convert_each(block, number, table)
@@ -238,14 +238,14 @@ def _read_numbers(lines: Iterator[str], table: _Table) -> dict[int, NDArray[np.f
     return {i: np.concatenate([block[:, k] for block in blocks]) for k, i in enumerate(table.used)}
 
 
-def _require_words(block: list[str], first: int, words: list[int], table: _Table) -> None:
+def _require_words(block: list[str], first: int, word_columns: list[int], table: _Table) -> None:
     for number, line in enumerate(block, first):
         cells = table.cells(line)
-        column = next((i for i in words if i < len(cells) and is_number(cells[i])), None)
+        column = next((i for i in word_columns if i < len(cells) and is_number(cells[i])), None)
         if column is not None:
             refuse(
-                f"{table.name}: line {number}: column {column + 1} has the number "
-                f"{shown_text(cells[column])} and none in line {table.first}",
+                f"{table.name}: line {number}: column {column + 1} has a number, "
+                f"{shown_text(cells[column])}, but none in line {table.first}",
                 "columns of numbers or of words",
             )
 
