@@ -49,7 +49,7 @@ contains
       gain = 4/(floor%upper%length*floor%upper%width)*modal_square &
          *spread(get_shape(m, n, source)*get_shape(m, n, point), 2, 2)
       compliance = sum(gain/omega**2, mask=.not. individual)
-      ! At the source the modes above the sum add their compliances; at other points these cancel.
+      ! At the source, the modes above the summed ones add their compliances; at other points these cancel on average.
       if (all(abs(source - point) < epsilon(1.0_wp))) compliance = compliance + get_far_compliance(floor%upper)
       call new_modal_receiver('floating_floor', pack(gain, individual), pack(omega, individual), &
          pack(loss_factor, individual), [compliance, residual_corner], receiver, error)

@@ -35,7 +35,7 @@ contains
       !> Namelist group, for messages.
       character(len=*), intent(in) :: group
       type(plate_type), intent(in) :: plate
-      !> Set if there are too many; names length and width.
+      !> Set if there are too many; the message names length and width.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: count
 

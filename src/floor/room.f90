@@ -113,7 +113,7 @@ contains
    !> Checks the number of reverberation times.
    subroutine check_room(room, error)
       type(room_type), intent(in) :: room
-      !> Set if it is neither 0 nor that of the bands.
+      !> Set if it is neither 0 nor the number of bands.
       type(error_type), allocatable, intent(out) :: error
       type(band_type), allocatable :: bands(:)
 
