@@ -18,7 +18,7 @@ module thud_band_projection
    implicit none (type, external)
    private
 
-   public :: band_projection_type, get_band_energies, get_class_window, get_window_class, is_projected, &
+   public :: band_projection_type, get_band_energies, get_window_length, get_window_index, is_projected, &
       new_band_projection
 
    !> The last sequences are omitted if their energy in all bands together is below this fraction of the maximum energy of a
@@ -61,7 +61,7 @@ module thud_band_projection
 contains
 
    !> Class of a record: index, from 1, of the shortest window that holds its samples.
-   elemental function get_window_class(n_sample) result(window)
+   elemental function get_window_index(n_sample) result(window)
       !> Samples of the record.
       integer, intent(in) :: n_sample
       integer :: window
@@ -70,18 +70,18 @@ contains
       if (n_sample <= shortest_window) return
       window = floor(windows_per_octave*log(real(n_sample, wp)/shortest_window)/log(2.0_wp)) + 1
       ! Lengths are rounded: the next window may be the right one.
-      if (get_class_window(window) < n_sample) window = window + 1
-   end function get_window_class
+      if (get_window_length(window) < n_sample) window = window + 1
+   end function get_window_index
 
    !> Length of the window of a class.
-   elemental function get_class_window(window) result(n_sample)
+   elemental function get_window_length(window) result(n_sample)
       !> Index of the window, from 1.
       integer, intent(in) :: window
       !> Samples, even.
       integer :: n_sample
 
       n_sample = 2*nint(shortest_window/2*2.0_wp**(real(window - 1, wp)/windows_per_octave))
-   end function get_class_window
+   end function get_window_length
 
    !> Whether to project records of this length: the matrices must be computed quickly.
    pure function is_projected(n_sample, sample_rate, bands) result(projected)

@@ -111,7 +111,7 @@ contains
       else if (.not. maxval(abs(force)) < sqrt(huge(1.0_wp)/real(size(force), wp))/sample_rate) then
          error = input_error('the force is too large for its energy to be computed; allowed: forces in N')
       else if (.not. sum(force**2) > min_energy) then
-         error = input_error('the force is zero throughout, or next to it, and has no level; allowed: a force that is not')
+         error = input_error('the force is zero or nearly zero throughout and has no level; allowed: a force with a level')
       end if
    end subroutine check_record
 
