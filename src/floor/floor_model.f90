@@ -109,7 +109,8 @@ contains
       !> Set if the floor has no such point.
       type(error_type), allocatable, intent(out) :: error
 
-      error = input_error('&floor: name: this floor has no point except the one under the source; allowed: a rectangular floor')
+      error = input_error('&floor: name: this floor has no point except the one under the source; allowed: a ' &
+         //'rectangular floor')
    end subroutine get_transfer
 
    !> The plate that radiates into the room below, and its conductance: the power into this plate per mean-square force,
