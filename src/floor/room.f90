@@ -138,8 +138,8 @@ contains
          error = input_error('&room: wall_lengths are '//to_text(walls)//' m together, longer than the edges of the ' &
             //'floor; allowed: up to '//to_text(2*(plate%length + plate%width))//' m')
       else if (room%ceiling%mass > 0.0_wp .and. room%ceiling%depth > height) then
-         error = input_error('&room: ceiling_depth = '//to_text(room%ceiling%depth)//' m is more than the volume divided by ' &
-            //'the area of the floor; allowed: up to '//to_text(height)//' m')
+         error = input_error('&room: ceiling_depth = '//to_text(room%ceiling%depth)//' m is more than the volume ' &
+            //'divided by the area of the floor; allowed: up to '//to_text(height)//' m')
       end if
    end subroutine check_below
 
