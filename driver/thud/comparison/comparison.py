@@ -81,14 +81,14 @@ class Comparison(Displayed, Page):
         peak = QUANTITIES["peak_force"]
         rows = [
             ("", *self.impacts, f"limits, {self.source.replace('_', ' ')}"),
-            ("force", *(impact.assessed_force(self.force) for impact in impacts), ""),
-            ("levels", *(impact.level_method for impact in impacts), ""),
+            ("assessed force", *(impact.assessed_force(self.force) for impact in impacts), ""),
+            ("method of the levels", *(impact.level_method for impact in impacts), ""),
             *(_criterion_row(row) for row in zip(*(v.criteria for v in verdicts), strict=True)),
             (peak.label, *(peak.show(impact.peak(self.force)) for impact in impacts), ""),
             *_quantity_rows(impacts),
         ]
         if any(times):
-            rows.append(("computed in, ms", *(f"{1e3 * t:.1f}" if t else "" for t in times), ""))
+            rows.append(("computing time, ms", *(f"{1e3 * t:.1f}" if t else "" for t in times), ""))
         return [*rows, ("verdict", *(verdict.result for verdict in verdicts), "")]
 
     def figure(self) -> Figure:
