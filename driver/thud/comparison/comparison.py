@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from thud.base._schema import LevelsForce, LimitsSource
     from thud.level.assessment import Criterion
 
-# Endings of namelist files; all others are recordings.
+# Endings of namelist files; all other files are read as recordings.
 NAMELISTS = (".nml", ".namelist", "")
 
 
@@ -50,9 +50,9 @@ class Comparison(Displayed, Page):
     run_times : dict of str to float
         Computing time of each model, s.
     force : str or None
-        ``"floor"`` or ``"elastic"``: the force that is compared; None: that of each case.
+        The compared force, ``"floor"`` or ``"elastic"``; None: the assessed force of each case.
     source : str
-        Source of the limits.
+        Impact source whose limits apply.
     """
 
     impacts: dict[str, ImpactResult]
@@ -63,17 +63,17 @@ class Comparison(Displayed, Page):
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings of all impacts, each after the name of its impact."""
+        """Warnings of all impacts, each preceded by the name of its impact."""
         return [f"{name}: {warning}" for name, i in self.impacts.items() for warning in i.warnings]
 
     def __repr__(self) -> str:
-        """Return the names of what is compared."""
+        """Return the names of the compared impacts."""
         return f"<Comparison: {', '.join(self.impacts)}>"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return rows of text: names, force, method, criteria, quantities, times, verdicts.
 
-        There is a column for each impact, and a last one for the limits.
+        Each impact has a column; the last column has the limits.
         """
         impacts = self.impacts.values()
         verdicts = [impact.assess(self.source, self.force) for impact in impacts]
@@ -116,15 +116,15 @@ def _criterion_row(criteria: tuple[Criterion, ...]) -> tuple[str, ...]:
 
 
 def _cell(criterion: Criterion, quantity: Quantity) -> str:
-    """Return the value of a criterion, and in which way it misses its limits."""
+    """Return the value of a criterion, and whether it is too low, too high or undecided."""
     if np.isnan(criterion.value):
-        return "not known"
+        return "unknown"
     if criterion.conforms:
         word = ""
     elif criterion.value < criterion.lower:
         word = "low"
     else:
-        word = "high" if criterion.value > criterion.upper else "open"
+        word = "high" if criterion.value > criterion.upper else "undecided"
     return f"{criterion.value * quantity.display_scale:z.{quantity.decimals}f} {word}".rstrip()
 
 
@@ -168,10 +168,10 @@ def compare(
     Parameters
     ----------
     impacts
-        One or more cases (which are solved), impacts and recordings, by name or in a list; in a
-        list, impacts have the names of their cases.
+        Cases (which are solved), impacts and recordings, as a mapping of names or in a list, whose
+        entries have the names of their cases.
     force
-        ``"floor"`` or ``"elastic"``; by default that of each case.
+        ``"floor"`` or ``"elastic"``; by default the assessed force of each case.
     source
         ``"rubber_ball"`` or ``"tyre"``: source of the limits; by default that of the cases and
         recordings.
@@ -186,8 +186,8 @@ def compare(
     Raises
     ------
     InputError
-        If there is nothing to compare, or the drops or the limits differ; the height of a recording
-        counts if it is known.
+        If there is nothing to compare, or the drops or the limits differ. Recordings of unknown
+        height are not checked.
 
     Warns
     -----
@@ -230,7 +230,7 @@ def _require_same_drop(impacts: Mapping[str, ImpactResult]) -> None:
         listed = ", ".join(f"{n} falls with {i.impact_velocity:.4g} m/s" for n, i in known.items())
         refuse(
             f"&drop: height or gravity differs ({listed})",
-            f"the same drop, here within {tolerance:.1%} of the speed",
+            f"the same drop: impact velocities within {tolerance:.1%}",
         )
 
 
@@ -260,7 +260,7 @@ def _named(impacts: object) -> dict[str, Case | ImpactResult]:
 
 
 def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | ImpactResult]:
-    """Read namelist files (``.nml``) and recordings; their names are those of cases and files.
+    """Read namelist files (``.nml``) and recordings, by the names of the cases and the files.
 
     Raises
     ------
@@ -273,7 +273,7 @@ def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Impact
         if path.suffix.lower() in NAMELISTS:
             item = read_case(path)
         else:
-            # SciPy takes its time.
+            # SciPy is slow to import.
             from thud.recordings.read_recording import read_recording
 
             item = read_recording(path)
