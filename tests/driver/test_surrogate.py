@@ -371,7 +371,7 @@ def test_map_shows_undecided_verdicts(trained: thud.Surrogate) -> None:
         undecided, near & (found.dataset["margin"] >= -error) & rest[0] & rest[1]
     )
     assert 0 < int(undecided.sum()) < undecided.size
-    assert ("undecided by the surrogate", f"{int(undecided.sum())}") in found.rows()
+    assert ("undecided because of the surrogate", f"{int(undecided.sum())}") in found.rows()
     labels = [text.get_text() for text in thud.plot.draw_design(found).legends[0].get_texts()]
     assert "Undecided by surrogate" in labels
 

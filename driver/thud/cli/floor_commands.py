@@ -81,7 +81,7 @@ RATE = Command(
         argument(
             "levels",
             metavar="LEVELS.csv",
-            help="columns: frequency, levels of positions; optional: background, reverberation_time",
+            help="frequency, levels at positions; optional: background, reverberation_time",
         ),
         argument("--volume", type=float, metavar="M3", help="volume of the room"),
         *output("the results (default: outputs/<name of the file>)"),

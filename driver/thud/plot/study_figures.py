@@ -65,7 +65,7 @@ def show_parameter(axes: Axes, which: Which, parameter: xr.DataArray) -> float:
 
     The parameter has the attributes of the dataset. Return the factor of its values on the axis.
     """
-    unit, factor = parameter.attrs["shown_unit"], 10.0 ** int(parameter.attrs["shown_power"])
+    unit, factor = parameter.attrs["shown_unit"], 10.0 ** int(parameter.attrs["shown_exponent"])
     values = parameter.values
     maximum = float(np.abs(values).max())
     if unit == parameter.attrs["units"] and not _PLAIN[0] <= maximum < _PLAIN[1]:

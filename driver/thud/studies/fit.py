@@ -62,8 +62,8 @@ def fit(  # noqa: PLR0913 - options of a search
 ) -> Fit:
     """Estimate parameters of a model from a force history or from levels, by least squares.
 
-    Trust-region reflective steps (`scipy.optimize.least_squares`) within the limits, parameters
-    scaled by their starts. Points at which the model cannot be computed are rejected.
+    The search takes trust-region reflective steps (`scipy.optimize.least_squares`) within the
+    limits; parameters are scaled by their starts. Points where the model fails are rejected.
 
     Parameters
     ----------
@@ -74,21 +74,21 @@ def fit(  # noqa: PLR0913 - options of a search
         Names of keys of ball, drop or model that take real numbers; in a mapping each with its
         start or a `Parameter`.
     case
-        Everything else; by default the ball of the paper in the model of the paper.
+        The case with all other keys; by default the ball of the paper in the model of the paper.
     confidence
         Confidence of the intervals.
     starts
-        Number of starts: the start of the parameters, and others spread over their limits, or
-        within a factor of 2 of it without limits. The best result counts.
+        Number of starting points: the start of the parameters, and others spread over the limits,
+        or within a factor of 2 of the start if there are no limits. The best fit is returned.
     seed
-        Seed of the other starts.
+        Seed of the other starting points.
     max_steps
-        Maximum number of steps from each start.
+        Maximum number of steps from each starting point.
     surrogate
         A surrogate, or the path of its file, that predicts the levels of the search instead of the
         model. Its errors add to the uncertainties of the target; the model computes the result.
     progress
-        Show how many impacts were computed.
+        Show how many impacts have been computed.
 
     Returns
     -------
@@ -127,7 +127,7 @@ def _targets(target: Any) -> tuple[Target, ...]:  # noqa: ANN401 - checked here
     if not isinstance(target, list):
         target = [target if isinstance(target, Target) else ForceTarget(target)]
     elif not target or not all(isinstance(entry, Target) for entry in target):
-        refuse("target is a list of something else", "one or more of ForceTarget and LevelTarget")
+        refuse("target is a list with other entries than targets", "ForceTarget and LevelTarget")
     return tuple(target)
 
 
@@ -200,7 +200,7 @@ class FitStudy(Study):
     surrogate: Surrogate | None = None
 
     def own_identity(self) -> dict[str, str]:
-        """Return target and search."""
+        """Return tables and data of the targets, and the options of the search."""
         tables = self.tables["target"]
         tables = tables if isinstance(tables, list) else [tables]
         result: dict[str, str] = {}
@@ -230,10 +230,10 @@ class FitKind(Kind[FitStudy, Fit]):
         return fitted_parameter(name, entry, case)
 
     def complete(self, study: Study, content: Mapping[str, Any], folder: Path) -> FitStudy:
-        """Return a study with its target."""
+        """Return a study with its targets."""
         names = {parameter.name for parameter in study.parameters}
         if study.density is not None and names & {"outer_radius", "wall_thickness"}:
-            refuse("[fixed] density is not allowed beside a geometry that is fitted", "mass")
+            refuse("[fixed] density is not allowed if the geometry is fitted", "mass")
         case = study.case
         if study.density is not None:
             case = with_density(case, study.density)
@@ -255,7 +255,7 @@ class FitKind(Kind[FitStudy, Fit]):
             return result
         trained = read_plan(table_of(content, "surrogate"), folder)
         if not isinstance(trained, Surrogate):
-            refuse("[surrogate] of a fit has no file", "file, of a surrogate that is trained")
+            refuse("[surrogate] of a fit has no file", "the file of a trained surrogate")
         return self.with_surrogate(result, trained)
 
     def with_surrogate(self, study: FitStudy, trained: Surrogate) -> FitStudy:

@@ -43,9 +43,9 @@ class RunOptions(TypedDict, total=False):
     progress : bool
         Show a progress bar.
     replace : bool
-        Replace results of another version of the study, and files that thud has not written.
+        Replace results of another version of the study, and files that were not written by thud.
     surrogate : Surrogate or str or None
-        Predicts the samples instead of the model; or the path of its file.
+        Surrogate, or the path of its file, that predicts the samples instead of the model.
     """
 
     backend: Literal["threads", "processes", "dask"] | None
@@ -61,7 +61,7 @@ class Kind(ABC, Generic[S, R]):
     """A kind of study: how its file is read, how it is computed, which files it writes."""
 
     name: ClassVar[str]
-    # Keys and tables of its file beside those of every study.
+    # Keys and tables of its file besides those of every study.
     words: ClassVar[tuple[str, ...]]
 
     def read_study(self, source: Source) -> S:
@@ -122,7 +122,7 @@ class Kind(ABC, Generic[S, R]):
 
     @abstractmethod
     def compute(self, study: S, results: Results | None, **options: Unpack[RunOptions]) -> R:
-        """Return the result, kept in a directory if given."""
+        """Return the result; keep finished samples in a directory if there is one."""
 
     @abstractmethod
     def identity_files(self, study: S) -> list[str]:
@@ -130,12 +130,12 @@ class Kind(ABC, Generic[S, R]):
 
     @abstractmethod
     def identity_in(self, path: Path) -> dict[str, str] | None:
-        """Return the identity of results; None if there is no result to lose."""
+        """Return the identity of results; None if there are none worth keeping."""
 
     @abstractmethod
     def listed_files(self, study: S) -> list[str]:
         """Return the names of files that a study may write and list in the manifest."""
 
     def files(self, result: R, study: S) -> dict[str, bytes]:  # noqa: ARG002 - most have none
-        """Return further files by their names."""
+        """Return the contents of additional files by name."""
         return {}

@@ -32,9 +32,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Maximum number of values of a parameter, or of base samples: memory.
+# Maximum number of values of a parameter, or of base samples, for memory.
 MAX_VALUES = 2**30
-# Keys of a parameter that varies, by its form, and of one that is fitted; all take `unit` too.
+# Keys in the table of a varying parameter, by its form, and of a fitted one; `unit` is always
+# allowed.
 FORMS = {"values": ("values",), "low": ("low", "high", "count", "scale"), "std": ("mean", "std")}
 FITTED = ("start", "low", "high")
 NUMBERS = ("real", "whole", "list")
@@ -50,7 +51,7 @@ class Parameter(Plain):
     start : float or None
         Where a fit starts; by default the value of the case.
     low, high : float or None
-        Ends of the values, or limits of the search of a fit, by default those of the key.
+        Range of the values, or limits of a fit, by default those of the key.
     values : sequence or None
         The values; a random design draws each with equal probability.
     count : int
@@ -58,12 +59,13 @@ class Parameter(Plain):
     scale : str
         ``"linear"`` or ``"log"``: spacing of the values.
     mean, std : float or None
-        Of a normal distribution; the mean is by default the value of the case.
+        Mean and standard deviation of a normal distribution; the mean is by default the value of
+        the case.
     unit : str or None
-        Unit of all of them; by default that of the key.
+        Unit of these numbers; by default that of the key.
     name : str
-        Name of the key, entries of lists as ``"frequency(2)"``; set by the study, which also
-        converts the numbers to the unit of the key and keeps `unit` for tables and figures.
+        Name of the key, or of an entry of a list, such as ``"frequency(2)"``. The study sets it,
+        converts the numbers to the unit of the key, and keeps `unit` for tables and figures.
     key : Key
         The key; set by the study.
     """
@@ -103,7 +105,7 @@ class Parameter(Plain):
 
     @property
     def shown_unit(self) -> tuple[str, int]:
-        """Unit for tables and figures, and the power of ten that converts it to that of the key."""
+        """Unit for tables and figures, and the exponent of ten that converts it to `key.unit`."""
         unit = self.unit or self.key.unit or "1"
         return unit, power_of(unit, self.key.unit, self.name)
 
@@ -152,7 +154,7 @@ class Parameter(Plain):
         return result
 
     def __str__(self) -> str:
-        """Return the parameter as it would stand in a file."""
+        """Return the parameter as it would be written in a file."""
         _, power = self.shown_unit
         entries: dict[str, Any] = self.table
         for word, value in entries.items():
@@ -192,7 +194,7 @@ def varied(
     if form == "values":
         values = table["values"]
         if not isinstance(values, list | tuple) or not values:
-            refuse(f"{label}: values = {shown(values)} is empty or no list", "[one, or, more]")
+            refuse(f"{label}: values = {shown(values)} is empty or not a list", "[one, or, more]")
         result = {"values": tuple(checked(f"{label}: values", key, v, power) for v in values)}
     elif form == "low":
         result = _between(label, key, table, read)
@@ -221,7 +223,7 @@ def fitted(name: str, entry: object, owners: tuple[str, ...]) -> Parameter:
 def _begin(
     name: str, table: object, owners: tuple[str, ...], words: Sequence[str]
 ) -> tuple[str, Key, Mapping[str, Any], int]:
-    """Return label, key, table and power of ten of the unit of a parameter."""
+    """Return label, key and table of a parameter, and the exponent of ten of its unit."""
     label = f"[parameters] {name}"
     key, entry = find_key(name, owners)
     if key.kind == "list" and entry is None:
@@ -255,7 +257,7 @@ def _between(
         refuse(f"{label} has no high end", "high beside low")
     low, high = read("low"), read("high")
     whole = key.kind == "whole"
-    # Limits that are other keys depend on the sample.
+    # Limits that are names of other keys depend on the sample.
     lower = -math.inf if isinstance(key.lower, str) else key.lower
     upper = math.inf if isinstance(key.upper, str) else key.upper
     if whole and not lower <= low <= high <= upper:
@@ -292,7 +294,7 @@ def _normal(
 
 
 def quantity(label: str, entry: object, unit: str) -> Any:  # noqa: ANN401 - a value of any kind
-    """Return a value, a list, or a table of ``value`` and ``unit``, in the unit of a key."""
+    """Return a value or a list, converted to a unit if it is a table of ``value`` and ``unit``."""
     if not isinstance(entry, Mapping):
         return entry
     require_words(label, entry, ("value", "unit"))
