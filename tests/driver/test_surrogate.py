@@ -94,7 +94,7 @@ def test_probability_lies_in_the_range_that_is_stated(
     wrong = (result.dataset["conforms"] != direct.dataset["conforms"]).values[sure].mean()
     assert wrong <= 7 * 0.05
     assert abs(result.probability - direct.probability) <= high - low + wrong
-    assert result.rows()[-1][0] == "  by errors of the surrogate"
+    assert result.rows()[-1][0] == "  with errors of the surrogate"
     assert "surrogate of" in result.dataset.attrs["surrogate"]
 
 

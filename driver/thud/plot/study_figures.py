@@ -439,6 +439,6 @@ def draw_uncertainty(result: Uncertainty) -> Figure:
     title = f"All criteria met: {share}"
     if result.surrogate_range:
         low, high = result.surrogate_range
-        title += f"\nby errors of the surrogate {100 * low:.1f} to {100 * high:.1f} %"
+        title += f"\nwith errors of the surrogate {100 * low:.1f} to {100 * high:.1f} %"
     legend_above(axes, title=title)
     return figure

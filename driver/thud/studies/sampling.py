@@ -1,4 +1,4 @@
-"""Designs: which samples a study has, and the points of those that are sampled."""
+"""Sampling designs: which samples a study has, and the points of random designs."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SAMPLED = ("random", "latin_hypercube", "sobol", "saltelli")
-# Fewer base samples than this give no Sobol indices.
+# Minimum number of base samples for Sobol indices.
 MIN_BASE_SAMPLES = 4
-# Maximum of NumPy's integers.
+# Largest integer of NumPy.
 _MAX_SAMPLES = 2**63 - 1
 
 

@@ -27,12 +27,12 @@ from thud.studies.parameter import Parameter, checked, quantity
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
-# What studies are read from.
+# Types that a study is read from.
 Source: TypeAlias = "str | os.PathLike[str] | Mapping[str, object] | Study"
 
 # Keys and tables that every study may have.
 WORDS = ("name", "case", "fixed", "parameters")
-# Maximum length of a text before it is shortened to its beginning and a checksum.
+# Texts that are longer than this are shortened to their beginning and a checksum.
 _MAX_LENGTH = 300
 # Quantiles of the parameters for trial cases.
 TRIAL_QUANTILES = (0.01, 0.5, 0.99)
@@ -56,9 +56,9 @@ class Study:
     density : float or None
         Density of the wall if it is fixed instead of the mass, kg/m3.
     text : str
-        The text of the study.
+        Text of the study file.
     inputs : tuple of path-like
-        The files that it is read from.
+        Files that the study is read from.
     """
 
     name: str
@@ -126,7 +126,7 @@ def read_tables(
 
 
 def named_files(value: object, folder: Path) -> Iterator[Path]:
-    """Yield the files whose paths, relative to a folder, are texts of a study."""
+    """Yield the existing files that a study names by paths relative to a folder."""
     if isinstance(value, str):
         with suppress(OSError, ValueError):
             if (folder / value).is_file():
@@ -142,7 +142,7 @@ def _content(path: Path) -> str:
     except OSError as error:
         refuse(f"{error.strerror}", "a file that exists and can be read", error)
     except UnicodeDecodeError as error:
-        refuse(f"byte {error.start + 1} is not of UTF-8", "TOML, which is UTF-8", error)
+        refuse(f"byte {error.start + 1} is not UTF-8", "TOML, which is UTF-8", error)
 
 
 def _text(source: Mapping[str, object]) -> str:
@@ -178,7 +178,7 @@ def read_common(
     words: Iterable[str],
     new_parameter: Callable[[str, object, Case, float | None], Parameter],
 ) -> Study:
-    """Read the part that all kinds share; `words` are the kind's own keys beside `WORDS`."""
+    """Read the part that all kinds share; `words` are the kind's own keys besides `WORDS`."""
     require_words("the study", content, (*WORDS, *words))
     fixed, parameters = (table_of(content, name) for name in ("fixed", "parameters"))
     name = content["name"]
@@ -196,7 +196,7 @@ def read_common(
 
 
 def table_of(content: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """Return a table of a study, empty where it is missing."""
+    """Return a table of a study, empty if it is missing."""
     table = content.get(name, {})
     if not isinstance(table, dict):
         refuse_value(name, table, f"a table [{name}]")
@@ -256,7 +256,7 @@ def _require_use(fixed: Mapping[str, Any], parameters: Mapping[str, Any]) -> Non
 
 
 def _require_valid(study: Study, fixed: Mapping[str, Any]) -> None:
-    """Raise InputError if the library refuses a fixed value for all values of the parameters."""
+    """Raise InputError if a fixed value is invalid for all values of the parameters."""
     keys = {name.partition("(")[0] for name in fixed} | ({"mass"} if study.density else set())
     refusals = []
     for quantile in TRIAL_QUANTILES:

@@ -28,15 +28,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class PredictedLevels:
-    """What a surrogate predicts of one drop, in the units of a target, shape (size,)."""
+    """Quantities of one drop from a surrogate, in the units of a target, shape (size,)."""
 
     values: NDArray[np.float64]
 
 
 class SurrogateLevels(LevelMisfit):
-    """How far the levels that a surrogate predicts are from a target.
+    """Misfit between a target and the levels that a surrogate predicts.
 
-    The mean squares of its held-out errors add to the variances of the target, where known.
+    The mean squares of its held-out errors are added to the variances of the target, if known.
     """
 
     def __init__(self, misfit: LevelMisfit, surrogate: Surrogate, case: Case) -> None:
@@ -74,7 +74,7 @@ class SurrogateLevels(LevelMisfit):
         return cast("Impact", PredictedLevels(values))
 
     def values(self, impact: Impact) -> NDArray[np.float64]:
-        """Return what is compared, dB, s and 1, of a prediction or an impact, shape (size,)."""
+        """Return the compared quantities, dB, s and 1, shape (size,)."""
         return impact.values if isinstance(impact, PredictedLevels) else super().values(impact)
 
 
@@ -103,7 +103,7 @@ def within_region(entry: Range, surrogate: Surrogate) -> Range:
 
 
 def recompute(fit: Fit) -> Fit:
-    """Return a fit with the impacts of the model, and warnings where the surrogate differs."""
+    """Return a fit with the impacts of the model, and warnings if the surrogate differs."""
     targets = []
     missed = share = 0.0
     for target in fit.targets:

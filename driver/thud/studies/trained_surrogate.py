@@ -1,4 +1,4 @@
-"""A surrogate: results of a model by interpolation, with their errors."""
+"""Surrogates: interpolation of the results of a model, with its errors."""
 
 from __future__ import annotations
 
@@ -46,31 +46,31 @@ if TYPE_CHECKING:
 COVERAGE = 0.95
 # Samples that are computed together: their kernel stays in the cache.
 _CHUNK = 250
-# Values beyond the region by this fraction of its width are rounding.
+# Values outside the region by up to this fraction of its width are rounding errors.
 _ROUNDING = 1e-9
 # Smoothness of the Matern kernel: functions that are twice differentiable.
 SMOOTHNESS = 2.5
 # Fewer drops have no order statistic that bounds 95 % of all with a confidence of 95 %.
 MIN_DROPS = 64
-# The time of the training grows with the third power of their number.
+# The time of the training grows with the third power of the number of drops.
 MAX_DROPS = 8192
 _ARRAYS = ("region", "points", "length", "weights", "mean", "scale", "residuals")
 
 
 @dataclass(frozen=True, eq=False)
 class Surrogate(StudyResult):
-    """Prediction of drops of a model from training drops of the same region.
+    """Prediction of drops of a model from training drops in the same region.
 
     A Gaussian process interpolates all quantities, in dB: levels, and 20 lg of other quantities.
-    Each has an error: that of 95 % of drops which it was not trained on is smaller, with a
-    confidence of 95 % (order statistic of the leave-one-out residuals).
+    Each has a stated error: with a confidence of 95 %, the errors of 95 % of other drops are
+    smaller (order statistic of the leave-one-out residuals).
 
     Attributes
     ----------
     case : Case
         The case of the drops.
     keys : tuple of str
-        Keys in which they differ.
+        Keys in which the drops differ.
     region : ndarray, shape (n_key, 2)
         Minimum and maximum of each key.
     outputs : dict of str to int
@@ -90,7 +90,7 @@ class Surrogate(StudyResult):
     mean, scale : ndarray, shape (n_number,)
         Mean and standard deviation of each number over the drops, dB.
     residuals : ndarray, shape (n_drop, n_number)
-        Prediction minus result of each drop without itself, dB.
+        Leave-one-out residuals: prediction minus result, dB.
     """
 
     case: Case
@@ -108,7 +108,7 @@ class Surrogate(StudyResult):
     residuals: Values
 
     def __repr__(self) -> str:
-        """Return the keys and the largest error of what is assessed."""
+        """Return the keys and the largest error of an assessed number."""
         error = float(self.errors[self.assessed].max())
         return (
             f"<Surrogate of {len(self.points)} drops by {', '.join(self.keys)}: "
@@ -140,7 +140,7 @@ class Surrogate(StudyResult):
 
     @property
     def labels(self) -> list[str]:
-        """Names of all numbers."""
+        """Labels of all numbers."""
         result = []
         for name, count in self.outputs.items():
             words = name.replace("_", " ")
@@ -156,7 +156,7 @@ class Surrogate(StudyResult):
 
     @property
     def errors(self) -> Values:
-        """Error of each number, dB, shape (n_number,); NaN where the model has no such result."""
+        """Error of each number, dB, shape (n_number,); NaN if the model has no such result."""
         count = len(self.points)
         # There is no such order statistic for 58 drops or fewer.
         rank = int(binom.ppf(COVERAGE, count, COVERAGE))
@@ -226,9 +226,9 @@ class Surrogate(StudyResult):
     def predict(self, case: Case, columns: Columns) -> Columns:
         """Return the results of samples of a case that differ in some keys, shape (n_sample,) each.
 
-        They are those of `thud.studies.samples.evaluate`, and ``undecided``: whether the errors
+        The results are those of `thud.studies.samples.evaluate`, and ``undecided``: whether errors
         could change the verdict. Samples outside the region have a status and a reason instead.
-        Raises InputError as `require`.
+        Raises InputError like `require`.
         """
         self.require(case, columns)
         with require_extra("surrogate"):
@@ -402,7 +402,7 @@ def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
     Raises
     ------
     InputError
-        If the file is damaged or no surrogate.
+        If the file is damaged or not a surrogate.
     OSError
         If it cannot be read for now.
     """
@@ -421,8 +421,8 @@ def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
     except Exception as error:
         if is_failure(error):
             raise
-        # Zip, NumPy and JSON raise many kinds.
-        reason = getattr(error, "strerror", None) or "no surrogate"
+        # Zip, NumPy and JSON raise many kinds of errors.
+        reason = getattr(error, "strerror", None) or "not a surrogate"
         refuse(f"{path} cannot be read: {reason}", "a file that Surrogate.save wrote", error)
     if not intact:
         refuse(
@@ -434,7 +434,7 @@ def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
 
 @dataclass(frozen=True)
 class Plan:
-    """How a surrogate is trained: maximum error, dB, and number of drops, seed."""
+    """How a surrogate is trained: maximum error, dB, maximum number of drops, seed."""
 
     error: float = 0.1
     size: int = 1024
@@ -442,7 +442,7 @@ class Plan:
 
     @property
     def identity(self) -> dict[str, str]:
-        """What a surrogate depends on beside its drops, as texts by group and key."""
+        """Everything besides drops that a surrogate depends on, as texts by group and key."""
         with require_extra("surrogate"):
             import sklearn
         return {
@@ -452,7 +452,7 @@ class Plan:
 
     @property
     def stages(self) -> list[tuple[int, int]]:
-        """First drop and stop (exclusive) of each stage; each adds about a half, up to `size`."""
+        """First drop and stop (exclusive) of each stage; stages grow by a half or a third."""
         ends = [min(MIN_DROPS, self.size)]
         while ends[-1] < self.size:
             # 64, 96, 128, 192, ...: balanced parts of Sobol's sequence.

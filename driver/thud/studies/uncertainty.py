@@ -1,4 +1,4 @@
-"""Probability of conformity: Monte Carlo over tolerances of manufacture and temperature."""
+"""Probability of conformity with tolerances of manufacture and temperature (Monte Carlo)."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ class Uncertainty(SampleResult):
         if self.surrogate_range:
             low, high = self.surrogate_range
             share = f"{100 * low:.1f} to {100 * high:.1f} %"
-            rows.append(("  by errors of the surrogate", "", "", share, ""))
+            rows.append(("  with errors of the surrogate", "", "", share, ""))
         return rows
 
     def plot(self) -> Figure:
@@ -132,7 +132,7 @@ class UncertaintyKind(SampleKind[Uncertainty]):
     def new_parameter(
         self, name: str, entry: object, case: Case, density: float | None
     ) -> Parameter:
-        """Return a parameter that varies; the limits are the same for all samples."""
+        """Return a parameter that varies; limits must be the same for all samples."""
         if name in {"source", "force"}:
             refuse(
                 f"[parameters] {name} is not allowed, because all samples have the same limits",
