@@ -171,7 +171,7 @@ def test_recording_stands_beside_its_model(shell: thud.Impact, tmp_path: Path) -
     np.testing.assert_allclose(recording.levels(), shell.levels(force="floor"), atol=0.1)
     comparison = thud.compare({"model": shell, "plate": recording})
     plate = column(comparison, 2)
-    assert plate["restitution"] == plate["mass, kg"] == "not known"
+    assert plate["restitution"] == plate["mass, kg"] == "unknown"
     assert plate["verdict"] == "does not conform"
     assert "computing time, ms" not in plate
 

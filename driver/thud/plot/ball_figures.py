@@ -40,7 +40,7 @@ INSTANTS = 9
 ARROWS = (6, 4)
 FRAMES_PER_SECOND = 12
 DISPLACEMENT = "Displacement of the material, mm"
-# Drawn maximum displacement of a mode, as fraction of the radius.
+# Maximum displacement of a mode in its figure, as a fraction of the radius.
 AMPLITUDE = 0.3
 
 
@@ -72,12 +72,12 @@ def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
     impact
         An impact with snapshots.
     instants
-        Number of instants, at even times from first touch to release.
+        Number of instants, evenly spaced from first touch to release.
 
     Returns
     -------
     Figure
-        Half sections over the floor; displacement since first touch in mm, time in ms.
+        Half sections above the floor; displacement since first touch in mm, time in ms.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
     shown = _snapshots(impact)
     require_whole("instants", instants, 1, MAX_PANELS)
     times = impact.touch_time + np.linspace(0, impact.contact_time, instants)
-    # Fewer panels where there are fewer snapshots.
+    # There are fewer panels if there are fewer snapshots than instants.
     chosen = sorted({int(np.argmin(np.abs(shown.time - time))) for time in times})
     rows = -(-len(chosen) // 3)
     figure = new_figure(0.6 + 1.6 * rows)
@@ -117,7 +117,7 @@ def animate(impact: Impact, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     InputError
-        If the impact has no snapshots or the path another ending.
+        If the impact has no snapshots, or the path does not end with ``.gif``.
     OSError
         If the file cannot be written.
     """
@@ -145,7 +145,7 @@ def animate(impact: Impact, path: str | os.PathLike[str]) -> None:
 
 
 def _snapshots(impact: Impact) -> Motion:
-    """Return the snapshots of an impact; raise InputError where it has none."""
+    """Return the snapshots of an impact; raise InputError if it has none."""
     require_kind("impact", impact, Impact)
     if impact.motion is None:
         message = (
@@ -156,7 +156,7 @@ def _snapshots(impact: Impact) -> Motion:
 
 
 def _scale(shown: Motion, chosen: list[int] | range) -> Normalize:
-    """Return the scale of the colors of some snapshots, mm."""
+    """Return the color scale of some snapshots, mm."""
     return Normalize(0, 1e3 * max(_displacement(shown, i).max() for i in chosen))
 
 
@@ -205,7 +205,7 @@ def _add_key(axes: Axes, arrows: Quiver, impact: Impact) -> None:
     velocity = float(f"{impact.impact_velocity:.1g}")
     figure = axes.get_figure(root=True)
     assert figure is not None  # noqa: S101 - the axes are new
-    # In fractions of the figure: a key in inches would be lost where notebooks crop the figure.
+    # In fractions of the figure: a key in inches would be lost if a notebook crops the figure.
     x, y = (WIDTH - 0.52, 0.11) / figure.get_size_inches()
     axes.quiverkey(
         arrows, x, y, velocity, f"{velocity:g} m/s", labelpos="E", coordinates="figure",
@@ -227,12 +227,12 @@ def mode_shapes(modes: FreeModes, columns: int = 3) -> Figure:
     Returns
     -------
     Figure
-        One half section for each mode; the color is the displacement over its maximum.
+        One half section for each mode; the color is the displacement divided by its maximum.
     """
     require_kind("modes", modes, FreeModes)
     require_whole("columns", columns, 1, MAX_PANELS)
     rows = -(-len(modes.frequency) // columns)
-    # More than three side by side need more than a column.
+    # More than three shapes side by side are wider than a column.
     figure = new_figure(0.45 + 1.75 * rows, WIDTH * max(1, columns / 3))
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     radius = modes.ball.outer_radius
@@ -260,7 +260,7 @@ def loss_factor(models: Mapping[str, FiniteElement]) -> Figure:
     Parameters
     ----------
     models
-        Models with a material by their names in the legend.
+        Finite-element models by their names in the legend.
 
     Returns
     -------
@@ -270,7 +270,7 @@ def loss_factor(models: Mapping[str, FiniteElement]) -> Figure:
     Raises
     ------
     InputError
-        If `models` is not a mapping of names to such models, or empty.
+        If `models` is not a mapping of names to models, or empty.
     """
     require_mapping("models", models, "models")
     figure, axes = empty_axes(2.5)

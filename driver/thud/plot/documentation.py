@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 @lru_cache(maxsize=4)
 def _solve_published(viscosity: FiniteElementViscosity = "fractional") -> Impact:
-    """Return the impact of the ball of the published modes by finite elements."""
+    """Return the impact of the ball with the published modes, by finite elements."""
     return solve(
         Ball.standard(), model="finite_element", viscosity=viscosity, snapshot_interval=1e-3
     )
@@ -56,7 +56,7 @@ def _solve_chipboard() -> FloorImpact:
 
 
 def _draw_heights() -> Figure:
-    """Draw the three heights of the paper."""
+    """Draw the forces of drops from the three heights of the paper."""
     impacts = {f"{height:.2f} m": solve(drop=Drop(height)) for height in (0.1, 1, 1.6)}
     return force_history(impacts, "elastic")
 
@@ -74,15 +74,15 @@ def _draw_shell() -> Figure:
 
 
 def _draw_models() -> Figure:
-    """Draw the model of the paper, its improvement, and the finite elements."""
-    # The ends of the band of inputs/studies/law_of_loss.toml.
-    ends = {
+    """Draw the levels of the model of the paper, the modal ball, and finite elements."""
+    # The two extreme damping laws of inputs/studies/law_of_loss.toml.
+    extremes = {
         f"finite elements, order {order:g}": FiniteElement(
             viscosity="fractional", fractional_order=order, loss_factor=loss_factor
         )
         for order, loss_factor in ((0.15, 0.1305), (1.0, 0.2041))
     }
-    elements = {name: solve(Ball.standard(), model=model) for name, model in ends.items()}
+    elements = {name: solve(Ball.standard(), model=model) for name, model in extremes.items()}
     return levels({"hollow sphere": solve(), "modal ball": solve(model="modal_ball"), **elements})
 
 
@@ -97,7 +97,7 @@ def _draw_tires() -> Figure:
 
 
 def _draw_fluxes() -> Figure:
-    """Draw the interpretations of the flux term of the paper."""
+    """Draw the levels for each interpretation of the flux term of the paper."""
     choices: tuple[HollowSphereMomentumFlux, ...] = (
         "momentum_balance", "retarding", "conservative", "none",
     )  # fmt: skip
@@ -106,7 +106,7 @@ def _draw_fluxes() -> Figure:
 
 
 def _draw_families() -> Figure:
-    """Draw which modes carry which octave: quasi-static families, one at a time."""
+    """Draw how levels change if one family of modes at a time is quasi-static."""
     static = {f"n = {n} static": [n] for n in range(2, 7)}
     static["all static"] = list(range(ModalBall.harmonics + 1))
     impacts = {
@@ -117,7 +117,7 @@ def _draw_families() -> Figure:
 
 
 def _draw_laws() -> Figure:
-    """Draw the damping laws."""
+    """Draw the loss factors of the damping laws."""
     laws = {
         f"Fractional, order {order:g}": FiniteElement(
             viscosity="fractional", fractional_order=order, loss_factor=loss
@@ -135,7 +135,7 @@ def _draw_laws() -> Figure:
 
 
 def _draw_compressions() -> Figure:
-    """Draw the ball of the paper by each model, at one modulus, without viscosity."""
+    """Draw the compression of the paper's ball by each model, with one modulus, not viscous."""
     ball = Ball(poisson_ratio=0.49)
     models: dict[str, ModelName] = {"shell": "hollow_sphere", "modal ball": "modal_ball"}
     curves = {name: compress(ball, model) for name, model in models.items()}
@@ -146,7 +146,7 @@ def _draw_compressions() -> Figure:
 
 
 def _draw_floors() -> Figure:
-    """Draw floors of the folder inputs/floors."""
+    """Draw the mobilities of floors of the folder inputs/floors."""
     concrete = Plate(source_x=0.4, source_y=0.35)
     timber = replace(concrete, edges="absorption")
     return floor_mobilities(
@@ -172,7 +172,7 @@ def _draw_floors() -> Figure:
 
 
 def _draw_impedances() -> Figure:
-    """Draw three models of the ball, and floors from chipboard to concrete."""
+    """Draw the impedances of three models of the ball, and of floors up to concrete."""
     resistance = [560.0, 1e3, 2e3, 5e3, 1e5]
     sources = {
         "shell": ball_impedance(solve(), resistance),

@@ -58,8 +58,8 @@ if TYPE_CHECKING:
 # Line styles and markers of `thud.plot.style` by the names of plotly.
 _DASHES = ("solid", "dash", "dashdot", "dot", "longdashdot", "2px,2px", "longdash")
 _SYMBOLS = ("circle", "square", "triangle-up", "diamond", "triangle-down", "cross", "x")
-# Maximum number of letters of a line of a legend.
-_LINE = 30
+# Maximum number of characters in a line of a legend.
+_MAX_CHARACTERS = 30
 
 
 def html_page(
@@ -85,19 +85,19 @@ def html_page(
 def curve_style(i: int, label: str) -> dict[str, Any]:
     """Return name, line and marker of a curve by its index."""
     return {
-        "name": "<br>".join(html.escape(line) for line in wrap(label, _LINE)),
+        "name": "<br>".join(html.escape(line) for line in wrap(label, _MAX_CHARACTERS)),
         "line": {"color": COLORS[i % len(COLORS)], "dash": styled(i, _DASHES)},
         "marker": {"symbol": styled(i, _SYMBOLS), "size": 8},
     }
 
 
 def curve_points(x: Iterable[Any], y: Iterable[float]) -> dict[str, list[Any]]:
-    """Return a curve, its values with six digits."""
+    """Return the points of a curve, with values of six digits."""
     return {"x": list(x), "y": [float(f"{value:.6g}") + 0.0 for value in y]}
 
 
 def plot_layout(x: str, y: str, kind: str = "linear", scale: str = "linear") -> dict[str, Any]:
-    """Return the layout of a plot, without colors, which are those of the page."""
+    """Return the layout of a plot, without colors, which the page sets."""
     return {
         "xaxis": {"title": {"text": x}, "type": kind, "zeroline": False, "automargin": True},
         "yaxis": {
@@ -184,7 +184,7 @@ document.getElementById("plot0").on("plotly_restyle", ([change, curves]) => {
 
 # Maximum number of characters of a name in one line of a table.
 _COLUMN = 20
-# Space around the text of a cell, and left of all axes, inch.
+# Space around the text of a cell, and to the left of all axes, inch.
 _CELL_MARGIN = (0.12, 0.08)
 _AXIS = 0.8
 
@@ -262,7 +262,7 @@ def comparison_html(
     ]
     return html_page(
         "Comparison of models and recordings",
-        "Forces as force plates record them, low-passed at 1.25 kHz, and their levels; grey boxes "
+        "Forces as force plates record them, low-passed at 1.25 kHz, and their levels; gray boxes "
         "are the tolerances of the standards, which one-third-octave bands do not have.",
         table,
         plots,
@@ -274,7 +274,7 @@ def _names(bands: BandSet) -> list[str]:
 
 
 def _tolerance(source: LimitsSource) -> dict[str, Any]:
-    """Return the tolerance of each octave as a grey box."""
+    """Return the tolerance of each octave as a gray box."""
     lower, upper = octave_limits(source)
     return {
         "type": "bar",
@@ -289,7 +289,7 @@ def _tolerance(source: LimitsSource) -> dict[str, Any]:
     }
 
 
-# Labels of the steps of the chain, and whether their axes are logarithmic.
+# Labels of the steps from force to room, and whether their axes are logarithmic.
 _STEPS = {
     LEVEL: False,
     "Energy into the floor, J": True,
@@ -300,7 +300,7 @@ _STEPS = {
 
 @own_style()
 def draw_floors(comparison: FloorComparison) -> Figure:
-    """Draw the chain of each floor as spectra, its levels beside the classes, and the table."""
+    """Draw spectra of the steps from force to room, ratings with class limits, and the table."""
     figure = new_figure(7.2, 2 * WIDTH)
     grid = figure.add_gridspec(4, 2)
     panels = [figure.add_subplot(grid[i, j]) for i in range(2) for j in range(2)]
@@ -347,7 +347,7 @@ def floors_html(comparison: FloorComparison) -> str:
         "They are statistical means over positions, floors and rooms; see the warnings of each "
         "prediction."
     )
-    # The level in the room, of full width, comes first.
+    # The first plot has the full width: the level in the room.
     return html_page("Comparison of floors", text, comparison.rows(), [plots[-1], *plots[:-1]])
 
 
@@ -358,7 +358,7 @@ def _chain(prediction: RoomPrediction) -> tuple[NDArray[np.float64], ...]:
 
 
 def _draw_classes(axes: Axes, comparison: FloorComparison) -> None:
-    """Draw the single numbers beside the maximum levels of the Korean classes."""
+    """Draw the single-number ratings, and the maximum levels of the Korean classes as lines."""
     x = np.arange(len(comparison.predictions))
     room = [prediction.octave_rating.a_weighted for prediction in comparison.predictions.values()]
     after = [

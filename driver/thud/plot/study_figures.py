@@ -51,19 +51,19 @@ if TYPE_CHECKING:
     Columns = dict[str, NDArray[Any]]
 
 
-Which = Literal["x", "y"]
+AxisName = Literal["x", "y"]
 # Hatches of bars, which distinguish colors in print.
 HATCHES = (None, "//////", "......", "\\\\\\\\\\\\", "xxxxxx", "------", "||||||", "++++++")
 # Range of numbers that are shown in the unit of the key; others have a display unit.
 _PLAIN = (1e-2, 1e4)
-# Maximum over minimum from which logarithmic ticks are 1, 2, 5, and powers of ten.
+# Ratios of maximum to minimum from which logarithmic ticks are 1, 2, 5, or powers of ten only.
 _HALF_DECADE, _DECADES = 5.0, 200.0
 
 
-def show_parameter(axes: Axes, which: Which, parameter: xr.DataArray) -> float:
+def show_parameter(axes: Axes, which: AxisName, parameter: xr.DataArray) -> float:
     """Give an axis the name, unit and scale of a numeric parameter.
 
-    The parameter has the attributes of the dataset. Return the factor of its values on the axis.
+    Return the factor that converts its values to the unit of the axis.
     """
     unit, factor = parameter.attrs["shown_unit"], 10.0 ** int(parameter.attrs["shown_exponent"])
     values = parameter.values
@@ -101,14 +101,14 @@ def parameter_label(parameter: xr.DataArray) -> str:
     return humanize(str(parameter.name)).capitalize()
 
 
-# Maximum number of values of a parameter that are not grouped in classes.
+# Maximum number of values of a parameter that are not grouped, and number of groups.
 _MAX_VALUES = 32
 _CLASSES = 16
-# Maximum number of markers of a line; half of it in half the width.
+# Maximum number of markers of a line; half as many in a panel of half the width.
 _MAX_MARKS = 16
 # Maximum number of values of a text parameter that have a panel each.
 _MAX_PANELS = 6
-# Smallest range that is drawn, dB.
+# Smallest range of levels that is drawn, dB.
 _TINY = 0.05
 
 
@@ -123,9 +123,9 @@ class _Excess(NamedTuple):
 def draw_sweep(result: Sweep) -> Figure:
     """Draw octave levels against the first numeric parameter that has several values.
 
-    Levels are those of the assessed force relative to the nominal ones, dB. Each value of the first
-    text parameter, up to six of them, has its panel. Lines are medians over the other parameters,
-    shades extend from the minimum to the maximum.
+    Levels are those of the assessed force relative to the nominal ones, dB. The first text
+    parameter with up to six values has a panel for each. Lines are medians over the other
+    parameters; shades extend from the minimum to the maximum.
     """
     dataset = result.dataset
     columns = _columns(dataset)
@@ -138,16 +138,18 @@ def draw_sweep(result: Sweep) -> Figure:
     parts = {"": np.ones(len(columns[name]), dtype=bool)}
     if split:
         parts = {str(value): columns[split] == value for value in np.unique(columns[split])}
-    across = 1 if len(parts) == 1 else 2
-    down = -(-len(parts) // across)
-    figure = new_figure(1.1 + (1.9 if across == 1 else 1.6) * down)
-    panels = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False).ravel()
+    column_count = 1 if len(parts) == 1 else 2
+    row_count = -(-len(parts) // column_count)
+    figure = new_figure(1.1 + (1.9 if column_count == 1 else 1.6) * row_count)
+    panels = figure.subplots(
+        row_count, column_count, sharex=True, sharey=True, squeeze=False
+    ).ravel()
     for i, (axes, (title, panel)) in enumerate(zip(panels, parts.items(), strict=False)):
         _draw_tolerance(axes, excess.tolerance)
         levels = np.where(panel[:, np.newaxis], excess.level, np.nan)
-        _draw_octaves(axes, dataset[name], columns[name], levels, _MAX_MARKS // across)
+        _draw_octaves(axes, dataset[name], columns[name], levels, _MAX_MARKS // column_count)
         axes.set_title(title.replace("_", " "))
-        lowest = i + across >= len(parts)
+        lowest = i + column_count >= len(parts)
         axes.tick_params(axis="x", labelbottom=lowest)
         axes.xaxis.label.set_visible(lowest)
     for axes in panels[len(parts) :]:
@@ -185,7 +187,7 @@ def _excess(dataset: xr.Dataset, columns: Columns) -> _Excess:
 
 
 def _draw_tolerance(axes: Axes, tolerance: tuple[float, float]) -> None:
-    """Draw the maximum tolerance of an octave, and the minimum on it, around the nominal level."""
+    """Draw the maximum tolerance of all octaves around the nominal level, the minimum on top."""
     for width, color in zip(reversed(tolerance), ("0.92", "0.84"), strict=True):
         axes.axhspan(-width, width, color=color, linewidth=0, zorder=0)
     axes.axhline(0, color="0.45", linewidth=0.8)
@@ -198,7 +200,7 @@ def _draw_octaves(
     levels: NDArray[np.float64],
     max_marks: int,
 ) -> None:
-    """Draw the octave levels of samples, those that are not NaN, against a parameter."""
+    """Draw the octave levels of samples against a parameter, without levels that are NaN."""
     positions, members, names = _classes(values)
     if names is None:
         positions = positions * show_parameter(axes, "x", parameter)
@@ -221,7 +223,7 @@ def _draw_octaves(
 def _classes(
     values: NDArray[Any],
 ) -> tuple[NDArray[np.float64], list[NDArray[np.bool_]], list[str] | None]:
-    """Return positions on an axis, the samples of each, and the names of texts."""
+    """Return positions on an axis, the samples at each, and labels if the values are texts."""
     distinct = np.unique(values)
     if values.dtype.kind not in "iuf":
         members = [values == value for value in distinct]
@@ -241,9 +243,9 @@ def _of_finite(part: NDArray[np.float64], function: Any) -> float:  # noqa: ANN4
 
 
 def _meaning(excess: _Excess, split: str | None, others: list[str]) -> str:
-    """Return the explanation of panels, lines, shades and grey."""
+    """Return the explanation of panels, lines, shades and gray areas."""
     minimum, maximum = excess.tolerance
-    lines = [f"Grey: tolerances of the octaves, ±{minimum:g} to ±{maximum:g} dB"]
+    lines = [f"Gray: tolerances of the octaves, ±{minimum:g} to ±{maximum:g} dB"]
     if others:
         over = humanize(others[0]) if len(others) == 1 else f"{len(others)} other parameters"
         lines.insert(0, f"Lines: median over {over}; shades: range")
@@ -256,14 +258,15 @@ def _meaning(excess: _Excess, split: str | None, others: list[str]) -> str:
 def draw_design(result: Design) -> Figure:
     """Draw the margin of a design map, dB, its zero as a line, and the samples that conform.
 
-    The margin is positive where all octave levels lie within their limits. For a case with a room
-    draw the rating of its standardized levels instead.
+    The margin is positive if all octave levels lie within their limits. For a case with a room the
+    figure shows the rating of its standardized levels instead.
     """
     dataset = result.dataset
     figure, axes = empty_axes(2.9)
-    which: tuple[Which, Which] = ("x", "y")
+    names: tuple[AxisName, AxisName] = ("x", "y")
     scales = [
-        show_parameter(axes, w, dataset[name]) for w, name in zip(which, result.axes, strict=True)
+        show_parameter(axes, which, dataset[name])
+        for which, name in zip(names, result.axes, strict=True)
     ]
     x, y = (dataset[name].values * scale for name, scale in zip(result.axes, scales, strict=True))
     if RATING in dataset:
@@ -381,7 +384,7 @@ def draw_sensitivity(result: Sensitivity) -> Figure:
 def draw_surrogate(result: Surrogate) -> Figure:
     """Draw the error of each assessed quantity in held-out drops, dB, and the bound.
 
-    Quantities that are not levels have errors in 20 lg of their ratio.
+    The error of a quantity that is not a level is 20 lg of the ratio to the result of the model.
     """
     labels = [
         name for name, assessed in zip(result.labels, result.assessed, strict=True) if assessed
@@ -410,7 +413,7 @@ def draw_surrogate(result: Surrogate) -> Figure:
 
 @own_style()
 def draw_uncertainty(result: Uncertainty) -> Figure:
-    """Draw the distribution of octave levels over the tolerances of the standards.
+    """Draw the distribution of octave levels, and the tolerances of the standards.
 
     Levels are relative to the nominal ones, dB; bars cover 95 % of the samples.
     """
