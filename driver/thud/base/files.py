@@ -89,14 +89,8 @@ class Page(ABC):
     def save(self, directory: str | os.PathLike[str], *, replace: bool = False) -> list[Path]:
         """Write the files of `files` and return their paths.
 
-        Files that thud has not written are replaced with `replace` only.
-
-        Raises
-        ------
-        InputError
-            Where a file is in the way.
-        OSError
-            Where they cannot be written.
+        Files that thud has not written are replaced with `replace` only. Raise InputError where a
+        file is in the way, and OSError where they cannot be written.
         """
         return Results(Path(directory), self._command, replace=replace).write(self.files())
 
@@ -145,23 +139,10 @@ class Results:
     ) -> list[Path]:
         """Write files by name; return their paths.
 
-        Parameters
-        ----------
-        contents
-            Contents of the files.
-        stale
-            Names of files that are removed where an earlier call has written them and this one
-            does not.
-        marker
-            Content of the file that identifies the results of a case, ``effective.nml`` or
-            ``samples.nml``, where the files belong to these results.
-
-        Raises
-        ------
-        InputError
-            Where a file is in the way, or another run has replaced the results of the case.
-        OSError
-            Where a file cannot be written.
+        Files named in `stale` are removed if an earlier call of the command has written them. For
+        files that belong to the results of a case, `marker` is the content of ``effective.nml`` or
+        ``samples.nml``. Raise InputError where a file is in the way, or another run has replaced
+        the results of the case, and OSError where a file cannot be written.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         with nullcontext() if self.is_locked else locked(self.folder):

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-# From floors that a ball hardly leaves to floors that change a level by 0.01 dB, N s/m.
+# From floors that the ball barely leaves to floors that change a level by 0.01 dB, N s/m.
 RESISTANCES = np.geomspace(10**2.75, 1e6, 14)
 # Spectral lines in each band.
 _LINES_PER_BAND = 64
@@ -95,12 +95,8 @@ class BallImpedance(Displayed):
     def tangent(self, frequency: ArrayLike) -> NDArray[np.complex128]:
         """Return the impedance of tangent mass behind spring and damper, N s/m, shape (n,).
 
-        That of steady vibration about the maximum deflection, which no impact has time for.
-
-        Parameters
-        ----------
-        frequency : array_like, shape (n,)
-            Frequencies above 0, Hz.
+        That of steady vibration about the maximum deflection, which no impact has time for, at
+        frequencies above 0, Hz.
         """
         values = require_real("frequency", require_array("frequency", frequency, dimensions=(1,)))
         if not (values > 0).all():
@@ -112,13 +108,8 @@ class BallImpedance(Displayed):
     def limit(self, decibels: float = 1.0) -> Array:
         """Return the resistance below which a floor changes the level, N s/m, shape (n_band,).
 
-        The logarithm of the change is interpolated over that of the resistance. NaN where no floor
-        changes the level so much.
-
-        Parameters
-        ----------
-        decibels
-            Change of the level, dB, above 0.
+        The logarithm of the change, dB, is interpolated over that of the resistance. NaN where no
+        floor changes the level so much.
         """
         if not 0 < decibels < math.inf:
             refuse_value("decibels", decibels, "above 0")

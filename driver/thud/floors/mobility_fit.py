@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 Quantity = Literal["mobility", "accelerance", "receptance"]
 # Powers of i omega that make a mobility of each.
 _POWERS = {"mobility": 0, "accelerance": -1, "receptance": 1}
-# The same by the number of the response in universal files: displacement, velocity, acceleration.
+# Quantities by the type of the response in universal files: displacement, velocity, acceleration.
 _RESPONSES = {8: "receptance", 11: "mobility", 12: "accelerance"}
 _EXCITATION_FORCE = 13
 _REACTION_FORCE = 9
@@ -118,9 +118,9 @@ class MobilityFit(Displayed):
     def band_errors(self) -> dict[float, tuple[float, float]]:
         """Return errors in the octaves 31.5 to 500 Hz that the measurement covers.
 
-        By mid frequency, Hz: the relative error, root of the mean square, and the level of the real
-        part, hence of the energy that a flat force injects, against the measured one, dB; NaN where
-        one of them is not positive.
+        By mid frequency, Hz: the relative error, root of the mean square, and fitted − measured
+        level of the real part, hence of the energy that a flat force injects, dB; NaN where one of
+        them is not positive.
         """
         result = {}
         errors = self._errors()
@@ -260,7 +260,7 @@ def fit_mobility(
 
 
 def _checked(table: tuple[ArrayLike, ...]) -> tuple[Array, NDArray[np.complex128]]:
-    """Return frequencies and complex values; raise InputError for anything else."""
+    """Return frequencies and complex values; raise InputError for other values."""
     if len(table) != 2:  # noqa: PLR2004 - frequencies and values
         refuse(f"a tuple of {len(table)}", "frequencies, Hz, and complex values")
     frequency = require_real("frequency", require_array("frequency", table[0], (1,)))

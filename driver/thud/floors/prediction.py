@@ -221,8 +221,8 @@ def _on_floor(source: ImpactResult, case: Case) -> FloorImpact | None:
 def _force_change(mass: float, contact_time: float, resistance: float) -> float:
     """Return the change of the peak force on a resistance, dB, of a linear source.
 
-    F'' + (k/Z) F' + (k/M) F = 0 with F(0) = 0 and F'(0) = k v0: against the rigid floor the peak is
-    exp(-b arctan(w/b)/w), b = k/(2 Z), w**2 = k/M - b**2; on a floor so light that the
+    F'' + (k/Z) F' + (k/M) F = 0 with F(0) = 0 and F'(0) = k v0. Relative to the rigid floor the
+    peak is exp(-b arctan(w/b)/w), b = k/(2 Z), w**2 = k/M - b**2; on a floor so light that the
     force does not oscillate, exp(-b artanh(w/b)/w) with w**2 = b**2 - k/M.
     """
     stiffness = mass * (math.pi / contact_time) ** 2

@@ -19,12 +19,7 @@ AVERAGED = 1e-4
 def contact_span(force: ArrayLike, sample_rate: float) -> tuple[float, float]:
     """Return begin and end of a contact, s from first touch.
 
-    Parameters
-    ----------
-    force : array_like, shape (n_sample,)
-        Force from first touch to release, N, without noise.
-    sample_rate
-        Samples per second, Hz.
+    The force, N, shape (n_sample,), runs from first touch to release, without noise.
     """
     values = np.asarray(force, dtype=np.float64)
     time = np.arange(len(values)) / sample_rate
@@ -47,16 +42,7 @@ def average_within(
 ) -> NDArray[np.float64]:
     """Return means of columns over a width around times, within the first and last time.
 
-    Parameters
-    ----------
-    values : ndarray, shape (n_time, n_column)
-        Values at uniformly spaced times, linear between them.
-    time : ndarray, shape (n_time,)
-        Their times.
-    at : ndarray, shape (n,)
-        Centers of the means.
-    width
-        Width of the mean.
+    The values, shape (n_time, n_column), at uniformly spaced times are linear between them.
     """
     step = time[1] - time[0]
     area = np.zeros_like(values)

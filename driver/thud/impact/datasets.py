@@ -1,4 +1,4 @@
-"""Impacts and ensembles as datasets of xarray: names, units and meanings, which studies share."""
+"""Impacts and ensembles as xarray datasets, with units and meanings."""
 
 from __future__ import annotations
 
@@ -46,16 +46,13 @@ def impact_dataset(impact: Impact, histories: Mapping[str, NDArray[np.float64]])
     """Return the dataset of an impact and of its histories, by name and unit."""
     variables: dict[str, Any] = {}
     for column, values in histories.items():
-        named = _HISTORY.fullmatch(column)
-        name, unit = named.groups() if named else (column, "")
-        words = _attributes(unit.replace("_per_", "/"), name.replace("_", " "))
-        variables[name] = ("time", values, words)
+        match = _HISTORY.fullmatch(column)
+        name, unit = match.groups() if match else (column, "")
+        attrs = _attributes(unit.replace("_per_", "/"), name.replace("_", " "))
+        variables[name] = ("time", values, attrs)
     for name, (force, bands) in LEVELS.items():
-        variables[name] = (
-            bands,
-            impact.levels(bands, force=force),
-            attributes(SAMPLE_RESULTS[name]),
-        )
+        levels = impact.levels(bands, force=force)
+        variables[name] = (bands, levels, attributes(SAMPLE_RESULTS[name]))
     for name in schema.IMPACT_QUANTITIES:
         variables[name] = ((), getattr(impact, name), attributes(schema.QUANTITIES[name]))
     conforms = impact.assess().conforms
@@ -100,8 +97,8 @@ def ensemble_dataset(ensemble: Ensemble) -> xr.Dataset:
         if (values := getattr(ensemble, f"{force}_force")) is not None:
             seconds = np.arange(values.shape[1]) / ensemble.sample_rate
             coordinates["time"] = _time(seconds)
-            words = _attributes("N", f"{force} force")
-            variables[f"{force}_force"] = (("sample", "time"), values, words)
+            attrs = _attributes("N", f"{force} force")
+            variables[f"{force}_force"] = (("sample", "time"), values, attrs)
     return xr.Dataset(variables, coordinates, origin(ensemble.case)).copy(deep=True)
 
 
@@ -152,7 +149,7 @@ def _frequencies(
 
 
 def origin(case: Case) -> dict[str, str]:
-    """Return the case of results and what has computed them."""
+    """Return the case of results and the software that computed them."""
     return {
         "model": case.model.name if case.model else "",
         "assessed_force": case.levels.force,

@@ -1,4 +1,4 @@
-"""Impact of a source on a floor that moves."""
+"""Impact of a source on a mobile floor."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class FloorEnergy(Immutable):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FloorImpact(Impact):
-    """Impact on a floor that moves: `floor_force` is the contact force.
+    """Impact on a mobile floor: `floor_force` is the contact force.
 
     The standards assess the force on a rigid floor, that of the `Impact` whose `on_floor` this is.
 
@@ -128,10 +128,10 @@ class FloorImpact(Impact):
         """Return header and rows of text, an octave each."""
         energy = self.injected_energy()
         columns = (self.blocked_levels(), self.levels(force="floor"), self.difference())
-        head = ("octave, Hz", "blocked, dB", "contact, dB", "difference, dB", "energy, J")
+        header = ("octave, Hz", "blocked, dB", "contact, dB", "difference, dB", "energy, J")
         cells = [[f"{value:.2f}" for value in column] for column in columns]
         energies = [f"{value:.3g}" for value in energy.by_motion]
-        return [head, *zip((f"{f:g}" for f in energy.frequency), *cells, energies, strict=True)]
+        return [header, *zip((f"{f:g}" for f in energy.frequency), *cells, energies, strict=True)]
 
     def _floor_histories(self) -> dict[str, NDArray[np.float64]]:
         """Return the force on a rigid floor and the motion of this one."""
@@ -148,8 +148,8 @@ class FloorImpact(Impact):
         with require_extra("studies"):
             from thud.impact.datasets import attributes
 
-        words = attributes(FLOOR_QUANTITIES["floor_work"])
-        return super().to_xarray().assign(floor_work=((), self.floor_work, words))
+        attrs = attributes(FLOOR_QUANTITIES["floor_work"])
+        return super().to_xarray().assign(floor_work=((), self.floor_work, attrs))
 
     def plot(self) -> Figure:
         """Draw contact against blocked force, their levels, and the mobility of the floor."""
@@ -161,7 +161,7 @@ class FloorImpact(Impact):
 def new_floor_impact(
     case: Case, answer: Bundle, blocked_force: NDArray[np.float64]
 ) -> FloorImpact | None:
-    """Return the impact on a floor that moves in a bundle of the library; None without one."""
+    """Return the impact on a mobile floor in a bundle of the library; None without one."""
     prefix = "on_floor."
     moving = {key[len(prefix) :]: answer[key] for key in answer if key.startswith(prefix)}
     if not moving:

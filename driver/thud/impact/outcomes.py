@@ -1,4 +1,4 @@
-"""Outcomes of many drops."""
+"""Results of many drops."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ class Ensemble(SampleQuantities, Displayed):
         return rows
 
     def to_xarray(self) -> xr.Dataset:
-        """Return the outcomes along the dimension ``sample``, with units and provenance.
+        """Return the results along the dimension ``sample``, with units and provenance.
 
         Raise InputError where xarray is not installed.
         """

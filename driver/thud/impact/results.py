@@ -135,11 +135,11 @@ def _new_impact(files: _Files) -> Impact:
 def _read_history(
     files: _Files, prefix: str, scalars: Mapping[str, float], model_quantities: Mapping[str, float]
 ) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:
-    """Return what the files of a history hold, and further columns of its forces."""
+    """Return the fields of a history, and the other columns of its forces."""
     force = _table(files.read(f"{prefix}force.csv"))
     file_name = f"{prefix}model_histories.csv"
     histories = _table(files.read(file_name)) if file_name in files else {}
-    # Parts of the force stand before the whole one, further columns behind.
+    # Components of the force precede the force; other columns follow it.
     columns = list(force)
     last = columns.index("floor_force_N")
     history = {

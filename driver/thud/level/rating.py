@@ -90,7 +90,7 @@ def rating(levels: ArrayLike, bands: BandSet = "octave") -> Rating:
         dB re 20 uPa, as measured or standardized.
     bands
         ``"octave"`` or ``"third"``. Maxima of one-third octaves do not add up to those of octaves:
-        each is weighted by itself.
+        each set of bands has its own rating.
 
     Raises
     ------
