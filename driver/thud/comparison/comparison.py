@@ -129,7 +129,7 @@ def _cell(criterion: Criterion, quantity: Quantity) -> str:
 
 
 def _quantity_rows(impacts: Iterable[ImpactResult]) -> list[tuple[str, ...]]:
-    """Return the rows of the known quantities that have no other row."""
+    """Return rows of the known quantities that are not shown in another row."""
     other_rows = {"peak_force", "peak_elastic_force", *(name for name, *_ in LIMITS[SOURCES[0]])}
     rows = []
     for name in SAMPLE_QUANTITIES:
@@ -168,8 +168,8 @@ def compare(
     Parameters
     ----------
     impacts
-        Cases (which are solved), impacts and recordings, as a mapping of names or in a list, whose
-        entries have the names of their cases.
+        Cases (which are solved), impacts and recordings: a mapping by names, or a list, whose
+        entries take the names of their cases.
     force
         ``"floor"`` or ``"elastic"``; by default the assessed force of each case.
     source

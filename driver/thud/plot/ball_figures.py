@@ -215,7 +215,7 @@ def _add_key(axes: Axes, arrows: Quiver, impact: Impact) -> None:
 
 @own_style()
 def mode_shapes(modes: FreeModes, columns: int = 3) -> Figure:
-    """Draw mode shapes as half sections over the outline of the ball at rest (paper, figure 4).
+    """Draw mode shapes as half sections, with the outline of the ball at rest (paper, figure 4).
 
     Parameters
     ----------

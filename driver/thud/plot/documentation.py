@@ -48,7 +48,7 @@ def _solve_published(viscosity: FiniteElementViscosity = "fractional") -> Impact
 
 @cache
 def _solve_chipboard() -> FloorImpact:
-    """Return the same impact on chipboard of 22 mm, far from its joists: 1600 N s/m."""
+    """Return the impact of this ball on 22 mm of chipboard far from joists, 1600 N s/m."""
     model = FiniteElement(snapshot_interval=1e-3)
     impact = solve(Ball.standard(), model=model, floor=InfinitePlate(resistance=1600.0)).on_floor
     assert impact is not None  # noqa: S101 - the floor is mobile
@@ -135,7 +135,7 @@ def _draw_laws() -> Figure:
 
 
 def _draw_compressions() -> Figure:
-    """Draw the compression of the paper's ball by each model, with one modulus, not viscous."""
+    """Draw the compression of the paper's ball by each model, with one modulus, undamped."""
     ball = Ball(poisson_ratio=0.49)
     models: dict[str, ModelName] = {"shell": "hollow_sphere", "modal ball": "modal_ball"}
     curves = {name: compress(ball, model) for name, model in models.items()}

@@ -75,7 +75,7 @@ def draw_forces(axes: Axes, impacts: Mapping[str, Curve], force: LevelsForce | N
     for i, (name, impact, kind) in enumerate(iterate_curves(impacts, force)):
         axes.plot(*contact_force(impact, kind), label=escape_label(name), **line_style(i))
     axes.margins(x=0)
-    # A number of ticks that depends on the layout would change it in turn.
+    # A number of ticks that depends on the layout would change the layout in turn.
     axes.locator_params(axis="y", nbins=8)
     axes.set_xlabel(TIME_LABEL)
     axes.set_ylabel(force_label(impacts, force))
@@ -107,7 +107,7 @@ def levels(
     source: LimitsSource | None = None,
     method: LevelsMethod | None = None,
 ) -> Figure:
-    """Draw octave levels over the tolerance band of the standards (paper, figure 3).
+    """Draw octave levels with the tolerance band of the standards (paper, figure 3).
 
     One-third-octave bands, which have no limits, are drawn below if a case asks for them.
 

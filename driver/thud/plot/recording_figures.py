@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 # Height without the legend, inch: a report has two figures side by side.
 HEIGHT = 2.15
-# Maximum number of drops drawn as lines; of more, the range is filled.
+# Maximum number of drops drawn as lines; the range of more drops is filled.
 MAX_LINES = 40
 # Margin of the filtered force around the drawn times, s: longer than the filter's response.
 FILTER_MARGIN = 2e-2

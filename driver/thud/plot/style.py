@@ -151,7 +151,7 @@ def iterate_curves(
 ) -> Iterator[tuple[str, Curve, LevelsForce]]:
     """Yield label, impact and kind of force of each curve.
 
-    Without `force`, each case has its assessed force; labels name forces that differ. Raises
+    By default the force is that assessed in each case; labels name forces that differ. Raises
     InputError if `impacts` is not a mapping of names to impacts, or empty.
     """
     require_mapping("impacts", impacts, "impacts")

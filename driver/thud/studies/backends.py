@@ -26,8 +26,9 @@ if TYPE_CHECKING:
     Keep = Callable[[Block, dict[str, NDArray[Any]]], None]
 
 BACKENDS = ("threads", "processes", "dask")
-# Maximum time, s, until the scheduler replies, and that it may have no worker.
+# Maximum time until the scheduler replies, s.
 SCHEDULER_TIMEOUT = 5.0
+# Maximum time without any worker, s.
 WORKER_TIMEOUT = 60.0
 # Time between two checks of the workers, s.
 CHECK_INTERVAL = 5.0
@@ -172,7 +173,7 @@ def _dask(address: str) -> Iterator[tuple[Executor, int, Callable[[], None]]]:
 def _connected(kind: type, address: str) -> Any:  # noqa: ANN401 - of an optional package
     """Return a client of a scheduler; raise OSError if it does not answer in time.
 
-    The time limit of the client ends with the connection. Another thread therefore waits for the
+    The client has no time limit after it has connected. Another thread therefore waits for the
     client, and closes a client that is late.
     """
     connection: Future[Any] = Future()

@@ -111,7 +111,7 @@ class Blocks:
     def _write_zarr(self, paths: list[Path]) -> None:
         """Write a Zarr group, some variables at a time: only these have to fit in memory."""
         part = self.path.with_name(f".{self.path.name}.part")
-        # An interrupted removal may have left it.
+        # An interrupted removal may have left this directory.
         shutil.rmtree(part, ignore_errors=True)
         part = own_path(part)
         with _open(paths[0]) as first:
@@ -130,7 +130,7 @@ class Blocks:
 
 
 def result_names(study: SampleStudy) -> list[str]:
-    """Return the possible file names of a study's results; the first is that of complete ones."""
+    """Return the possible file names of a study's results; the first is of complete results."""
     large = disk_space(study) > MAX_NETCDF_SIZE
     endings = ["nc", "zarr", "partial"]
     if study.format == "zarr" or (large and study.format == "auto"):
@@ -194,7 +194,7 @@ def _join(
 
 
 def _loaded(dataset: xr.Dataset) -> xr.Dataset:
-    """Load a dataset, its texts as objects of any length."""
+    """Load a dataset, with texts as objects of any length."""
     texts: dict[Any, Any] = {
         name: variable.astype(object)
         for name, variable in dataset.variables.items()

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-# Points of a curve of the model, which is interpolated between them.
+# Number of points of a curve of the model, which is interpolated.
 _POINTS = 81
 _PARAMETERS = 2
 _MIN_DATA = 5
@@ -95,7 +95,7 @@ def fit_compression(  # noqa: PLR0913 - as in `compress`
 ) -> CompressionFit:
     """Estimate the modulus of elasticity of a ball from a compression between two plates.
 
-    Least squares of the force; the deflection at which the plates touch the ball is estimated too.
+    Squared residuals of the force are minimized; the deflection at first touch is estimated too.
     Residuals are assumed to be independent and of equal variance. A warning reports if their signs
     are not random: the model then does not explain the curve.
 
@@ -106,7 +106,7 @@ def fit_compression(  # noqa: PLR0913 - as in `compress`
     force : array_like, shape (n,)
         Measured force, N.
     ball
-        The ball, whose modulus is the start of the search; by default that of the paper.
+        The ball, whose modulus starts the search; by default the ball of the paper.
     model, gas
         As in `compress`.
     confidence
@@ -207,7 +207,7 @@ def _work_ratio(curve: CompressionCurve, measured: Array, measured_force: Array)
     if not model_work > 0:
         refuse(
             f"deflection spans {np.ptp(measured):g} m, where the model has no force",
-            "a ball that is pressed by millimeters",
+            "a compression by millimeters",
         )
     return max(work, 0.01 * float(measured_force[-1] * np.ptp(measured))) / model_work
 

@@ -37,7 +37,7 @@ def disk_space(study: SampleStudy) -> int:
 def new_dataset(study: SampleStudy, columns: Columns, results: Columns) -> xr.Dataset:
     """Return the results of samples along the dimension ``sample``, levels also along bands.
 
-    `columns` are their parameters by name, `results` those of `evaluate`.
+    `columns` are the parameters of the samples by name, `results` the results of `evaluate`.
     """
     coordinates, variables = sample_variables(results)
     for parameter in study.parameters:
@@ -93,7 +93,7 @@ def in_order(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def grid_of(study: SampleStudy, dataset: xr.Dataset) -> xr.Dataset:
-    """Return a complete dataset; that of a grid has a dimension for each parameter."""
+    """Return a complete dataset; a grid gets a dimension for each parameter."""
     if study.design != "grid":
         return dataset
     coordinates = {name: dataset[name] for name in BANDS if name in dataset.coords}

@@ -32,7 +32,7 @@ _AXES = 2
 
 @dataclass(frozen=True, eq=False)
 class Design(SampleResult):
-    """Margin and verdict over two parameters.
+    """Margin and verdict as functions of two parameters.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Design(SampleResult):
     axes : tuple of str
         The two parameters.
     mark : tuple of float or None
-        Position of the ball of the paper, or else of the case; None if it is outside the map.
+        Position of the ball of `mark_name`; None if it is outside the map.
     mark_name : str
         ``"paper's ball"`` or ``"case"``.
     """
@@ -61,7 +61,7 @@ class Design(SampleResult):
         return f"<Design, {' and '.join(self.axes)}: {count}>"
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text: how many samples conform, and the best one."""
+        """Return header and rows of text: how many samples conform, and the best sample."""
         margin = self.dataset["margin"]
         rows: list[tuple[str, ...]] = [("quantity", "value"), ("samples", f"{margin.size}")]
         rows.append(("octave levels conform", f"{int((margin >= 0).sum())}"))
@@ -83,7 +83,7 @@ class Design(SampleResult):
         return rows
 
     def plot(self) -> Figure:
-        """Return the margin over both parameters."""
+        """Return the map as a figure."""
         from thud.plot import draw_design
 
         return draw_design(self)
@@ -127,7 +127,7 @@ def _is_axis(parameter: Parameter) -> bool:
 
 
 def _mark(study: SampleStudy) -> tuple[tuple[float, float] | None, str]:
-    """Return position and name of the paper's ball if all else agrees with it, else of the case."""
+    """Return the mark: the paper's ball if all other keys have its values, else the case."""
     names = [parameter.name for parameter in study.parameters]
     paper, ours = _ball_and_drop(Case(), None), _ball_and_drop(study.case, study.density)
     mass_follows_density = study.density is not None or DENSITY.name in names

@@ -85,7 +85,7 @@ def require_version(
         if changes and not results.replace:
             refuse(
                 f"{path} belongs to another version of this study: {changes}",
-                "another directory, or --replace (replace=True) to compute it again",
+                "another directory, or --replace (replace=True) to compute the study again",
             )
         if changes:
             outdated.append(path)
@@ -96,7 +96,7 @@ def require_version(
 
 
 def _changes(path: Path, identity_in: Callable[[Path], dict[str, str] | None], study: Study) -> str:
-    """Return how a study differs from that of results; raise if a path holds no results."""
+    """Return how a study differs from that of saved results; raise if these are not results."""
     if path.is_symlink():
         message = f"{path} is a link"
         raise ValueError(message)

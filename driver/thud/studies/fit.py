@@ -71,8 +71,8 @@ def fit(  # noqa: PLR0913 - options of a search
         The data; a recording, an impact or arrays of time, s, and force, N, are the record of a
         `ForceTarget`. A list of targets is fitted jointly, each with its own `fixed` keys.
     parameters
-        Names of keys of ball, drop or model that take real numbers; in a mapping each with its
-        start or a `Parameter`.
+        Names of keys of ball, drop or model with real values; a mapping states the start or a
+        `Parameter` of each.
     case
         The case with all other keys; by default the ball of the paper in the model of the paper.
     confidence
@@ -223,7 +223,7 @@ class FitKind(Kind[FitStudy, Fit]):
     """Fits as a kind of study."""
 
     name = "fit"
-    words = ("target", "surrogate", *OPTIONS)
+    own_keys = ("target", "surrogate", *OPTIONS)
 
     def new_parameter(self, name: str, entry: object, case: Case, density: object) -> Parameter:  # noqa: ARG002
         """Return a parameter that is fitted."""

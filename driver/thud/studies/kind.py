@@ -62,7 +62,7 @@ class Kind(ABC, Generic[S, R]):
 
     name: ClassVar[str]
     # Keys and tables of its file besides those of every study.
-    words: ClassVar[tuple[str, ...]]
+    own_keys: ClassVar[tuple[str, ...]]
 
     def read_study(self, source: Source) -> S:
         """Return a study of this kind; see `thud.studies.kinds.read_study`."""
@@ -71,7 +71,7 @@ class Kind(ABC, Generic[S, R]):
                 refuse(f"{source.name} is a {source.kind} study", f"a {self.name} study")
             return source  # type: ignore[return-value]
         with read_tables(source) as (content, folder, text):
-            common = read_common(content, folder, self.name, self.words, self.new_parameter)
+            common = read_common(content, folder, self.name, self.own_keys, self.new_parameter)
             own = () if isinstance(source, Mapping) else (source,)
             inputs = (*own, *named_files(content, folder))
             common = dataclasses.replace(common, text=text, inputs=inputs)
@@ -103,7 +103,7 @@ class Kind(ABC, Generic[S, R]):
     def new_parameter(
         self, name: str, entry: object, case: Case, density: float | None
     ) -> Parameter:
-        """Return a parameter from its name and table; `density` is that of the wall if fixed."""
+        """Return a parameter by its name and table; `density` is the fixed one of the wall."""
 
     @abstractmethod
     def complete(self, study: Study, content: Mapping[str, Any], folder: Path) -> S:
@@ -122,7 +122,7 @@ class Kind(ABC, Generic[S, R]):
 
     @abstractmethod
     def compute(self, study: S, results: Results | None, **options: Unpack[RunOptions]) -> R:
-        """Return the result; keep finished samples in a directory if there is one."""
+        """Return the result; finished samples are kept in a directory, if any."""
 
     @abstractmethod
     def identity_files(self, study: S) -> list[str]:
@@ -130,7 +130,7 @@ class Kind(ABC, Generic[S, R]):
 
     @abstractmethod
     def identity_in(self, path: Path) -> dict[str, str] | None:
-        """Return the identity of results; None if there are none worth keeping."""
+        """Return the identity of saved results; None if they have no finished sample."""
 
     @abstractmethod
     def listed_files(self, study: S) -> list[str]:

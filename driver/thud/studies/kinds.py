@@ -1,4 +1,4 @@
-"""The list of kinds of studies; the module of a kind is imported when it is used."""
+"""Kinds of studies; the module of a kind is imported when the kind is used."""
 
 from __future__ import annotations
 

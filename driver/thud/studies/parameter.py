@@ -44,12 +44,12 @@ _SCALES = ("linear", "log")
 
 @dataclass(frozen=True, eq=False)
 class Parameter(Plain):
-    """A parameter of a study, as its table in ``[parameters]``.
+    """A parameter of a study, as stated by its table in ``[parameters]``.
 
     Attributes
     ----------
     start : float or None
-        Where a fit starts; by default the value of the case.
+        Start of a fit; by default the value of the case.
     low, high : float or None
         Range of the values, or limits of a fit, by default those of the key.
     values : sequence or None
@@ -99,7 +99,7 @@ class Parameter(Plain):
 
     @property
     def table(self) -> dict[str, object]:
-        """Its table, without defaults."""
+        """Its table in a study, without defaults."""
         words = (word for word in vars(self) if word not in {"name", "key"})
         return {w: vars(self)[w] for w in words if vars(self)[w] != getattr(Parameter, w)}
 
@@ -127,7 +127,7 @@ class Parameter(Plain):
         return np.unique(np.rint(values).astype(int)) if self.key.kind == "whole" else values
 
     def quantile(self, fraction: NDArray[np.float64]) -> NDArray[np.generic]:
-        """Return the values below which a fraction of all values lies."""
+        """Return quantiles: values below which the stated fractions of all values lie."""
         if self.values is not None:
             return np.take(self.grid(), (fraction * len(self.values)).astype(int))
         if self.std is not None and self.mean is not None:
@@ -175,7 +175,7 @@ def varied(
 ) -> Parameter:
     """Return a parameter that varies; `default_mean` is its value in the case."""
     words = [word for form in FORMS.values() for word in form]
-    label, key, table, power = _begin(name, table, owners, words)
+    label, key, table, power = _read_table(name, table, owners, words)
     form = next((form for form in FORMS if form in table), None)
     if form is None:
         refuse(
@@ -211,7 +211,7 @@ def fitted(name: str, entry: object, owners: tuple[str, ...]) -> Parameter:
         entry = {}
     elif not isinstance(entry, Mapping):
         entry = {"start": entry}
-    label, key, table, power = _begin(name, entry, owners, FITTED)
+    label, key, table, power = _read_table(name, entry, owners, FITTED)
     numbers: dict[str, Any] = {}
     for word, value in table.items():
         if word != "unit" and value is not None:
@@ -220,14 +220,14 @@ def fitted(name: str, entry: object, owners: tuple[str, ...]) -> Parameter:
     return Parameter(**numbers, unit=table.get("unit"), name=name, key=key)
 
 
-def _begin(
+def _read_table(
     name: str, table: object, owners: tuple[str, ...], words: Sequence[str]
 ) -> tuple[str, Key, Mapping[str, Any], int]:
     """Return label, key and table of a parameter, and the exponent of ten of its unit."""
     label = f"[parameters] {name}"
     key, entry = find_key(name, owners)
     if key.kind == "list" and entry is None:
-        refuse(f"{label} is a list", f"one entry of it, such as {name + '(1)'!r}")
+        refuse(f"{label} is a list", f"one of its entries, such as {name + '(1)'!r}")
     if not isinstance(table, Mapping):
         refuse(f"{label} = {shown(table)} is not a table", f"{', '.join(words)}, unit")
     require_words(label, table, (*words, "unit"))
@@ -236,7 +236,7 @@ def _begin(
 
 
 def checked(label: str, key: Key, value: object, power: int) -> Value:
-    """Return a value in the unit of its key; raise InputError if it is of another kind."""
+    """Return a value in the unit of its key; raise InputError if the key has another kind."""
     number = math.nan
     if isinstance(value, int | float) and not isinstance(value, bool):
         number = scaled(value, power) if -LARGEST < value < LARGEST else math.inf
@@ -254,7 +254,7 @@ def _between(
     label: str, key: Key, table: Mapping[str, Any], read: Callable[[str], float]
 ) -> dict[str, Any]:
     if "high" not in table:
-        refuse(f"{label} has no high end", "high beside low")
+        refuse(f"{label} has no high end", "both low and high")
     low, high = read("low"), read("high")
     whole = key.kind == "whole"
     # Limits that are names of other keys depend on the sample.
@@ -289,7 +289,7 @@ def _normal(
         refuse_value(f"{label}: std", table["std"], "0 < std")
     mean = read("mean") if "mean" in table else default_mean
     if mean is None or not math.isfinite(float(mean)):
-        refuse(f"{label} has no mean", "mean beside std")
+        refuse(f"{label} has no mean", "both mean and std")
     return {"mean": float(mean), "std": std}
 
 

@@ -49,9 +49,9 @@ def _require_no_floor(case: Case) -> None:
 
 
 class DropsKind(Kind[SampleStudy, R]):
-    """A kind of study that computes drops around its case."""
+    """A kind of study that computes many variations of its case."""
 
-    words: ClassVar[tuple[str, ...]] = ("format", "design", "temperature", "surrogate")
+    own_keys: ClassVar[tuple[str, ...]] = ("format", "design", "temperature", "surrogate")
     # Sampling designs that are allowed, the default first.
     designs: ClassVar[tuple[str, ...]]
 
@@ -127,7 +127,7 @@ class SampleKind(DropsKind[R]):
     def compute(
         self, study: SampleStudy, results: Results | None, **options: Unpack[RunOptions]
     ) -> R:
-        """Return the result of all samples, computed or continued."""
+        """Compute missing samples; return the result of all samples."""
         try:
             if study.plan:
                 study = replace(study, surrogate=train(study, results, options))

@@ -48,7 +48,7 @@ class SampleStudy(Study):
     format : str
         ``"netcdf"``, ``"zarr"``, or ``"auto"``: Zarr for large results.
     plan : Plan or None
-        How a surrogate is trained to predict the samples, if it has to be.
+        How to train a surrogate that predicts the samples.
     surrogate : Surrogate or None
         Surrogate that predicts the samples instead of the model.
     """

@@ -26,7 +26,7 @@ _MAX_SAMPLES = 2**63 - 1
 
 
 def sampler_versions(design: str) -> dict[str, str]:
-    """Return the versions of the packages that sample a design, on which its points depend."""
+    """Return the versions of the packages on which the points of a design depend."""
     names = {"saltelli": ("scipy", "SALib")}.get(design, ("scipy",) if design in SAMPLED else ())
     return {f"{name.lower()}_version": version(name) for name in names}
 

@@ -156,7 +156,7 @@ def _indices(study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
         errors = np.concatenate(
             [study.surrogate.mean_square(name) for name in (f"{force}_level", "contact_time", peak)]
         )
-        # Levels are in dB; other quantities are compared in dB too.
+        # The errors of all quantities are in dB.
         spread = np.array(
             [
                 np.var(v[rows] if i < levels.shape[1] else 20 * np.log10(v[rows]))
@@ -177,7 +177,7 @@ def _indices(study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
 def sobol_indices(
     values: NDArray[np.float64], dimension: int, seed: int = 0
 ) -> tuple[NDArray[np.float64], ...]:
-    """Return first-order and total Sobol indices of a quantity, each with its half interval.
+    """Return first-order and total Sobol indices of a quantity, with half widths of intervals.
 
     `values`, shape (n (dimension + 2),), belong to the points of a ``"saltelli"`` design; `seed` is
     for the resampling. Indices have shape (dimension,); NaN if the values do not vary.

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 Source: TypeAlias = "str | os.PathLike[str] | Mapping[str, object] | Study"
 
 # Keys and tables that every study may have.
-WORDS = ("name", "case", "fixed", "parameters")
+COMMON_KEYS = ("name", "case", "fixed", "parameters")
 # Texts that are longer than this are shortened to their beginning and a checksum.
 _MAX_LENGTH = 300
 # Quantiles of the parameters for trial cases.
@@ -41,12 +41,12 @@ _NAMED_KEY = re.compile(r"&\w+: (\w+)")
 
 @dataclass(frozen=True)
 class Study:
-    """A study, complete and checked; `read_study` makes one.
+    """A study, complete and checked, as returned by `read_study`.
 
     Attributes
     ----------
     name : str
-        Name of the study, also of its files.
+        Name of the study and of its files.
     kind : str
         Kind of study, see `thud.studies.kinds.KINDS`.
     case : Case
@@ -94,7 +94,7 @@ class Study:
         return case if self.density is None else with_density(case, self.density)
 
     def own_identity(self) -> dict[str, str]:
-        """Return what only the results of this kind depend on."""
+        """Return the additional settings on which results of this kind depend."""
         return {}
 
 
@@ -175,11 +175,11 @@ def read_common(
     content: dict[str, Any],
     folder: Path,
     kind: str,
-    words: Iterable[str],
+    own_keys: Iterable[str],
     new_parameter: Callable[[str, object, Case, float | None], Parameter],
 ) -> Study:
-    """Read the part that all kinds share; `words` are the kind's own keys besides `WORDS`."""
-    require_words("the study", content, (*WORDS, *words))
+    """Read the part that all kinds share; `own_keys` are those besides `COMMON_KEYS`."""
+    require_words("the study", content, (*COMMON_KEYS, *own_keys))
     fixed, parameters = (table_of(content, name) for name in ("fixed", "parameters"))
     name = content["name"]
     is_text = isinstance(name, str) and name.strip() and name.isprintable()
@@ -216,7 +216,7 @@ def _case(path: object, folder: Path, fixed: Mapping[str, Any]) -> Case:
         if case.model is None or model != case.model.name:
             case = replace(case, model=new_model(model, {}))
     if case.model is None:
-        refuse(f"case = {shown(path)} has no source model", "a case with one")
+        refuse(f"case = {shown(path)} has no source model", "a case with a source model")
     return case
 
 
@@ -250,7 +250,7 @@ def _require_use(fixed: Mapping[str, Any], parameters: Mapping[str, Any]) -> Non
         # A fixed value may be the mean of a normal distribution.
         if name in parameters and ("std" not in parameters[name] or "mean" in parameters[name]):
             refuse(
-                f"[fixed] {name} has no effect beside [parameters] {name}",
+                f"[fixed] {name} has no effect because of [parameters] {name}",
                 "one of them, or std without mean in [parameters]",
             )
 
@@ -271,7 +271,7 @@ def _require_valid(study: Study, fixed: Mapping[str, Any]) -> None:
 
 
 def with_density(case: Case, density: float) -> Case:
-    """Return a case whose mass is that of a wall of a density, kg/m3."""
+    """Return a case whose mass follows from the density of the wall, kg/m3."""
     volume = wall_volume(case.ball.outer_radius, case.ball.wall_thickness)
     return replace(case, ball=replace(case.ball, mass=density * volume))
 

@@ -27,7 +27,7 @@ class SurrogateKind(DropsKind[Surrogate]):
     """Surrogates as a kind of study."""
 
     name = "surrogate"
-    words: ClassVar[tuple[str, ...]] = ("surrogate",)
+    own_keys: ClassVar[tuple[str, ...]] = ("surrogate",)
     designs = ("grid",)
 
     def new_parameter(

@@ -60,7 +60,7 @@ class SurrogateLevels(LevelMisfit):
             self.deviation = freeze(np.hypot(self.deviation, self.model_error))
 
     def solve(self, case: Case) -> Impact:
-        """Return the prediction for a case, which only `values` reads."""
+        """Return the prediction for a case in place of an impact; only `values` reads it."""
         columns: dict[str, Any] = {
             name: np.array([value_in(case, name)]) for name in self.surrogate.keys
         }

@@ -66,7 +66,7 @@ class TrainingStudy(SampleStudy):
 def train(study: SampleStudy, results: Results | None, options: RunOptions) -> Surrogate:
     """Return the surrogate of all samples of a study, trained or read from its directory.
 
-    Its drops are kept there, as samples of a study of their own. Raises InputError if a key cannot
+    Its drops are saved there as samples of a separate study. Raises InputError if a key cannot
     be learned or a drop has no result, NumericalError if the error exceeds its bound.
     """
     plan = study.plan
@@ -182,7 +182,7 @@ def _learn(
 
 
 def _decibels(name: str, values: Values) -> Values:
-    """Return a quantity in dB, shape (n, count); NaN where it has no logarithm."""
+    """Return a quantity in dB, shape (n, count); NaN if any value has no logarithm."""
     if name in LEVELS:
         return values
     if (values <= 0).any():

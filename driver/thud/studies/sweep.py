@@ -139,6 +139,6 @@ def read_sweep(path: str | os.PathLike[str]) -> Sweep:
     InputError
         If there are no results of a study.
     OSError
-        If they cannot be read for now.
+        If they temporarily cannot be read.
     """
     return Sweep(read_dataset(Path(path)))

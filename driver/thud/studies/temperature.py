@@ -70,8 +70,8 @@ class Temperature:
         """Return samples with the values of keys at their ``temperature``, shape (n_sample,).
 
         Modulus and loss factor are those at the `loss_frequency` of the case: the complex modulus
-        of the fractional law changes by the factor 1 + p (cos + i sin) (a**order - 1) with the
-        angle pi order/2 and p = loss factor/sin.
+        of the fractional law changes by the factor 1 + p (cos + i sin) (a**order - 1) with cos and
+        sin of pi order/2, and p = loss factor/sin.
         """
         result = dict(samples)
         temperature = result.pop(TEMPERATURE.name)

@@ -62,8 +62,8 @@ class Surrogate(StudyResult):
     """Prediction of drops of a model from training drops in the same region.
 
     A Gaussian process interpolates all quantities, in dB: levels, and 20 lg of other quantities.
-    Each has a stated error: with a confidence of 95 %, the errors of 95 % of other drops are
-    smaller (order statistic of the leave-one-out residuals).
+    Each quantity has a stated error: with a confidence of 95 %, the errors of 95 % of other drops
+    are smaller (order statistic of the leave-one-out residuals).
 
     Attributes
     ----------
@@ -129,7 +129,7 @@ class Surrogate(StudyResult):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Its accuracy."""
+        """Accuracy of the surrogate."""
         return (self.accuracy,)
 
     def plot(self) -> Figure:
@@ -347,7 +347,7 @@ class Surrogate(StudyResult):
         return file.getvalue()
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write it atomically to a file ``.npz``, which `read_surrogate` reads."""
+        """Write the surrogate atomically to a file ``.npz``, which `read_surrogate` reads."""
         replace_file(path, self.to_bytes())
 
 
@@ -404,7 +404,7 @@ def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
     InputError
         If the file is damaged or not a surrogate.
     OSError
-        If it cannot be read for now.
+        If the file temporarily cannot be read.
     """
     require_kind("surrogate", path, str | Path)
     try:
