@@ -229,15 +229,15 @@ def copy_examples(options: argparse.Namespace) -> int:
         if not source.is_dir():
             refuse("this package has no inputs", "an installed one; in a clone they are in inputs/")
         target.parent.mkdir(parents=True, exist_ok=True)
-        part = own_path(target.with_name(f".{target.name}.part"))
+        partial = own_path(target.with_name(f".{target.name}.part"))
         try:
             # Installers compile the Python scripts among the inputs.
-            shutil.copytree(source, part, ignore=shutil.ignore_patterns("__pycache__"))
-            part.rename(target)
+            shutil.copytree(source, partial, ignore=shutil.ignore_patterns("__pycache__"))
+            partial.rename(target)
         except shutil.Error as error:
             refuse(f"{target} cannot be written", "a writable directory with free space", error)
         finally:
-            shutil.rmtree(part, ignore_errors=True)
+            shutil.rmtree(partial, ignore_errors=True)
     if not options.quiet:
         print(f"Inputs: {target}")
     return 0

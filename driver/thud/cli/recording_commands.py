@@ -191,8 +191,8 @@ def run_history(options: argparse.Namespace) -> int:
 
     history = read_history(options.reports, different_balls=options.different_balls)
     results = results_of(options, "history", options.reports)
-    drawn = draw_all({"history": partial(draw_history, history)})
-    paths = results.write(figure_files(drawn))
+    figures = draw_all({"history": partial(draw_history, history)})
+    paths = results.write(figure_files(figures))
     if not options.quiet:
         print(history.title)
         print(format_rows(history.table()))

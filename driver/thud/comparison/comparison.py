@@ -110,9 +110,9 @@ def _criterion_row(criteria: tuple[Criterion, ...]) -> tuple[str, ...]:
     band = name.removeprefix("octave_").replace("_", ".")
     level = Quantity(name, f"{band} Hz", "", "dB", "dB", 1.0, 2, "")
     quantity = QUANTITIES.get(name, level)
-    ends = [f"{end * quantity.display_scale:g}" for end in (criteria[0].lower, criteria[0].upper)]
+    limits = [f"{end * quantity.display_scale:g}" for end in (criteria[0].lower, criteria[0].upper)]
     cells = [_cell(criterion, quantity) for criterion in criteria]
-    return (quantity.label, *cells, " to ".join(dict.fromkeys(ends)))
+    return (quantity.label, *cells, " to ".join(dict.fromkeys(limits)))
 
 
 def _cell(criterion: Criterion, quantity: Quantity) -> str:
@@ -120,12 +120,12 @@ def _cell(criterion: Criterion, quantity: Quantity) -> str:
     if np.isnan(criterion.value):
         return "unknown"
     if criterion.conforms:
-        word = ""
+        state = ""
     elif criterion.value < criterion.lower:
-        word = "low"
+        state = "low"
     else:
-        word = "high" if criterion.value > criterion.upper else "undecided"
-    return f"{criterion.value * quantity.display_scale:z.{quantity.decimals}f} {word}".rstrip()
+        state = "high" if criterion.value > criterion.upper else "undecided"
+    return f"{criterion.value * quantity.display_scale:z.{quantity.decimals}f} {state}".rstrip()
 
 
 def _quantity_rows(impacts: Iterable[ImpactResult]) -> list[tuple[str, ...]]:

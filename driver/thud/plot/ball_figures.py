@@ -84,16 +84,16 @@ def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
     InputError
         If the impact has no snapshots, or there are too many instants.
     """
-    shown = _snapshots(impact)
+    snapshots = _snapshots(impact)
     require_whole("instants", instants, 1, MAX_PANELS)
     times = impact.touch_time + np.linspace(0, impact.contact_time, instants)
     # There are fewer panels if there are fewer snapshots than instants.
-    chosen = sorted({int(np.argmin(np.abs(shown.time - time))) for time in times})
+    chosen = sorted({int(np.argmin(np.abs(snapshots.time - time))) for time in times})
     rows = -(-len(chosen) // 3)
     figure = new_figure(0.6 + 1.6 * rows)
     panels = figure.subplots(rows, 3, squeeze=False).ravel()
-    scale = _scale(shown, chosen)
-    depth = shown.floor_displacement[chosen].max()
+    scale = _scale(snapshots, chosen)
+    depth = snapshots.floor_displacement[chosen].max()
     for axes, i in zip(panels, chosen, strict=False):
         arrows = _draw_instant(axes, impact, i, scale, depth)
     for axes in panels:
@@ -124,15 +124,15 @@ def animate(impact: Impact, path: str | os.PathLike[str]) -> None:
     if Path(path).suffix.lower() != ".gif":
         message = f"{path}: this ending is not known; allowed: .gif"
         raise InputError(message)
-    shown = _snapshots(impact)
+    snapshots = _snapshots(impact)
     figure, axes = empty_axes(WIDTH)
-    count = len(shown.time)
-    scale = _scale(shown, range(count))
+    count = len(snapshots.time)
+    scale = _scale(snapshots, range(count))
     _add_colorbar(figure, [axes], scale, DISPLACEMENT)
 
     def draw(i: int) -> list[Any]:
         axes.clear()
-        depth = shown.floor_displacement.max()
+        depth = snapshots.floor_displacement.max()
         _add_key(axes, _draw_instant(axes, impact, i, scale, depth), impact)
         axes.set_axis_off()
         return []
@@ -155,36 +155,38 @@ def _snapshots(impact: Impact) -> Motion:
     return impact.motion
 
 
-def _scale(shown: Motion, chosen: list[int] | range) -> Normalize:
+def _scale(snapshots: Motion, chosen: list[int] | range) -> Normalize:
     """Return the color scale of some snapshots, mm."""
-    return Normalize(0, 1e3 * max(_displacement(shown, i).max() for i in chosen))
+    return Normalize(0, 1e3 * max(_displacement(snapshots, i).max() for i in chosen))
 
 
-def _displacement(shown: Motion, i: int) -> NDArray[np.float64]:
+def _displacement(snapshots: Motion, i: int) -> NDArray[np.float64]:
     """Return the displacements since first touch, m, shape (n_line, n_ring)."""
-    touching = shown.start - [0, shown.start[..., 1].min()]
-    length: NDArray[np.float64] = np.hypot(*(shown.position[i] - touching).T).T
-    return length
+    touch_position = snapshots.start - [0, snapshots.start[..., 1].min()]
+    distance: NDArray[np.float64] = np.hypot(*(snapshots.position[i] - touch_position).T).T
+    return distance
 
 
 def _draw_instant(axes: Axes, impact: Impact, i: int, scale: Normalize, depth: float) -> Quiver:
     """Draw the ball, its velocities and the floor, down to a depth, m; return the arrows."""
     radius = impact.case.ball.outer_radius
-    shown = _snapshots(impact)
-    position = shown.position[i]
-    floor = -shown.floor_displacement[i]
-    _draw_section(axes, position, 1e3 * _displacement(shown, i), scale)
+    snapshots = _snapshots(impact)
+    position = snapshots.position[i]
+    floor = -snapshots.floor_displacement[i]
+    _draw_section(axes, position, 1e3 * _displacement(snapshots, i), scale)
     shown_nodes = (slice(None, None, ARROWS[0]), slice(None, None, ARROWS[1]))
-    start, velocity = (field[shown_nodes].reshape(-1, 2) for field in (position, shown.velocity[i]))
+    start, velocity = (
+        field[shown_nodes].reshape(-1, 2) for field in (position, snapshots.velocity[i])
+    )
     # At first touch an arrow is as long as a third of the radius.
-    unit = 3 * impact.impact_velocity / radius
-    above = start[:, 1] + velocity[:, 1] / unit >= floor
+    velocity_scale = 3 * impact.impact_velocity / radius
+    above_floor = start[:, 1] + velocity[:, 1] / velocity_scale >= floor
     arrows = axes.quiver(
-        *start[above].T,
-        *velocity[above].T,
+        *start[above_floor].T,
+        *velocity[above_floor].T,
         angles="xy",
         scale_units="xy",
-        scale=unit,
+        scale=velocity_scale,
         width=0.014,
         color="0.1",
         # A light edge shows arrows on dark colors.
@@ -192,8 +194,8 @@ def _draw_instant(axes: Axes, impact: Impact, i: int, scale: Normalize, depth: f
     )
     lowest = -depth - 0.12 * radius
     axes.fill_between([-0.05 * radius, 1.4 * radius], lowest, floor, color="0.6", linewidth=0)
-    since = 1e3 * (shown.time[i] - impact.touch_time)
-    axes.set_title(f"{since:.1f} ms")
+    elapsed = 1e3 * (snapshots.time[i] - impact.touch_time)
+    axes.set_title(f"{elapsed:.1f} ms")
     axes.set_xlim(-0.05 * radius, 1.4 * radius)
     axes.set_ylim(lowest - 0.03 * radius, 2.4 * radius)
     axes.set_aspect("equal")

@@ -223,9 +223,9 @@ def ball_impedances(
         # Markers stand side by side: equal impedances stay distinguishable.
         x = frequency * 1.05 ** (i - (len(sources) - 1) / 2)
         style = {"color": "black", "linestyle": "none", **marker_style(i)}
-        words = f", {name}" if name else ""
-        axes.loglog(x, np.abs(source.impedance), label=f"source{words}", **style)
-        axes.loglog(x, source.limit(), fillstyle="none", label=f"limit of 1 dB{words}", **style)
+        suffix = f", {name}" if name else ""
+        axes.loglog(x, np.abs(source.impedance), label=f"source{suffix}", **style)
+        axes.loglog(x, source.limit(), fillstyle="none", label=f"limit of 1 dB{suffix}", **style)
     axes.xaxis.set_major_locator(FixedLocator(frequency.tolist()))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xticklabels([f"{f:g}" for f in frequency])

@@ -229,10 +229,10 @@ def _add_table(figure: Figure, grid: GridSpec, rows: Sequence[Sequence[str]]) ->
     for (row, column), cell in table.get_celld().items():
         cell.set(width=widths[column], height=heights[row], linewidth=0.5)
         cell.set_text_props(ha="right" if column else "left")
-    above, others = figure.get_figheight(), grid.nrows - 1
-    grid.set_height_ratios([*([above / others] * others), heights.sum()])
+    upper_height, upper_rows = figure.get_figheight(), grid.nrows - 1
+    grid.set_height_ratios([*([upper_height / upper_rows] * upper_rows), heights.sum()])
     width = widths.sum() + _AXIS
-    figure.set_size_inches(max(figure.get_figwidth(), width), above + heights.sum())
+    figure.set_size_inches(max(figure.get_figwidth(), width), upper_height + heights.sum())
 
 
 def comparison_html(
@@ -361,7 +361,7 @@ def _draw_classes(axes: Axes, comparison: FloorComparison) -> None:
     """Draw the single-number ratings, and the maximum levels of the Korean classes as lines."""
     x = np.arange(len(comparison.predictions))
     room = [prediction.octave_rating.a_weighted for prediction in comparison.predictions.values()]
-    after = [
+    standardized = [
         prediction.standardized_rating.a_weighted for prediction in comparison.predictions.values()
     ]
     axes.bar(
@@ -369,7 +369,7 @@ def _draw_classes(axes: Axes, comparison: FloorComparison) -> None:
         label="in the room, of octaves",
     )  # fmt: skip
     axes.bar(
-        x + 0.2, after, 0.36, color="white", edgecolor="black", linewidth=0.5,
+        x + 0.2, standardized, 0.36, color="white", edgecolor="black", linewidth=0.5,
         hatch="//////", label="standardized, of one-third-octave bands",
     )  # fmt: skip
     for number, limit in enumerate(CLASS_LIMITS, 1):
@@ -380,5 +380,5 @@ def _draw_classes(axes: Axes, comparison: FloorComparison) -> None:
         )  # fmt: skip
     axes.set_xticks(x, [escape_label(name) for name in comparison.predictions], rotation=20)
     axes.set_ylabel("L_iA,Fmax, dB")
-    axes.set_ylim(bottom=min([CLASS_LIMITS[0], *room, *after]) - 5)
+    axes.set_ylim(bottom=min([CLASS_LIMITS[0], *room, *standardized]) - 5)
     axes.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))

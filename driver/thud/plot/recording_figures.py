@@ -69,11 +69,11 @@ def recording_forces(recording: Recording) -> Figure:
 
 def _recorded(drop: Drop, time: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the force of a drop, low-passed at 1.25 kHz, N, at times since first touch, s."""
-    ends = (
+    indices = (
         (np.array([time[0] - FILTER_MARGIN, time[-1] + FILTER_MARGIN]) - drop.begin)
         * drop.sample_rate
     ).astype(int)
-    first, stop = np.clip(ends, 0, len(drop.force))
+    first, stop = np.clip(indices, 0, len(drop.force))
     force = low_pass(drop.force[first:stop], drop.sample_rate)
     return np.interp(time, drop.time[first:stop], force)
 
@@ -113,9 +113,9 @@ def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
     x = np.arange(len(average.level), dtype=float)
     _draw_drops(axes, x, average.drops, recording)
     expanded = np.array([estimate.expanded for estimate in recording.level_estimates(bands)])
-    mark = "average, 95 %" if len(average.drops) > 1 else "drop, 95 %"
+    label = "average, 95 %" if len(average.drops) > 1 else "drop, 95 %"
     axes.errorbar(
-        x, average.level, yerr=_bar(expanded), label=mark, marker="o", markersize=3, **BARS,
+        x, average.level, yerr=_bar(expanded), label=label, marker="o", markersize=3, **BARS,
     )  # fmt: skip
     bounds = average.flag == "background"
     if bounds.any():
@@ -124,9 +124,9 @@ def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
             markersize=6, markerfacecolor="white", color=COLORS[0], zorder=3,
         )  # fmt: skip
     lowest = np.nanmin(average.level) if np.isfinite(average.level).any() else 0.0
-    near = np.where(average.background > lowest - MAX_DISTANCE, average.background, np.nan)
+    visible = np.where(average.background > lowest - MAX_DISTANCE, average.background, np.nan)
     axes.plot(
-        x, near, label=_background_label(average.background, near), color="black",
+        x, visible, label=_background_label(average.background, visible), color="black",
         linewidth=0.8, linestyle=":", marker="_", markersize=7,
     )  # fmt: skip
     octave_axis(axes, bands)

@@ -133,31 +133,34 @@ def draw_sweep(result: Sweep) -> Figure:
     numeric = [name for name in varied if columns[name].dtype.kind in "iuf"]
     name = (numeric or varied or list(columns))[0]
     texts = [n for n in varied if n not in numeric and n != name]
-    split = next((n for n in texts if len(np.unique(columns[n])) <= _MAX_PANELS), None)
+    panel_parameter = next((n for n in texts if len(np.unique(columns[n])) <= _MAX_PANELS), None)
     excess = _excess(dataset, columns)
-    parts = {"": np.ones(len(columns[name]), dtype=bool)}
-    if split:
-        parts = {str(value): columns[split] == value for value in np.unique(columns[split])}
-    column_count = 1 if len(parts) == 1 else 2
-    row_count = -(-len(parts) // column_count)
+    masks = {"": np.ones(len(columns[name]), dtype=bool)}
+    if panel_parameter:
+        masks = {
+            str(value): columns[panel_parameter] == value
+            for value in np.unique(columns[panel_parameter])
+        }
+    column_count = 1 if len(masks) == 1 else 2
+    row_count = -(-len(masks) // column_count)
     figure = new_figure(1.1 + (1.9 if column_count == 1 else 1.6) * row_count)
     panels = figure.subplots(
         row_count, column_count, sharex=True, sharey=True, squeeze=False
     ).ravel()
-    for i, (axes, (title, panel)) in enumerate(zip(panels, parts.items(), strict=False)):
+    for i, (axes, (title, mask)) in enumerate(zip(panels, masks.items(), strict=False)):
         _draw_tolerance(axes, excess.tolerance)
-        levels = np.where(panel[:, np.newaxis], excess.level, np.nan)
+        levels = np.where(mask[:, np.newaxis], excess.level, np.nan)
         _draw_octaves(axes, dataset[name], columns[name], levels, _MAX_MARKS // column_count)
         axes.set_title(title.replace("_", " "))
-        lowest = i + column_count >= len(parts)
+        lowest = i + column_count >= len(masks)
         axes.tick_params(axis="x", labelbottom=lowest)
         axes.xaxis.label.set_visible(lowest)
-    for axes in panels[len(parts) :]:
+    for axes in panels[len(masks) :]:
         axes.remove()
     force = "assessed force" if "force" in columns else FORCE_NAMES[dataset.attrs["assessed_force"]]
     figure.supylabel(f"Level − nominal, dB\n({force})")
-    others = [n for n in varied if n not in {name, split}]
-    legend_above(panels[0], title=_meaning(excess, split, others))
+    others = [n for n in varied if n not in {name, panel_parameter}]
+    legend_above(panels[0], title=_meaning(excess, panel_parameter, others))
     return figure
 
 
@@ -236,21 +239,21 @@ def _classes(
     return np.array([np.median(values[chosen]) for chosen in members]), members, None
 
 
-def _of_finite(part: NDArray[np.float64], function: Any) -> float:  # noqa: ANN401 - of NumPy
+def _of_finite(values: NDArray[np.float64], function: Any) -> float:  # noqa: ANN401 - of NumPy
     """Return a function of the finite numbers; NaN if there are none."""
-    known = part[np.isfinite(part)]
-    return float(function(known)) if known.size else np.nan
+    finite = values[np.isfinite(values)]
+    return float(function(finite)) if finite.size else np.nan
 
 
-def _meaning(excess: _Excess, split: str | None, others: list[str]) -> str:
+def _meaning(excess: _Excess, panel_parameter: str | None, others: list[str]) -> str:
     """Return the explanation of panels, lines, shades and gray areas."""
     minimum, maximum = excess.tolerance
     lines = [f"Gray: tolerances of the octaves, ±{minimum:g} to ±{maximum:g} dB"]
     if others:
         over = humanize(others[0]) if len(others) == 1 else f"{len(others)} other parameters"
         lines.insert(0, f"Lines: median over {over}; shades: range")
-    if split:
-        lines.insert(0, f"Panels: {humanize(split)}")
+    if panel_parameter:
+        lines.insert(0, f"Panels: {humanize(panel_parameter)}")
     return "\n".join(lines)
 
 
@@ -355,19 +358,19 @@ def draw_sensitivity(result: Sensitivity) -> Figure:
     position = np.arange(len(outputs), dtype=float)
     for i, name in enumerate(parameters):
         row = indices.sel(parameter=name)
-        at = position + (i - (len(parameters) - 1) / 2) * thickness
+        y = position + (i - (len(parameters) - 1) / 2) * thickness
         axes.barh(
-            at, row["total"], 0.9 * thickness, color=COLORS[i % len(COLORS)],
+            y, row["total"], 0.9 * thickness, color=COLORS[i % len(COLORS)],
             hatch=HATCHES[i % len(HATCHES)], edgecolor="white", linewidth=0,
             label=humanize(name),
         )  # fmt: skip
         style: dict[str, Any] = {"color": "black", "linestyle": "none", "elinewidth": 0.6}
         axes.errorbar(
-            row["total"], at - thickness / 5, xerr=row["total_interval"], marker="|", markersize=3,
+            row["total"], y - thickness / 5, xerr=row["total_interval"], marker="|", markersize=3,
             label="total index" if i == len(parameters) - 1 else None, **style,
         )  # fmt: skip
         axes.errorbar(
-            row["first_order"], at + thickness / 5, xerr=row["first_order_interval"], marker="D",
+            row["first_order"], y + thickness / 5, xerr=row["first_order_interval"], marker="D",
             markersize=2, markerfacecolor="white", markeredgewidth=0.5,
             label="first order" if i == len(parameters) - 1 else None, **style,
         )  # fmt: skip

@@ -159,8 +159,8 @@ def iterate_curves(
         require_kind(name, impact, ImpactResult)
     kinds = [impact.assessed_force(force) for impact in impacts.values()]
     for (name, impact), kind in zip(impacts.items(), kinds, strict=True):
-        which = f", {FORCE_NAMES[kind]}" if len(set(kinds)) > 1 else ""
-        yield f"{name}{which}", impact, kind
+        suffix = f", {FORCE_NAMES[kind]}" if len(set(kinds)) > 1 else ""
+        yield f"{name}{suffix}", impact, kind
 
 
 def force_name(impacts: Mapping[str, Curve], force: LevelsForce | None) -> str:

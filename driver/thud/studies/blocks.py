@@ -117,11 +117,11 @@ class Blocks:
         with _open(paths[0]) as first:
             sizes = {str(name): values.nbytes for name, values in first.data_vars.items()}
         names = list(sizes)
-        together = max(1, 2 * MAX_NETCDF_SIZE // (max(sizes.values()) * len(paths)))
+        group_size = max(1, 2 * MAX_NETCDF_SIZE // (max(sizes.values()) * len(paths)))
         try:
             with _named(self.path):
-                for i in range(0, len(names), together):
-                    result = _join(paths, names[i : i + together], known_intact=i > 0)
+                for i in range(0, len(names), group_size):
+                    result = _join(paths, names[i : i + group_size], known_intact=i > 0)
                     grid = grid_of(self._study, result)
                     grid.to_zarr(part, mode="a" if i else "w", consolidated=False)
                 part.rename(self.path)

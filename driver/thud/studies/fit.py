@@ -248,8 +248,8 @@ class FitKind(Kind[FitStudy, Fit]):
         get_ranges(case, study.parameters)
         # JSON knows neither dates nor infinity.
         shown = json.loads(json.dumps(content, default=str), parse_constant=str)
-        head = {**vars(study), "case": case}
-        result = FitStudy(**head, targets=targets, tables=shown, options=options)
+        common = {**vars(study), "case": case}
+        result = FitStudy(**common, targets=targets, tables=shown, options=options)
         result.pairs()
         if "surrogate" not in content:
             return result

@@ -221,7 +221,7 @@ def fitted(name: str, entry: object, owners: tuple[str, ...]) -> Parameter:
 
 
 def _read_table(
-    name: str, table: object, owners: tuple[str, ...], words: Sequence[str]
+    name: str, table: object, owners: tuple[str, ...], allowed_keys: Sequence[str]
 ) -> tuple[str, Key, Mapping[str, Any], int]:
     """Return label, key and table of a parameter, and the exponent of ten of its unit."""
     label = f"[parameters] {name}"
@@ -229,8 +229,8 @@ def _read_table(
     if key.kind == "list" and entry is None:
         refuse(f"{label} is a list", f"one of its entries, such as {name + '(1)'!r}")
     if not isinstance(table, Mapping):
-        refuse(f"{label} = {shown(table)} is not a table", f"{', '.join(words)}, unit")
-    require_words(label, table, (*words, "unit"))
+        refuse(f"{label} = {shown(table)} is not a table", f"{', '.join(allowed_keys)}, unit")
+    require_words(label, table, (*allowed_keys, "unit"))
     unit = key.unit or "1" if table.get("unit") is None else table["unit"]
     return label, key, table, power_of(unit, key.unit, label)
 

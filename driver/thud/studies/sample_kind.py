@@ -68,19 +68,19 @@ class DropsKind(Kind[SampleStudy, R]):
 
     def complete(self, study: Study, content: Mapping[str, Any], folder: Path) -> SampleStudy:
         """Return a study with its sampling design."""
-        written = content.get("format", _FILE_FORMATS[0])
-        require_choice("format", written, _FILE_FORMATS)
+        file_format = content.get("format", _FILE_FORMATS[0])
+        require_choice("format", file_format, _FILE_FORMATS)
         table = table_of(content, "temperature") if "temperature" in content else None
         temperature = read_temperature(table, study.case, study.parameters)
         design = read_design(table_of(content, "design"), self.designs, study.parameters)
         # Samples need no snapshots, free modes or compression.
         case = replace(study.case, modes=None, compression=None)
-        owned = (key for key in KEYS if key.owner == study.model)
-        files = {key.name: 0.0 for key in owned if key.group == OF_FILES}
+        model_keys = (key for key in KEYS if key.owner == study.model)
+        files = {key.name: 0.0 for key in model_keys if key.group == OF_FILES}
         if case.model and files:
             case = replace(case, model=replace(case.model, **files))  # type: ignore[arg-type]
-        head = {**vars(study), "case": case}
-        result = SampleStudy(**head, **design, temperature=temperature, format=written)
+        common = {**vars(study), "case": case}
+        result = SampleStudy(**common, **design, temperature=temperature, format=file_format)
         if "surrogate" not in content:
             return result
         _require_no_floor(case)

@@ -132,8 +132,10 @@ def _indices(study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
     outputs = {f"level {band:g} Hz": levels[:, i] for i, band in enumerate(get_bands().nominal)}
     outputs |= {name.replace("_", " "): dataset[name].to_numpy() for name in ("contact_time", peak)}
     # Quantities of drops on a floor.
-    below = (name for name in FLOOR_QUANTITIES if name in dataset and dataset[name].ndim == 1)
-    outputs |= {name.replace("_", " "): dataset[name].to_numpy() for name in below}
+    floor_quantities = (
+        name for name in FLOOR_QUANTITIES if name in dataset and dataset[name].ndim == 1
+    )
+    outputs |= {name.replace("_", " "): dataset[name].to_numpy() for name in floor_quantities}
     dimension = len(study.parameters)
     usable = (dataset["status"].to_numpy() == 0).reshape(-1, dimension + 2).all(axis=1)
     if usable.sum() < MIN_BASE_SAMPLES:

@@ -88,8 +88,8 @@ class Study:
 
     def trial_case(self, quantile: float) -> Case:
         """Return the case with its parameters at a quantile; raise InputError if it is invalid."""
-        acting = (p for p in self.parameters if p.key not in {DENSITY, TEMPERATURE})
-        result = {p.name: p.trial(quantile) for p in acting}
+        varied = (p for p in self.parameters if p.key not in {DENSITY, TEMPERATURE})
+        result = {p.name: p.trial(quantile) for p in varied}
         case = with_values(self.case, {name: v for name, v in result.items() if v is not None})
         return case if self.density is None else with_density(case, self.density)
 
@@ -258,15 +258,15 @@ def _require_use(fixed: Mapping[str, Any], parameters: Mapping[str, Any]) -> Non
 def _require_valid(study: Study, fixed: Mapping[str, Any]) -> None:
     """Raise InputError if a fixed value is invalid for all values of the parameters."""
     keys = {name.partition("(")[0] for name in fixed} | ({"mass"} if study.density else set())
-    refusals = []
+    messages = []
     for quantile in TRIAL_QUANTILES:
         try:
             check_case(replace(study.trial_case(quantile), modes=None, compression=None))
         except InputError as error:
-            refusals.append(str(error))
-    named = [_NAMED_KEY.match(refusal) for refusal in refusals]
+            messages.append(str(error))
+    named = [_NAMED_KEY.match(message) for message in messages]
     if len(named) == len(TRIAL_QUANTILES) and all(result and result[1] in keys for result in named):
-        message = f"[fixed]: {refusals[0]}"
+        message = f"[fixed]: {messages[0]}"
         raise InputError(message)
 
 

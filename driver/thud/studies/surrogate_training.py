@@ -206,17 +206,17 @@ def regress(points: Values, values: Values, assessed: NDArray[np.bool_]) -> dict
     # Constant quantities, such as a prescribed contact time.
     scale[scale <= _ROUNDING * np.maximum(np.abs(mean), 1.0)] = 0.0
     varies = scale > 0  # false for NaN
-    normal = np.where(varies, (values - mean) / np.where(varies, scale, 1.0), 0.0)
-    chosen = assessed & varies if (assessed & varies).any() else assessed
+    normalized = np.where(varies, (values - mean) / np.where(varies, scale, 1.0), 0.0)
+    fitted = assessed & varies if (assessed & varies).any() else assessed
     shape = Matern(np.full(points.shape[1], 2.0), (0.05, 50.0), nu=SMOOTHNESS)
     kernel = ConstantKernel(10.0, (1e-2, 1e6)) * shape + WhiteKernel(1e-2, (1e-10, 10.0))
     process = GaussianProcessRegressor(kernel)
     with warnings.catch_warnings(), threadpool_limits(1, "blas"):
         # A parameter without effect gets the maximum length.
         warnings.simplefilter("ignore", ConvergenceWarning)
-        process.fit(points, normal[:, chosen])
+        process.fit(points, normalized[:, fitted])
         inverse = cho_solve((process.L_, True), np.eye(len(points)))
-        weights = inverse @ normal
+        weights = inverse @ normalized
     signal = process.kernel_.k1
     # Leave-one-out residuals (Rasmussen and Williams 2006, eq. 5.12).
     residuals = np.where(varies | ~np.isfinite(mean), -weights / np.diag(inverse)[:, None], 0.0)

@@ -241,8 +241,8 @@ class Surrogate(StudyResult):
         )
         low, high = self.region.T
         width = high - low
-        edge = _ROUNDING * np.maximum(width, np.abs(high))
-        outside = ~((values >= low - edge) & (values <= high + edge))
+        tolerance = _ROUNDING * np.maximum(width, np.abs(high))
+        outside = ~((values >= low - tolerance) & (values <= high + tolerance))
         points = (values - low) / np.where(width > 0, width, 1.0)
         kernel = Matern(self.length, nu=SMOOTHNESS)
         numbers = np.empty((count, len(self.mean)))
@@ -269,21 +269,23 @@ class Surrogate(StudyResult):
     def _results(
         self, case: Case, numbers: Values, samples: Columns, reasons: NDArray[np.object_]
     ) -> Columns:
-        parts = self._split(numbers)
-        levels = {name: columns for name, columns in parts.items() if self.outputs[name] > 1}
-        result: Columns = {n: 10 ** (columns[:, 0] / 20) for n, columns in parts.items()} | levels
+        quantities = self._split(numbers)
+        levels = {name: columns for name, columns in quantities.items() if self.outputs[name] > 1}
+        result: Columns = {
+            n: 10 ** (columns[:, 0] / 20) for n, columns in quantities.items()
+        } | levels
         names = ("contact_time", "restitution")
         level = f"{case.levels.force}_level"
         mass_and_height = [
             samples.get(n, np.asarray(value_in(case, n))) for n in ("mass", "height")
         ]
-        exact = [np.zeros(1)] * 3
+        no_errors = [np.zeros(1)] * 3
         verdicts = assess_many(
             (result[level], *(result[n] for n in names), np.array([self.peaks]), *mass_and_height),
             (
                 self.error_of(level)[np.newaxis],
                 *(result[n] * (10 ** (self.error_of(n) / 20) - 1) for n in names),
-                *exact,
+                *no_errors,
             ),
             case.limits.source,
         )
@@ -303,7 +305,7 @@ class Surrogate(StudyResult):
         if any(getattr(self, name).shape != shape for name, shape in shapes.items()):
             return False
         low, high = self.region.T
-        known = (self.points, self.length, *(
+        finite = (self.points, self.length, *(
             getattr(self, name)[..., self.assessed] for name in ("weights", "mean", "residuals")
         ))  # fmt: skip
         return bool(
@@ -311,7 +313,7 @@ class Surrogate(StudyResult):
             and self.assessed.any()
             and (low <= high).all()
             and (self.length > 0).all()
-            and all(np.isfinite(part).all() for part in known)
+            and all(np.isfinite(part).all() for part in finite)
             and self.bound > 0
             and self.peaks == int(self.peaks)
             and self.case.model
@@ -365,12 +367,12 @@ def assess_many(
     criteria = get_criteria(source)
     lower = np.array([criterion.lower for criterion in criteria])
     upper = np.array([criterion.upper for criterion in criteria])
-    inside = np.minimum(assessed - lower, upper - assessed)
-    surely, perhaps = ((inside >= sign * deviation).all(axis=1) for sign in (1, -1))
+    margins = np.minimum(assessed - lower, upper - assessed)
+    certain, possible = ((margins >= sign * deviation).all(axis=1) for sign in (1, -1))
     return {
-        "margin": inside[:, :bands].min(axis=1),
-        "conforms": (inside >= 0).all(axis=1),
-        "undecided": perhaps & ~surely,
+        "margin": margins[:, :bands].min(axis=1),
+        "conforms": (margins >= 0).all(axis=1),
+        "undecided": possible & ~certain,
     }
 
 

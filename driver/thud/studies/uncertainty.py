@@ -143,17 +143,19 @@ class UncertaintyKind(SampleKind[Uncertainty]):
     def new_result(self, study: SampleStudy, dataset: xr.Dataset) -> Uncertainty:
         """Return the distribution over all samples."""
         dataset = dataset.load()
-        good = dataset["status"].values == 0
-        if good.sum() < 2:  # noqa: PLR2004 - a spread needs two
+        computed = dataset["status"].values == 0
+        if computed.sum() < 2:  # noqa: PLR2004 - a spread needs two
             reason = next((f" ({text})" for text in dataset["reason"].values if text), "")
-            refuse(f"only {good.sum()} of {study.size} samples have results{reason}", "two or more")
+            refuse(
+                f"only {computed.sum()} of {study.size} samples have results{reason}", "two or more"
+            )
         return Uncertainty(
             dataset,
-            dataset[f"{study.case.levels.force}_level"].values[good],
+            dataset[f"{study.case.levels.force}_level"].values[computed],
             study.case.limits.source,
-            int(dataset["conforms"].values[good].sum()),
-            int(good.sum()),
-            int((~good).sum()),
+            int(dataset["conforms"].values[computed].sum()),
+            int(computed.sum()),
+            int((~computed).sum()),
         )
 
 
