@@ -227,8 +227,8 @@ def test_case_that_fails_is_named() -> None:
     ("value", "uncertainty", "scale", "decimals", "cell"),
     [
         (38.1, 0, 10.0, 2, "381.00"), (37.9, 0, 1.0, 1, "37.9 low"), (40.1, 1, 1.0, 1, "40.1 high"),
-        (38.0, 0.1, 1.0, 1, "38.0 open"), (40.0, 0.1, 1.0, 1, "40.0 open"),
-        (np.nan, 0, 1.0, 1, "not known"),
+        (38.0, 0.1, 1.0, 1, "38.0 undecided"), (40.0, 0.1, 1.0, 1, "40.0 undecided"),
+        (np.nan, 0, 1.0, 1, "unknown"),
     ],
 )  # fmt: skip
 def test_cell_tells_how_a_criterion_is_missed(

@@ -94,7 +94,7 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
 
 
 def _figures(answer: Bundle, options: argparse.Namespace) -> dict[str, bytes]:
-    """Return the figure files of a run, drawn from its results in memory."""
+    """Draw the figures of a run from its results in memory."""
     contents: dict[str, bytes] = {}
     if options.no_figures and not options.animation:
         return contents
@@ -231,7 +231,7 @@ def copy_examples(options: argparse.Namespace) -> int:
         target.parent.mkdir(parents=True, exist_ok=True)
         partial = own_path(target.with_name(f".{target.name}.part"))
         try:
-            # Installers compile the Python scripts among the inputs.
+            # Installers compile Python scripts.
             shutil.copytree(source, partial, ignore=shutil.ignore_patterns("__pycache__"))
             partial.rename(target)
         except shutil.Error as error:

@@ -64,7 +64,6 @@ def explore(options: argparse.Namespace) -> int:
 
 @contextmanager
 def _temporary_files_in(folder: Path) -> Iterator[None]:
-    """Put temporary files in a directory."""
     before = tempfile.tempdir
     tempfile.tempdir = str(folder)
     try:

@@ -63,7 +63,7 @@ class Comparison(Displayed, Page):
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings of all impacts, each preceded by the name of its impact."""
+        """Warnings of all impacts, each after the name of its impact."""
         return [f"{name}: {warning}" for name, i in self.impacts.items() for warning in i.warnings]
 
     def __repr__(self) -> str:
@@ -105,7 +105,6 @@ class Comparison(Displayed, Page):
 
 
 def _criterion_row(criteria: tuple[Criterion, ...]) -> tuple[str, ...]:
-    """Return the row of one criterion."""
     name = criteria[0].name
     band = name.removeprefix("octave_").replace("_", ".")
     level = Quantity(name, f"{band} Hz", "", "dB", "dB", 1.0, 2, "")
@@ -129,7 +128,7 @@ def _cell(criterion: Criterion, quantity: Quantity) -> str:
 
 
 def _quantity_rows(impacts: Iterable[ImpactResult]) -> list[tuple[str, ...]]:
-    """Return rows of the known quantities that are not shown in another row."""
+    """Return rows of the known quantities that have no other row."""
     other_rows = {"peak_force", "peak_elastic_force", *(name for name, *_ in LIMITS[SOURCES[0]])}
     rows = []
     for name in SAMPLE_QUANTITIES:
@@ -168,8 +167,8 @@ def compare(
     Parameters
     ----------
     impacts
-        Cases (which are solved), impacts and recordings: a mapping by names, or a list, whose
-        entries take the names of their cases.
+        Cases (which are solved), impacts and recordings: a mapping by names, or a list with the
+        names of the cases.
     force
         ``"floor"`` or ``"elastic"``; by default the assessed force of each case.
     source

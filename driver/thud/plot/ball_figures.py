@@ -56,7 +56,6 @@ def _draw_section(
 
 
 def _add_colorbar(figure: Figure, panels: Iterable[Axes], scale: Normalize, label: str) -> None:
-    """Add the color bar below the panels."""
     figure.colorbar(
         ScalarMappable(scale), ax=[*panels], location="bottom", shrink=0.7, aspect=30, pad=0.02,
         label=label,

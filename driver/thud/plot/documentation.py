@@ -56,13 +56,11 @@ def _solve_chipboard() -> FloorImpact:
 
 
 def _draw_heights() -> Figure:
-    """Draw the forces of drops from the three heights of the paper."""
     impacts = {f"{height:.2f} m": solve(drop=Drop(height)) for height in (0.1, 1, 1.6)}
     return force_history(impacts, "elastic")
 
 
 def _draw_viscosity() -> Figure:
-    """Draw the effect of the viscosity of the rubber on the force."""
     return force_history({"viscous": _solve_published(), "elastic": _solve_published("none")})
 
 
@@ -87,7 +85,6 @@ def _draw_models() -> Figure:
 
 
 def _draw_tires() -> Figure:
-    """Draw the tire as one mass and as belt and rim."""
     tire, drop = Ball(mass=7.3), Drop(0.85)
     impacts = {
         "one mass": solve(tire, drop, "hunt_crossley", contact_time=0.02, restitution=0.8),
@@ -97,7 +94,7 @@ def _draw_tires() -> Figure:
 
 
 def _draw_fluxes() -> Figure:
-    """Draw the levels for each interpretation of the flux term of the paper."""
+    """Draw the interpretations of the flux term of the paper."""
     choices: tuple[HollowSphereMomentumFlux, ...] = (
         "momentum_balance", "retarding", "conservative", "none",
     )  # fmt: skip
@@ -117,7 +114,6 @@ def _draw_families() -> Figure:
 
 
 def _draw_laws() -> Figure:
-    """Draw the loss factors of the damping laws."""
     laws = {
         f"Fractional, order {order:g}": FiniteElement(
             viscosity="fractional", fractional_order=order, loss_factor=loss
@@ -135,7 +131,7 @@ def _draw_laws() -> Figure:
 
 
 def _draw_compressions() -> Figure:
-    """Draw the compression of the paper's ball by each model, with one modulus, undamped."""
+    """Draw the paper's ball by each model, with one modulus, undamped."""
     ball = Ball(poisson_ratio=0.49)
     models: dict[str, ModelName] = {"shell": "hollow_sphere", "modal ball": "modal_ball"}
     curves = {name: compress(ball, model) for name, model in models.items()}
@@ -146,7 +142,6 @@ def _draw_compressions() -> Figure:
 
 
 def _draw_floors() -> Figure:
-    """Draw the mobilities of floors of the folder inputs/floors."""
     concrete = Plate(source_x=0.4, source_y=0.35)
     timber = replace(concrete, edges="absorption")
     return floor_mobilities(
@@ -172,7 +167,6 @@ def _draw_floors() -> Figure:
 
 
 def _draw_impedances() -> Figure:
-    """Draw the impedances of three models of the ball, and of floors up to concrete."""
     resistance = [560.0, 1e3, 2e3, 5e3, 1e5]
     sources = {
         "shell": ball_impedance(solve(), resistance),

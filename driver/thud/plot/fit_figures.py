@@ -234,7 +234,6 @@ def _add_ellipse(
 
 
 def _draw_correlation(fit: Fit) -> Figure:
-    """Draw the correlations of all parameters as a table of colors."""
     figure = new_figure(WIDTH)
     axes = figure.add_subplot()
     shown = np.ma.masked_invalid(fit.correlation)

@@ -220,7 +220,7 @@ def ball_impedances(
     frequency = np.array([])
     for i, (name, source) in enumerate(sources.items()):
         frequency = source.frequency
-        # Markers stand side by side: equal impedances stay distinguishable.
+        # Markers side by side: equal impedances stay visible.
         x = frequency * 1.05 ** (i - (len(sources) - 1) / 2)
         style = {"color": "black", "linestyle": "none", **marker_style(i)}
         suffix = f", {name}" if name else ""

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from thud.impact.impact import Impact
     from thud.plot.style import Curve
 
-# A contact ends where the force falls below this fraction of its maximum.
+# A contact ends below this fraction of the maximum force.
 CONTACT_THRESHOLD = 0.01
 # Drawn time before and after the contact, as a fraction of the contact time.
 MARGIN = 0.04
@@ -161,8 +161,7 @@ def draw_levels(
 def common_source(impacts: Mapping[str, Curve], source: LimitsSource | None = None) -> LimitsSource:
     """Return a source of limits, by default that of the cases and recordings.
 
-    A recording without a stated source takes that of the others. Raises InputError if sources
-    differ.
+    A recording without a stated source takes that of the others. Raises InputError if they differ.
     """
     if source is not None:
         return source

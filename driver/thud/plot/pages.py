@@ -115,7 +115,6 @@ def plot_layout(x: str, y: str, kind: str = "linear", scale: str = "linear") -> 
 
 
 def _row(cells: Sequence[str], tag: str) -> str:
-    """Return a row of the table."""
     return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
 
 
@@ -358,7 +357,7 @@ def _chain(prediction: RoomPrediction) -> tuple[NDArray[np.float64], ...]:
 
 
 def _draw_classes(axes: Axes, comparison: FloorComparison) -> None:
-    """Draw the single-number ratings, and the maximum levels of the Korean classes as lines."""
+    """Draw the ratings of floors, and the limits of the Korean classes."""
     x = np.arange(len(comparison.predictions))
     room = [prediction.octave_rating.a_weighted for prediction in comparison.predictions.values()]
     standardized = [

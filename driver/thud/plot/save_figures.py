@@ -84,7 +84,7 @@ def save_all(
     kind
         Format: ``"svg"``, ``"png"`` or ``"pdf"``.
     replace
-        Also replace files that were not written by thud.
+        Also replace files not written by thud.
 
     Raises
     ------

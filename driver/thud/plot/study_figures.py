@@ -101,10 +101,10 @@ def parameter_label(parameter: xr.DataArray) -> str:
     return humanize(str(parameter.name)).capitalize()
 
 
-# Maximum number of values of a parameter that are not grouped, and number of groups.
+# Maximum number of ungrouped values of a parameter, and number of groups.
 _MAX_VALUES = 32
 _CLASSES = 16
-# Maximum number of markers of a line; half as many in a panel of half the width.
+# Maximum number of markers of a line; half as many in half the width.
 _MAX_MARKS = 16
 # Maximum number of values of a text parameter that have a panel each.
 _MAX_PANELS = 6

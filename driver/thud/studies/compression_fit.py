@@ -215,7 +215,6 @@ def _work_ratio(curve: CompressionCurve, measured: Array, measured_force: Array)
 def _warnings(
     residuals: Array, relative_touch: float, bounds: tuple[list[float], list[float]]
 ) -> list[str]:
-    """Return the warnings of a fit."""
     result = []
     if min(relative_touch - bounds[0][1], bounds[1][1] - relative_touch) < 1e-6:  # noqa: PLR2004 - of the span
         result.append(

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 # Endings of the figures.
 FORMATS = (".svg",)
-# Maximum number of differences that are listed; the others are counted.
+# Maximum number of listed differences; others are counted.
 _MAX_SHOWN = 3
 
 
@@ -96,7 +96,7 @@ def require_version(
 
 
 def _changes(path: Path, identity_in: Callable[[Path], dict[str, str] | None], study: Study) -> str:
-    """Return how a study differs from that of saved results; raise if these are not results."""
+    """Return how a study differs from saved results; raise if these are not results."""
     if path.is_symlink():
         message = f"{path} is a link"
         raise ValueError(message)

@@ -74,7 +74,7 @@ def fit(  # noqa: PLR0913 - options of a search
         Names of keys of ball, drop or model with real values; a mapping states the start or a
         `Parameter` of each.
     case
-        The case with all other keys; by default the ball of the paper in the model of the paper.
+        All other keys; by default the ball of the paper in the model of the paper.
     confidence
         Confidence of the intervals.
     starts
@@ -88,7 +88,7 @@ def fit(  # noqa: PLR0913 - options of a search
         A surrogate, or the path of its file, that predicts the levels of the search instead of the
         model. Its errors add to the uncertainties of the target; the model computes the result.
     progress
-        Show how many impacts have been computed.
+        Show the number of computed impacts.
 
     Returns
     -------
@@ -123,7 +123,6 @@ def fit(  # noqa: PLR0913 - options of a search
 
 
 def _targets(target: Any) -> tuple[Target, ...]:  # noqa: ANN401 - checked here
-    """Return the targets of a call of `fit`."""
     if not isinstance(target, list):
         target = [target if isinstance(target, Target) else ForceTarget(target)]
     elif not target or not all(isinstance(entry, Target) for entry in target):
@@ -134,7 +133,6 @@ def _targets(target: Any) -> tuple[Target, ...]:  # noqa: ANN401 - checked here
 def _pairs(
     case: Case, targets: Sequence[Target], names: AbstractSet[str]
 ) -> list[tuple[Case, Misfit]]:
-    """Return the case and the misfit of each target."""
     result: list[tuple[Case, Misfit]] = []
     for number, target in enumerate(targets, start=1):
         label = "target" if len(targets) == 1 else f"target {number}"
@@ -167,7 +165,6 @@ def _search(
     *,
     progress: bool,
 ) -> Fit:
-    """Return the best fit by the model, or by a surrogate if there is one."""
     if surrogate is None:
         return search(pairs, ranges, options, progress=progress)
     pairs = _with_surrogate(pairs, surrogate, ranges)
@@ -200,7 +197,7 @@ class FitStudy(Study):
     surrogate: Surrogate | None = None
 
     def own_identity(self) -> dict[str, str]:
-        """Return tables and data of the targets, and the options of the search."""
+        """Return the settings of targets and search."""
         tables = self.tables["target"]
         tables = tables if isinstance(tables, list) else [tables]
         result: dict[str, str] = {}

@@ -43,7 +43,7 @@ class RunOptions(TypedDict, total=False):
     progress : bool
         Show a progress bar.
     replace : bool
-        Replace results of another version of the study, and files that were not written by thud.
+        Replace results of another version of the study, and files not written by thud.
     surrogate : Surrogate or str or None
         Surrogate, or the path of its file, that predicts the samples instead of the model.
     """

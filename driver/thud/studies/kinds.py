@@ -20,7 +20,7 @@ class KindInfo(NamedTuple):
     has_samples: bool = True
 
 
-# A name is that of the command, the function, and the module with the `Kind` as ``KIND``.
+# A key names the command, the function, and the module with the `Kind` as ``KIND``.
 KINDS = {
     "sweep": KindInfo("drops over a grid, a list or a random design of parameters"),
     "sensitivity": KindInfo("Sobol indices: how much each parameter affects each result"),

@@ -34,8 +34,7 @@ if TYPE_CHECKING:
 
 # Maximum number of values of a parameter, or of base samples, for memory.
 MAX_VALUES = 2**30
-# Keys in the table of a varying parameter, by its form, and of a fitted one; `unit` is always
-# allowed.
+# Table keys of a varying parameter, by its form, and of a fitted one, besides `unit`.
 FORMS = {"values": ("values",), "low": ("low", "high", "count", "scale"), "std": ("mean", "std")}
 FITTED = ("start", "low", "high")
 NUMBERS = ("real", "whole", "list")
@@ -127,7 +126,7 @@ class Parameter(Plain):
         return np.unique(np.rint(values).astype(int)) if self.key.kind == "whole" else values
 
     def quantile(self, fraction: NDArray[np.float64]) -> NDArray[np.generic]:
-        """Return quantiles: values below which the stated fractions of all values lie."""
+        """Return the values below which fractions of all values lie."""
         if self.values is not None:
             return np.take(self.grid(), (fraction * len(self.values)).astype(int))
         if self.std is not None and self.mean is not None:

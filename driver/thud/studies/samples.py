@@ -65,7 +65,7 @@ class SampleStudy(Study):
     counts_peaks: ClassVar[bool] = False
 
     def own_identity(self) -> dict[str, str]:
-        """Return the settings that only samples have: design, temperature law, surrogate."""
+        """Return the settings of design, temperature and surrogate."""
         result = sampler_versions(self.design) | {"[design] kind": self.design}
         if self.size:
             result |= {"[design] size": f"{self.size}", "[design] seed": f"{self.seed}"}

@@ -37,9 +37,9 @@ class Temperature:
     reference : float
         Temperature at which the keys of the case hold, degC.
     coefficient : float or None
-        Temperature coefficient of the modulus, 1/K.
+        Coefficient of the modulus, 1/K.
     c1, c2 : float or None
-        Constants of the shift of the frequency, 1 and K.
+        Constants of the shift, 1 and K.
     """
 
     reference: float
@@ -89,7 +89,6 @@ class Temperature:
 
 
 def _loss_law(case: Case) -> str:
-    """Return the damping law of a case."""
     options = vars(case.model)
     return next((options[key] for key in _LAW_KEYS if key in options), "none")
 

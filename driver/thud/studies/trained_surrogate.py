@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 COVERAGE = 0.95
 # Samples that are computed together: their kernel stays in the cache.
 _CHUNK = 250
-# Values outside the region by up to this fraction of its width are rounding errors.
+# Values this fraction of the width outside the region are rounding errors.
 _ROUNDING = 1e-9
 # Smoothness of the Matern kernel: functions that are twice differentiable.
 SMOOTHNESS = 2.5
@@ -349,7 +349,7 @@ class Surrogate(StudyResult):
         return file.getvalue()
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the surrogate atomically to a file ``.npz``, which `read_surrogate` reads."""
+        """Write the file ``.npz`` that `read_surrogate` reads, atomically."""
         replace_file(path, self.to_bytes())
 
 
