@@ -1,4 +1,5 @@
-!> Warnings on possible but implausible cases: balls unlike rubber, moduli of another model, forces of no real source.
+!> Warnings on cases that are allowed but implausible: a ball unlike rubber, a modulus of elasticity that belongs to another
+!> model, a force that no real source has.
 module thud_warnings
    use thud_ball, only: get_density
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
@@ -33,7 +34,7 @@ module thud_warnings
    real(wp), parameter :: same_modulus = 0.02_wp
 
    !> Levels over all frequencies of a conforming ball and a conforming tyre, dB re 1 N and 1 s: [2]. They are 4.4 dB above
-   !> the sums of the nominal octave levels, as for the flagship case and for a half sine of 20 ms.
+   !> the sums of the nominal octave levels, as for the standard ball and for a half sine of 20 ms.
    real(wp), parameter :: source_level(2) = [44.0_wp, 52.0_wp]
 
    !> Distance from `source_level` beyond which the units of the input are probably wrong, dB.

@@ -124,7 +124,8 @@ contains
       end do
    end function get_modes_table
 
-   !> Table of the quasi-static compression for the screen: last point, and secant stiffness at the last and first point.
+   !> Table of the quasi-static compression for the screen: last point, secant stiffness there and at the first deflection
+   !> above 0.
    function get_compression_table(compression) result(text)
       type(compression_type), intent(in) :: compression
       character(len=:), allocatable :: text
