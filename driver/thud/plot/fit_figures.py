@@ -36,7 +36,7 @@ MAX_UPRIGHT = 5
 # Line breaks in names that are too long for the axis.
 WRAPPED_NAMES = {"contact time": "contact\ntime", "restitution": "resti-\ntution"}
 # Median difference, relative to the maximum force, above which the unfiltered record is drawn too.
-VISIBLE = 0.003
+MIN_DIFFERENCE = 0.003
 # Drawn time before and after the contact, as fractions of the contact time.
 BEFORE, AFTER = 0.15, 0.4
 
@@ -76,7 +76,7 @@ def _draw_force(fitted: FittedTarget, deviation: float, above: Axes, below: Axes
     time = 1e3 * column["time_s"]
     record, target = column["record_N"], column["target_N"]
     band = f"below {misfit.below / 1e3:.3g} kHz"
-    if np.median(np.abs(record - target)) > VISIBLE * target.max():
+    if np.median(np.abs(record - target)) > MIN_DIFFERENCE * target.max():
         above.plot(time, record / 1e3, color="0.6", linewidth=0.5, label="Record")
     above.plot(
         time, target / 1e3, color=COLORS[5], linewidth=2.8, alpha=0.6, label=f"Record {band}"

@@ -182,10 +182,10 @@ document.getElementById("plot0").on("plotly_restyle", ([change, curves]) => {
 
 
 # Maximum number of characters of a name in one line of a table.
-_COLUMN = 20
+_MAX_NAME_LENGTH = 20
 # Space around the text of a cell, and to the left of all axes, inch.
 _CELL_MARGIN = (0.12, 0.08)
-_AXIS = 0.8
+_LEFT_MARGIN = 0.8
 
 
 @own_style()
@@ -209,7 +209,7 @@ def comparison_page(
     octaves.set_ylabel(level_label(impacts, force))
     legend_above(octaves)
     head, *body = table
-    _add_table(figure, grid, [[fill(name, _COLUMN) for name in head], *body])
+    _add_table(figure, grid, [[fill(name, _MAX_NAME_LENGTH) for name in head], *body])
     return figure
 
 
@@ -230,7 +230,7 @@ def _add_table(figure: Figure, grid: GridSpec, rows: Sequence[Sequence[str]]) ->
         cell.set_text_props(ha="right" if column else "left")
     upper_height, upper_rows = figure.get_figheight(), grid.nrows - 1
     grid.set_height_ratios([*([upper_height / upper_rows] * upper_rows), heights.sum()])
-    width = widths.sum() + _AXIS
+    width = widths.sum() + _LEFT_MARGIN
     figure.set_size_inches(max(figure.get_figwidth(), width), upper_height + heights.sum())
 
 
@@ -304,7 +304,7 @@ def draw_floors(comparison: FloorComparison) -> Figure:
     grid = figure.add_gridspec(4, 2)
     panels = [figure.add_subplot(grid[i, j]) for i in range(2) for j in range(2)]
     for i, (name, prediction) in enumerate(comparison.predictions.items()):
-        for axes, values in zip(panels, _chain(prediction), strict=True):
+        for axes, values in zip(panels, _step_values(prediction), strict=True):
             axes.plot(
                 np.arange(len(values)), values, label=escape_label(name), **line_style(i),
                 **marker_style(i, 3.5),
@@ -327,7 +327,7 @@ def floors_html(comparison: FloorComparison) -> str:
     for i, (name, prediction) in enumerate(comparison.predictions.items()):
         style = curve_style(i, name)
         names = [f"{frequency:g}" for frequency in prediction.frequency]
-        for step, values in zip(traces, _chain(prediction), strict=True):
+        for step, values in zip(traces, _step_values(prediction), strict=True):
             points = curve_points(names, values)
             step.append(
                 {**style, "mode": "lines+markers", **points, "showlegend": step is traces[-1]}
@@ -350,7 +350,7 @@ def floors_html(comparison: FloorComparison) -> str:
     return html_page("Comparison of floors", text, comparison.rows(), [plots[-1], *plots[:-1]])
 
 
-def _chain(prediction: RoomPrediction) -> tuple[NDArray[np.float64], ...]:
+def _step_values(prediction: RoomPrediction) -> tuple[NDArray[np.float64], ...]:
     """Return the values of each step of a prediction."""
     force = 10 * np.log10(prediction.energy / prediction.conductance)
     return force, prediction.energy, 100 * prediction.radiated_share, prediction.level

@@ -55,9 +55,9 @@ AxisName = Literal["x", "y"]
 # Hatches of bars, which distinguish colors in print.
 HATCHES = (None, "//////", "......", "\\\\\\\\\\\\", "xxxxxx", "------", "||||||", "++++++")
 # Range of numbers that are shown in the unit of the key; others have a display unit.
-_PLAIN = (1e-2, 1e4)
+_PLAIN_RANGE = (1e-2, 1e4)
 # Ratios of maximum to minimum from which logarithmic ticks are 1, 2, 5, or powers of ten only.
-_HALF_DECADE, _DECADES = 5.0, 200.0
+_MIN_STEP_RATIO, _MIN_DECADE_RATIO = 5.0, 200.0
 
 
 def show_parameter(axes: Axes, which: AxisName, parameter: xr.DataArray) -> float:
@@ -68,7 +68,7 @@ def show_parameter(axes: Axes, which: AxisName, parameter: xr.DataArray) -> floa
     unit, factor = parameter.attrs["shown_unit"], 10.0 ** int(parameter.attrs["shown_exponent"])
     values = parameter.values
     maximum = float(np.abs(values).max())
-    if unit == parameter.attrs["units"] and not _PLAIN[0] <= maximum < _PLAIN[1]:
+    if unit == parameter.attrs["units"] and not _PLAIN_RANGE[0] <= maximum < _PLAIN_RANGE[1]:
         unit, size = display_unit(unit, maximum)
         factor = 1 / size
     shown = unit.replace("degC", "°C")
@@ -86,11 +86,11 @@ def show_parameter(axes: Axes, which: AxisName, parameter: xr.DataArray) -> floa
 def _mark_decades(axis: Axis, values: NDArray[np.float64]) -> None:
     """Give a logarithmic axis ticks with plain numbers."""
     ratio = values.max() / values.min()
-    if ratio < _HALF_DECADE:
+    if ratio < _MIN_STEP_RATIO:
         axis.set_major_locator(MaxNLocator(5))
     else:
         axis.set_major_locator(
-            LogLocator(subs=(1, 2, 5) if ratio < _DECADES else (1,), numticks=12)
+            LogLocator(subs=(1, 2, 5) if ratio < _MIN_DECADE_RATIO else (1,), numticks=12)
         )
     axis.set_major_formatter(FormatStrFormatter("%g"))
     axis.set_minor_formatter(NullFormatter())
@@ -103,16 +103,16 @@ def parameter_label(parameter: xr.DataArray) -> str:
 
 # Maximum number of ungrouped values of a parameter, and number of groups.
 _MAX_VALUES = 32
-_CLASSES = 16
+_GROUP_COUNT = 16
 # Maximum number of markers of a line; half as many in half the width.
-_MAX_MARKS = 16
+_MAX_MARKERS = 16
 # Maximum number of values of a text parameter that have a panel each.
 _MAX_PANELS = 6
 # Smallest range of levels that is drawn, dB.
-_TINY = 0.05
+_MIN_RANGE = 0.05
 
 
-class _Excess(NamedTuple):
+class _RelativeLevels(NamedTuple):
     """Levels minus nominal levels of each sample, minimum and maximum tolerance, dB."""
 
     level: NDArray[np.float64]
@@ -134,7 +134,7 @@ def draw_sweep(result: Sweep) -> Figure:
     name = (numeric or varied or list(columns))[0]
     texts = [n for n in varied if n not in numeric and n != name]
     panel_parameter = next((n for n in texts if len(np.unique(columns[n])) <= _MAX_PANELS), None)
-    excess = _excess(dataset, columns)
+    relative = _get_relative_levels(dataset, columns)
     masks = {"": np.ones(len(columns[name]), dtype=bool)}
     if panel_parameter:
         masks = {
@@ -148,9 +148,9 @@ def draw_sweep(result: Sweep) -> Figure:
         row_count, column_count, sharex=True, sharey=True, squeeze=False
     ).ravel()
     for i, (axes, (title, mask)) in enumerate(zip(panels, masks.items(), strict=False)):
-        _draw_tolerance(axes, excess.tolerance)
-        levels = np.where(mask[:, np.newaxis], excess.level, np.nan)
-        _draw_octaves(axes, dataset[name], columns[name], levels, _MAX_MARKS // column_count)
+        _draw_tolerance(axes, relative.tolerance)
+        levels = np.where(mask[:, np.newaxis], relative.level, np.nan)
+        _draw_octaves(axes, dataset[name], columns[name], levels, _MAX_MARKERS // column_count)
         axes.set_title(title.replace("_", " "))
         lowest = i + column_count >= len(masks)
         axes.tick_params(axis="x", labelbottom=lowest)
@@ -160,7 +160,7 @@ def draw_sweep(result: Sweep) -> Figure:
     force = "assessed force" if "force" in columns else FORCE_NAMES[dataset.attrs["assessed_force"]]
     figure.supylabel(f"Level − nominal, dB\n({force})")
     others = [n for n in varied if n not in {name, panel_parameter}]
-    legend_above(panels[0], title=_meaning(excess, panel_parameter, others))
+    legend_above(panels[0], title=_get_explanation(relative, panel_parameter, others))
     return figure
 
 
@@ -171,7 +171,7 @@ def _columns(dataset: xr.Dataset) -> Columns:
     return {name: dataset[name].broadcast_like(whole).values.ravel() for name in names}
 
 
-def _excess(dataset: xr.Dataset, columns: Columns) -> _Excess:
+def _get_relative_levels(dataset: xr.Dataset, columns: Columns) -> _RelativeLevels:
     """Return the levels of the assessed force relative to the nominal levels of the source."""
     levels = {
         force: dataset[f"{force}_level"].values.reshape(-1, len(dataset["octave"]))
@@ -186,7 +186,7 @@ def _excess(dataset: xr.Dataset, columns: Columns) -> _Excess:
         lower, upper = octave_limits(source)
         level[sources == source] -= (lower + upper) / 2
         tolerances.extend((upper - lower) / 2)
-    return _Excess(level, (min(tolerances), max(tolerances)))
+    return _RelativeLevels(level, (min(tolerances), max(tolerances)))
 
 
 def _draw_tolerance(axes: Axes, tolerance: tuple[float, float]) -> None:
@@ -201,10 +201,10 @@ def _draw_octaves(
     parameter: xr.DataArray,
     values: NDArray[Any],
     levels: NDArray[np.float64],
-    max_marks: int,
+    max_markers: int,
 ) -> None:
     """Draw the octave levels of samples against a parameter, without levels that are NaN."""
-    positions, members, names = _classes(values)
+    positions, members, names = _group_values(values)
     if names is None:
         positions = positions * show_parameter(axes, "x", parameter)
     else:
@@ -217,13 +217,13 @@ def _draw_octaves(
             np.array([_of_finite(group, f) for group in groups])
             for f in (np.median, np.min, np.max)
         )
-        marks = marker_style(i, 3) if len(positions) <= max_marks else {}
+        marks = marker_style(i, 3) if len(positions) <= max_markers else {}
         axes.plot(positions, middle, label=f"{band:g} Hz", **line_style(i), **marks)
-        if np.nanmax(upper - lower, initial=0) > _TINY:
+        if np.nanmax(upper - lower, initial=0) > _MIN_RANGE:
             axes.fill_between(positions, lower, upper, color=COLORS[i], alpha=0.15, linewidth=0)
 
 
-def _classes(
+def _group_values(
     values: NDArray[Any],
 ) -> tuple[NDArray[np.float64], list[NDArray[np.bool_]], list[str] | None]:
     """Return positions on an axis, the samples at each, and labels if the values are texts."""
@@ -233,9 +233,9 @@ def _classes(
         return np.arange(len(distinct), dtype=float), members, [str(value) for value in distinct]
     if len(distinct) <= _MAX_VALUES:
         return distinct.astype(float), [values == value for value in distinct], None
-    edges = np.quantile(values, np.linspace(0, 1, _CLASSES + 1))
-    position = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _CLASSES - 1)
-    members = [position == i for i in range(_CLASSES) if (position == i).any()]
+    edges = np.quantile(values, np.linspace(0, 1, _GROUP_COUNT + 1))
+    position = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _GROUP_COUNT - 1)
+    members = [position == i for i in range(_GROUP_COUNT) if (position == i).any()]
     return np.array([np.median(values[chosen]) for chosen in members]), members, None
 
 
@@ -245,9 +245,11 @@ def _of_finite(values: NDArray[np.float64], function: Any) -> float:  # noqa: AN
     return float(function(finite)) if finite.size else np.nan
 
 
-def _meaning(excess: _Excess, panel_parameter: str | None, others: list[str]) -> str:
+def _get_explanation(
+    relative: _RelativeLevels, panel_parameter: str | None, others: list[str]
+) -> str:
     """Return the explanation of panels, lines, shades and gray areas."""
-    minimum, maximum = excess.tolerance
+    minimum, maximum = relative.tolerance
     lines = [f"Gray: tolerances of the octaves, ±{minimum:g} to ±{maximum:g} dB"]
     if others:
         over = humanize(others[0]) if len(others) == 1 else f"{len(others)} other parameters"
@@ -330,8 +332,8 @@ def _draw_margin(
     """Draw the margin as colors, white at 0, with lines at 0 and at round values."""
     lower, upper = min(float(margin.min()), 0.0), max(float(margin.max()), 0.0)
     # On the smaller side, usually that of conforming samples, colors change up to 4 times faster.
-    norm = TwoSlopeNorm(0, min(lower, -upper / 4, -_TINY), max(upper, -lower / 4, _TINY))
-    steps = np.asarray(MaxNLocator(7).tick_values(lower, max(upper, lower + _TINY)))
+    norm = TwoSlopeNorm(0, min(lower, -upper / 4, -_MIN_RANGE), max(upper, -lower / 4, _MIN_RANGE))
+    steps = np.asarray(MaxNLocator(7).tick_values(lower, max(upper, lower + _MIN_RANGE)))
     # Five colors from one line to the next.
     fine = np.linspace(steps[0], steps[-1], 5 * (len(steps) - 1) + 1)
     filled = axes.contourf(*position, margin, levels=fine, cmap="PuOr", norm=norm)

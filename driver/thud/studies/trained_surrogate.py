@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 # Fraction of held-out drops within the stated error, and the confidence of that statement.
 COVERAGE = 0.95
 # Samples that are computed together: their kernel stays in the cache.
-_CHUNK = 250
+_CHUNK_SIZE = 250
 # Values this fraction of the width outside the region are rounding errors.
 _ROUNDING = 1e-9
 # Smoothness of the Matern kernel: functions that are twice differentiable.
@@ -246,8 +246,8 @@ class Surrogate(StudyResult):
         points = (values - low) / np.where(width > 0, width, 1.0)
         kernel = Matern(self.length, nu=SMOOTHNESS)
         numbers = np.empty((count, len(self.mean)))
-        for start in range(0, count, _CHUNK):
-            chunk = slice(start, start + _CHUNK)
+        for start in range(0, count, _CHUNK_SIZE):
+            chunk = slice(start, start + _CHUNK_SIZE)
             numbers[chunk] = kernel(points[chunk], self.points) @ self.weights
         numbers = numbers * self.scale + self.mean
         numbers[:, ~(self.errors <= self.bound)] = np.nan
