@@ -92,7 +92,7 @@ contains
 
       associate (model => case%models(get_model_number(case))%model)
          limits = [get_rate_limit(case%sampling), model%get_validity_limits(case%ball, case%drop, case%sampling, history), &
-            validity_limit_type('model', 'restitution less 1', history%restitution - 1, highest=restitution_error, &
+            validity_limit_type('model', 'restitution minus 1', history%restitution - 1, highest=restitution_error, &
             reason='it gives energy to the source'), &
             validity_limit_type('floor', 'restitution', history%restitution, lowest=-restitution_error, &
             reason='the source goes on downwards with a floor too light for it')]
@@ -125,7 +125,7 @@ contains
       if (allocated(error)) return
       first = findloc(levels < total - max_decline, .true., dim=1)
       if (first > 0) call add(warnings, 'octaves from '//trim(get_band_name(bands(first))) &
-         //' Hz on hold less than 1e-12 of the energy of the force: rounding counts in their levels')
+         //' Hz on hold less than 1e-12 of the energy of the force: rounding errors affect their levels')
    end subroutine add_level_warnings
 
    !> Adds warnings on octaves of the standard in which the floor model is not valid.

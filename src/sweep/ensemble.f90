@@ -5,7 +5,7 @@
 !> own column in arrays of fixed shape or, for levels of a long contact, from its own record.
 module thud_ensemble
    use thud_band, only: band_type, get_octaves, octave_count
-   use thud_band_projection, only: band_projection_type, get_band_energies, get_class_window, get_window_class, &
+   use thud_band_projection, only: band_projection_type, get_band_energies, get_window_length, get_window_index, &
       is_projected, new_band_projection
    use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
    use thud_cache_line, only: get_aligned_start, line_length
@@ -67,7 +67,7 @@ contains
       allocate (projections%bands(octave_count + size(bands)))
       projections%bands(:octave_count) = get_octaves()
       projections%bands(octave_count + 1:) = bands
-      allocate (projections%window(get_window_class(n_time)))
+      allocate (projections%window(get_window_index(n_time)))
    end function new_projections
 
    !> Whether two sets of matrices are interchangeable: same rate, bands and longest window.
@@ -133,7 +133,7 @@ contains
          type(workspace_type) :: workspace
          integer :: block
 
-         call set_workspace(workspace, sampling, limits, get_class_window(size(projections%window)))
+         call set_workspace(workspace, sampling, limits, get_window_length(size(projections%window)))
          !$omp do schedule(dynamic)
          do block = 1, size(first) - 1
             call check_interrupt(workspace%error)
@@ -222,13 +222,13 @@ contains
       window_index = 0
       do i = 1, size(samples)
          if (.not. outcomes(i)%computed) cycle
-         window_index(i) = get_window_class(min(int(outcomes(i)%contact_time*sampling%sample_rate) + 1, size(force, 2)))
+         window_index(i) = get_window_index(min(int(outcomes(i)%contact_time*sampling%sample_rate) + 1, size(force, 2)))
       end do
-      force(:, n_written + 1:get_class_window(max(1, maxval(window_index)))) = 0.0_wp
+      force(:, n_written + 1:get_window_length(max(1, maxval(window_index)))) = 0.0_wp
       ! Each sample has its own window, so that its levels do not depend on the other samples of the block.
       do window = minval(window_index, mask=window_index > 0), maxval(window_index)
          if (.not. any(window_index == window)) cycle
-         if (is_projected(get_class_window(window), projections%sample_rate, projections%bands)) then
+         if (is_projected(get_window_length(window), projections%sample_rate, projections%bands)) then
             call project(workspace, force, window, window_index == window, projections, levels)
          else
             call get_levels_one_by_one(workspace, force, window, window_index == window, projections, levels)
@@ -286,7 +286,7 @@ contains
       do i = 1, size(chosen)
          if (.not. chosen(i)) cycle
          do j = 1, force_count
-            call get_force_exposure_levels(force(i + (j - 1)*block_size, :get_class_window(window)), &
+            call get_force_exposure_levels(force(i + (j - 1)*block_size, :get_window_length(window)), &
                projections%sample_rate, projections%bands, 'exact', levels(:, j, i), workspace%error)
             if (allocated(workspace%error)) return
          end do
@@ -316,11 +316,11 @@ contains
 
       !$omp critical (thud_projections)
       failed = .false.
-      if (projections%window(window)%n_sample == 0) call new_band_projection(get_class_window(window), &
+      if (projections%window(window)%n_sample == 0) call new_band_projection(get_window_length(window), &
          projections%sample_rate, projections%bands, projections%window(window), failed)
       !$omp end critical (thud_projections)
       if (failed) error = numerical_error('&sampling: sample_rate: the matrices of the levels for ' &
-         //to_text(get_class_window(window))//' samples cannot be made; allowed: other rates')
+         //to_text(get_window_length(window))//' samples cannot be made; allowed: other rates')
    end subroutine require_window
 
    !> Whether a sample meets all criteria. Peaks are counted last, as this takes longer than all other criteria.

@@ -131,7 +131,7 @@ contains
       character(len=:), allocatable :: text
 
       associate (deflection => compression%deflection, force => compression%force, n => size(compression%force))
-         text = '  slow compression between plates'//newline &
+         text = '  quasi-static compression between plates'//newline &
             //row('peak deflection', 1.0e3_wp*deflection(n), 2, 'mm') &
             //row('force there', force(n), 1, 'N') &
             //row('secant stiffness', force(n)/deflection(n)/1.0e3_wp, 2, 'kN/m') &
