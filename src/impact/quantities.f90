@@ -59,7 +59,7 @@ module thud_quantities
       'relative residual of the momentum balance', of_impact), &
       quantity_type('energy_residual', 'energy residual', '', '', '', 1.0_wp, 6, &
       'relative residual of the energy balance', of_impact), &
-      quantity_type('peak_count', 'peaks of the force', '', '', '', 1.0_wp, 0, &
+      quantity_type('peak_count', 'number of force peaks', '', '', '', 1.0_wp, 0, &
       'number of peaks of the assessed force', of_others), &
       quantity_type('mass', 'mass', 'M', 'kg', 'kg', 1.0_wp, 3, 'mass of the source', of_others), &
       quantity_type('drop_height', 'drop height', 'h', 'm', 'm', 1.0_wp, 3, 'drop height', of_others), &

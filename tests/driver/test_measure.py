@@ -50,7 +50,7 @@ def test_examples_are_measured_as_they_were_made(
     monkeypatch.chdir(tmp_path)
     files = [str(FOLDER / drop["file"]) for drop in DROPS]
     config = str(FOLDER / "lab.toml")
-    monkeypatch.setattr("thud.cli.recording_commands.SHOWN", 2)
+    monkeypatch.setattr("thud.cli.recording_commands.MAX_PRINTED", 2)
     # The ball of finite elements with its default law lies 0.3 dB below the limit at 500 Hz.
     assert cli.main(["measure", *files, "--config", config, "--check", "-o", "out"]) == 3
     shown = capsys.readouterr().out

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud.base.display import left_out
+from thud.base.display import warn_if_not_drawn
 from thud.base.errors import NumericalError, ThudError
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output, print_notes
 from thud.studies.directory import open_results
@@ -28,7 +28,11 @@ _SAMPLES = (
         help="how samples are computed; the results are the same (default: threads)",
     ),
     argument("--workers", type=int, metavar="N", help="threads or processes"),
-    argument("--scheduler", metavar="ADDRESS", help="of Dask, tcp://host:8786"),
+    argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="address of a Dask scheduler, such as tcp://host:8786",
+    ),
 )
 
 
@@ -85,7 +89,7 @@ def run_study(options: argparse.Namespace) -> int:
         print_notes(f"{options.study}: {text}" for text in (*result.warnings, *result.notes))
         contents = kind.files(result, study)
         if drawn:
-            with left_out("the figure of the study"):
+            with warn_if_not_drawn("the figure of the study"):
                 from thud.plot import figure_files
 
                 contents |= figure_files(result.figures(study.name))

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from thud.base.checks import require_choice, shown
-from thud.base.display import draw_all, left_out
+from thud.base.display import draw_all, warn_if_not_drawn
 from thud.base.errors import InputError
 from thud.base.files import Results, replace_file
 from thud.plot.style import own_style
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-# The first, the default, is the smallest and the fastest to write.
+# The first is the default: the smallest, and the fastest to write.
 FORMATS = ("svg", "png", "pdf")
 
 
 def save(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Save a figure atomically, in the format of the ending of its path.
+    """Save a figure atomically, in the format that the ending of the path names.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def figure_files(figures: Mapping[str, Figure], kind: str = FORMATS[0]) -> dict[
     """Return the contents of figures by file name; warn of those that cannot be drawn."""
     contents = {}
     for name, figure in figures.items():
-        with left_out(f"{name}.{kind}"):
+        with warn_if_not_drawn(f"{name}.{kind}"):
             contents[f"{name}.{kind}"] = _content(figure, name, kind)
     return contents
 
@@ -84,7 +84,7 @@ def save_all(
     kind
         Format: ``"svg"``, ``"png"`` or ``"pdf"``.
     replace
-        Replace also files that thud has not written.
+        Also replace files not written by thud.
 
     Raises
     ------

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.ticker import MultipleLocator
 
-from thud.plot.style import COLORS, GREY, WIDTH, legend_above, new_figure, own_style
+from thud.plot.style import COLORS, GRAY, WIDTH, legend_above, new_figure, own_style
 from thud.report.rows import NOT_KNOWN, limits_of, style_of
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def _draw_criterion(
     span = history.dates[-1] - history.dates[0] + MIN_MARGIN
     edges = np.array([history.dates[0] - span, *history.dates, history.dates[-1] + span])
     lower, upper = np.pad(bounds, ((1, 1), (0, 0)), "edge").T
-    axes.fill_between(edges, lower, upper, step="mid", color=GREY, linewidth=0)
+    axes.fill_between(edges, lower, upper, step="mid", color=GRAY, linewidth=0)
     for date, entry in zip(history.dates, entries, strict=True):
         if entry["value"] is None:
             continue
@@ -89,7 +89,7 @@ def _draw_criterion(
 
 
 def _add_legend(axes: Axes, trends: list[Trend | None]) -> None:
-    axes.fill_between([], [], color=GREY, linewidth=0, label="allowed")
+    axes.fill_between([], [], color=GRAY, linewidth=0, label="allowed")
     for verdict, (marker, color) in MARKS.items():
         axes.errorbar(
             [], [], yerr=[], label=verdict, marker=marker, markersize=4.5, markerfacecolor=color,
