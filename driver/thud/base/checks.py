@@ -35,7 +35,7 @@ def refuse_value(name: str, value: object, allowed: str) -> NoReturn:
 
 
 def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
-    """Raise InputError where an argument is of another type."""
+    """Raise InputError if an argument is of another type."""
     if not isinstance(value, kind):
         expected = getattr(kind, "__name__", None) or " or ".join(
             k.__name__ for k in get_args(kind)
@@ -44,14 +44,14 @@ def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
 
 
 def require_choice(name: str, value: object, allowed: Collection[str]) -> None:
-    """Raise InputError where a word is not one of several."""
+    """Raise InputError if a word is not one of several."""
     if not isinstance(value, str) or value not in allowed:
         unknown = f"{name} = {shown(value)} is not known{suggestion(value, allowed)}"
         refuse(unknown, ", ".join(map(repr, allowed)))
 
 
 def require_mapping(name: str, value: object, entries: str) -> None:
-    """Raise InputError where an argument is not a mapping of names to one or more entries."""
+    """Raise InputError if an argument is not a mapping of names to one or more entries."""
     if not isinstance(value, Mapping) or not value:
         refuse(f"{name} are not stated", f"a mapping of names to one or more {entries}")
 
@@ -72,7 +72,7 @@ def suggestion(word: object, known: Collection[str]) -> str:
 
 
 def require_array(name: str, values: ArrayLike, dimensions: Container[int]) -> NDArray[Any]:
-    """Return an array; raise InputError where it is ragged, masked or of other dimensions."""
+    """Return an array; raise InputError if it is ragged, masked or of other dimensions."""
     allowed = "one dimension" + (", or a scalar" if 0 in dimensions else "")
     try:
         array = np.asarray(values)
@@ -86,7 +86,7 @@ def require_array(name: str, values: ArrayLike, dimensions: Container[int]) -> N
 
 
 def require_real(name: str, array: NDArray[Any], kinds: str = "iuf") -> NDArray[np.float64]:
-    """Return an array as float64; raise InputError where it is not of real numbers."""
+    """Return an array as float64; raise InputError if it is not of real numbers."""
     if array.size and array.dtype.kind not in kinds:
         refuse(f"{name} is not an array of real numbers", "one dimension of them")
     return np.ascontiguousarray(array, dtype=np.float64)
@@ -101,14 +101,14 @@ def require_pair(name: str, values: ArrayLike) -> tuple[float, float]:
 
 
 def require_whole(name: str, value: Any, low: int, high: int) -> None:  # noqa: ANN401
-    """Raise InputError where a value is not a whole number from low to high."""
+    """Raise InputError if a value is not a whole number from low to high."""
     is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not is_whole or not low <= value <= high:
         refuse_value(name, value, f"whole numbers from {low} to {high}")
 
 
 def require_number(name: str, value: Any) -> None:  # noqa: ANN401 - of a user
-    """Raise InputError where a value is not a finite number."""
+    """Raise InputError if a value is not a finite number."""
     kinds = int | float | np.integer | np.floating
     valid = isinstance(value, kinds) and not isinstance(value, bool)
     if not valid or not -LARGEST <= (value if isinstance(value, int) else float(value)) <= LARGEST:

@@ -22,7 +22,7 @@ _DISTRIBUTIONS = {"sklearn": "scikit-learn"}
 
 @contextmanager
 def require_extra(extra: str) -> Iterator[None]:
-    """Raise InputError where a package is missing, with the packages of an extra."""
+    """Raise InputError if a package is missing, with the packages of an extra."""
     try:
         yield
     except ModuleNotFoundError as error:

@@ -94,9 +94,9 @@ class Page(ABC):
         Raises
         ------
         InputError
-            Where a file is in the way.
+            If a file is in the way.
         OSError
-            Where they cannot be written.
+            If they cannot be written.
         """
         return Results(Path(directory), self._command, replace=replace).write(self.files())
 
@@ -159,9 +159,9 @@ class Results:
         Raises
         ------
         InputError
-            Where a file is in the way, or another run has replaced the results of the case.
+            If a file is in the way, or another run has replaced the results of the case.
         OSError
-            Where a file cannot be written.
+            If a file cannot be written.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         with nullcontext() if self.is_locked else locked(self.folder):
@@ -207,7 +207,7 @@ class Results:
             return {}
 
     def require_no_input(self, path: Path) -> None:
-        """Raise InputError where a path is an input."""
+        """Raise InputError if a path is an input."""
         if is_one_of(path, self.inputs):
             refuse(f"{path} is an input, which is never replaced", "another directory")
 
@@ -262,7 +262,7 @@ def is_failure(error: BaseException) -> bool:
 
 
 def read_input(path: Path) -> bytes:
-    """Return the content of an input; raise OSError where it is no regular file."""
+    """Return the content of an input; raise OSError if it is no regular file."""
     _require_regular(path.stat(), path)
     return path.read_bytes()
 
@@ -294,7 +294,7 @@ def checksum(content: bytes) -> str:
 def read_manifest(folder: Path) -> dict[str, Entry]:
     """Return the entries of the manifest of a directory, none without a manifest.
 
-    The last checksum of a file is that of its latest content. Raise InputError where another file
+    The last checksum of a file is that of its latest content. Raise InputError if another file
     has its name.
     """
     path = folder / MANIFEST
@@ -332,7 +332,7 @@ def _is_listed(path: Path, listed: Mapping[str, Entry]) -> bool:
 def locked(folder: Path, kind: int = fcntl.LOCK_EX) -> Iterator[None]:
     """Hold the lock of a result directory, so that no other run replaces or extends it.
 
-    Raise BlockingIOError where another run holds it and `kind` has LOCK_NB.
+    Raise BlockingIOError if another run holds it and `kind` has LOCK_NB.
     """
     with _open_locked(folder, os.O_RDONLY | os.O_DIRECTORY, kind) as (_, _, is_locked):
         if kind & fcntl.LOCK_EX and not is_locked:
@@ -363,7 +363,7 @@ def _open_locked(path: Path, flags: int, kind: int) -> Iterator[tuple[Path, int,
 
 
 def _flock(descriptor: int, kind: int) -> bool:
-    """Lock an open file; return False where the file system has no locks."""
+    """Lock an open file; return False if the file system has no locks."""
     try:
         fcntl.flock(descriptor, kind)
     except OSError as error:

@@ -51,7 +51,7 @@ class Immutable:
         return all(map(_equal, _fields(self), _fields(other)))
 
     def __hash__(self) -> int:
-        """Return the hash of the fields; raise TypeError where a field has none."""
+        """Return the hash of the fields; raise TypeError if a field has none."""
         return hash((type(self), *map(_hashed, _fields(self))))
 
 

@@ -62,7 +62,7 @@ class Group(Plain):
     """Base of the dataclasses whose fields are keys, or groups of them."""
 
     def __new__(cls, *_: object, **keywords: object) -> Self:
-        """Raise InputError where a keyword is not a field."""
+        """Raise InputError if a keyword is not a field."""
         require_keywords(f"{cls.__name__}()", keywords, _names(cls))
         return super().__new__(cls)
 

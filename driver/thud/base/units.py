@@ -42,7 +42,7 @@ DISPLAY_UNITS = {
 def power_of(unit: object, key_unit: str, label: str) -> int:
     """Return the power of ten that converts a unit to that of a key.
 
-    Raise InputError where the unit does not fit; `label` names it in the message.
+    Raise InputError if the unit does not fit; `label` names it in the message.
     """
     # Other units have no multiples.
     multiples = MULTIPLES.get(key_unit, {key_unit: 0})
@@ -63,7 +63,7 @@ def quantity(text: str) -> float:
     Raises
     ------
     InputError
-        Where it is no finite number, or the unit is unknown.
+        If it is no finite number, or the unit is unknown.
 
     Examples
     --------

@@ -63,7 +63,7 @@ def group_of(model: str, option: Field[Any]) -> str:
 
 
 def new_model(model: str | ModelOptions, options: Mapping[str, object]) -> ModelOptions:
-    """Return the options of a model by its name; raise InputError where one is not known."""
+    """Return the options of a model by its name; raise InputError if one is not known."""
     if isinstance(model, ModelOptions):
         if options:
             problem = f"model is an object of {type(model).__name__} beside {', '.join(options)}"
@@ -134,7 +134,7 @@ class Case(Group, Displayed):
         Raises
         ------
         InputError
-            Where a value is not a number, text or, for keys that take one, a list of numbers.
+            If a value is not a number, text or, for keys that take one, a list of numbers.
         """
         for group, kind in GROUPS.items():
             require_kind(group, getattr(self, group), kind)
@@ -214,7 +214,7 @@ class Case(Group, Displayed):
 def tables_case(tables: Mapping[str, Any]) -> Case:
     """Return the case of tables of keys by group, such as those of JSON or TOML; see `check_case`.
 
-    Raise InputError where a group, or the name of model or floor, is not known, or a group is no
+    Raise InputError if a group, or the name of model or floor, is not known, or a group is no
     table.
     """
     require_words("the case", tables, {key.group for key in KEYS} | {"model", "floor"})
@@ -281,9 +281,9 @@ def write_case(case: Case, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     InputError
-        Where the case holds a value that is not allowed; nothing is written.
+        If the case holds a value that is not allowed; nothing is written.
     OSError
-        Where the file cannot be written.
+        If the file cannot be written.
     """
     check_case(case)
     replace_file(path, case_text(case))

@@ -114,7 +114,7 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
 
 
 def value_in(case: Case, name: str) -> Value | None:
-    """Return the value of a key in a case; None where it has none, or a list of them."""
+    """Return the value of a key in a case; None if it has none, or a list of them."""
     key, entry = find_key(name, key_owners(case))
     value = getattr(getattr(case, _group_of(key, case)), key.name, None)
     if isinstance(value, tuple) and entry:

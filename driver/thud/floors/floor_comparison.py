@@ -96,7 +96,7 @@ def compare_floors(
     Raises
     ------
     InputError
-        Where there are no cases, or a case has no room.
+        If there are no cases, or a case has no room.
     """
     require_mapping("cases", cases, "cases or predictions")
     result: dict[str, RoomPrediction] = {}

@@ -112,7 +112,7 @@ class BallImpedance(Displayed):
     def limit(self, decibels: float = 1.0) -> Array:
         """Return the resistance below which a floor changes the level, N s/m, shape (n_band,).
 
-        The logarithm of the change is interpolated over that of the resistance. NaN where no floor
+        The logarithm of the change is interpolated over that of the resistance. NaN if no floor
         changes the level so much.
 
         Parameters
@@ -187,7 +187,7 @@ def ball_impedance(
     Raises
     ------
     InputError
-        Where the force of the model does not depend on the floor, a resistance is out of range, or
+        If the force of the model does not depend on the floor, a resistance is out of range, or
         the source stays on a floor.
 
     Examples

@@ -166,7 +166,7 @@ class MobilityFit(Displayed):
     def to_dataframe(self) -> pd.DataFrame:
         """Return the measured mobility and the fit, m/(N s), complex.
 
-        Raise InputError where pandas is not installed.
+        Raise InputError if pandas is not installed.
         """
         fitted = self.mobility(self.frequency)
         return data_frame(

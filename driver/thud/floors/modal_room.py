@@ -183,7 +183,7 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
     Raises
     ------
     InputError
-        Where the floor is no plate, a position lies outside, or the room has too many modes.
+        If the floor is no plate, a position lies outside, or the room has too many modes.
     """
     prediction = predict_level(source, floor, room)
     return positions_below(prediction, balls=balls, microphones=microphones, seed=seed)

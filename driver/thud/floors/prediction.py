@@ -116,7 +116,7 @@ class RoomPrediction(RoomLevel, Displayed):
     def difference(self, measured: RoomLevels) -> Array:
         """Return measured − predicted level, dB, shape (12,), in the room as it is.
 
-        Raise InputError where the measured levels are not in one-third-octave bands.
+        Raise InputError if the measured levels are not in one-third-octave bands.
         """
         require_kind("measured", measured, RoomLevels)
         if measured.bands != BANDS:
@@ -174,7 +174,7 @@ def predict_level(
     Raises
     ------
     InputError
-        Where floor or room are missing or out of range.
+        If floor or room are missing or out of range.
     """
     require_kind("source", source, ImpactResult)
     case = source.case
@@ -209,7 +209,7 @@ def predict_level(
 
 
 def _on_floor(source: ImpactResult, case: Case) -> FloorImpact | None:
-    """Return the impact on the floor of a case; None where its force is the blocked one."""
+    """Return the impact on the floor of a case; None if its force is the blocked one."""
     existing = source if isinstance(source, FloorImpact) else source.on_floor
     if source.case.model is None or source.case.floor == case.floor:
         return existing

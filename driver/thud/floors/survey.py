@@ -124,7 +124,7 @@ class RoomLevels(Displayed):
 
     @property
     def standardized_rating(self) -> Rating | None:
-        """Single numbers of the standardized levels; None where there are none."""
+        """Single numbers of the standardized levels; None if there are none."""
         levels = self.standardized
         return None if levels is None else rating(levels[self._rated], self.bands)
 
@@ -313,7 +313,7 @@ def rating_table(result: RoomLevels) -> list[tuple[str, ...]]:
 
 
 def _kind(title: str, path: object) -> str:
-    """Return the kind of a column; raise InputError where its title has another unit."""
+    """Return the kind of a column; raise InputError if its title has another unit."""
     kind = TITLES.get(_plain(title), "level")
     if OTHER_UNITS & {word.lower() for word in re.findall(r"[A-Za-z]+", title)[1:]}:
         refuse(f"{path}: {title.strip()!r} is not in {UNITS[kind]}", f"{kind} in {UNITS[kind]}")
@@ -321,7 +321,7 @@ def _kind(title: str, path: object) -> str:
 
 
 def _require_positions(titles: list[str], path: object) -> None:
-    """Raise InputError where one of several columns of levels is a mean or a spread."""
+    """Raise InputError if one of several columns of levels is a mean or a spread."""
     for title in titles:
         if len(titles) > 1 and NO_POSITION & {*_plain(title).split()}:
             refuse(f"{path}: {title.strip()!r} is no position", ALLOWED)
@@ -352,7 +352,7 @@ def _nominal(frequency: float, path: object) -> float:
 
 
 def _bands_of(frequency: Array, path: object) -> BandSet:
-    """Return the set of bands; raise InputError where rated ones are missing or double."""
+    """Return the set of bands; raise InputError if rated ones are missing or double."""
     double = frequency[1:][np.diff(frequency) <= 0]
     if double.size:
         refuse(f"{path}: frequency {double[0]:g} Hz is given twice", "each band once")

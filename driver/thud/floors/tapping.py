@@ -99,7 +99,7 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
     Raises
     ------
     InputError
-        Where the floor is no plate, or out of range.
+        If the floor is no plate, or out of range.
 
     Examples
     --------

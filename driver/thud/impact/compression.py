@@ -61,7 +61,7 @@ class CompressionCurve(Displayed):
     def to_dataframe(self) -> pd.DataFrame:
         """Return the columns of ``compression.csv``.
 
-        Raise InputError where pandas is not installed.
+        Raise InputError if pandas is not installed.
         """
         return data_frame({"deflection_m": self.deflection, "force_N": self.force})
 
@@ -105,7 +105,7 @@ def compress(
     InputError
         Names group, key, value and allowed range.
     NumericalError
-        Where the ball cannot be compressed so far.
+        If the ball cannot be compressed so far.
     """
     case = Case(
         ball=Ball() if ball is None else ball,

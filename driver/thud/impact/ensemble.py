@@ -110,7 +110,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     Raises
     ------
     InputError
-        Where a key is not known, arrays are not numeric or do not broadcast, the case, the bands
+        If a key is not known, arrays are not numeric or do not broadcast, the case, the bands
         or the number of threads are invalid, or the results do not fit in memory.
     """
     from tqdm import tqdm

@@ -116,7 +116,7 @@ class FloorImpact(Impact):
     def velocity_at(self, x: float, y: float) -> NDArray[np.float64]:
         """Return the velocity of a point of a floor with sides, m/s, shape (n_sample,).
 
-        Raise InputError where the floor has no such point.
+        Raise InputError if the floor has no such point.
         """
         answer = ask(
             "point_velocity", case=case_text(Case(floor=self.floor)), force=self.floor_force,

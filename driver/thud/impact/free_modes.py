@@ -99,7 +99,7 @@ def free_modes(
     InputError
         Names group, key, value and allowed range.
     NumericalError
-        Where the modes cannot be computed.
+        If the modes cannot be computed.
 
     Warns
     -----

@@ -62,9 +62,9 @@ class Impact(ImpactQuantities, Displayed):
     warnings : tuple of str
         Implausible input, such as a wall whose density no rubber has.
     motion : Motion or None
-        Snapshots of the deformed ball; None where the model has none.
+        Snapshots of the deformed ball; None if the model has none.
     on_floor : FloorImpact or None
-        The same drop on the floor of the case; None where there is none, it is rigid, or the model
+        The same drop on the floor of the case; None if there is none, it is rigid, or the model
         knows the force on a rigid floor only.
     room_level : RoomLevel or None
         Level in the room of the case; None without a room, and of results that were read.
@@ -240,7 +240,7 @@ class Impact(ImpactQuantities, Displayed):
     def to_xarray(self) -> xr.Dataset:
         """Return histories, levels of both forces and numbers, with units and provenance.
 
-        Snapshots are left out. Raise InputError where xarray is not installed.
+        Snapshots are left out. Raise InputError if xarray is not installed.
         """
         with require_extra("studies"):
             from thud.impact.datasets import impact_dataset
@@ -250,7 +250,7 @@ class Impact(ImpactQuantities, Displayed):
     def to_dataframe(self) -> pd.DataFrame:
         """Return the histories over time, with the columns of ``force.csv`` and `model_histories`.
 
-        Raise InputError where pandas is not installed.
+        Raise InputError if pandas is not installed.
         """
         return data_frame(self.histories(), self.time)
 

@@ -37,7 +37,7 @@ def mobility(
     Raises
     ------
     InputError
-        Where a key of the floor is out of range, or the floor has no such point.
+        If a key of the floor is out of range, or the floor has no such point.
 
     Examples
     --------

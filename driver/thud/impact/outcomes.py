@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Ensemble(SampleQuantities, Displayed):
-    """Results of many samples of a case; NaN where a sample could not be computed.
+    """Results of many samples of a case; NaN if a sample could not be computed.
 
     It has the attributes of `SampleQuantities`, and those below.
 
@@ -113,7 +113,7 @@ class Ensemble(SampleQuantities, Displayed):
     def to_xarray(self) -> xr.Dataset:
         """Return the outcomes along the dimension ``sample``, with units and provenance.
 
-        Raise InputError where xarray is not installed.
+        Raise InputError if xarray is not installed.
         """
         with require_extra("studies"):
             from thud.impact.datasets import ensemble_dataset

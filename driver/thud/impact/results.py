@@ -56,13 +56,13 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
     Raises
     ------
     InputError
-        Where the directory does not hold the results of an impact, or one of the files is not as
+        If the directory does not hold the results of an impact, or one of the files is not as
         the run has written it.
 
     Warns
     -----
     PlausibilityWarning
-        Where the file that says so, ``.thud``, is missing; also in `Impact.warnings`.
+        If the file that says so, ``.thud``, is missing; also in `Impact.warnings`.
     """
     try:
         folder = Path(directory)
@@ -89,7 +89,7 @@ class _Files:
         return name in self.listed if self.listed else (self.folder / name).exists()
 
     def read(self, name: str) -> str:
-        """Return the text of a file; raise InputError where the run has not written it."""
+        """Return the text of a file; raise InputError if the run has not written it."""
         if Path(name).name != name:
             refuse(
                 f"{self.folder}: {shown(name)} is named as a file of it",

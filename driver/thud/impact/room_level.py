@@ -54,7 +54,7 @@ class RoomLevel(Immutable):
     conductance : ndarray, shape (12,)
         Power that a force of unit mean square gives to the floor, m/(N s).
     floor_warnings : tuple of str
-        Where the model of the floor is not valid.
+        If the model of the floor is not valid.
     """
 
     frequency: Array

@@ -62,7 +62,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     InputError
         Names group, key, value and allowed range.
     NumericalError
-        Where the drop leaves the range of the model or the steps are too coarse.
+        If the drop leaves the range of the model or the steps are too coarse.
 
     Warns
     -----

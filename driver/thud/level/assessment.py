@@ -202,7 +202,7 @@ def assess(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     Raises
     ------
     InputError
-        Where the source is not known, `levels` are not five, or a value is not a number.
+        If the source is not known, `levels` are not five, or a value is not a number.
     """
     standard = get_criteria(source)
     octaves = [_estimate("levels", level, "dB") for level in levels]
@@ -251,7 +251,7 @@ def octave_limits(source: LimitsSource) -> tuple[NDArray[np.float64], NDArray[np
 
 
 def _estimate(name: str, value: Any, unit: str) -> Estimate:  # noqa: ANN401 - of a user
-    """Return a value as an estimate with a unit; raise InputError where it is no number."""
+    """Return a value as an estimate with a unit; raise InputError if it is no number."""
     if not isinstance(value, Estimate):
         return Estimate(to_float(name, value), unit=unit)
     return value if value.unit == unit else replace(value, unit=unit)

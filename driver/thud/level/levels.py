@@ -67,7 +67,7 @@ def get_bands(bands: BandSet = "octave") -> Bands:
     Raises
     ------
     InputError
-        Where `bands` is unknown.
+        If `bands` is unknown.
     """
     require_choice("bands", bands, BANDWIDTHS)
     return _bands(bands)
@@ -111,7 +111,7 @@ def force_exposure_levels(
     Raises
     ------
     InputError
-        Where the record is empty, zero throughout, not finite or not one-dimensional, or the
+        If the record is empty, zero throughout, not finite or not one-dimensional, or the
         rate, the bands or the method are invalid.
     """
     require_choice("bands", bands, BANDWIDTHS)
@@ -137,7 +137,7 @@ def peak_count(force: ArrayLike, sample_rate: float) -> int:
     """Return the number of peaks of a force: maxima with a drop of 10 % on both sides.
 
     The force, N, shape (n_sample,), starts and ends at zero; only content below 1.25 kHz is used.
-    Raise InputError where it is empty, not finite or not one-dimensional, or the rate, Hz, is not
+    Raise InputError if it is empty, not finite or not one-dimensional, or the rate, Hz, is not
     positive.
     """
     record = _record(force)
@@ -156,7 +156,7 @@ def _record(values: ArrayLike, name: str = "force") -> NDArray[np.float64]:
 
 
 def to_float(name: str, value: object) -> float:
-    """Return a number as float; raise InputError where it is not one."""
+    """Return a number as float; raise InputError if it is not one."""
     try:
         return float(value)  # type: ignore[arg-type]
     except (OverflowError, TypeError, ValueError) as error:

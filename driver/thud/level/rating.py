@@ -74,7 +74,7 @@ class Rating(Displayed):
 def rated_bands(bands: BandSet) -> NDArray[np.float64]:
     """Return the rounded mid frequencies of the rated bands, Hz.
 
-    Raise InputError where `bands` is not known.
+    Raise InputError if `bands` is not known.
     """
     require_choice("bands", bands, RATED_BANDS)
     return np.array(RATED_BANDS[bands])
@@ -95,7 +95,7 @@ def rating(levels: ArrayLike, bands: BandSet = "octave") -> Rating:
     Raises
     ------
     InputError
-        Where the number of levels is wrong, or one is no level of sound.
+        If the number of levels is wrong, or one is no level of sound.
 
     Examples
     --------
@@ -149,7 +149,7 @@ def standardized_level(
     Raises
     ------
     InputError
-        Where a value is not finite, a time or the volume is not positive, or shapes differ.
+        If a value is not finite, a time or the volume is not positive, or shapes differ.
     """
     values = _finite("level", np.atleast_1d(np.asarray(level)))
     times = _finite("reverberation_time", np.atleast_1d(np.asarray(reverberation_time)))
@@ -169,7 +169,7 @@ def standardized_level(
 
 
 def require_volume(volume: Any) -> float:  # noqa: ANN401 - of a user
-    """Return a volume, m3; raise InputError where it is not positive and finite."""
+    """Return a volume, m3; raise InputError if it is not positive and finite."""
     try:
         value = float(volume)
     except (TypeError, ValueError, OverflowError):
