@@ -32,7 +32,7 @@ class Displayed(Immutable, ABC):
 
 
 @contextmanager
-def left_out(figure: str) -> Iterator[None]:
+def warn_if_not_drawn(figure: str) -> Iterator[None]:
     """Warn if a figure cannot be drawn for any reason; the results do not need it."""
     try:
         yield
@@ -49,7 +49,7 @@ def draw_all(draws: Mapping[str, Callable[[], Figure | None]]) -> dict[str, Figu
     """Return figures by name, without those that are empty or cannot be drawn."""
     drawn = {}
     for name, draw in draws.items():
-        with left_out(name):
+        with warn_if_not_drawn(name):
             figure = draw()
             if figure is not None:
                 drawn[name] = figure

@@ -15,7 +15,7 @@ from tqdm import tqdm
 
 from thud.base.bridge import ask, text
 from thud.base.checks import refuse
-from thud.base.display import draw_all, left_out
+from thud.base.display import draw_all, warn_if_not_drawn
 from thud.base.errors import InputError, PlausibilityWarning, ThudError
 from thud.base.files import Results, own_path
 from thud.base.tables import format_rows
@@ -103,7 +103,7 @@ def _figures(answer: Bundle, options: argparse.Namespace) -> dict[str, bytes]:
     modes = new_modes(case.ball, answer) if "modes" in answer else None
     curve = new_curve(case, answer) if "compression" in answer else None
     moving = {"motion": impact, "floor_motion": impact and impact.on_floor}
-    with TemporaryDirectory() as folder, left_out("a figure"):
+    with TemporaryDirectory() as folder, warn_if_not_drawn("a figure"):
         from thud import plot
 
         if not options.no_figures:
@@ -114,7 +114,7 @@ def _figures(answer: Bundle, options: argparse.Namespace) -> dict[str, bytes]:
         for name, drop in moving.items():
             if options.animation and drop and drop.motion:
                 path = Path(folder, f"{name}.gif")
-                with left_out(path.name):
+                with warn_if_not_drawn(path.name):
                     plot.animate(drop, path)
                     contents[path.name] = path.read_bytes()
     return contents

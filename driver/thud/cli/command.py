@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tqdm import tqdm
 
-from thud.base.display import draw_all, left_out
+from thud.base.display import draw_all, warn_if_not_drawn
 from thud.base.errors import InputError, LockWarning, ReportWarning, ThudError
 from thud.base.files import Results
 
@@ -119,7 +119,7 @@ def save_result(  # noqa: PLR0913, PLR0917 - differ between commands
     results = results_of(options, result.name, [source])
     contents = dict([file])
     if not options.no_figures:
-        with left_out(figure):
+        with warn_if_not_drawn(figure):
             from thud.plot.save_figures import figure_files
 
             contents |= figure_files(draw_all({figure: result.plot}))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud.base.display import left_out
+from thud.base.display import warn_if_not_drawn
 from thud.base.errors import NumericalError, ThudError
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output, print_notes
 from thud.studies.directory import open_results
@@ -85,7 +85,7 @@ def run_study(options: argparse.Namespace) -> int:
         print_notes(f"{options.study}: {text}" for text in (*result.warnings, *result.notes))
         contents = kind.files(result, study)
         if drawn:
-            with left_out("the figure of the study"):
+            with warn_if_not_drawn("the figure of the study"):
                 from thud.plot import figure_files
 
                 contents |= figure_files(result.figures(study.name))

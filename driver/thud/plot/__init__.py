@@ -21,7 +21,7 @@ except ValueError as error:
     )
 
 from thud.base._schema import Plate
-from thud.base.display import draw_all, left_out
+from thud.base.display import draw_all, warn_if_not_drawn
 from thud.plot.ball_figures import (
     animate as animate,
     compression as compression,
@@ -121,7 +121,7 @@ def case_figures(
         # SciPy takes its time.
         from thud.floors.prediction import predict_level
 
-        with left_out("the level in the room"):
+        with warn_if_not_drawn("the level in the room"):
             prediction = predict_level(impact)
             draws["room"] = partial(draw_prediction, prediction)
             draws["room_decay"] = partial(draw_decay, prediction)

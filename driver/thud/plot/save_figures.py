@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from thud.base.checks import require_choice, shown
-from thud.base.display import draw_all, left_out
+from thud.base.display import draw_all, warn_if_not_drawn
 from thud.base.errors import InputError
 from thud.base.files import Results, replace_file
 from thud.plot.style import own_style
@@ -61,7 +61,7 @@ def figure_files(figures: Mapping[str, Figure], kind: str = FORMATS[0]) -> dict[
     """Return the contents of figures by file name; warn of those that cannot be drawn."""
     contents = {}
     for name, figure in figures.items():
-        with left_out(f"{name}.{kind}"):
+        with warn_if_not_drawn(f"{name}.{kind}"):
             contents[f"{name}.{kind}"] = _content(figure, name, kind)
     return contents
 

@@ -9,7 +9,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import QUANTITIES
-from thud.base.display import left_out
+from thud.base.display import warn_if_not_drawn
 from thud.level.assessment import RESULTS
 from thud.plot.style import own_style
 from thud.recordings.measured_drop import ESTIMATES
@@ -273,7 +273,7 @@ def _cells(figures: Sequence[Figure]) -> list[str]:
     """Return the cells of the figures that can be drawn."""
     cells = []
     for i, figure in enumerate(figures):
-        with left_out("a figure of the report"):
+        with warn_if_not_drawn("a figure of the report"):
             cells.append(f"<td>{_svg(figure, f'f{i}')}</td>")
     return cells
 

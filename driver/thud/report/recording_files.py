@@ -10,7 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from thud.base.bridge import version
-from thud.base.display import draw_all, left_out
+from thud.base.display import draw_all, warn_if_not_drawn
 from thud.base.errors import InputError, ReportWarning
 from thud.base.extras import require_extra
 from thud.level.assessment import RESULTS
@@ -197,7 +197,7 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
 
 def _has_matplotlib() -> bool:
     """Return whether figures can be drawn; warn if they cannot."""
-    with left_out("the page"):
+    with warn_if_not_drawn("the page"):
         import matplotlib as mpl
 
         return bool(mpl.__version__)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.bridge import version
-from thud.base.display import left_out
+from thud.base.display import warn_if_not_drawn
 from thud.base.extras import require_extra
 from thud.base.files import Results
 from thud.base.immutable import Immutable
@@ -298,7 +298,7 @@ class Fit(Estimates):
         """
         contents = self.files()
         if figures:
-            with left_out("the figure of the fit"):
+            with warn_if_not_drawn("the figure of the fit"):
                 from thud.plot import figure_files
 
                 contents |= figure_files(self.figures())
