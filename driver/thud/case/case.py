@@ -29,7 +29,7 @@ from thud.base._schema import (
 )
 from thud.base.bridge import ask, text
 from thud.base.checks import (
-    LARGEST,
+    MAX_NUMBER,
     refuse,
     refuse_value,
     require_choice,
@@ -242,7 +242,7 @@ def _plain(group: str, key: str, value: object) -> float | str | list[float | st
     if isinstance(value, list | tuple) and key in LISTS:
         return [_plain(group, key, entry) for entry in value]  # type: ignore[misc]
     is_plain = isinstance(value, int | float) or (isinstance(value, str) and value.isprintable())
-    if not is_plain or (isinstance(value, int) and abs(value) > LARGEST):
+    if not is_plain or (isinstance(value, int) and abs(value) > MAX_NUMBER):
         refuse_value(f"&{group}: {key}", value, "a number or plain text")
     return value  # type: ignore[return-value]
 

@@ -18,7 +18,7 @@ from scipy.signal import lfilter, sosfilt
 from thud.base._schema import Plate, Room
 from thud.base.bridge import ask
 from thud.base.checks import (
-    LARGEST_SEED,
+    MAX_SEED,
     refuse,
     refuse_value,
     require_array,
@@ -201,7 +201,7 @@ def positions_below(
     require_kind("floor", floor, Plate)
     assert isinstance(floor, Plate)  # noqa: S101 - for the type checker
     size = (floor.length, floor.width, room.volume / (floor.length * floor.width))
-    require_whole("seed", seed, 0, LARGEST_SEED)
+    require_whole("seed", seed, 0, MAX_SEED)
     generator = np.random.default_rng(seed)
     positions = _positions("balls", balls, size[:2], generator)
     receivers = _positions("microphones", microphones, size, generator)

@@ -14,7 +14,7 @@ from scipy.stats import binom
 
 from thud.base.bridge import version
 from thud.base.checks import (
-    LARGEST_SEED,
+    MAX_SEED,
     refuse,
     refuse_value,
     require_kind,
@@ -477,5 +477,5 @@ def read_plan(table: Mapping[str, object], folder: Path) -> Plan | Surrogate:
     if not error > 0:  # type: ignore[operator]
         refuse_value(f"{label} error", error, "numbers above 0, dB")
     require_whole(f"{label} size", size, MIN_DROPS, MAX_DROPS)
-    require_whole(f"{label} seed", seed, 0, LARGEST_SEED)
+    require_whole(f"{label} seed", seed, 0, MAX_SEED)
     return Plan(float(error), size, seed)  # type: ignore[arg-type]
