@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, Unpack
 
 from thud.base._schema import KEYS
 from thud.base.checks import refuse, require_choice
-from thud.case.keys import DENSITY, OF_FILES, key_owners, value_in
+from thud.case.keys import DENSITY, OUTPUT_GROUP, key_owners, value_in
 from thud.studies.backends import checked_backend
 from thud.studies.blocks import compute_samples, read_identity, result_names
 from thud.studies.dataset import disk_space
@@ -76,7 +76,7 @@ class DropsKind(Kind[SampleStudy, R]):
         # Samples need neither snapshots nor free modes nor a compression.
         case = replace(study.case, modes=None, compression=None)
         owned = (key for key in KEYS if key.owner == study.model)
-        files = {key.name: 0.0 for key in owned if key.group == OF_FILES}
+        files = {key.name: 0.0 for key in owned if key.group == OUTPUT_GROUP}
         if case.model and files:
             case = replace(case, model=replace(case.model, **files))  # type: ignore[arg-type]
         head = {**vars(study), "case": case}

@@ -25,7 +25,7 @@ from thud.base.checks import (
 from thud.base.extras import require_extra
 from thud.base.files import is_failure, read_input, replace_file
 from thud.case.case import Case, case_text
-from thud.case.keys import OF_FILES, value_in, with_values
+from thud.case.keys import OUTPUT_GROUP, value_in, with_values
 from thud.level.assessment import get_criteria
 from thud.level.levels import get_bands
 from thud.studies.study_result import StudyResult
@@ -386,7 +386,7 @@ def keys_of(case: Case) -> dict[str, str]:
     return {
         f"&{group}: {key}": f"{value!r}"
         for group, keys in groups.items()
-        if group not in {"case", "limits", OF_FILES}
+        if group not in {"case", "limits", OUTPUT_GROUP}
         for key, value in keys.items()
     }
 
