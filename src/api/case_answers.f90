@@ -123,7 +123,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: frequency(:), loss_factor(:)
 
-      frequency = request%get_array('frequency')
+      allocate (frequency, source=request%get_array('frequency'))
       allocate (loss_factor, mold=frequency)
       associate (model => case%models(get_model_number(case))%model)
          call model%get_loss_factors(case%ball, frequency, loss_factor, error)
@@ -153,7 +153,7 @@ contains
       call bundle%add_number('cost', sweep%cost)
       call bundle%add_number('force_length', real(get_sample_count(case%sampling), wp))
       if (request%has('values')) then
-         values = request%get_array('values')
+         allocate (values, source=request%get_array('values'))
          call solve_sweep(case, columns, reshape(values, [size(columns), size(values)/size(columns)]), &
             nint(request%get_number('threads')), request%get_number('forces') > 0.0_wp, sweep, error)
          if (allocated(error)) return

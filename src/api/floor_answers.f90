@@ -36,7 +36,7 @@ contains
       real(wp), allocatable :: point(:)
       complex(wp), allocatable :: mobility(:)
 
-      point = request%get_array('point')
+      allocate (point, source=request%get_array('point'))
       associate (floor => case%floors(get_floor_number(case))%model)
          if (size(point) == 2) then
             call floor%get_transfer(point(1), point(2), receiver, error)
@@ -86,8 +86,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: force(:), velocity(:), point(:)
 
-      force = request%get_array('force')
-      point = request%get_array('point')
+      allocate (force, source=request%get_array('force'))
+      allocate (point, source=request%get_array('point'))
       allocate (velocity, mold=force)
       associate (floor => case%floors(get_floor_number(case))%model)
          call get_point_velocity(floor, force, request%get_number('sample_rate'), point(1), point(2), velocity, error)
@@ -131,7 +131,7 @@ contains
       type(plate_type) :: plate
       real(wp), allocatable :: frequency(:), conductance(:)
 
-      frequency = request%get_array('frequency')
+      allocate (frequency, source=request%get_array('frequency'))
       allocate (conductance, mold=frequency)
       associate (floor => case%floors(get_floor_number(case))%model)
          call floor%get_radiator(frequency, plate, conductance, error)

@@ -53,7 +53,7 @@ contains
       type(bundle_type), intent(inout) :: bundle
       real(wp), allocatable :: force(:), low(:)
 
-      force = request%get_array('force')
+      allocate (force, source=request%get_array('force'))
       allocate (low, mold=force)
       call get_low_pass(force, request%get_number('sample_rate'), request%get_number('cutoff'), low)
       call bundle%add_array('force', shape(low), low)
@@ -69,7 +69,7 @@ contains
       real(wp) :: a_weighted
 
       call request%get_text('bands', set)
-      levels = request%get_array('levels')
+      allocate (levels, source=request%get_array('levels'))
       a_weighted = get_a_weighted_level(set, levels)
       call bundle%add_number('a_weighted', a_weighted)
       call bundle%add_number('rounded', real(get_rounded(a_weighted), wp))
@@ -83,7 +83,7 @@ contains
       type(bundle_type), intent(inout) :: bundle
       real(wp), allocatable :: levels(:)
 
-      levels = request%get_array('levels')
+      allocate (levels, source=request%get_array('levels'))
       levels = levels + get_standardization(request%get_array('reverberation_time'), request%get_number('volume'))
       call bundle%add_array('levels', shape(levels), levels)
    end subroutine answer_standardization
@@ -95,7 +95,7 @@ contains
       real(wp), allocatable :: levels(:), corrected(:)
       logical, allocatable :: is_upper_bound(:)
 
-      levels = request%get_array('levels')
+      allocate (levels, source=request%get_array('levels'))
       allocate (corrected, mold=levels)
       allocate (is_upper_bound(size(levels)))
       call correct_for_background(levels, request%get_array('background'), corrected, is_upper_bound)

@@ -1,5 +1,5 @@
-!> Computes all results that a case asks for: free modes, quasi-static compression, the impact and its assessment, the
-!> drop on the floor, the level in the room below, and warnings. It reads and writes no files.
+!> Computes all results that a case asks for: free modes, quasi-static compression, the drop on a rigid floor with its levels
+!> and criteria, the drop on the floor of the case, the level in the room below, and warnings. It reads and writes no files.
 module thud_compute
    use thud_band, only: band_type, get_level_bands, octave_count
    use thud_case, only: case_type, check_case, get_floor_number, get_model_number
@@ -147,7 +147,7 @@ contains
          allocate (on_floor)
          call model%solve(case%ball, case%drop, case%sampling, on_floor, error, receiver)
       end associate
-      ! Models that ignore the receiver have computed a drop on a rigid floor.
+      ! A model may couple by default but ignore the receiver; then it has computed a drop on a rigid floor.
       if (.not. allocated(on_floor%floor_velocity)) deallocate (on_floor)
    end subroutine drop_on_floor
 

@@ -2,7 +2,7 @@
 !>
 !> The state holds displacement towards the floor (m) and velocity (m/s) of each mass in turn, then impulse on the floor
 !> (N s) and energy lost (J); a source may append components. On a mobile floor displacements and velocities are relative to
-!> the floor; accelerations, force and loss keep their meaning.
+!> the floor; accelerations are absolute, and force and loss are defined as on a rigid floor.
 module thud_contact_source
    use thud_drop, only: drop_type
    use thud_error, only: error_type, numerical_error
@@ -80,7 +80,7 @@ contains
       real(wp), intent(in) :: time
       !> State at the event: [n_state].
       real(wp), intent(inout) :: state(:)
-      !> Gets maxima at the turning point, and the contact time at release.
+      !> History, in which the turning point sets the maxima and the release sets the contact time.
       type(force_history_type), intent(inout) :: history
 
       state(self%get_event()) = 0.0_wp
@@ -93,7 +93,7 @@ contains
       end if
    end subroutine pass_event
 
-   !> Whether the source has left a rigid floor for good; a single mass has at release.
+   !> Whether the source has left a rigid floor for good; a single mass leaves at release.
    pure function has_separated(self, state) result(separated)
       class(contact_source_type), intent(in) :: self
       !> State: [n_state].
@@ -138,7 +138,7 @@ contains
          //to_text(state(1))//' m; allowed: lower drops')
    end function get_failure
 
-   !> Maximum displacement of the first mass below the center of mass in flight, m.
+   !> Amplitude in flight of the first mass relative to the center of mass, m.
    pure function get_amplitude(self, state) result(amplitude)
       class(contact_source_type), intent(in) :: self
       !> State: [n_state].

@@ -34,7 +34,7 @@ contains
       integer, intent(in) :: n_step
       !> The floor under the source.
       type(receiver_type), intent(in) :: receiver
-      !> The history, prepared by the source; gets samples, maxima, contact time and the motion of the floor.
+      !> The history, prepared by the source; samples, maxima, contact time and the motion of the floor are set here.
       type(force_history_type), intent(inout) :: history
       !> State at the end of the record, not relative to the floor: [n_state].
       real(wp), intent(out) :: state(:)
@@ -81,7 +81,7 @@ contains
       !> Length of the step, s.
       real(wp), intent(in) :: step
       type(impact_type), intent(inout) :: impact
-      !> Gets maxima and the time of each release.
+      !> History, in which maxima and the time of the last release are updated.
       type(force_history_type), intent(inout) :: history
       !> Set if the equations fail.
       type(error_type), allocatable, intent(out) :: error
@@ -115,9 +115,9 @@ contains
       type(drop_type), intent(in) :: drop
       !> The event.
       integer, intent(in) :: event
-      !> Motion at the end of the step; gets that at the event.
+      !> Motion at the end of the step, replaced by the motion at the event.
       type(coupled_state_type), intent(inout) :: end
-      !> Time to the end of the step, s: before and after.
+      !> Time from `impact%time` to the end of the step, s.
       real(wp), intent(inout) :: remaining
       type(impact_type), intent(inout) :: impact
       type(error_type), allocatable, intent(out) :: error
@@ -170,13 +170,13 @@ contains
       integer, intent(in) :: i
       type(force_history_type), intent(inout) :: history
 
-      associate (motion => impact%motion)
-         history%floor_displacement(i) = motion%motion%displacement
-         history%floor_velocity(i) = motion%floor_velocity
-         call source%record_sample(get_relative_state(source, motion), i, history)
+      associate (coupled => impact%motion)
+         history%floor_displacement(i) = coupled%motion%displacement
+         history%floor_velocity(i) = coupled%floor_velocity
+         call source%record_sample(get_relative_state(source, coupled), i, history)
          ! Force and floor velocity may jump at first touch: the first sample is the mean of both sides.
-         if (i > 1) history%floor_force(i) = motion%force
-         if (i == 1) history%floor_velocity(i) = motion%floor_velocity/2
+         if (i > 1) history%floor_force(i) = coupled%force
+         if (i == 1) history%floor_velocity(i) = coupled%floor_velocity/2
       end associate
    end subroutine record
 
@@ -195,11 +195,12 @@ contains
             //' s ends while the source is still in contact; allowed: longer than the contact')
          return
       end if
-      associate (motion => impact%motion)
-         associate (state => get_relative_state(source, motion))
+      associate (coupled => impact%motion)
+         associate (state => get_relative_state(source, coupled))
+            ! Maximum displacement that the first mass can reach, m, and velocity of the center of mass, m/s.
             lowest = source%get_center(state) + [source%get_amplitude(state), 0.0_wp]
          end associate
-         if (can_strike(impact%receiver, motion%motion, -lowest(1), -lowest(2) - motion%floor_velocity)) then
+         if (can_strike(impact%receiver, coupled%motion, -lowest(1), -lowest(2) - coupled%floor_velocity)) then
             error = input_error('&sampling: duration = '//to_text(sampling%duration) &
                //' s ends while the floor may strike the source again; allowed: longer')
          end if

@@ -13,8 +13,8 @@ module thud_coupled_phases
 
    public :: begin_contact, get_distance, get_event, impact_type, pass_event, update_maxima
 
-   !> Fraction of the initial energy at which a light floor captures the source and the contact ends, of kinetic energy and
-   !> of force times deflection.
+   !> A light floor may stop the source, so that it never leaves. The floor has captured the source, and the contact ends, if
+   !> kinetic energy and force times deflection are both below this fraction of the initial energy.
    real(wp), parameter :: capture_tolerance = 1.0e-12_wp
 
    !> Maximum number of Newton iterations for the first force, and the relative change that ends them.
@@ -46,8 +46,8 @@ module thud_coupled_phases
 
 contains
 
-   !> Sets force and velocity of the floor at touch. The first force balances source and direct mobility of the receiver; the
-   !> cap has no mass yet.
+   !> Sets force and velocity of the floor at touch. The force depends on the velocity, and by the direct mobility of the
+   !> receiver the velocity depends on the force. The cap has no mass yet.
    pure subroutine begin_contact(source, impact, error)
       class(contact_source_type), intent(inout) :: source
       type(impact_type), intent(inout) :: impact
@@ -61,30 +61,30 @@ contains
       source%touching = .true.
       source%compressing = .true.
       impact%n_contact = impact%n_contact + 1
-      associate (motion => impact%motion, index => 2*source%n_mass + 1)
-         motion%force = 0.0_wp
+      associate (coupled => impact%motion, index => 2*source%n_mass + 1)
+         coupled%force = 0.0_wp
          length = 1.0e-7_wp*impact%scale
          ! The force grows at most with the square of the velocity: Newton's method converges from one side.
          do k = 1, max_iterations
-            motion%floor_velocity = get_receiver_velocity(impact%receiver, motion%force, motion%motion)
-            state = get_relative_state(source, motion)
+            coupled%floor_velocity = get_receiver_velocity(impact%receiver, coupled%force, coupled%motion)
+            state = get_relative_state(source, coupled)
             slower = state
             slower(2) = state(2) - length
             call source%get_derivative(impact%time, state, rate, valid)
             call source%get_derivative(impact%time, slower, slower_rate, valid)
-            change = (rate(index) - motion%force) &
+            change = (rate(index) - coupled%force) &
                /(1 + impact%receiver%direct*(rate(index) - slower_rate(index))/(state(2) - slower(2)))
-            if (abs(change) <= epsilon(change)*abs(motion%force)) exit
-            motion%force = motion%force + change
+            if (abs(change) <= epsilon(change)*abs(coupled%force)) exit
+            coupled%force = coupled%force + change
          end do
          ! Written so that NaN fails too.
-         if (.not. (valid .and. abs(change) <= tolerance*abs(motion%force))) then
+         if (.not. (valid .and. abs(change) <= tolerance*abs(coupled%force))) then
             error = numerical_error('&drop: '//fixed(1.0e3_wp*impact%time, 3)//' ms after first touch the first force of ' &
                //'a contact does not converge; allowed: a lower height, or a floor of lower mobility')
             return
          end if
-         motion%acceleration = rate(2:2*source%n_mass:2)
-         impact%peak_force = max(impact%peak_force, motion%force)
+         coupled%acceleration = rate(2:2*source%n_mass:2)
+         impact%peak_force = max(impact%peak_force, coupled%force)
       end associate
    end subroutine begin_contact
 
@@ -137,12 +137,12 @@ contains
       !> The event.
       integer, intent(in) :: event
       type(impact_type), intent(inout) :: impact
-      !> Gets maxima and the time of release.
+      !> History, in which maxima and the time of release are set.
       type(force_history_type), intent(inout) :: history
       !> Set if the first force of a contact does not converge.
       type(error_type), allocatable, intent(out) :: error
 
-      associate (motion => impact%motion)
+      associate (coupled => impact%motion)
          select case (event)
          case (turning_point)
             call update_maxima(source, impact, history)
@@ -150,11 +150,11 @@ contains
          case (release)
             source%touching = .false.
             history%contact_time = impact%time
-            motion%force = 0.0_wp
-            motion%floor_velocity = get_receiver_velocity(impact%receiver, 0.0_wp, motion%motion)
-            motion%displacement(1) = motion%motion%displacement
+            coupled%force = 0.0_wp
+            coupled%floor_velocity = get_receiver_velocity(impact%receiver, 0.0_wp, coupled%motion)
+            coupled%displacement(1) = coupled%motion%displacement
          case default
-            motion%displacement(1) = motion%motion%displacement
+            coupled%displacement(1) = coupled%motion%displacement
             call begin_contact(source, impact, error)
          end select
       end associate
@@ -164,22 +164,22 @@ contains
    pure subroutine update_maxima(source, impact, history)
       class(contact_source_type), intent(inout) :: source
       type(impact_type), intent(inout) :: impact
-      !> Gets maxima and the contact time.
+      !> History, in which maxima and contact time are set.
       type(force_history_type), intent(inout) :: history
       real(wp) :: state(source%n_state)
 
       if (.not. source%touching) return
       state = get_relative_state(source, impact%motion)
       call source%record_peaks(state, history)
-      associate (motion => impact%motion)
-         impact%peak_force = max(impact%peak_force, motion%force)
-         impact%captured = max(maxval(motion%velocity**2), motion%force*state(1)/source%mass) &
+      associate (coupled => impact%motion)
+         impact%peak_force = max(impact%peak_force, coupled%force)
+         impact%captured = max(maxval(coupled%velocity**2), coupled%force*state(1)/source%mass) &
             <= capture_tolerance*impact%scale**2
          if (.not. impact%captured) return
          source%touching = .false.
          history%contact_time = impact%time
-         motion%force = 0.0_wp
-         motion%floor_velocity = get_receiver_velocity(impact%receiver, 0.0_wp, motion%motion)
+         coupled%force = 0.0_wp
+         coupled%floor_velocity = get_receiver_velocity(impact%receiver, 0.0_wp, coupled%motion)
       end associate
    end subroutine update_maxima
 

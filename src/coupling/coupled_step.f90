@@ -1,8 +1,9 @@
 !> One time step of a source on a mobile floor: collocation at the stages of `thud_radau`, with the forces on the floor and
 !> the accelerations of the masses as unknowns.
 !>
-!> The mass of a cap that lies on the floor makes its motion arbitrarily stiff: the time constant, mass divided by
-!> resistance, starts from zero at first touch. The method damps such a decay instead of resolving it.
+!> The cap, the part of the source that lies on the floor, moves with the floor. The mass of the cap is zero at first touch,
+!> and so is its time constant, the mass divided by the resistance of the floor: the equations are arbitrarily stiff. The
+!> method damps such a fast decay instead of resolving it.
 module thud_coupled_step
    use thud_contact_source, only: contact_source_type
    use thud_kinds, only: wp
@@ -15,8 +16,11 @@ module thud_coupled_step
 
    public :: coupled_state_type, get_relative_state, take_coupled_step
 
-   !> Maximum number of Newton iterations of a step, and of those in a row with the same derivatives.
-   integer, parameter :: max_iterations = 30, max_reuse = 5
+   !> Maximum number of Newton iterations of a step.
+   integer, parameter :: max_iterations = 30
+
+   !> Number of successive iterations that use the same derivatives.
+   integer, parameter :: max_reuse = 5
 
    !> Change of velocity, as a fraction of the scale of velocities, that ends the iterations.
    real(wp), parameter :: tolerance = 1.0e-13_wp
@@ -24,7 +28,7 @@ module thud_coupled_step
    !> Relative length of the finite differences for the derivatives.
    real(wp), parameter :: difference = 1.0e-7_wp
 
-   !> Weights of the second integral up to each stage, from the values at the stages: [n_stage, n_stage].
+   !> Maps the values of a polynomial at the stages to its double integrals up to the stages: [n_stage, n_stage].
    real(wp), parameter :: second_integral(n_stage, n_stage) = matmul(radau_integral, radau_integral)
 
    !> Motion of source and floor.
@@ -39,7 +43,7 @@ module thud_coupled_step
       type(receiver_motion_type) :: motion
    end type coupled_state_type
 
-   !> Trial values of the unknowns, and the response of the source.
+   !> Trial values of the unknowns, and the rate of the source's state that they give.
    type :: trial_type
       !> Forces on the floor, N: [n_stage], and accelerations, m/s2: [n_stage, n_mass].
       real(wp), allocatable :: force(:), acceleration(:, :)
@@ -49,7 +53,7 @@ module thud_coupled_step
       real(wp) :: time(n_stage)
       !> Displacements, velocities and accelerations of the floor, m, m/s, m/s2: [n_stage].
       real(wp), dimension(n_stage) :: floor_displacement, floor_velocity, floor_acceleration
-      !> State relative to the floor at the stages: [n_state, n_stage]; and its rate.
+      !> State relative to the floor at the stages, and its rate: [n_state, n_stage].
       real(wp), allocatable :: state(:, :), rate(:, :)
       !> Derivatives of the rate with respect to displacements and velocities: [n_state, 2*n_mass, n_stage].
       real(wp), allocatable :: derivative(:, :, :)
@@ -74,7 +78,7 @@ contains
    !> Advances source and floor by one step.
    pure subroutine take_coupled_step(source, stages, time, scale, start, end, valid, converged)
       class(contact_source_type), intent(in) :: source
-      !> Response of the floor over this step.
+      !> Motion of the floor at the stages of this step, per unit force and per unit initial motion.
       type(receiver_stages_type), intent(in) :: stages
       !> Time at the beginning since first touch, s; scale of velocities, m/s.
       real(wp), intent(in) :: time, scale
@@ -130,7 +134,7 @@ contains
       call advance_stages(stages, trial%force, end%motion)
    end subroutine take_coupled_step
 
-   !> Motion at the stages under the trial's forces and accelerations, and the response of the source.
+   !> Motion at the stages under the trial forces and accelerations, and the rate of the source's state.
    pure subroutine evaluate_stages(source, stages, start, trial, valid)
       class(contact_source_type), intent(in) :: source
       type(receiver_stages_type), intent(in) :: stages
@@ -157,7 +161,7 @@ contains
       end associate
    end subroutine evaluate_stages
 
-   !> Derivatives of the response of the source, by differences.
+   !> Derivatives of the rate of the source's state, by finite differences.
    pure subroutine differentiate(source, interval, scale, trial)
       class(contact_source_type), intent(in) :: source
       !> Length of the step, s; scale of velocities, m/s.
@@ -172,7 +176,7 @@ contains
          do j = 1, 2*source%n_mass
             length = difference*merge(abs(trial%state(j, i)) + scale*interval, scale, mod(j, 2) == 1)
             moved = trial%state(:, i)
-            ! Towards smaller deflections, which stay inside the domain.
+            ! Towards smaller values, because smaller deflections stay inside the domain.
             moved(j) = moved(j) - length
             call get_rate(source, trial%time(i), moved, rate, valid)
             trial%derivative(:, j, i) = (trial%rate(:, i) - rate)/(trial%state(j, i) - moved(j))
@@ -203,7 +207,7 @@ contains
    pure function get_residual(source, trial) result(residual)
       class(contact_source_type), intent(in) :: source
       type(trial_type), intent(in) :: trial
-      !> Values of the equations minus the unknowns: [n_unknown].
+      !> Right-hand sides of the equations minus the unknowns: [n_unknown].
       real(wp) :: residual(n_stage*(1 + source%n_mass))
       integer :: k
 
@@ -233,24 +237,25 @@ contains
       !> The derivative: [n_unknown, n_unknown].
       real(wp), intent(out) :: matrix(:, :)
       real(wp), dimension(n_stage, 2) :: by_force, by_acceleration
-      real(wp) :: by_cap(n_stage, n_stage), cap_mass(n_stage)
+      real(wp) :: floor_acceleration_by_force(n_stage, n_stage), cap_mass(n_stage)
       real(wp) :: slope
       integer :: i, j, k, row, column, kind, index
 
       matrix = 0.0_wp
       cap_mass = get_cap_mass(source, trial)
-      by_cap = matmul(radau_derivative, stages%velocity)/stages%interval
+      floor_acceleration_by_force = matmul(radau_derivative, stages%velocity)/stages%interval
       do i = 1, n_stage
          ! Derivatives of relative displacement and velocity at this stage.
          by_force = -reshape([stages%displacement(i, :), stages%velocity(i, :)], [n_stage, 2])
          by_acceleration = reshape([stages%interval**2*second_integral(i, :), stages%interval*radau_integral(i, :)], &
             [n_stage, 2])
          do k = 0, source%n_mass
-            ! k = 0 is the balance of the cap, the others are the equations of motion.
+            ! k = 0 is the balance of the forces on the cap; k > 0 is the equation of motion of mass k.
             row = k*n_stage + i
             index = merge(2*source%n_mass + 1, 2*k, k == 0)
             matrix(row, row) = 1.0_wp
             do j = 1, 2*source%n_mass
+               ! Component j of the state is the displacement (kind 1) or the velocity (kind 2) of mass (j + 1)/2.
                slope = trial%derivative(index, j, i)
                ! The mass of the cap grows with the deflection.
                if (k == 0 .and. j == 1 .and. cap_mass(i) > 0.0_wp) then
@@ -263,7 +268,7 @@ contains
                   - slope*by_acceleration(:, kind)
             end do
          end do
-         matrix(i, :n_stage) = matrix(i, :n_stage) + cap_mass(i)*by_cap(i, :)
+         matrix(i, :n_stage) = matrix(i, :n_stage) + cap_mass(i)*floor_acceleration_by_force(i, :)
       end do
    end subroutine set_matrix
 

@@ -22,10 +22,12 @@ module thud_receiver_stages
       real(wp) :: interval = 0.0_wp
       !> Velocity, m/(N s), and displacement, m/N, at each stage due to unit force at each stage: [n_stage, n_stage].
       real(wp) :: velocity(n_stage, n_stage), displacement(n_stage, n_stage)
-      !> The same due to unit x_k at the beginning, m/(N s2) and m/(N s): [n_pole, n_stage].
+      !> The same due to unit amplitude x_k (see `thud_receiver`) at the beginning, m/(N s2) and m/(N s): [n_pole, n_stage].
       complex(wp), allocatable :: free_velocity(:, :), free_displacement(:, :)
-      !> The x_k at the end per unit x_k at the beginning: [n_pole]; per unit force at each stage, s: [n_pole, n_stage].
-      complex(wp), allocatable :: decay(:), gain(:, :)
+      !> The x_k at the end per unit x_k at the beginning: [n_pole].
+      complex(wp), allocatable :: decay(:)
+      !> The x_k at the end per unit force at each stage, s: [n_pole, n_stage].
+      complex(wp), allocatable :: gain(:, :)
    end type receiver_stages_type
 
 contains
@@ -57,7 +59,8 @@ contains
             if (i == n_stage) stages%decay(k) = phi(0)
             stages%free_velocity(k, i) = receiver%residue(k)*phi(0)
             stages%free_displacement(k, i) = receiver%residue(k)*time*phi(1)
-            ! The force (t/h)**m gives x_k = m! c**m (c h) phi_(m+1), its integral one more factor c h and phi_(m+2).
+            ! At the time c h, the force (t/h)**m gives x_k = m! c**m (c h) phi_(m+1), and the integral of x_k is
+            ! m! c**m (c h)**2 phi_(m+2).
             gain = matmul(phi(1:n_stage)*weight(:, i), radau_monomial)*time
             travel = matmul(phi(2:n_stage + 1)*weight(:, i), radau_monomial)*time**2
             if (i == n_stage) stages%gain(k, :) = gain
@@ -77,7 +80,7 @@ contains
       real(wp) :: v, w
       integer :: i, k
 
-      ! Vectorized sums; reading the factors is the limit.
+      ! Vectorized sums; their speed is limited by reading the factors from memory.
       do i = 1, n_stage
          v = 0.0_wp
          w = motion%displacement

@@ -1,4 +1,5 @@
-!> Two simply supported plates with a resilient layer between them: receiver of the upper plate, and power into the lower.
+!> Two simply supported plates with a resilient layer between them: the upper plate as a receiver, and the power into the
+!> lower plate.
 module thud_double_plate
    use thud_constants, only: pi
    use thud_error, only: error_type
@@ -48,6 +49,7 @@ contains
       gain = 4/(floor%upper%length*floor%upper%width)*modal_square &
          *spread(get_shape(m, n, source)*get_shape(m, n, point), 2, 2)
       compliance = sum(gain/omega**2, mask=.not. individual)
+      ! At the source the modes above the sum add their compliances; at other points these cancel.
       if (all(abs(source - point) < epsilon(1.0_wp))) compliance = compliance + get_far_compliance(floor%upper)
       call new_modal_receiver('floating_floor', pack(gain, individual), pack(omega, individual), &
          pack(loss_factor, individual), [compliance, residual_corner], receiver, error)
@@ -127,7 +129,7 @@ contains
       !> The conductance, m/(N s).
       real(wp) :: conductance
       complex(wp) :: root(4)
-      complex(wp) :: b1, b2, s, k1, k2, half, term, total
+      complex(wp) :: b1, b2, s, c1, c2, half, term, total
       real(wp) :: omega
       integer :: i, j
 
@@ -135,10 +137,10 @@ contains
       b1 = get_bending_stiffness(floor%upper)*cmplx(1.0_wp, floor%upper%loss_factor, wp)
       b2 = get_bending_stiffness(floor%lower)*cmplx(1.0_wp, get_total_loss(floor%lower, air_type(), frequency), wp)
       s = floor%layer_stiffness*cmplx(1.0_wp, floor%layer_loss, wp)
-      k1 = (s - get_surface_mass(floor%upper)*omega**2)/b1
-      k2 = (s - get_surface_mass(floor%lower)*omega**2)/b2
-      half = sqrt(((k1 - k2)/2)**2 + s**2/(b1*b2))
-      root(1:2) = -(k1 + k2)/2 + [half, -half]
+      c1 = (s - get_surface_mass(floor%upper)*omega**2)/b1
+      c2 = (s - get_surface_mass(floor%lower)*omega**2)/b2
+      half = sqrt(((c1 - c2)/2)**2 + s**2/(b1*b2))
+      root(1:2) = -(c1 + c2)/2 + [half, -half]
       root(3:4) = conjg(root(1:2))
       total = 0.0_wp
       do i = 1, 4

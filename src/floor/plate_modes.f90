@@ -162,8 +162,9 @@ contains
       gain = 4/(get_surface_mass(plate)*plate%length*plate%width)*get_shape(m, n, source)*get_shape(m, n, point)
       residual_terms = [sum(gain/omega**2, mask=.not. individual), residual_corner]
       ! The modes that are not summed cancel on average, except at the source.
-      if (.not. present(max_across) .and. all(abs(source - point) < epsilon(1.0_wp))) &
+      if (.not. present(max_across) .and. all(abs(source - point) < epsilon(1.0_wp))) then
          residual_terms(1) = residual_terms(1) + get_far_compliance(plate)
+      end if
       if (present(residual)) residual_terms = residual
       associate (omega => pack(omega, individual))
          call new_modal_receiver(group, pack(gain, individual), omega, get_total_loss(plate, air_type(), omega/(2*pi)), &

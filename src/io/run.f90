@@ -23,21 +23,6 @@ module thud_run
 
    public :: load_case, outcome_type, replaces, run_case
 
-   !> Files of an impact.
-   character(len=13), parameter :: file_names(3) = [character(len=13) :: 'force.csv', 'levels.csv', 'summary.nml']
-
-   !> File of additional quantities of the model against time.
-   character(len=*), parameter :: model_histories_file = 'model_histories.csv'
-
-   !> Files of the drop on a mobile floor.
-   character(len=16), parameter :: floor_names(2) = [character(len=16) :: 'floor_force.csv', 'floor_levels.csv']
-
-   !> File of a quasi-static compression.
-   character(len=*), parameter :: compression_file = 'compression.csv'
-
-   !> File of the full input; it identifies the case of the results.
-   character(len=*), parameter :: input_file = 'effective.nml'
-
    !> Beginning of a note; the path of the directory follows.
    character(len=*), parameter :: replaces = 'replaces the results of another input of the same name in '
 
@@ -124,7 +109,8 @@ contains
       logical :: differs
       integer :: i
 
-      input%name = input_file
+      ! The full input identifies the case of the results.
+      input%name = 'effective.nml'
       call get_case_text(case, input%content)
       outcome%directory = output
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)
@@ -183,22 +169,22 @@ contains
       if (.not. case%has_impact) return
       outcome%conforms = is_conforming(case, results%impact%assessment)
       outcome%table = outcome%table//newline//get_table(case, results%impact%history, results%impact%assessment)
-      call add_file(files, file_names(1), get_force_csv(results%impact%history))
-      call add_file(files, file_names(2), get_levels_csv(case, results%impact%assessment))
+      call add_file(files, 'force.csv', get_force_csv(results%impact%history))
+      call add_file(files, 'levels.csv', get_levels_csv(case, results%impact%assessment))
       summary = get_summary(case, results%impact%history, results%impact%assessment, results%warning)
       call add_history_files(results%impact%history, '', write_all, files)
       if (allocated(results%on_floor)) then
          call get_floor_table(case, results%impact, results%on_floor, results%floor, text)
          outcome%table = outcome%table//newline//text
          call get_floor_force_csv(results%impact%history, results%on_floor, results%floor, text)
-         call add_file(files, floor_names(1), text)
+         call add_file(files, 'floor_force.csv', text)
          call get_floor_levels_csv(results%impact, results%floor, text)
-         call add_file(files, floor_names(2), text)
+         call add_file(files, 'floor_levels.csv', text)
          call get_floor_summary(results%on_floor, text)
          summary = summary//text
          call add_history_files(results%on_floor, 'floor_', write_all, files)
       end if
-      call add_file(files, file_names(3), summary)
+      call add_file(files, 'summary.nml', summary)
       if (case%has_room) then
          call get_room_table(case, results%room, results%impact%history%contact_time, allocated(results%on_floor), text)
          outcome%table = outcome%table//newline//text
@@ -207,7 +193,7 @@ contains
       end if
       outcome%table = outcome%table//get_defaults_line(case)
       if (.not. case%has_compression) return
-      call add_file(files, compression_file, get_history_csv('deflection_m,force_N', &
+      call add_file(files, 'compression.csv', get_history_csv('deflection_m,force_N', &
          results%compression%deflection, reshape(results%compression%force, [size(results%compression%force), 1])))
       outcome%table = outcome%table//newline//get_compression_table(results%compression)
    end subroutine describe
@@ -222,7 +208,7 @@ contains
       !> The files: [n_file].
       type(text_file_type), allocatable, intent(inout) :: files(:)
 
-      if (write_all .and. allocated(history%model_history)) call add_file(files, prefix//model_histories_file, &
+      if (write_all .and. allocated(history%model_history)) call add_file(files, prefix//'model_histories.csv', &
          get_model_histories_csv(history))
       if (history%motion%n_frame == 0) return
       call extend(files, size(motion_names))

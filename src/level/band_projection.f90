@@ -3,11 +3,11 @@
 !> The energy of a record f in a band is f'Qf with the sinc kernel Q of the band (see `thud_force_exposure`). All bands lie
 !> below one frequency W. The kernel of all frequencies below W has few eigenvectors with significant eigenvalues: about
 !> 2 W T for records of length T, the discrete prolate spheroidal sequences (Slepian 1978). The kernel commutes with a
-!> tridiagonal matrix, which gives them quickly and without cancellation. A record is projected on them once for all bands;
-!> the spectrum of the projection at Gauss-Legendre nodes gives the energies. The sequences are symmetric or antisymmetric,
-!> so records are folded first, which halves the work.
+!> tridiagonal matrix: both have the same eigenvectors, and the matrix gives them quickly and without cancellation. A record
+!> is projected on the sequences once for all bands; the spectrum of the projection at Gauss-Legendre nodes gives the
+!> energies. The sequences are symmetric or antisymmetric, so records are folded first, which halves the work.
 !>
-!> The omitted sequences change the root of a band's energy by at most sqrt(dropped) times the norm of the record, see
+!> The omitted sequences change the square root of a band's energy by at most sqrt(dropped) times the norm of the record, see
 !> `dropped`; the quadrature errs by less than `quadrature_error`.
 module thud_band_projection
    use thud_band, only: band_type
@@ -21,20 +21,22 @@ module thud_band_projection
    public :: band_projection_type, get_band_energies, get_class_window, get_window_class, is_projected, &
       new_band_projection
 
-   !> Energy of the omitted sequences in all bands together, divided by that of white noise in the bands.
+   !> The last sequences are omitted if their energy in all bands together is below this fraction of the maximum energy of a
+   !> sequence.
    real(wp), parameter :: dropped = 1.0e-22_wp
 
    !> Error of a quadrature over a band, relative to the maximum of its integrand.
    real(wp), parameter :: quadrature_error = 1.0e-17_wp
 
-   !> Number of computed sequences beyond 2 W T, more than ever matter: 1e-22 is reached after 12 to 20.
+   !> Number of sequences computed in addition to 2 W T. This is enough: `dropped` is reached after 12 to 20 of them.
    integer, parameter :: margin = 32
 
    !> Maximum product of the number of samples and the squared number of sequences, which takes some two seconds. More
    !> would pay only for thousands of records.
    real(wp), parameter :: max_work = 5.0e8_wp
 
-   !> Window lengths per doubling: a window is at most 1/11 longer than needed.
+   !> Records are padded with zeros to a few lengths, the windows. Number of windows per doubling of the length: a window is
+   !> at most 1/11 longer than needed.
    integer, parameter :: windows_per_octave = 8
 
    !> Shortest window, samples.
@@ -81,7 +83,7 @@ contains
       n_sample = 2*nint(shortest_window/2*2.0_wp**(real(window - 1, wp)/windows_per_octave))
    end function get_class_window
 
-   !> Whether the matrices for records of this length are computed quickly.
+   !> Whether to project records of this length: the matrices must be computed quickly.
    pure function is_projected(n_sample, sample_rate, bands) result(projected)
       !> Samples of the records.
       integer, intent(in) :: n_sample
@@ -142,19 +144,19 @@ contains
       real(wp), intent(in) :: half_width
       !> True if LAPACK does not find them.
       logical, intent(out) :: failed
-      real(wp), dimension(projection%n_sample) :: diagonal, beside, values
+      real(wp), dimension(projection%n_sample) :: diagonal, off_diagonal, values
       real(wp) :: work(20*projection%n_sample)
       real(wp), allocatable :: vectors(:, :)
-      integer :: support(2*projection%n_sample), whole_work(10*projection%n_sample)
+      integer :: support(2*projection%n_sample), integer_work(10*projection%n_sample)
       integer :: i, n, rank, n_value, status
 
       n = projection%n_sample
       rank = get_rank(n, half_width)
       diagonal = [(((n - 1 - 2*i)/2.0_wp)**2*cos(2*pi*half_width), i=0, n - 1)]
-      beside = [(real(i, wp)*(n - i)/2, i=1, n)]
+      off_diagonal = [(real(i, wp)*(n - i)/2, i=1, n)]
       allocate (vectors(n, rank))
-      call dstevr('V', 'I', n, diagonal, beside, 0.0_wp, 0.0_wp, n - rank + 1, n, 0.0_wp, n_value, values, vectors, n, &
-         support, work, size(work), whole_work, size(whole_work), status)
+      call dstevr('V', 'I', n, diagonal, off_diagonal, 0.0_wp, 0.0_wp, n - rank + 1, n, 0.0_wp, n_value, values, vectors, &
+         n, support, work, size(work), integer_work, size(integer_work), status)
       failed = status /= 0 .or. n_value /= rank
       if (failed) return
       ! The largest eigenvalue belongs to the first sequence, which is symmetric; then the symmetry alternates.
@@ -226,7 +228,7 @@ contains
       end do
    end subroutine get_spectra
 
-   !> Removes the last sequences, which have no energy in the bands.
+   !> Removes the last sequences, which have nearly no energy in the bands.
    subroutine drop_sequences(sequences, spectra)
       !> Halves of the sequences: [n_half, n_sequence].
       real(wp), allocatable, intent(inout) :: sequences(:, :)

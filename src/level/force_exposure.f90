@@ -104,7 +104,7 @@ contains
       else if (size(force) == 0 .or. size(force) > max_samples) then
          error = input_error('the force has '//to_text(size(force))//' samples; allowed: 1 to '//to_text(max_samples))
       else if (total > 2*min_energy .and. total < huge(1.0_wp)/size(force)/sample_rate**2) then
-         return  ! Most records: every term of such a sum is finite and small enough.
+         continue  ! Every term of such a sum is finite and small enough.
       else if (.not. all(ieee_is_finite(force))) then
          error = input_error('the force holds a value that is not finite, first at sample ' &
             //to_text(findloc(ieee_is_finite(force), .false., dim=1))//'; allowed: finite numbers')

@@ -89,14 +89,8 @@ class Page(ABC):
     def save(self, directory: str | os.PathLike[str], *, replace: bool = False) -> list[Path]:
         """Write the contents of `files` and return the paths.
 
-        Files that thud has not written are replaced only if `replace` is true.
-
-        Raises
-        ------
-        InputError
-            If a file that thud has not written exists.
-        OSError
-            If a file cannot be written.
+        Files that thud has not written are replaced only if `replace` is true. Raise InputError if
+        such a file exists otherwise, and OSError if a file cannot be written.
         """
         return Results(Path(directory), self._command, replace=replace).write(self.files())
 
@@ -148,22 +142,11 @@ class Results:
     ) -> list[Path]:
         """Write files and return their paths.
 
-        Parameters
-        ----------
-        contents
-            Contents of the files by name.
-        stale
-            Names of files to remove if they are not in `contents` and an earlier call wrote them.
-        marker
-            For files that belong to the results of a case: content of the file that identifies
-            these results, ``effective.nml`` or ``samples.nml``.
-
-        Raises
-        ------
-        InputError
-            If a file of the user exists, or another run has replaced the results of the case.
-        OSError
-            If a file cannot be written.
+        Files named in `stale` are removed if an earlier call of the command has written them. For
+        files that belong to the results of a case, `marker` is the content of ``effective.nml`` or
+        ``samples.nml``, which identifies the results. Raise InputError if a file of the user
+        exists, or another run has replaced the results of the case, and OSError if a file cannot be
+        written.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         with nullcontext() if self.is_locked else locked(self.folder):

@@ -76,7 +76,7 @@ def new_model(model: str | ModelOptions, options: Mapping[str, object]) -> Model
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Case(Group, Displayed):
-    """Everything that one run needs.
+    """Input of one run.
 
     Attributes
     ----------
@@ -131,10 +131,8 @@ class Case(Group, Displayed):
     def to_namelist(self) -> Namelist:
         """Return the case as a namelist with every key, which prints as the text of a file.
 
-        Raises
-        ------
-        InputError
-            If a value is not a number, a text or, if the key takes a list, a list of numbers.
+        Raise InputError if a value is not a number, a text or, if the key takes a list, a list of
+        numbers.
         """
         for group, kind in GROUPS.items():
             require_kind(group, getattr(self, group), kind)
@@ -202,13 +200,13 @@ class Case(Group, Displayed):
         if "floor" in content:
             name = content["floor"].get("name", next(iter(FLOORS)))
             floor = FLOORS[name](**_with_lists(content.get(name, {})))
-        impact_groups: dict[str, Any] = {
+        optional: dict[str, Any] = {
             group: kind(**_with_lists(content[group]))
             for group, kind in IMPACT_GROUPS.items()
             if group in content
         }
         name = content.get("case", {}).get("name", cls.name)
-        return cls(name=name, model=model, floor=floor, modes=modes, **groups, **impact_groups)
+        return cls(name=name, model=model, floor=floor, modes=modes, **groups, **optional)
 
 
 def tables_case(tables: Mapping[str, Any]) -> Case:

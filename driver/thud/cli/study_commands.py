@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 _STUDY = argument("study", metavar="STUDY.toml", help="study file")
 _SAMPLES = (
-    argument("--yes", action="store_true", help="allow any number of samples"),
+    argument("--yes", dest="allow_large", action="store_true", help="allow any number of samples"),
     argument(
         "--backend",
         choices=("threads", "processes", "dask"),
@@ -67,7 +67,7 @@ def run_study(options: argparse.Namespace) -> int:
             "backend": options.backend,
             "workers": options.workers,
             "scheduler": options.scheduler,
-            "allow_large": options.yes,
+            "allow_large": options.allow_large,
         }
     kind.require(study, **run_options)
     folder = Path(options.output or Path("outputs", study.name))

@@ -29,8 +29,8 @@ CONVENTION = (
     "F(f) = integral of F(t) exp(-i 2 pi f t) dt, N s, t = 0 at first touch; frequencies from 0, "
     "not doubled: F(-f) is the complex conjugate, the energy of a band is 2 * integral of |F|^2 df"
 )
-# Resampling: allowed rates, Hz, the largest whole number of the ratio, and the samples of the lower
-# rate that the filter of scipy.signal.resample_poly reaches.
+# Resampling: allowed rates, Hz, the maximum whole number of the ratio, and the reach of the filter
+# of scipy.signal.resample_poly in samples of the lower rate.
 RATES = (2500.0, 1e6)
 MAX_RATIO = 1000
 REACH = 10

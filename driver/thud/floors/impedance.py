@@ -96,11 +96,7 @@ class BallImpedance(Displayed):
         """Return the impedance of the tangent mass on spring and damper, N s/m, shape (n,).
 
         It applies to steady vibration about the maximum deflection, not to the short impact.
-
-        Parameters
-        ----------
-        frequency : array_like, shape (n,)
-            Frequencies above 0, Hz.
+        Frequencies, Hz, are greater than 0.
         """
         values = require_real("frequency", require_array("frequency", frequency, dimensions=(1,)))
         if not (values > 0).all():
@@ -112,12 +108,8 @@ class BallImpedance(Displayed):
     def limit(self, decibels: float = 1.0) -> Array:
         """Return the resistance below which a floor changes the level, N s/m, shape (n_band,).
 
-        The change is interpolated on logarithmic axes. NaN if no floor changes the level so much.
-
-        Parameters
-        ----------
-        decibels
-            Change of the level, dB, greater than 0.
+        The change, dB, is interpolated on logarithmic axes. NaN if no floor changes the level so
+        much.
         """
         if not 0 < decibels < math.inf:
             refuse_value("decibels", decibels, "above 0")

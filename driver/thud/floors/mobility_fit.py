@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 Quantity = Literal["mobility", "accelerance", "receptance"]
 # Power of i omega by which a quantity is multiplied to convert it to a mobility.
 _POWERS = {"mobility": 0, "accelerance": -1, "receptance": 1}
-# Quantity by the data type of the response in universal files: displacement, velocity, acceleration.
+# Quantity by the data type of a response in universal files: displacement, velocity, acceleration.
 _RESPONSES = {8: "receptance", 11: "mobility", 12: "accelerance"}
 _EXCITATION_FORCE = 13
 _REACTION_FORCE = 9
@@ -292,12 +292,12 @@ def _fit_best_order(name: str, frequency: Array, values: NDArray[np.complex128])
         except ThudError as error:
             failure = failure or error
             continue
-        error = max(result.error, _MIN_ERROR)
+        fit_error = max(result.error, _MIN_ERROR)
         count = 2 * len(frequency)
-        criterion = count * np.log(error**2) + (2 * order + 1) * np.log(count)
+        criterion = count * np.log(fit_error**2) + (2 * order + 1) * np.log(count)
         if criterion < minimum:
             best, minimum, worse_count = result, criterion, 0
-        if error <= _MIN_ERROR:
+        if fit_error <= _MIN_ERROR:
             break
     if best is None:
         raise failure or NumericalError("no fit of the mobility exists")

@@ -245,45 +245,37 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     InputError
         If a column or band is missing, duplicate or not plausible; the message names it.
     """
-    name = Path(path).stem
     titles, table = read_titled(path, ALLOWED)
     if len(titles) != table.shape[1]:
         refuse(f"{path}: {len(titles)} titles for {table.shape[1]} columns", ALLOWED)
     kinds = [_kind(title, path) for title in titles]
-    _require_positions(
-        [title for title, kind in zip(titles, kinds, strict=True) if kind == "level"], path
-    )
+    positions = [title for title, kind in zip(titles, kinds, strict=True) if kind == "level"]
+    other = next((title for title in positions if NO_POSITION & {*_plain(title).split()}), "")
+    if other and len(positions) > 1:
+        refuse(f"{path}: column {other.strip()!r} is not a position", ALLOWED)
     if double := [kind for kind in UNITS if kind != "level" and kinds.count(kind) > 1]:
         refuse(f"{path}: more than one column of {double[0]}", ALLOWED)
-    columns = {kind: table[:, i] for i, kind in enumerate(kinds) if kind != "level"}
-    if "frequency" not in columns or "level" not in kinds:
-        missing = "frequency" if "frequency" not in columns else "levels"
+    if "frequency" not in kinds or not positions:
+        missing = "levels" if "frequency" in kinds else "frequency"
         refuse(f"{path}: there is no column of {missing}", ALLOWED)
-    frequency = np.array([_nominal(f, path) for f in columns["frequency"]])
-    order = np.argsort(frequency)
-    frequency = frequency[order]
+    frequency = np.array([_nominal(f, path) for f in table[:, kinds.index("frequency")]])
+    table, frequency = table[np.argsort(frequency)], np.sort(frequency)
     bands = _bands_of(frequency, path)
-    levels = table[:, [kind == "level" for kind in kinds]].T[:, order]
-    for quantity, values, limits in (
-        ("level", levels, LEVEL_RANGE),
-        ("background", columns.get("background"), LEVEL_RANGE),
-        ("reverberation_time", columns.get("time"), TIME_RANGE),
+    columns = {kind: table[:, i] for i, kind in enumerate(kinds)}
+    background, time = columns.get("background"), columns.get("time")
+    levels = table[:, [kind == "level" for kind in kinds]].T
+    for quantity, values, (low, high), unit in (
+        ("level", levels, LEVEL_RANGE, "dB"),
+        ("background", background, LEVEL_RANGE, "dB"),
+        ("reverberation_time", time, TIME_RANGE, "s"),
     ):
-        if values is None:
-            continue
-        is_valid = (values >= limits[0]) & (values <= limits[1])
-        if not is_valid.all():
-            unit = "s" if quantity == "reverberation_time" else "dB"
+        if values is not None and (wrong := values[~((values >= low) & (values <= high))]).size:
             refuse(
-                f"{path}: {quantity} = {values[~is_valid][0]:g} {unit} is not allowed",
-                f"{limits[0]:g} to {limits[1]:g} {unit}",
+                f"{path}: {quantity} = {wrong[0]:g} {unit} is not allowed",
+                f"{low:g} to {high:g} {unit}",
             )
-    return RoomLevels(
-        name, bands, frequency, levels,
-        columns["background"][order] if "background" in columns else None,
-        columns["time"][order] if "time" in columns else None,
-        None if volume is None else require_volume(volume),
-    )  # fmt: skip
+    volume = None if volume is None else require_volume(volume)
+    return RoomLevels(Path(path).stem, bands, frequency, levels, background, time, volume)
 
 
 def levels_csv(result: RoomLevels) -> bytes:
@@ -317,13 +309,6 @@ def _kind(title: str, path: object) -> str:
     if OTHER_UNITS & {word.lower() for word in re.findall(r"[A-Za-z]+", title)[1:]}:
         refuse(f"{path}: {title.strip()!r} is not in {UNITS[kind]}", f"{kind} in {UNITS[kind]}")
     return kind
-
-
-def _require_positions(titles: list[str], path: object) -> None:
-    """Raise InputError if several columns have levels and a title is not that of a position."""
-    for title in titles:
-        if len(titles) > 1 and NO_POSITION & {*_plain(title).split()}:
-            refuse(f"{path}: column {title.strip()!r} is not a position", ALLOWED)
 
 
 def _plain(title: str) -> str:

@@ -19,12 +19,7 @@ AVERAGING_WIDTH = 1e-4
 def contact_span(force: ArrayLike, sample_rate: float) -> tuple[float, float]:
     """Return the begin and the end of a contact as times after first touch, s.
 
-    Parameters
-    ----------
-    force : array_like, shape (n_sample,)
-        Force from first touch to release, N, without noise.
-    sample_rate
-        Samples per second, Hz.
+    The force, N, shape (n_sample,), runs from first touch to release, without noise.
     """
     values = np.asarray(force, dtype=np.float64)
     time = np.arange(len(values)) / sample_rate
@@ -48,16 +43,7 @@ def average_within(
 ) -> NDArray[np.float64]:
     """Return moving averages of columns; intervals are cut off at the first and the last time.
 
-    Parameters
-    ----------
-    values : ndarray, shape (n_time, n_column)
-        Values at uniformly spaced times, interpolated linearly.
-    time : ndarray, shape (n_time,)
-        Times of the values.
-    centers : ndarray, shape (n,)
-        Centers of the intervals.
-    width
-        Width of the intervals.
+    The values, shape (n_time, n_column), at uniformly spaced times are interpolated linearly.
     """
     step = time[1] - time[0]
     area = np.zeros_like(values)

@@ -1,4 +1,4 @@
-"""Impacts and ensembles as datasets of xarray, with the names, units and meanings of studies."""
+"""Impacts and ensembles as xarray datasets, with units and meanings."""
 
 from __future__ import annotations
 
@@ -48,14 +48,11 @@ def impact_dataset(impact: Impact, histories: Mapping[str, NDArray[np.float64]])
     for column, values in histories.items():
         match = _HISTORY.fullmatch(column)
         name, unit = match.groups() if match else (column, "")
-        labels = _attributes(unit.replace("_per_", "/"), name.replace("_", " "))
-        variables[name] = ("time", values, labels)
+        attrs = _attributes(unit.replace("_per_", "/"), name.replace("_", " "))
+        variables[name] = ("time", values, attrs)
     for name, (force, bands) in LEVELS.items():
-        variables[name] = (
-            bands,
-            impact.levels(bands, force=force),
-            attributes(SAMPLE_RESULTS[name]),
-        )
+        levels = impact.levels(bands, force=force)
+        variables[name] = (bands, levels, attributes(SAMPLE_RESULTS[name]))
     for name in schema.IMPACT_QUANTITIES:
         variables[name] = ((), getattr(impact, name), attributes(schema.QUANTITIES[name]))
     conforms = impact.assess().conforms
@@ -100,8 +97,8 @@ def ensemble_dataset(ensemble: Ensemble) -> xr.Dataset:
         if (values := getattr(ensemble, f"{force}_force")) is not None:
             seconds = np.arange(values.shape[1]) / ensemble.sample_rate
             coordinates["time"] = _time(seconds)
-            labels = _attributes("N", f"{force} force")
-            variables[f"{force}_force"] = (("sample", "time"), values, labels)
+            attrs = _attributes("N", f"{force} force")
+            variables[f"{force}_force"] = (("sample", "time"), values, attrs)
     return xr.Dataset(variables, coordinates, case_attributes(ensemble.case)).copy(deep=True)
 
 

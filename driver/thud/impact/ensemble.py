@@ -103,7 +103,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     Returns
     -------
     Ensemble
-        Scalars, levels and verdicts. Failed samples have a status, a reason and NaN, and do not
+        Quantities, levels and verdicts. Failed samples have a status, a reason and NaN, and do not
         affect other samples.
 
     Raises
@@ -294,9 +294,9 @@ def _columns(
 def _numbers(key: Key, array: NDArray[Any]) -> NDArray[np.float64]:
     """Return the numbers of a parameter; a choice is represented by its index, from 1."""
     if key.kind == "choice":
-        words, index = np.unique(array.astype(str), return_inverse=True)
-        for word in words:
-            require_choice(key.name, str(word), key.choices)
-        indices = np.array([key.choices.index(word) + 1.0 for word in words])
+        choices, index = np.unique(array.astype(str), return_inverse=True)
+        for choice in choices:
+            require_choice(key.name, str(choice), key.choices)
+        indices = np.array([key.choices.index(choice) + 1.0 for choice in choices])
         return indices[index].reshape(array.shape)
     return require_real(key.name, array, "b" if key.kind == "flag" else "iuf")

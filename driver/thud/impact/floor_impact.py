@@ -128,10 +128,10 @@ class FloorImpact(Impact):
         """Return the header and a row of text for each octave."""
         energy = self.injected_energy()
         columns = (self.blocked_levels(), self.levels(force="floor"), self.difference())
-        head = ("octave, Hz", "blocked, dB", "contact, dB", "difference, dB", "energy, J")
+        header = ("octave, Hz", "blocked, dB", "contact, dB", "difference, dB", "energy, J")
         cells = [[f"{value:.2f}" for value in column] for column in columns]
         energies = [f"{value:.3g}" for value in energy.by_motion]
-        return [head, *zip((f"{f:g}" for f in energy.frequency), *cells, energies, strict=True)]
+        return [header, *zip((f"{f:g}" for f in energy.frequency), *cells, energies, strict=True)]
 
     def _floor_histories(self) -> dict[str, NDArray[np.float64]]:
         """Return the force on a rigid floor and the motion of this floor."""
@@ -148,8 +148,8 @@ class FloorImpact(Impact):
         with require_extra("studies"):
             from thud.impact.datasets import attributes
 
-        labels = attributes(FLOOR_QUANTITIES["floor_work"])
-        return super().to_xarray().assign(floor_work=((), self.floor_work, labels))
+        attrs = attributes(FLOOR_QUANTITIES["floor_work"])
+        return super().to_xarray().assign(floor_work=((), self.floor_work, attrs))
 
     def plot(self) -> Figure:
         """Draw contact against blocked force, their levels, and the mobility of the floor."""

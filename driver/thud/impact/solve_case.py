@@ -72,7 +72,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     sampling = {"sample_rate": sample_rate, "duration": duration, "substeps": substeps}
     settings = {name: value for name, value in sampling.items() if value is not None}
     if isinstance(ball, Case):
-        if settings or options or any(part is not None for part in (drop, model, floor)):
+        if settings or options or any(value is not None for value in (drop, model, floor)):
             refuse("solve() has other arguments in addition to a case", "solve(case)")
         case = ball
     else:

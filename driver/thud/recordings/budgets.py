@@ -183,7 +183,7 @@ def average_mass(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
     systematic = {"calibration": value * conditions.calibration, "drop height": height}
     return average_estimates(
         [drop.effective_mass for drop in known],
-        *(Contribution(cause, part) for cause, part in systematic.items() if part),
+        *(Contribution(cause, value) for cause, value in systematic.items() if value),
     )
 
 

@@ -190,7 +190,7 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]
             continue
         if not DURATIONS[0] <= (high - low + 1) * width / rate <= DURATIONS[1]:
             continue
-        # Background next to the pulse, which slow noise moves away from that of a second.
+        # Background next to the pulse: slow noise moves it away from the median of its segment.
         ahead, after = (
             level[max(free, low - LENGTH) : low - DISTANCE],
             level[high + DISTANCE :][:LENGTH],

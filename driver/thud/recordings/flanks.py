@@ -92,7 +92,7 @@ REACH = 6.0
 # Draws of each kind of flank, and minimum probability of a kind.
 N_DRAW = 128
 MIN_PROBABILITY = 1e-6
-# Weights that smooth samples, against the ringing of an anti-aliasing filter.
+# Weights that smooth samples, to reduce the ringing of an anti-aliasing filter.
 SMOOTHING = np.array([0.25, 0.5, 0.25])
 # Times at which the shapes are tabulated, ms: step, and range before and after the touch.
 TICK = 1e-3

@@ -100,15 +100,15 @@ def read_chain(text: object) -> list[Factor]:
     """
     if not isinstance(text, str):
         refuse_value("calibration", text, EXAMPLES)
-    parts = [part.strip() for part in re.split(r"[;,]", text[:1000]) if part.strip()]
+    terms = [term.strip() for term in re.split(r"[;,]", text[:1000]) if term.strip()]
     factors = []
-    for part in parts:
-        match = FACTOR.fullmatch(part)
+    for term in terms:
+        match = FACTOR.fullmatch(term)
         value = float(match["value"]) if match else 0.0
         if not match or not SIZES[0] < abs(value) < SIZES[1]:
-            refuse(f"calibration: {part[:60]!r} is not a number with units", EXAMPLES)
+            refuse(f"calibration: {term[:60]!r} is not a number with units", EXAMPLES)
         (top, over), (bottom, under) = (
-            UNITS[require_unit(match[side], f"calibration {part[:60]!r}")]
+            UNITS[require_unit(match[side], f"calibration {term[:60]!r}")]
             for side in ("top", "bottom")
         )
         factors.append(Factor(value * over / under, top, bottom))

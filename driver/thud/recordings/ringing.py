@@ -67,10 +67,10 @@ def check_ringing(contact: Contact, plate: Plate | None = None) -> tuple[str, ..
     # Between the frequencies of the transform: the vertex of a parabola.
     low, top, high = np.log(energy[k, index - 1 : index + 2])
     resonance += (frequency[1] - frequency[0]) * (low - high) / (2 * (low - 2 * top + high))
-    stated = "is not the one of [plate]" if plate else "is in levels, peaks and contact time"
+    effect = "is not the one of [plate]" if plate else "is in levels, peaks and contact time"
     warning = (
         f"the plate keeps ringing after the contact, at {resonance:.0f} Hz with {amplitude:.2g} N: "
-        f"a resonance of the plate that {stated}; state it in [plate]"
+        f"a resonance of the plate that {effect}; state it in [plate]"
     )
     return (warning,)
 

@@ -62,7 +62,7 @@ def open_signals(  # noqa: PLR0913 - the keys of the configuration
         N per unit, a chain of factors such as ``"4.1 pC/N, 10 mV/pC"``, or a `Calibration`.
     polarity
         Sign of a compression in the file, ``"positive"`` or ``"negative"``; without it that of
-        the larger excursion.
+        the larger peak.
     sample_rate
         Samples per second, Hz, where the file does not say it or is wrong.
 
@@ -184,7 +184,9 @@ def _signal(path: Path, channel: Channel, stated: _Stated, *, several: bool) -> 
         refuse(f"{name}: {channel.n_sample} samples", f"{MIN_SAMPLES} samples or more")
     rate, steps = _rate(channel, stated, name)
     unit, replaced = _unit(channel, stated, name)
-    factor, words, uncertainty = newtons_per_unit(unit, stated.calibration, channel.counts, name)
+    factor, description, uncertainty = newtons_per_unit(
+        unit, stated.calibration, channel.counts, name
+    )
     # Integers are read as fractions of full scale.
     scale = factor * channel.counts if channel.counts and unit == "counts" else factor
     extremes = scan(channel.samples, channel.n_sample, name)
@@ -197,7 +199,7 @@ def _signal(path: Path, channel: Channel, stated: _Stated, *, several: bool) -> 
         samples=partial(_read_scaled, channel.samples, sign * scale),
         full_scale=abs(scale) if channel.counts else None,
         date=shown_text(channel.date),
-        calibration=words,
+        calibration=description,
         calibration_uncertainty=uncertainty,
         steps=(*channel.steps, *steps, *replaced, *changed),
         warnings=check_peak(extremes, sign * scale, name, assumed=unit == ASSUMED),

@@ -1,8 +1,8 @@
 !> Sets of files: which files of a directory belong together, and how a new set replaces them.
 !>
-!> A manifest lists the files that thud has written, each with the checksum of its content and the command that wrote it
-!> (blank for files of the set). All other files, and listed files that have changed since, are the user's and stay. A
-!> workspace is a directory with the new set and its manifest.
+!> A manifest lists the files that thud has written, each with the checksum of its content and, if the file does not belong
+!> to the set, the command that wrote it. All other files, and listed files that have changed since, are the user's and
+!> stay. A workspace is a directory with the new set and its manifest.
 module thud_file_set
    use, intrinsic :: iso_fortran_env, only: int32, int64
    use thud_error, only: error_type, input_error
@@ -20,7 +20,7 @@ module thud_file_set
    character(len=*), parameter :: manifest = '.thud'
    character(len=*), parameter :: head = '# files that thud has written, with checksums (CRC-32)'
 
-   !> Name of a file while the driver writes it; without locks a period and the name of the writer follow.
+   !> Name of a file while the driver writes it. If the file system has no locks, a period and the name of the writer follow.
    character(len=*), parameter :: temporary = manifest//'.new'
 
    !> Prefix of the names of old files that are set aside in the workspace.
@@ -38,7 +38,7 @@ module thud_file_set
 
 contains
 
-   !> Whether a directory is a workspace: empty, or with a name that begins with that of the manifest.
+   !> Whether a directory is a workspace: it is empty, or holds a file whose name begins with `manifest`.
    pure function is_workspace(names) result(yes)
       !> Names in the directory: [n_name].
       character(len=*), intent(in) :: names(:)
@@ -93,7 +93,7 @@ contains
       character(len=*), intent(in) :: target
       !> Names in the new set: [n_file].
       character(len=*), intent(in) :: names(:)
-      !> The old set has the same input.
+      !> Whether the old set has the same input.
       logical, intent(in) :: same
       !> Manifest entries of the files that stay: [n_kept].
       type(entry_type), allocatable, intent(out) :: kept(:)
@@ -118,11 +118,11 @@ contains
       character(len=*), intent(in) :: workspace
       !> The directory, under its lock.
       character(len=*), intent(in) :: target
-      !> The new files; the last one is the marker: [n_file].
+      !> The new files; the last one is the marker, which identifies the case: [n_file].
       type(entry_type), intent(in) :: entries(:)
       !> Names of other old files to remove: [n_gone].
       character(len=*), intent(in) :: gone(:)
-      !> The two directories may be exchanged.
+      !> Whether the two directories may be exchanged.
       logical, intent(in) :: exchangeable
       !> Set if a file cannot be written or moved; the directory is unchanged then.
       type(error_type), allocatable, intent(out) :: error
@@ -140,7 +140,7 @@ contains
       character(len=*), intent(in) :: workspace, target
       !> Names of old files that are not carried over: [n_replaced].
       character(len=*), intent(in) :: replaced(:)
-      !> The directories have been exchanged.
+      !> Whether the directories have been exchanged.
       logical, intent(out) :: done
       character(len=name_length), allocatable :: names(:)
       logical :: changed
@@ -168,7 +168,7 @@ contains
       character(len=*), intent(in) :: workspace, target
       !> Names of old files to replace or remove: [n_replaced].
       character(len=*), intent(in) :: replaced(:)
-      !> The new files; the last one is the marker: [n_file].
+      !> The new files; the last one is the marker, which identifies the case: [n_file].
       type(entry_type), intent(in) :: entries(:)
       !> Set if a file cannot be moved; the directory is unchanged then.
       type(error_type), allocatable, intent(out) :: error
@@ -240,7 +240,7 @@ contains
       character(len=*), intent(in) :: path
       !> Entries; none without a manifest: [n_entry].
       type(entry_type), allocatable, intent(out) :: entries(:)
-      !> There is a manifest, or nothing of that name.
+      !> Whether there is a manifest, or nothing of that name.
       logical, intent(out) :: is_manifest
       character(len=name_length + 64) :: line
       character(len=256) :: message

@@ -23,7 +23,7 @@ module thud_result_directory
    !> Name of a workspace inside the directory.
    character(len=*), parameter :: inner_workspace = '.thud.part'
 
-   !> Owner of a directory: none, or the same case with the same or another input.
+   !> Results that a directory holds: none of this case, or those of this case with the same or with another input.
    integer, parameter :: no_owner = 0, same_input = 1, other_input = 2
 
    !> A directory while its results are written.
@@ -35,7 +35,7 @@ module thud_result_directory
       type(text_file_type) :: marker
       !> Paths of the files that the results depend on: [n_input].
       character(len=path_length), allocatable :: inputs(:)
-      !> Also replace files that thud has not written.
+      !> Whether to replace even files that thud has not written.
       logical :: replace = .false.
       !> Names of all files of the set: [n_file].
       character(len=name_length), allocatable :: names(:)
@@ -47,7 +47,7 @@ module thud_result_directory
       integer(int32) :: sum = 0_int32
       !> Descriptors of that file, of the lock on the workspace, and of the lock on the directory; negative if none.
       integer :: file = -1, workspace_lock = -1, lock = -1
-      !> The directory was missing and has been created.
+      !> Whether the directory was missing and has been created.
       logical :: is_new = .false.
    end type result_directory_type
 
@@ -58,9 +58,9 @@ contains
       character(len=*), intent(in) :: path
       !> The file that will identify the case.
       type(text_file_type), intent(in) :: marker
-      !> Accept a directory with any files.
+      !> Whether to accept a directory with any files.
       logical, intent(in) :: replace
-      !> The directory holds results of the same case with another input.
+      !> Whether the directory holds results of the same case with another input.
       logical, intent(out) :: differs
       type(error_type), allocatable, intent(out) :: error
       integer :: owner
@@ -79,9 +79,9 @@ contains
       type(text_file_type), intent(in) :: files(:)
       !> Paths of the files that the results depend on, which are never replaced: [n_input].
       character(len=*), intent(in) :: inputs(:)
-      !> Also replace files that thud has not written.
+      !> Whether to replace even files that thud has not written.
       logical, intent(in) :: replace
-      !> The files replace results of the same case with another input.
+      !> Whether the files replace results of the same case with another input.
       logical, intent(out) :: differs
       !> Set if the files cannot be written; the directory is unchanged then.
       type(error_type), allocatable, intent(out) :: error
@@ -105,7 +105,7 @@ contains
       character(len=*), intent(in) :: names(:)
       !> Paths of the files that the results depend on, which are never replaced: [n_input].
       character(len=*), intent(in) :: inputs(:)
-      !> Also replace files that thud has not written.
+      !> Whether to replace even files that thud has not written.
       logical, intent(in) :: replace
       !> The directory; to be closed even after an error.
       type(result_directory_type), intent(out) :: directory
@@ -133,7 +133,7 @@ contains
    !> Ends the writing: afterwards all files are in the directory, or none.
    subroutine close_results(directory, differs, error)
       type(result_directory_type), intent(inout) :: directory
-      !> The files replace results of the same case with another input.
+      !> Whether the files replace results of the same case with another input.
       logical, intent(out) :: differs
       !> Set if an earlier step or this one fails; the directory is unchanged then.
       type(error_type), allocatable, intent(inout) :: error
@@ -234,7 +234,7 @@ contains
       character(len=*), intent(in) :: path
       !> The file that will identify the case.
       type(text_file_type), intent(in) :: marker
-      !> Accept a directory with any files.
+      !> Whether to accept a directory with any files.
       logical, intent(in) :: replace
       !> `no_owner`, `same_input` or `other_input`.
       integer, intent(out) :: owner
@@ -395,9 +395,9 @@ contains
    !> Replaces the files of the directory by those of the workspace.
    subroutine publish(directory, differs, moved, error)
       type(result_directory_type), intent(inout) :: directory
-      !> The files replace results of the same case with another input.
+      !> Whether the files replace results of the same case with another input.
       logical, intent(out) :: differs
-      !> The workspace itself has become the directory.
+      !> Whether the workspace itself has become the directory.
       logical, intent(out) :: moved
       !> Set if the directory now belongs to something else, or its files cannot be replaced.
       type(error_type), allocatable, intent(out) :: error

@@ -97,13 +97,13 @@ contains
       !> The table so far.
       character(len=:), allocatable, intent(inout) :: text
       real(wp) :: level
-      integer :: class
+      integer :: korean_class
 
       level = get_a_weighted_level(prediction%octaves(1)%set, prediction%octave_level)
-      class = get_class(level)
+      korean_class = get_class(level)
       text = text//': L_iA,Fmax '//fixed(level, 2)//' dB, '
-      if (class > 0) then
-         text = text//'class '//to_text(class)
+      if (korean_class > 0) then
+         text = text//'class '//to_text(korean_class)
       else
          text = text//'no class'
       end if

@@ -85,7 +85,7 @@ contains
       modulus = 1.6e6_wp
    end function get_paper_modulus
 
-   !> Limits of shell theory, of a wall that stays near the sphere, and of a contact without gravity.
+   !> Limits of the assumptions: a thin shell, a wall that stays close to the sphere, and no gravity during the contact.
    function get_validity_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop

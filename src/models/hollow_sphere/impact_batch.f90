@@ -13,8 +13,8 @@ module thud_impact_batch
 
    public :: add_end, advance, finish_step, get_single, get_watched, impact_batch_type, is_finite, locate
 
-   !> Impacts, in the units of `thud_shell_batch` unless stated otherwise. Fastest if it begins with a cache line, see
-   !> `thud_cache_line`; interoperable, so that it may lie in a buffer.
+   !> Impacts, in the units of `thud_shell_batch` unless stated otherwise. Fastest if it lies at the beginning of a
+   !> cache line, see `thud_cache_line`; interoperable, so that it may lie in a buffer.
    type, bind(c) :: impact_batch_type
       !> Series of the equations.
       type(series_batch_type) :: series
@@ -31,11 +31,12 @@ module thud_impact_batch
       !> Maximum force on the floor, at the same instants, N: [batch_size].
       real(wp) :: peak_force(batch_size)
       !> Steps from first touch to release: [batch_size].
-      real(wp) :: contact(batch_size)
+      real(wp) :: contact_steps(batch_size)
       type(shell_batch_type) :: shell
       !> Factor s of the flux term in restitution.
       real(wp) :: restitution_weight
-      !> Slot of the present state: at release or, for a ball without release, at the beginning of its last step.
+      !> Index in `states` of the present state. After the impact this is the state at release or, for a ball without
+      !> release, at the beginning of its last step.
       integer(c_int) :: now
       !> Whether the ball was released: [batch_size].
       logical(c_bool) :: released(batch_size)
@@ -47,8 +48,8 @@ module thud_impact_batch
 
 contains
 
-   !> Takes a whole or shortened step from the present state to the other slot. Balls that leave the reach of their series
-   !> take it one by one with the single solver, which computes the powers.
+   !> Takes a whole or shortened step from the present state to the other slot. If balls leave the reach of their series, the
+   !> single solver, which needs no series, takes the step for each of them.
    pure subroutine advance(impacts, active, length, elastic_force, floor_force, missed)
       !> The impacts; the new velocity is NaN if a stage has left the domain of the equation.
       type(impact_batch_type), intent(inout) :: impacts
@@ -62,14 +63,14 @@ contains
       real(wp), intent(out) :: floor_force(batch_size)
       !> Whether a ball left the reach of its series.
       logical, intent(out) :: missed
-      integer :: i, then
+      integer :: i, other
 
-      then = 3 - impacts%now
-      call take_step(impacts%shell, impacts%series, impacts%states(impacts%now), length, impacts%states(then), &
+      other = 3 - impacts%now
+      call take_step(impacts%shell, impacts%series, impacts%states(impacts%now), length, impacts%states(other), &
          elastic_force, floor_force, missed)
       if (.not. missed) return
       do i = 1, batch_size
-         impacts%out_of_range(i) = active(i) .and. .not. is_finite(impacts%states(then)%velocity(i))
+         impacts%out_of_range(i) = active(i) .and. .not. is_finite(impacts%states(other)%velocity(i))
          if (impacts%out_of_range(i)) call take_single_step(impacts, i, length(i))
       end do
    end subroutine advance
@@ -133,7 +134,7 @@ contains
       real(wp), intent(out) :: length(batch_size)
       integer, parameter :: max_iterations = 200
       real(wp), dimension(batch_size) :: left, right, left_value, right_value, value, rounding
-      logical, dimension(batch_size) :: open, left_moved, right_moved
+      logical, dimension(batch_size) :: searching, left_moved, right_moved
       integer :: iteration
 
       call expand_series(impacts%shell, impacts%states(impacts%now), ends, impacts%series)
@@ -145,23 +146,23 @@ contains
       left_moved = .false.
       right_moved = .false.
       do iteration = 1, max_iterations
-         open = ends .and. right - left > 2*epsilon(1.0_wp)*right
-         if (.not. any(open)) exit
+         searching = ends .and. right - left > 2*epsilon(1.0_wp)*right
+         if (.not. any(searching)) exit
          length = right - right_value*(right - left)/(right_value - left_value)
          where (mod(iteration, 8) == 0 .or. .not. (length > left .and. length < right)) length = (left + right)/2
          call try_length(impacts, compressing, ends, length, value)
          ! Halve the value at an end kept twice (Illinois): regula falsi would converge slowly.
-         where (open .and. value > 0.0_wp)
+         where (searching .and. value > 0.0_wp)
             left = length
             left_value = value
             right_value = merge(right_value/2, right_value, left_moved)
-         else where (open)
+         else where (searching)
             right = length
             right_value = value
             left_value = merge(left_value/2, left_value, right_moved)
          end where
          ! A value within rounding gives no better estimate.
-         where (open .and. abs(value) <= rounding)
+         where (searching .and. abs(value) <= rounding)
             left = length
             right = length
          end where
@@ -202,7 +203,7 @@ contains
 
    !> Takes a shortened step for some of the balls.
    subroutine finish_step(impacts, active, length, elastic_force, floor_force)
-      !> The impacts; their series are expanded at the end of the step.
+      !> The impacts; their series are expanded again at the end of the step.
       type(impact_batch_type), intent(inout) :: impacts
       !> Whether the ball takes the step: [batch_size].
       logical, intent(in) :: active(batch_size)
@@ -227,9 +228,9 @@ contains
       end associate
    end subroutine finish_step
 
-   !> Adds one end of an interval to the sums of impulse and loss. Together with the values at the beginnings of all steps
-   !> they become integrals by the trapezoidal rule with its first correction (Euler and Maclaurin), of fourth order like the
-   !> steps.
+   !> Adds the terms of one end of an interval to the sums of impulse and loss. The steps add their values at the beginning;
+   !> with the terms of both ends, the sums are integrals by the trapezoidal rule with its first correction (Euler and
+   !> Maclaurin), of fourth order like the steps.
    pure subroutine add_end(impacts, active, value_factor, rate_factor)
       !> The impacts, within reach of their series.
       type(impact_batch_type), intent(inout) :: impacts

@@ -29,7 +29,7 @@ module thud_shell_batch
       real(wp) :: air_pressure(batch_size)
       !> -gamma: [batch_size].
       real(wp) :: exponent(batch_size)
-      !> Deflection at which the shell closes, 1 - h/R: [batch_size].
+      !> Deflection at which the shell closes, 1 - (wall thickness)/R: [batch_size].
       real(wp) :: closing(batch_size)
       !> Unit of the forces, N: [batch_size].
       real(wp) :: force_unit(batch_size)

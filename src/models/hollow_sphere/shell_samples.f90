@@ -1,5 +1,5 @@
 !> Many drops of `thud_hollow_sphere`, a block of balls at a time: the same equation, steps and checks as
-!> `solve_hollow_sphere`, and the same values to 1e-10, the impulse to the residual of its balance.
+!> `solve_hollow_sphere`. The values agree to 1e-10; the impulse agrees to the residual of its balance.
 !>
 !> Samples that cannot be computed are NaN and do not affect others.
 module thud_shell_samples
@@ -39,7 +39,7 @@ module thud_shell_samples
 
    !> Outcome of one drop; NaN if it could not be computed.
    type :: sample_outcome_type
-      !> Whether the batch has computed the drop; otherwise the single solver has the result or the error.
+      !> Whether the batch has computed the drop; if not, the single solver gives the result or the error.
       logical :: computed = .false.
       !> Time from first touch to release, s.
       real(wp) :: contact_time = not_a_number
@@ -55,8 +55,8 @@ module thud_shell_samples
       real(wp) :: impulse = not_a_number
    end type sample_outcome_type
 
-   !> Residual of the balances of impulse and energy above which the single solver decides: the sums of the batch have up to
-   !> about twenty times the error.
+   !> Residual of the balances of impulse and energy above which the single solver checks them, because the sums of the batch
+   !> have up to about twenty times the error of those of the single solver.
    real(wp), parameter :: max_batch_residual = 0.1_wp*max_residual
 
 contains
@@ -71,7 +71,7 @@ contains
       fields = [in_group('ball', get_ball_fields(sample%ball)), in_group('drop', get_drop_fields(sample%drop))]
    end function get_sample_fields
 
-   !> The numbers of a sample, in the order of their keys: ball and drop contain nothing else: [n_key].
+   !> The numbers of a sample, in the order of their keys: [n_key]. Ball and drop have no other components.
    pure function get_numbers(sample) result(values)
       type(sample_type), intent(in) :: sample
       real(wp) :: values((storage_size(sample%ball) + storage_size(sample%drop))/storage_size(1.0_wp))
@@ -122,7 +122,7 @@ contains
    !> Whether the values of each sample lie inside their ranges.
    subroutine check_samples(samples, valid)
       type(sample_type), intent(in) :: samples(:)
-      !> Whether the values do: [n_sample].
+      !> Whether all values of the sample do: [n_sample].
       logical, intent(out) :: valid(:)
       type(sample_type), target :: any_sample
       type(field_type), allocatable :: fields(:)
@@ -163,9 +163,9 @@ contains
       !> The samples, with checked input: [n_sample].
       type(sample_type), intent(in) :: samples(:)
       type(sampling_type), intent(in) :: sampling
-      !> Elastic forces, then floor forces, N, up to the last contact: [2 block_size, n_time].
+      !> Elastic forces, then floor forces, N; the first `n_written` instants are set: [2*block_size, n_time].
       real(wp), intent(inout), contiguous :: force(:, :)
-      !> Number of instants that were written.
+      !> Number of instants up to the latest release.
       integer, intent(out) :: n_written
       !> The outcomes: [n_sample].
       type(sample_outcome_type), intent(out) :: outcomes(:)
@@ -190,7 +190,7 @@ contains
          outcomes(i)%computed = is_computed(impacts, i, samples(i), sampling)
          if (.not. outcomes(i)%computed) cycle
          associate (diameter => 2*samples(i)%ball%outer_radius)
-            outcomes(i)%contact_time = impacts%contact(i)*step
+            outcomes(i)%contact_time = impacts%contact_steps(i)*step
             outcomes(i)%peak_elastic_force = impacts%peak_elastic_force(i)
             outcomes(i)%peak_force = impacts%peak_force(i)
             outcomes(i)%max_deflection = impacts%max_deflection(i)*diameter
@@ -232,16 +232,16 @@ contains
       logical :: computed
       type(force_history_type) :: history
       type(error_type), allocatable :: error
-      real(wp) :: change, energy
+      real(wp) :: impulse_residual, energy_residual
 
       computed = impacts%released(i) .and. .not. impacts%out_of_domain(i)
-      if (computed) computed = impacts%contact(i) >= min_contact_samples*sampling%substeps
+      if (computed) computed = impacts%contact_steps(i) >= min_contact_samples*sampling%substeps
       if (.not. computed) return
       associate (state => impacts%states(impacts%now), v0 => impacts%impact_velocity(i))
-         change = abs(state%impulse(i) - (v0 - state%velocity(i)))/(v0 - state%velocity(i))
-         energy = abs(state%velocity(i)**2 + 2*state%loss(i) - v0**2)/v0**2
+         impulse_residual = abs(state%impulse(i) - (v0 - state%velocity(i)))/(v0 - state%velocity(i))
+         energy_residual = abs(state%velocity(i)**2 + 2*state%loss(i) - v0**2)/v0**2
       end associate
-      if (max(change, energy) <= max_batch_residual) return
+      if (max(impulse_residual, energy_residual) <= max_batch_residual) return
       ! The sums of the single solver, which include the stages of each step, decide.
       call solve_hollow_sphere(sample%ball, sample%drop, hollow_sphere_type(momentum_flux=flux_choices(sample%flux)), &
          sampling, history, error)

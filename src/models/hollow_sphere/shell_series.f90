@@ -3,13 +3,16 @@
 !> Powers and quotients are slow, and a ball moves little in a step: c and 1/(1 - y) are expanded about a deflection, the
 !> expansion point of the ball, and only multiplications and additions are needed while the ball stays near this point.
 !>
-!> The terms: x is a cubic with a double root at 1 and a single root at -1/2, so A x**(-gamma) = sum p_n d**n follows from
-!> its three Taylor coefficients by J. C. P. Miller's recurrence; 1/(1 - y) is a geometric series. The remainder: the nearest
-!> root has the distance rho = min(1 - y, 1/2 + y). The coefficients of x**(-gamma)/x_0**(-gamma) are at most those of (1 -
-!> d/rho)**(-3 gamma), hence for gamma <= 2 those of (1 - d/rho)**(-6), which are binomial(n + 5, 5)/rho**n. The first term
-!> left out, n = 8, is at most 1287 near**8, and the ratio of successive later terms is below 14/9 near: in total at most
-!> 4.7e-12 of the pressure. For gamma = 1.4 this bound is 7.6e-13, and 1.3e-14 in the inner part of the reach, where balls
-!> from 1 m stay at the default step.
+!> Coefficients: x is a cubic with a double root at 1 and a single root at -1/2. From its three Taylor coefficients, J. C. P.
+!> Miller's recurrence gives A x**(-gamma) = sum p_n d**n, where d is the distance from the expansion point; 1/(1 - y) is a
+!> geometric series.
+!>
+!> Omitted terms: the nearest root has the distance rho = min(1 - y, 1/2 + y). The coefficients of x**(-gamma)/x_0**(-gamma)
+!> are at most those of (1 - d/rho)**(-3 gamma), hence for gamma <= 2 those of (1 - d/rho)**(-6), which are
+!> binomial(n + 5, 5)/rho**n. The first omitted term, n = 8, is at most 1287 near**8 (see `near`), and the ratio of
+!> successive later terms is below 14/9 near: in total the omitted terms are at most 4.7e-12 of the pressure. For gamma = 1.4
+!> this bound is 7.6e-13. In the inner part of the reach, where balls dropped from 1 m stay at the default step, it is
+!> 1.3e-14.
 module thud_shell_series
    use thud_kinds, only: wp
    use thud_power, only: not_a_number, vector_power
@@ -22,13 +25,13 @@ module thud_shell_series
    !> Highest power of the series.
    integer, parameter :: degree = 7
 
-   !> Maximum distance at which a series is used, as a fraction of that to the nearest root of x.
+   !> Maximum distance at which a series is used, as a fraction of the distance to the nearest root of x.
    real(wp), parameter :: near = 1.0_wp/64
 
-   !> Fraction of the reach that is used as long as steps are short.
+   !> A series is kept as long as its ball will stay within this fraction of the reach until the next check.
    real(wp), parameter :: inner = 0.6_wp
 
-   !> Steps between two checks of the series; at the default step a ball from 2.7 m stays in reach of its series for as many.
+   !> Steps between two checks of the series; with the default step, a ball dropped from 2.7 m stays in reach for that long.
    integer, parameter :: series_steps = 16
 
    !> The series.
@@ -56,7 +59,7 @@ contains
          inner*reach
    end function will_last
 
-   !> Expands balls about the middle of their next steps; the present deflection is in reach.
+   !> Expands the series about the middle of the path of the next steps; the present deflection stays in reach.
    pure subroutine expand_series(shell, state, wanted, series)
       type(shell_batch_type), intent(in) :: shell
       type(state_batch_type), intent(in) :: state
@@ -129,12 +132,12 @@ contains
    end function get_reach
 
    !> Deceleration y c due to shell and gas.
-   elemental function get_deceleration(y, d, c0, c1, c2, c3, c4, c5, c6, c7) result(acceleration)
+   elemental function get_deceleration(y, d, c0, c1, c2, c3, c4, c5, c6, c7) result(deceleration)
       !> y, the distance from the expansion point, and the terms of the series.
       real(wp), intent(in) :: y, d, c0, c1, c2, c3, c4, c5, c6, c7
-      real(wp) :: acceleration
+      real(wp) :: deceleration
 
-      acceleration = y*(c0 + d*(c1 + d*(c2 + d*(c3 + d*(c4 + d*(c5 + d*(c6 + d*c7)))))))
+      deceleration = y*(c0 + d*(c1 + d*(c2 + d*(c3 + d*(c4 + d*(c5 + d*(c6 + d*c7)))))))
    end function get_deceleration
 
    !> Acceleration z**2/(1 - y) due to the flux for s = 1, with eight terms of the geometric series as a product.
@@ -201,12 +204,12 @@ contains
       real(wp), intent(out) :: floor_force(batch_size)
       !> Whether a ball was out of reach.
       logical, intent(out) :: missed
-      real(wp) :: half, sixth, y2, y3, y4, z2, z3, z4, d1, d2, d3, d4, a1, a2, a3, a4, elastic, whole, outside, outsides
+      real(wp) :: half, sixth, y2, y3, y4, z2, z3, z4, d1, d2, d3, d4, a1, a2, a3, a4, elastic, total, outside, outsides
       integer :: i
 
       outsides = 0.0_wp
       if (abs(shell%weight) > 0.0_wp) then
-         !$omp simd private(half, sixth, y2, y3, y4, z2, z3, z4, d1, d2, d3, d4, a1, a2, a3, a4, elastic, whole, outside) &
+         !$omp simd private(half, sixth, y2, y3, y4, z2, z3, z4, d1, d2, d3, d4, a1, a2, a3, a4, elastic, total, outside) &
          !$omp& reduction(+: outsides)
          do i = 1, batch_size
             associate (y => state%deflection(i), z => state%velocity(i), s => shell%weight, h => length(i), &
@@ -237,16 +240,16 @@ contains
                new%deflection(i) = y + sixth*(z + 2*(z2 + z3) + z4)
                new%velocity(i) = z + sixth*(a1 + 2*(a2 + a3) + a4) + outside
                elastic = (1 - y)*get_deceleration(y, d1, c0, c1, c2, c3, c4, c5, c6, c7)
-               whole = elastic + (1 - s)*(z*z)
-               new%impulse(i) = state%impulse(i) + whole
+               total = elastic + (1 - s)*(z*z)
+               new%impulse(i) = state%impulse(i) + total
                new%loss(i) = state%loss(i) + (0.5_wp - s)*(z*z*z)
                elastic_force(i) = shell%force_unit(i)*elastic
-               floor_force(i) = shell%force_unit(i)*whole
+               floor_force(i) = shell%force_unit(i)*total
             end associate
          end do
       else
          ! The same without the flux, which gfortran would otherwise compute for s = 0 too.
-         !$omp simd private(half, sixth, y2, y3, y4, z2, z3, z4, d1, d2, d3, d4, a1, a2, a3, a4, elastic, whole, outside) &
+         !$omp simd private(half, sixth, y2, y3, y4, z2, z3, z4, d1, d2, d3, d4, a1, a2, a3, a4, elastic, total, outside) &
          !$omp& reduction(+: outsides)
          do i = 1, batch_size
             associate (y => state%deflection(i), z => state%velocity(i), h => length(i), &
@@ -275,11 +278,11 @@ contains
                new%deflection(i) = y + sixth*(z + 2*(z2 + z3) + z4)
                new%velocity(i) = z + sixth*(a1 + 2*(a2 + a3) + a4) + outside
                elastic = (1 - y)*get_deceleration(y, d1, c0, c1, c2, c3, c4, c5, c6, c7)
-               whole = elastic + z*z
-               new%impulse(i) = state%impulse(i) + whole
+               total = elastic + z*z
+               new%impulse(i) = state%impulse(i) + total
                new%loss(i) = state%loss(i) + 0.5_wp*(z*z*z)
                elastic_force(i) = shell%force_unit(i)*elastic
-               floor_force(i) = shell%force_unit(i)*whole
+               floor_force(i) = shell%force_unit(i)*total
             end associate
          end do
       end if

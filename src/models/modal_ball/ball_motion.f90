@@ -35,17 +35,18 @@ module thud_ball_motion
       type(receiver_motion_type) :: floor_motion
       !> Workspace of a step: motion at its beginning; impulses of the floor on the modes: [n_mode].
       real(wp), allocatable :: before(:, :), mode_impulse(:)
-      !> Gaps between rings and floor, and for sticking rings those to the positions of first touch, m: [n_gap].
+      !> Gaps between rings and floor; for sticking rings also the gaps to the positions of first touch, m: [n_gap].
       real(wp), allocatable :: gap(:)
-      !> Gaps of the undeformed ball with its center at the height of the resting floor, m: [n_gap].
+      !> Gaps of the undeformed ball with its center at the height of the resting floor; for sticking rings also the offsets
+      !> that make the second gaps zero at the positions of first touch, m: [n_gap].
       real(wp), allocatable :: start(:)
    end type ball_motion_type
 
 contains
 
    !> The ball at first touch.
-   pure function new_ball_motion(step, interval, rings, floor, outer_radius, impact_velocity, gravity) result(state)
-      type(mode_step_type), intent(in) :: step
+   pure function new_ball_motion(modes, interval, rings, floor, outer_radius, impact_velocity, gravity) result(state)
+      type(mode_step_type), intent(in) :: modes
       !> Length of a step, s.
       real(wp), intent(in) :: interval
       type(surface_rings_type), intent(in) :: rings
@@ -55,9 +56,9 @@ contains
       real(wp), intent(in) :: outer_radius, impact_velocity, gravity
       type(ball_motion_type) :: state
 
-      allocate (state%motion, state%before, source=0*step%factor(:, :, place_v))
-      allocate (state%mode_impulse, source=0*step%omega)
-      allocate (state%gap(size(step%shape_at_ring, 2)), state%start(size(step%shape_at_ring, 2)), source=0.0_wp)
+      allocate (state%motion, state%before, source=0*modes%factor(:, :, place_v))
+      allocate (state%mode_impulse, source=0*modes%omega)
+      allocate (state%gap(size(modes%shape_at_ring, 2)), state%start(size(modes%shape_at_ring, 2)), source=0.0_wp)
       state%start(::rings%n_dof) = -outer_radius*rings%height
       state%height = outer_radius
       state%speed = -impact_velocity
@@ -69,13 +70,13 @@ contains
    end function new_ball_motion
 
    !> Advances modes and floor by one step, with the impulses between ball and floor at its beginning.
-   subroutine take_step(step, interval, mass, state, contact, impulse, error)
-      type(mode_step_type), intent(in) :: step
+   subroutine take_step(modes, interval, mass, state, contact, impulse, error)
+      type(mode_step_type), intent(in) :: modes
       !> Length of the step, s; mass of the ball, kg.
       real(wp), intent(in) :: interval, mass
       !> Motion of the ball.
       type(ball_motion_type), intent(inout) :: state
-      !> The rings; get their impulses.
+      !> The rings; their impulses are set here.
       type(ring_contact_type), intent(inout) :: contact
       !> Sum of the impulses of all rings, N s.
       real(wp), intent(out) :: impulse
@@ -84,11 +85,11 @@ contains
       real(wp) :: speed, floor_start, work
       integer :: i, n_mode, n_gap
 
-      n_mode = size(step%omega)
+      n_mode = size(modes%omega)
       associate (motion => state%motion, before => state%before, mode_impulse => state%mode_impulse, gap => state%gap, &
          n_dof => contact%n_dof)
          before = motion
-         call advance(step, before, motion)
+         call advance(modes, before, motion)
          mode_impulse = 0.0_wp
          impulse = 0.0_wp
          speed = state%speed
@@ -101,17 +102,17 @@ contains
             call advance_receiver(state%floor, state%floor_step, 0.0_wp, state%floor_motion)
             gap(::n_dof) = gap(::n_dof) + state%floor_motion%displacement
          end if
-         if (n_mode > 0) call dgemv('T', n_mode, size(gap), -1.0_wp, step%shape_at_ring, n_mode, motion, 1, 1.0_wp, gap, 1)
+         if (n_mode > 0) call dgemv('T', n_mode, size(gap), -1.0_wp, modes%shape_at_ring, n_mode, motion, 1, 1.0_wp, gap, 1)
          call solve_contact(contact, gap, error)
          if (allocated(error)) return
          call update_sticking(contact, state%start)
          n_gap = contact%last_gap
          if (n_gap > 0) then
             impulse = sum(contact%impulse(:n_gap:n_dof))
-            if (n_mode > 0) call dgemv('N', n_mode, n_gap, 1.0_wp, step%shape_at_ring, n_mode, contact%impulse, 1, &
+            if (n_mode > 0) call dgemv('N', n_mode, n_gap, 1.0_wp, modes%shape_at_ring, n_mode, contact%impulse, 1, &
                0.0_wp, mode_impulse, 1)
             do i = 1, size(motion, 2)
-               motion(:, i) = motion(:, i) - step%factor(:, i, place_v)*mode_impulse
+               motion(:, i) = motion(:, i) - modes%factor(:, i, place_v)*mode_impulse
             end do
             state%speed = state%speed + impulse/mass
             state%height = state%height + interval*impulse/mass
@@ -121,7 +122,7 @@ contains
          end if
          ! Damping acts after the impulse at the beginning of the step.
          before(:, place_v) = before(:, place_v) - mode_impulse
-         state%loss = state%loss + sum(get_energies(step, before) - get_energies(step, motion))
+         state%loss = state%loss + sum(get_energies(modes, before) - get_energies(modes, motion))
          if (.not. state%floor_moves) return
          call add_impulse(state%floor, state%floor_step, impulse, state%floor_motion)
          ! The work on the floor is that of the mean force.

@@ -1,5 +1,5 @@
 !> The improved analytical model that the paper asks for (section 5): the exact modes of the free hollow sphere under
-!> unilateral contact with the floor. Its only input is geometry and material.
+!> unilateral contact with the floor. Apart from the numerical resolution, its only input is geometry and material.
 !>
 !> Modes up to a highest harmonic oscillate; all others respond statically, by their flexibility. Time steps are exact for
 !> each mode. In every step the impulses of the surface rings make gaps and pressures complementary: no ring penetrates, none
@@ -38,7 +38,7 @@ module thud_modal_ball
    !> Maximum energy lost when gaps close within a step, as a fraction of the energy at first touch.
    real(wp), parameter :: max_contact_loss = 0.02_wp
 
-   !> Number of families whose energies are recorded separately, from n = 0 on.
+   !> Number of harmonics whose energies are recorded separately, from n = 0 on.
    integer, parameter :: n_family = 6
 
    !> The model.
@@ -75,7 +75,7 @@ contains
       end if
    end function get_cost
 
-   !> Modulus of elasticity of the paper's ball, Pa (section 2.3; for linear modes an effective modulus).
+   !> Modulus of elasticity of the paper's ball, Pa (section 2.3). For linear modes it is an effective modulus.
    function get_paper_modulus(options) result(modulus)
       class(modal_ball_type), intent(in) :: options
       real(wp) :: modulus
@@ -131,7 +131,7 @@ contains
       type(force_history_type), intent(out) :: history
       type(error_type), allocatable, intent(out) :: error
       type(receiver_type), intent(in), optional :: receiver
-      type(mode_step_type) :: step
+      type(mode_step_type) :: modes
       type(ring_contact_type) :: contact
       type(surface_rings_type) :: rings
       type(receiver_type) :: floor
@@ -150,20 +150,20 @@ contains
       allocate (history%model_history(n_sample, n_family + 2), source=0.0_wp)
       call use_one_blas_thread()
       rings = new_surface_rings(options%rings, options%static_harmonics, options%floor_friction == 'stick')
-      call prepare(ball, options, rings, floor, interval, step, contact, error)
+      call prepare(ball, options, rings, floor, interval, modes, contact, error)
       if (.not. allocated(error)) then
-         state = new_ball_motion(step, interval, rings, floor, ball%outer_radius, history%impact_velocity, &
+         state = new_ball_motion(modes, interval, rings, floor, ball%outer_radius, history%impact_velocity, &
             merge(drop%gravity, 0.0_wp, options%contact_gravity))
          if (state%floor_moves) then
             allocate (history%floor_displacement(n_sample), history%floor_velocity(n_sample), source=0.0_wp)
          end if
-         call march(ball, sampling, interval, rings, step, contact, state, history, error)
+         call march(ball, sampling, interval, rings, modes, contact, state, history, error)
       end if
       call restore_blas_threads()
    end subroutine solve
 
-   !> Sets the modes, their steps and the response of the rings.
-   subroutine prepare(ball, options, rings, floor, interval, step, contact, error)
+   !> Sets the modes, the factors of their time steps, and the response of the rings.
+   subroutine prepare(ball, options, rings, floor, interval, modes, contact, error)
       type(ball_type), intent(in) :: ball
       !> Modes and damping.
       class(modal_ball_options_type), intent(in) :: options
@@ -172,7 +172,7 @@ contains
       type(receiver_type), intent(in) :: floor
       !> Length of a step, s.
       real(wp), intent(in) :: interval
-      type(mode_step_type), intent(out) :: step
+      type(mode_step_type), intent(out) :: modes
       type(ring_contact_type), intent(out) :: contact
       !> Set if the modes cannot be computed, or if the rings cannot be distinguished.
       type(error_type), allocatable, intent(out) :: error
@@ -180,30 +180,31 @@ contains
       real(wp), allocatable :: zeta(:)
       logical :: failed
 
+      ! Response of the rigid ball and of the floor; the modes follow.
       response = 0.0_wp
       response(::rings%n_dof, ::rings%n_dof) = interval/ball%mass + get_impulse_response(floor, &
          new_receiver_step(floor, interval))
-      call add_modes(ball, options, rings, interval, step, response, error)
+      call add_modes(ball, options, rings, interval, modes, response, error)
       if (allocated(error)) return
-      allocate (zeta, mold=step%omega)
-      call set_damping(options, step, zeta)
-      call set_factors(step, zeta, interval)
-      response = response + matmul(transpose(step%shape_at_ring), spread(step%factor(:, place_q, place_v), 2, &
-         size(response, 1))*step%shape_at_ring)
+      allocate (zeta, mold=modes%omega)
+      call set_damping(options, modes, zeta)
+      call set_factors(modes, zeta, interval)
+      response = response + matmul(transpose(modes%shape_at_ring), spread(modes%factor(:, place_q, place_v), 2, &
+         size(response, 1))*modes%shape_at_ring)
       call new_ring_contact(response, rings%n_dof, contact, failed)
       if (failed) error = numerical_error('&modal_ball: rings = '//to_text(options%rings) &
          //' cannot be distinguished; allowed: fewer rings, more static_harmonics, or more substeps')
    end subroutine prepare
 
-   !> Adds the modes of all harmonics, and the static response of the rings to the modes left out.
-   subroutine add_modes(ball, options, rings, interval, step, response, error)
+   !> Adds the modes of all harmonics to `modes`, and the static displacement due to the omitted modes to `response`.
+   subroutine add_modes(ball, options, rings, interval, modes, response, error)
       type(ball_type), intent(in) :: ball
       !> Modes.
       class(modal_ball_options_type), intent(in) :: options
       type(surface_rings_type), intent(in) :: rings
       real(wp), intent(in) :: interval
-      !> Gets frequencies, harmonics and shapes of the modes.
-      type(mode_step_type), intent(inout) :: step
+      !> The modes; their frequencies, harmonics and shapes are set here.
+      type(mode_step_type), intent(inout) :: modes
       !> Displacement of each ring due to unit impulse on each, m/(N s), to be added to: [n_gap, n_gap].
       real(wp), intent(inout) :: response(:, :)
       !> Set if the modes cannot be computed.
@@ -216,7 +217,7 @@ contains
       integer :: n, kept, k, last
 
       basis = new_basis(ball, options%static_harmonics, options%cavity_gas)
-      allocate (step%omega(0), step%harmonic(0), shape_at_ring(size(response, 1), (options%harmonics + &
+      allocate (modes%omega(0), modes%harmonic(0), shape_at_ring(size(response, 1), (options%harmonics + &
          1)*options%radial_modes))
       do n = 0, options%static_harmonics
          call check_interrupt(error)
@@ -236,12 +237,12 @@ contains
             return
          end if
          static_displacement(:, :, n) = matmul(rings%shape_at_ring(:, :, n), family%flexibility)
-         last = size(step%omega) + size(family%omega)
-         shape_at_ring(:, size(step%omega) + 1:last) = matmul(rings%shape_at_ring(:, :, n), family%surface)
-         step%omega = [step%omega, family%omega]
-         step%harmonic = [step%harmonic, (n, k=1, size(family%omega))]
+         last = size(modes%omega) + size(family%omega)
+         shape_at_ring(:, size(modes%omega) + 1:last) = matmul(rings%shape_at_ring(:, :, n), family%surface)
+         modes%omega = [modes%omega, family%omega]
+         modes%harmonic = [modes%harmonic, (n, k=1, size(family%omega))]
       end do
-      step%shape_at_ring = transpose(shape_at_ring(:, :last))
+      modes%shape_at_ring = transpose(shape_at_ring(:, :last))
       associate (rows => size(response, 1), columns => size(static_displacement)/size(response, 1))
          call dgemm('N', 'T', rows, rows, columns, 1/interval, static_displacement, rows, rings%shape_at_ring, rows, &
             1.0_wp, response, rows)
@@ -249,36 +250,36 @@ contains
    end subroutine add_modes
 
    !> Integrates in time from first touch until the ball has left for good, or on a mobile floor to the end of the record.
-   subroutine march(ball, sampling, interval, rings, step, contact, state, history, error)
+   subroutine march(ball, sampling, interval, rings, modes, contact, state, history, error)
       type(ball_type), intent(in) :: ball
       type(sampling_type), intent(in) :: sampling
       real(wp), intent(in) :: interval
       type(surface_rings_type), intent(in) :: rings
-      type(mode_step_type), intent(in) :: step
+      type(mode_step_type), intent(in) :: modes
       type(ring_contact_type), intent(inout) :: contact
       !> Motion of ball and floor.
       type(ball_motion_type), intent(inout) :: state
       type(force_history_type), intent(inout) :: history
-      !> Set if the contact outlasts the record, or if energy is lost in contact.
+      !> Set if the contact outlasts the record, or if too much energy is lost in the contact.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: impulse, settling_time
-      integer :: i, j, n_step, last
+      integer :: i, j, n_step, last_contact
       logical :: has_separated
 
       ! The surface may touch again while the slowest mode swings back, half a period later.
       settling_time = 0.0_wp
-      if (size(step%omega) > 0) settling_time = pi/(sqrt(step%equilibrium_ratio)*minval(step%omega))
-      last = 0
+      if (size(modes%omega) > 0) settling_time = pi/(sqrt(modes%equilibrium_ratio)*minval(modes%omega))
+      last_contact = 0
       has_separated = .false.
       samples: do i = 1, size(history%floor_force)
-         call record_motion(ball, step, state, i, history)
+         call record_motion(ball, modes, state, i, history)
          do j = 1, sampling%substeps
             n_step = (i - 1)*sampling%substeps + j
-            call take_step(step, interval, ball%mass, state, contact, impulse, error)
+            call take_step(modes, interval, ball%mass, state, contact, impulse, error)
             call check_interrupt(error)
             if (allocated(error)) return
             if (contact%last > 0) then
-               last = n_step
+               last_contact = n_step
                history%impulse = history%impulse + impulse
                history%component(i, 1) = history%component(i, 1) + impulse*sampling%sample_rate
                history%model_history(i, 1) = max(history%model_history(i, 1), ball%outer_radius*rings%radius(contact%last))
@@ -289,7 +290,7 @@ contains
                   //' mm; allowed: a lower height, or a stiffer ball')
                return
             end if
-            has_separated = state%speed > 0.0_wp .and. (n_step - last)*interval > settling_time
+            has_separated = state%speed > 0.0_wp .and. (n_step - last_contact)*interval > settling_time
             if (has_separated .and. .not. state%floor_moves) exit samples
          end do
          if (state%floor_moves) then
@@ -301,9 +302,9 @@ contains
       end do samples
       call check_end(sampling, settling_time, has_separated, contact, state, error)
       if (allocated(error)) return
-      history%contact_time = last*interval
+      history%contact_time = last_contact*interval
       call check_contact_samples(sampling, history%contact_time, error)
-      if (.not. allocated(error)) call finish(ball, n_step*interval, step, state, history, error)
+      if (.not. allocated(error)) call finish(ball, n_step*interval, modes, state, history, error)
    end subroutine march
 
    !> Returns an error if the record ends too early.
@@ -334,11 +335,11 @@ contains
    end subroutine check_end
 
    !> Sets the scalars of the impact, and checks the balances.
-   subroutine finish(ball, time, step, state, history, error)
+   subroutine finish(ball, time, modes, state, history, error)
       type(ball_type), intent(in) :: ball
       !> Time since first touch, s.
       real(wp), intent(in) :: time
-      type(mode_step_type), intent(in) :: step
+      type(mode_step_type), intent(in) :: modes
       !> Motion of the ball after the contact.
       type(ball_motion_type), intent(in) :: state
       !> The history; its samples are complete.
@@ -362,7 +363,7 @@ contains
       history%model_quantity = [state%contact_loss]
       initial = ball%mass/2*history%impact_velocity**2
       energy = ball%mass*(state%speed**2/2 + state%gravity*(state%height - ball%outer_radius)) &
-         + sum(get_energies(step, state%motion)) + state%loss + state%contact_loss + state%floor_work
+         + sum(get_energies(modes, state%motion)) + state%loss + state%contact_loss + state%floor_work
       history%energy_residual = abs(energy - initial)/initial
       ! Written so that NaN fails too.
       if (.not. abs(state%contact_loss)/initial <= max_contact_loss) then
@@ -375,24 +376,24 @@ contains
    end subroutine finish
 
    !> Writes motion and energies of one sample into the history.
-   pure subroutine record_motion(ball, step, state, i, history)
+   pure subroutine record_motion(ball, modes, state, i, history)
       type(ball_type), intent(in) :: ball
-      type(mode_step_type), intent(in) :: step
+      type(mode_step_type), intent(in) :: modes
       !> Motion of the ball.
       type(ball_motion_type), intent(in) :: state
       !> Index of the sample.
       integer, intent(in) :: i
       type(force_history_type), intent(inout) :: history
-      real(wp) :: energy(size(step%omega))
+      real(wp) :: energy(size(modes%omega))
       integer :: k, column
 
-      energy = get_energies(step, state%motion)
+      energy = get_energies(modes, state%motion)
       history%deflection(i) = ball%outer_radius - state%height - state%floor_motion%displacement
       history%velocity(i) = -state%speed
       if (state%floor_moves) history%floor_displacement(i) = state%floor_motion%displacement
       history%max_deflection = max(history%max_deflection, history%deflection(i))
       do k = 1, size(energy)
-         column = 2 + min(step%harmonic(k), n_family)
+         column = 2 + min(modes%harmonic(k), n_family)
          history%model_history(i, column) = history%model_history(i, column) + energy(k)
       end do
    end subroutine record_motion

@@ -28,7 +28,8 @@ module thud_modal_ball_options
       character(len=name_length) :: damping_law = 'constant'
       !> Loss factor, twice the damping ratio.
       real(wp) :: loss_factor = 0.1_wp
-      !> Frequency of a loss factor that is not constant, Hz; there the storage modulus is the ball's modulus.
+      !> Frequency at which `loss_factor` applies if it is not constant, Hz. At this frequency the storage modulus is the
+      !> modulus of the ball.
       real(wp) :: loss_frequency = 74.0_wp
       !> Order of the fractional derivative.
       real(wp) :: fractional_order = 0.3_wp
@@ -75,7 +76,7 @@ contains
          '[0, harmonics]', whole=.true.)]
    end function get_fields
 
-   !> Returns an error if the rings are too few for the harmonics, or if no fractional law has the loss.
+   !> Returns an error if the rings are too few for the harmonics, or if no fractional law has this loss factor.
    subroutine check(ball, options, sampling, error)
       type(ball_type), intent(in) :: ball
       class(modal_ball_options_type), intent(in) :: options

@@ -89,6 +89,7 @@ contains
       logical :: failed
       integer :: n
 
+      ! Only for the ratio of long-term modulus to storage modulus.
       allocate (no_modes%omega(0))
       call set_damping(options, no_modes, no_damping)
       relaxed = ball

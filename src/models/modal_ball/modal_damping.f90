@@ -14,24 +14,24 @@ module thud_modal_damping
 contains
 
    !> Sets the Maxwell branches and the damping ratios of the modes.
-   subroutine set_damping(options, step, damping_ratio)
+   subroutine set_damping(options, modes, damping_ratio)
       class(modal_ball_options_type), intent(in) :: options
-      !> The modes; get their branches.
-      type(mode_step_type), intent(inout) :: step
+      !> The modes; their branches are set here.
+      type(mode_step_type), intent(inout) :: modes
       !> Damping ratios: [n_mode].
       real(wp), intent(out) :: damping_ratio(:)
       real(wp) :: viscosity
 
-      allocate (step%relative_modulus(0), step%time(0))
+      allocate (modes%relative_modulus(0), modes%time(0))
       select case (options%damping_law)
       case ('rising')
-         damping_ratio = options%loss_factor/2*step%omega/(2*pi*options%loss_frequency)
+         damping_ratio = options%loss_factor/2*modes%omega/(2*pi*options%loss_frequency)
       case ('fractional')
          call fit_fractional_loss(new_fractional_loss(options%fractional_order, options%loss_factor, &
-            options%loss_frequency), step%relative_modulus, step%time, viscosity)
-         step%equilibrium_ratio = 1/get_storage_ratio(step%relative_modulus, step%time, 2*pi*options%loss_frequency)
-         step%relative_modulus = step%relative_modulus*step%equilibrium_ratio
-         damping_ratio = step%omega*viscosity*step%equilibrium_ratio/2
+            options%loss_frequency), modes%relative_modulus, modes%time, viscosity)
+         modes%equilibrium_ratio = 1/get_storage_ratio(modes%relative_modulus, modes%time, 2*pi*options%loss_frequency)
+         modes%relative_modulus = modes%relative_modulus*modes%equilibrium_ratio
+         damping_ratio = modes%omega*viscosity*modes%equilibrium_ratio/2
       case default
          damping_ratio = options%loss_factor/2
       end select

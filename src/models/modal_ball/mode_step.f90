@@ -13,8 +13,8 @@ module thud_mode_step
    !> Indices of amplitude q and rate v in the motion of a mode; the strains x of the branches follow.
    integer, parameter, public :: place_q = 1, place_v = 2
 
-   !> The modes and their steps: the factors multiply the motion of a mode; an impulse p at the beginning adds -p times the
-   !> factors of the rate.
+   !> The modes and the factors of their time steps. The factors multiply the motion of a mode; an upward impulse p on the
+   !> mode at the beginning adds -p times the factors of the rate v.
    type :: mode_step_type
       !> Angular frequencies for the storage modulus, rad/s: [n_mode].
       real(wp), allocatable :: omega(:)
@@ -33,66 +33,66 @@ module thud_mode_step
 contains
 
    !> Factors of one step.
-   pure subroutine set_factors(step, damping_ratio, interval)
+   pure subroutine set_factors(modes, damping_ratio, interval)
       !> The modes; frequencies and branches are set.
-      type(mode_step_type), intent(inout) :: step
+      type(mode_step_type), intent(inout) :: modes
       !> Damping ratio of each mode from the viscosity: [n_mode].
       real(wp), intent(in) :: damping_ratio(:)
       !> Length of a step, s.
       real(wp), intent(in) :: interval
-      real(wp) :: rates(2 + size(step%time), 2 + size(step%time))
+      real(wp) :: matrix(2 + size(modes%time), 2 + size(modes%time))
       integer :: i, k, n
 
-      n = size(rates, 1)
-      allocate (step%factor(size(step%omega), n, n))
-      do i = 1, size(step%omega)
-         ! The rate divided by the frequency makes the elements similar.
-         associate (omega => step%omega(i))
-            rates = 0.0_wp
-            rates(place_q, place_v) = omega
-            rates(place_v, place_q) = -omega*(step%equilibrium_ratio + sum(step%relative_modulus))
-            rates(place_v, place_v) = -2*damping_ratio(i)*omega
-            rates(place_v, 3:) = omega*step%relative_modulus
+      n = size(matrix, 1)
+      allocate (modes%factor(size(modes%omega), n, n))
+      do i = 1, size(modes%omega)
+         ! With the rate divided by the frequency, the elements are of similar size.
+         associate (omega => modes%omega(i))
+            matrix = 0.0_wp
+            matrix(place_q, place_v) = omega
+            matrix(place_v, place_q) = -omega*(modes%equilibrium_ratio + sum(modes%relative_modulus))
+            matrix(place_v, place_v) = -2*damping_ratio(i)*omega
+            matrix(place_v, 3:) = omega*modes%relative_modulus
             do k = 3, n
-               rates(k, [place_q, k]) = [1, -1]/step%time(k - 2)
+               matrix(k, [place_q, k]) = [1, -1]/modes%time(k - 2)
             end do
-            rates = get_exponential(interval*rates)
-            rates(:, place_v) = rates(:, place_v)/omega
-            rates(place_v, :) = rates(place_v, :)*omega
+            matrix = get_exponential(interval*matrix)
+            matrix(:, place_v) = matrix(:, place_v)/omega
+            matrix(place_v, :) = matrix(place_v, :)*omega
          end associate
-         step%factor(i, :, :) = rates
+         modes%factor(i, :, :) = matrix
       end do
    end subroutine set_factors
 
    !> Advances the motion of the modes by one step.
-   pure subroutine advance(step, before, after)
-      type(mode_step_type), intent(in) :: step
+   pure subroutine advance(modes, before, after)
+      type(mode_step_type), intent(in) :: modes
       !> Motion at the beginning and at the end of the step: [n_mode, 2 + n_branch].
       real(wp), intent(in) :: before(:, :)
       real(wp), intent(out) :: after(:, :)
       integer :: i, k
 
       do i = 1, size(after, 2)
-         after(:, i) = step%factor(:, i, 1)*before(:, 1)
+         after(:, i) = modes%factor(:, i, 1)*before(:, 1)
          do k = 2, size(before, 2)
-            after(:, i) = after(:, i) + step%factor(:, i, k)*before(:, k)
+            after(:, i) = after(:, i) + modes%factor(:, i, k)*before(:, k)
          end do
       end do
    end subroutine advance
 
    !> Kinetic and elastic energy of each mode, J: [n_mode].
-   pure function get_energies(step, motion) result(energy)
-      type(mode_step_type), intent(in) :: step
+   pure function get_energies(modes, motion) result(energy)
+      type(mode_step_type), intent(in) :: modes
       !> The motion: [n_mode, 2 + n_branch].
       real(wp), intent(in) :: motion(:, :)
-      real(wp) :: energy(size(step%omega))
+      real(wp) :: energy(size(modes%omega))
       integer :: k
 
-      energy = step%equilibrium_ratio*motion(:, place_q)**2
-      do k = 1, size(step%relative_modulus)
-         energy = energy + step%relative_modulus(k)*(motion(:, place_q) - motion(:, 2 + k))**2
+      energy = modes%equilibrium_ratio*motion(:, place_q)**2
+      do k = 1, size(modes%relative_modulus)
+         energy = energy + modes%relative_modulus(k)*(motion(:, place_q) - motion(:, 2 + k))**2
       end do
-      energy = (motion(:, place_v)**2 + step%omega**2*energy)/2
+      energy = (motion(:, place_v)**2 + modes%omega**2*energy)/2
    end function get_energies
 
 end module thud_mode_step

@@ -3,7 +3,7 @@
 !>
 !> Sticking rings have a second gap, to the position of first touch, and a second impulse of any sign. The second impulse
 !> closes the second gap of the rings that touched in the previous step: this set does not depend on the unknowns, so the
-!> solution is unique, and the error of a ring that sticks too long or too late is proportional to the step.
+!> solution is unique, and the error of a ring that begins or ceases to stick one step late is proportional to the step.
 module thud_ring_contact
    use thud_error, only: error_type, numerical_error
    use thud_kinds, only: wp
@@ -63,7 +63,7 @@ contains
 
    !> Impulses of one step, by an active set that starts from the previous step.
    subroutine solve_contact(contact, gap, error)
-      !> The contact; gets impulses and touching rings of this step.
+      !> The contact; impulses and touching rings of this step are set here.
       type(ring_contact_type), intent(inout) :: contact
       !> Gaps without contact, m: [n_gap].
       real(wp), intent(in) :: gap(:)
@@ -98,7 +98,8 @@ contains
    !> Makes the rings that touch at the end of a step stick there.
    pure subroutine update_sticking(contact, start)
       type(ring_contact_type), intent(inout) :: contact
-      !> Gaps without motion, m: [n_gap].
+      !> Gaps without motion, m: [n_gap]. For rings that do not stick yet, the second gaps are shifted to zero in the
+      !> present position.
       real(wp), intent(inout) :: start(:)
 
       if (contact%n_dof == 1) return

@@ -16,8 +16,9 @@ module thud_sphere_modes
 
    public :: basis_type, family_type, get_family, get_static_family, new_basis
 
-   !> Distance of Poisson's ratio from 1/2 below which the material counts as incompressible: at less distance the
-   !> compressible energy would drown the others in rounding, and modes differ by as little.
+   !> Distance of Poisson's ratio from 1/2 below which the material counts as incompressible. Closer to 1/2, rounding of the
+   !> energy of compression would exceed the other energies. The modes differ from those of incompressible material by about
+   !> this distance.
    real(wp), parameter :: incompressible_distance = 1.0e-7_wp
 
    !> Gram matrices of the basis, the same for every harmonic.
@@ -44,7 +45,7 @@ module thud_sphere_modes
       real(wp), allocatable :: polynomial(:, :, :)
       !> Polynomials and two derivatives at the outer and at the inner radius: [2, degree + 1, 3].
       real(wp), allocatable :: at_end(:, :, :)
-      !> Terms of the energies by their power of n (n + 1), see `set_gram`: [n, n, 5] with n up to 2 (degree + 1).
+      !> Terms of the energies by their power of n (n + 1), see `set_gram`: [n_unknown, n_unknown, 5].
       real(wp), allocatable :: gram(:, :, :)
    end type basis_type
 
@@ -124,8 +125,8 @@ contains
             p(:, :, 1) - r*p(:, :, 2)], shape(u))
          w = reshape([zero, p(:, :, 1)], shape(u))
       end associate
-      ! With L = n (n + 1) the strain energy of r^2 e:e is
-      ! (rU')^2 + 2U^2 - 2UD + (1 - 1/L) D^2 + (L U^2 + 2 U E + E^2/L)/2.
+      ! With L = n (n + 1) and the strain tensor e, the integral of r^2 e:e over the unit sphere, divided by that of P_n^2,
+      ! is (rU')^2 + 2U^2 - 2UD + (1 - 1/L) D^2 + (L U^2 + 2 U E + E^2/L)/2.
       allocate (basis%gram(2*n, 2*n, 5))
       associate (mu2 => 2*basis%shear_modulus)
          basis%gram(:, :, 1) = mu2*(product_of(u_slope, u_slope) + 2*product_of(u, u) - mixed(u, d) + product_of(d, d) &
@@ -271,21 +272,21 @@ contains
       end associate
    end subroutine assemble
 
-   !> The same for n = 0: U = S/r^2 with a polynomial S, a constant if incompressible.
+   !> Stiffness, mass and surface displacement of n = 0: U = S/r^2 with a polynomial S, which is constant if incompressible.
    subroutine assemble_breathing(basis, stiffness, mass, surface)
       type(basis_type), intent(in) :: basis
       real(wp), allocatable, intent(out) :: stiffness(:, :)
       real(wp), allocatable, intent(out) :: mass(:, :)
       !> U at the outer surface, V = 0: [2, n].
       real(wp), allocatable, intent(out) :: surface(:, :)
-      real(wp), allocatable :: u(:, :), u_slope(:, :), divergence(:, :), inner(:)
+      real(wp), allocatable :: u(:, :), u_slope(:, :), divergence(:, :), volume_change(:)
       real(wp) :: scale
       integer :: n, m
 
       n = 1
       if (.not. basis%incompressible) n = get_degree(basis, 0) + 1
       m = size(basis%radius)
-      allocate (u(m, n), u_slope(m, n), divergence(m, n), inner(n))
+      allocate (u(m, n), u_slope(m, n), divergence(m, n), volume_change(n))
       scale = basis%outer_radius**2
       associate (r => spread(basis%radius, 2, n), weight => spread(basis%weight, 2, n))
          u = scale*basis%polynomial(:, :n, 1)/r**2
@@ -295,8 +296,8 @@ contains
             + 2*matmul(transpose(u), weight*u)) + basis%lame*matmul(transpose(divergence), weight*divergence))
          mass = 4*pi*basis%density*matmul(transpose(r*u), weight*r*u)
       end associate
-      inner = scale*basis%at_end(2, :n, 1)/basis%inner_radius**2*4*pi*basis%inner_radius**2
-      stiffness = stiffness + basis%gas_stiffness*outer(inner)
+      volume_change = scale*basis%at_end(2, :n, 1)/basis%inner_radius**2*4*pi*basis%inner_radius**2
+      stiffness = stiffness + basis%gas_stiffness*outer(volume_change)
       allocate (surface(2, n), source=0.0_wp)
       surface(1, :) = basis%at_end(1, :n, 1)
    end subroutine assemble_breathing
