@@ -22,7 +22,7 @@ from conftest import REPOSITORY, names_in, naming, python
 
 import thud
 from thud import cli
-from thud.base.files import own_path
+from thud.base.files import unique_path
 from thud.studies import blocks, fit, samples
 from thud.studies.blocks import Blocks
 from thud.studies.dataset import disk_space
@@ -329,7 +329,7 @@ def test_killed_study_goes_on_where_there_are_no_locks(
 ) -> None:
     study = thud.read_study(HEIGHTS)
     keep_one_block(study, tmp_path)
-    own_path(tmp_path / "python.partial/.block_000000000001.nc.part").write_bytes(b"half")
+    unique_path(tmp_path / "python.partial/.block_000000000001.nc.part").write_bytes(b"half")
     request.getfixturevalue("no_locks")
     with pytest.warns(thud.LockWarning):
         assert thud.sweep(study, tmp_path).dataset.sizes["height"] == 2

@@ -402,7 +402,7 @@ def test_calls_of_any_size_give_the_same(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(ensemble, "_compute", count)
     for most, expected in ((16, [16, 16, 16, 2]), (50, [50]), (25, [25, 25])):
         sizes.clear()
-        monkeypatch.setattr(ensemble, "_MAX_CALL", most)
+        monkeypatch.setattr(ensemble, "_MAX_SAMPLES", most)
         parts = thud.solve_many(parameters, bands="third", forces=True)
         assert_same_bits(whole, parts)
         np.testing.assert_array_equal(parts.floor_force, whole.floor_force)

@@ -22,7 +22,7 @@ from conftest import MINIMAL, REPOSITORY, RESULT_FILES, contents, names_in, nami
 
 import thud
 from thud.base.errors import PlausibilityWarning
-from thud.base.files import FIRST_LINE, TEMPORARY, Results, locked, own_path
+from thud.base.files import FIRST_LINE, TEMPORARY, Results, locked, unique_path
 
 sys.path.insert(0, str(REPOSITORY / "tests/faults"))
 from injection import can_inject, injecting
@@ -184,7 +184,7 @@ def test_figures_are_not_added_to_results_of_another_input(
 def test_unfinished_figures_go_where_there_are_no_locks(
     run: Run, two_inputs: TwoInputs, out: Path
 ) -> None:
-    part = own_path(out / TEMPORARY)
+    part = unique_path(out / TEMPORARY)
     mine = out / f"{TEMPORARY}s"
     part.write_bytes(b"half a figure")
     mine.write_bytes(b"mine")

@@ -1,6 +1,6 @@
-"""The one place where Python meets the Fortran library.
+"""All calls of the Fortran library.
 
-Bundles of the library become dictionaries, its status codes exceptions.
+Bundles of the library become dictionaries, and its status codes become exceptions.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    # By name: text, number, array, or more of them.
+    # Texts, numbers, arrays and dictionaries of them, by name.
     Bundle = dict[str, Any]
 
 api = _core.thud_api
 
-# Questions whose answers keep their state in static memory: no other Python thread runs meanwhile.
+# Questions that use static memory of the library: no other Python thread runs meanwhile.
 _ALONE = {"effective_case", "modes", "run"}
-# The status of an interrupt is this plus the number of the signal.
+# The status of an interrupt is this number plus the number of the signal.
 _INTERRUPTED = 128
 _ERRORS = {error.exit_code: error for error in (InputError, NumericalError)}
 
@@ -36,9 +36,9 @@ _ERRORS = {error.exit_code: error for error in (InputError, NumericalError)}
 def ask(question: str, /, **request: str | bytes | float | NDArray[np.float64]) -> Bundle:
     """Ask the library a question of `thud_answer`; return its answer.
 
-    The answer holds texts, numbers and arrays by name; those named ``group.name`` are in a
-    dictionary for each group. An interrupt ends the work early: the main thread, where the signal
-    handlers run, starts it again if they raise nothing, and other threads raise KeyboardInterrupt.
+    The answer holds texts, numbers and arrays by name; items named ``group.name`` are in a
+    dictionary for each group. An interrupt ends the computation early: the main thread runs the
+    signal handlers and asks again if they raise nothing; other threads raise KeyboardInterrupt.
     Raise InputError or NumericalError with the message of the library.
     """
     routine = api.ask_alone if question in _ALONE else api.ask
@@ -53,7 +53,7 @@ def ask(question: str, /, **request: str | bytes | float | NDArray[np.float64]) 
 def _packed(
     request: Mapping[str, str | bytes | float | NDArray[np.float64]],
 ) -> tuple[str, bytes, NDArray[np.float64]]:
-    """Return header, texts and values of a request; arrays are flattened in Fortran's order."""
+    """Return header, texts and values of a request; arrays are flattened in Fortran order."""
     header = ""
     texts = b""
     arrays = []
@@ -68,9 +68,9 @@ def _packed(
             header += f"{name}\tn{size}\n"
             arrays.append((slice(count, count + size), value))
             count += size
-    values = np.zeros(max(1, count))  # f2py knows no empty arrays
-    for where, value in arrays:
-        values[where] = value.ravel(order="F") if isinstance(value, np.ndarray) else value
+    values = np.zeros(max(1, count))  # f2py does not pass empty arrays
+    for span, value in arrays:
+        values[span] = value.ravel(order="F") if isinstance(value, np.ndarray) else value
     return header, texts, values
 
 
@@ -110,7 +110,7 @@ def _items(header: bytes) -> list[tuple[str, str, tuple[int, ...] | None, int]]:
 
 
 def text(value: bytes) -> str:
-    """Return a text of the library; invalid UTF-8 is kept by surrogate escapes."""
+    """Return the text in bytes of the library; invalid UTF-8 becomes surrogate escapes."""
     return value.decode(errors="surrogateescape")
 
 
@@ -120,10 +120,10 @@ def version() -> str:
 
 
 def compiler() -> str:
-    """Return the compiler of the library and its options, without those that hold paths."""
+    """Return the compiler of the library and its options, except options with paths."""
     return re.sub(r" (-[IJ] ?)?\S*/\S*", "", text(ask("library")["compiler"]))
 
 
 def progress() -> float:
-    """Return the fraction of the latest long work of this process that is done, 0 to 1."""
+    """Return the completed fraction, 0 to 1, of the latest long computation of this process."""
     return float(api.get_progress())

@@ -15,27 +15,27 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-# Maximum length of a value in a message; longer ones are shown by their type.
+# Maximum length of a value in a message; of longer values the message shows the type.
 MAX_SHOWN = 80
-# Maximum of all numbers: Python refuses to print much larger ones.
-LARGEST = 10**300
-# Maximum seed of the libraries that draw samples.
-LARGEST_SEED = 2**32 - 1
+# Maximum magnitude of all numbers; Python does not print much larger integers.
+MAX_NUMBER = 10**300
+# Maximum seed of the libraries that draw random samples.
+MAX_SEED = 2**32 - 1
 
 
 def refuse(problem: str, allowed: str, cause: Exception | None = None) -> NoReturn:
-    """Raise InputError: what is wrong, and what is allowed."""
+    """Raise InputError with a message that states the problem and what is allowed."""
     message = f"{problem}; allowed: {allowed}"
     raise InputError(message) from cause
 
 
 def refuse_value(name: str, value: object, allowed: str) -> NoReturn:
-    """Raise InputError for a value."""
+    """Raise InputError for a value that is not allowed."""
     refuse(f"{name} = {shown(value)} is not allowed", allowed)
 
 
 def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
-    """Raise InputError where an argument is of another type."""
+    """Raise InputError if an argument is not of a type."""
     if not isinstance(value, kind):
         expected = getattr(kind, "__name__", None) or " or ".join(
             k.__name__ for k in get_args(kind)
@@ -44,20 +44,20 @@ def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
 
 
 def require_choice(name: str, value: object, allowed: Collection[str]) -> None:
-    """Raise InputError where a word is not one of several."""
+    """Raise InputError if a value is not one of the allowed words."""
     if not isinstance(value, str) or value not in allowed:
         unknown = f"{name} = {shown(value)} is not known{suggestion(value, allowed)}"
         refuse(unknown, ", ".join(map(repr, allowed)))
 
 
 def require_mapping(name: str, value: object, entries: str) -> None:
-    """Raise InputError where an argument is not a mapping of names to one or more entries."""
+    """Raise InputError if an argument is not a mapping with names as keys, or is empty."""
     if not isinstance(value, Mapping) or not value:
         refuse(f"{name} are not stated", f"a mapping of names to one or more {entries}")
 
 
 def suggestion(word: object, known: Collection[str]) -> str:
-    """Return the known word closest to a misspelled one, for the end of a message.
+    """Return the end of a message that suggests the known word closest to a misspelled one.
 
     >>> suggestion("heigth", ["gravity", "height"])
     " (did you mean 'height'?)"
@@ -72,7 +72,7 @@ def suggestion(word: object, known: Collection[str]) -> str:
 
 
 def require_array(name: str, values: ArrayLike, dimensions: Container[int]) -> NDArray[Any]:
-    """Return an array; raise InputError where it is ragged, masked or of other dimensions."""
+    """Return an array; raise InputError if it is ragged or masked, or `ndim` is not allowed."""
     allowed = "one dimension" + (", or a scalar" if 0 in dimensions else "")
     try:
         array = np.asarray(values)
@@ -86,9 +86,9 @@ def require_array(name: str, values: ArrayLike, dimensions: Container[int]) -> N
 
 
 def require_real(name: str, array: NDArray[Any], kinds: str = "iuf") -> NDArray[np.float64]:
-    """Return an array as float64; raise InputError where it is not of real numbers."""
+    """Return an array as float64; raise InputError if its entries are not real numbers."""
     if array.size and array.dtype.kind not in kinds:
-        refuse(f"{name} is not an array of real numbers", "one dimension of them")
+        refuse(f"{name} is not an array of real numbers", "one dimension of real numbers")
     return np.ascontiguousarray(array, dtype=np.float64)
 
 
@@ -101,25 +101,26 @@ def require_pair(name: str, values: ArrayLike) -> tuple[float, float]:
 
 
 def require_whole(name: str, value: Any, low: int, high: int) -> None:  # noqa: ANN401
-    """Raise InputError where a value is not a whole number from low to high."""
+    """Raise InputError if a value is not a whole number from low to high."""
     is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not is_whole or not low <= value <= high:
         refuse_value(name, value, f"whole numbers from {low} to {high}")
 
 
 def require_number(name: str, value: Any) -> None:  # noqa: ANN401 - of a user
-    """Raise InputError where a value is not a finite number."""
+    """Raise InputError if a value is not a finite number."""
     kinds = int | float | np.integer | np.floating
-    valid = isinstance(value, kinds) and not isinstance(value, bool)
-    if not valid or not -LARGEST <= (value if isinstance(value, int) else float(value)) <= LARGEST:
+    is_valid = isinstance(value, kinds) and not isinstance(value, bool)
+    number = value if isinstance(value, int) or not is_valid else float(value)
+    if not is_valid or not -MAX_NUMBER <= number <= MAX_NUMBER:
         refuse_value(name, value, "finite numbers")
 
 
 def shown(value: object) -> str:
-    """Return a value for a message: its type if it is long or has several lines."""
-    if isinstance(value, int) and abs(value) > LARGEST:
+    """Return the text of a value for a message, or its type if the text is long."""
+    if isinstance(value, int) and abs(value) > MAX_NUMBER:
         return "a very large number"
-    # Lists of files are tuples in objects.
+    # Objects store the lists of files as tuples.
     text = repr(list(value) if type(value) is tuple else value)
     fits = len(text) <= MAX_SHOWN and "\n" not in text
     if fits:
@@ -132,7 +133,7 @@ def shown(value: object) -> str:
 def require_words(
     label: str, words: Iterable[str], known: Iterable[str], also: Iterable[str] = ()
 ) -> None:
-    """Raise InputError for an unknown word; the suggestion may be one of other words too."""
+    """Raise InputError for an unknown word; its message may also suggest one of `also`."""
     allowed = list(known)
     for word in words:
         if word not in allowed:

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# The first of these in a line separates its columns; without them blanks do.
+# Separators of columns by precedence; a line without any of them is separated by blanks.
 SEPARATORS = ("\t", ";", ",")
-# Decimal marks; the other mark then groups digits, as do the characters below.
+# Decimal marks; the mark that is not the decimal one groups digits, as do the characters below.
 MARKS = {".": "point", ",": "comma"}
 GROUPING = " \N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}'\N{RIGHT SINGLE QUOTATION MARK}"
 QUOTED = re.compile(r'"[^"]*"')
@@ -35,9 +35,9 @@ ALLOWED = (
 
 
 def _numbers(decimal: str) -> re.Pattern[str]:
-    """Return the pattern of numbers with a decimal mark: groups begin with 1 to 3 digits.
+    """Return the pattern of numbers with a decimal mark; the first group has 1 to 3 digits.
 
-    Digits follow a decimal comma: the comma in ``0, 1.5`` separates columns.
+    A decimal comma needs a digit behind it: the comma in ``0, 1.5`` separates columns.
     """
     mark = re.escape(decimal)
     fraction = rf"(?:{mark}\d{'+' if decimal == ',' else '*'})?"
@@ -53,12 +53,12 @@ NUMBERS = {decimal: _numbers(decimal) for decimal in MARKS}
 
 
 class DecimalMark(NamedTuple):
-    """The decimal mark of all numbers of a table, and the line that shows it, 0 for none."""
+    """Decimal mark of a table, and the number of the line that shows it; 0 if no line does."""
 
     mark: str = "."
     line: int = 0
 
-    def wrong(self, cell: str) -> str:
+    def explain(self, cell: str) -> str:
         """Return the reason why a cell is not a number."""
         reason = f"{cell[:40]!r} is not a number"
         if is_number(cell) and self.line:
@@ -67,7 +67,7 @@ class DecimalMark(NamedTuple):
 
 
 def read_table(path: str | os.PathLike[str]) -> NDArray[np.float64]:
-    """Return the numbers of a file of columns, shape (n_row, n_column); see `read_titled`."""
+    """Return the numbers of a file of columns, shape (n_row, n_column), as `read_titled` does."""
     return read_titled(path, ALLOWED)[1]
 
 
@@ -78,9 +78,9 @@ def read_titled(
 
     The titles are the cells of the line above the first number, if there is such a line. Commas,
     semicolons, tabs or blanks separate the columns, as in the first line of numbers; cells may
-    stand in quotes. The decimal mark is that of the whole table, see `find_decimal`. Empty lines,
-    comments after ``#`` and lines above the first number are skipped. Raise InputError with the
-    file, and the line that is not numeric or of another width.
+    be quoted. One decimal mark holds for the whole table, see `find_decimal`. Empty lines, comments
+    after ``#`` and lines above the first number are skipped. Raise InputError, naming file and
+    line, if a line is not numeric or has a different number of columns.
     """
     try:
         if not Path(path).is_file():  # opening a pipe could block
@@ -92,19 +92,19 @@ def read_titled(
         raise
     except (OSError, ValueError) as error:
         refuse(f"{path}: cannot be read ({error})", allowed, error)
-    filled: Iterator[tuple[int, str]] = (
+    numbered: Iterator[tuple[int, str]] = (
         (number, line) for number, line in enumerate(lines, start=1) if line
     )
     titles: list[str] = []
     separator: str | None = None
-    for number, line in filled:
+    for number, line in numbered:
         separator = find_separator(line)
         cells = split_line(line, separator)
         if any(map(is_number, cells)):
-            filled = itertools.chain([(number, line)], filled)
+            numbered = itertools.chain([(number, line)], numbered)
             break
         titles = cells
-    rows = [(number, split_line(line, separator), '"' in line) for number, line in filled]
+    rows = [(number, split_line(line, separator), '"' in line) for number, line in numbered]
     if not rows:
         refuse(f"{path}: cannot be read (no numbers)", allowed)
     decimal = find_decimal(rows, separator, str(path))
@@ -113,7 +113,7 @@ def read_titled(
     for row, (number, cells, _) in zip(table, rows, strict=True):
         values = [to_number(cell, decimal.mark) for cell in cells]
         if None in values:
-            refuse(f"{path}: line {number}: {decimal.wrong(cells[values.index(None)])}", allowed)
+            refuse(f"{path}: line {number}: {decimal.explain(cells[values.index(None)])}", allowed)
         if len(cells) != width:
             refuse(f"{path}: line {number}: {len(cells)} columns, {width} above it", allowed)
         row[:] = values
@@ -123,7 +123,7 @@ def read_titled(
 def read_lines(text: TextIO, name: str, allowed: str) -> Iterator[str]:
     """Yield the lines of a text without line ends.
 
-    Raise InputError with the line that is too long or holds zero bytes.
+    Raise InputError, naming the line, if a line is too long or holds zero bytes.
     """
     for number, ended in enumerate(iter(lambda: text.readline(MAX_LINE + 1), ""), start=1):
         line = ended.removesuffix("\n")
@@ -135,7 +135,7 @@ def read_lines(text: TextIO, name: str, allowed: str) -> Iterator[str]:
 
 
 def strip_comment(line: str) -> str:
-    """Return a line without its comment and terminators."""
+    """Return a line without its comment and its trailing semicolons."""
     return line.partition("#")[0].strip().rstrip(";").rstrip()
 
 
@@ -171,7 +171,7 @@ def split_line(line: str, separator: str | None) -> list[str]:
 
 
 def to_number(cell: str, decimal: str) -> float | None:
-    """Return the number in a cell; None if it is none with this decimal mark.
+    """Return the number in a cell; None if the cell is not a number with this decimal mark.
 
     >>> to_number("1.234,5", ","), to_number("1.234,5", ".")
     (1234.5, None)
@@ -192,11 +192,11 @@ def is_number(cell: str) -> bool:
 def find_decimal(
     rows: Iterable[tuple[int, list[str], bool]], separator: str | None, name: str
 ) -> DecimalMark:
-    """Return the decimal mark of a table from its lines: number, cells, and quotation.
+    """Return the decimal mark of a table.
 
-    The first number that is valid with only one of the marks decides: ``0,5``, ``1.234,5`` and
-    ``1,2345`` show a decimal comma, ``1,575`` shows nothing. Raise InputError with the line of an
-    ambiguous number if no number of the table decides.
+    Each row holds its line number, its cells, and whether the line has quotes. The first number
+    that is valid with only one mark decides: ``0,5``, ``1.234,5`` and ``1,2345`` show a decimal
+    comma; ``1,575`` is ambiguous. Raise InputError, naming its line, if no number decides.
     """
     ambiguous: tuple[int, str] | None = None
     for line, cells, are_quoted in rows:

@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-# Maximum length of a message of matplotlib.
-_MAX_SHOWN = 100
+# Maximum length of a cause in a warning.
+_MAX_CAUSE = 100
 
 
 class Displayed(Immutable, ABC):
-    """Base of results, whose HTML is their text above a table."""
+    """Base of results; their HTML is their text above a table."""
 
     @abstractmethod
     def rows(self) -> Sequence[Sequence[str]]:
@@ -33,20 +33,20 @@ class Displayed(Immutable, ABC):
 
 @contextmanager
 def warn_if_not_drawn(figure: str) -> Iterator[None]:
-    """Warn if a figure cannot be drawn for any reason; the results do not need it."""
+    """Warn instead of raising any error while a figure is drawn; results do not depend on it."""
     try:
         yield
     except Exception as error:
         # Compiled modules turn an interrupt into another error.
         if isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
             raise
-        cause = (str(error) or type(error).__name__).partition("\n")[0][:_MAX_SHOWN]
+        cause = (str(error) or type(error).__name__).partition("\n")[0][:_MAX_CAUSE]
         message = f"{figure} is not drawn ({cause}); the results are complete without it"
         warnings.warn(message, ReportWarning, stacklevel=4)
 
 
 def draw_all(draws: Mapping[str, Callable[[], Figure | None]]) -> dict[str, Figure]:
-    """Return figures by name, without those that are empty or cannot be drawn."""
+    """Return figures by name; figures that are empty or cannot be drawn are omitted."""
     drawn = {}
     for name, draw in draws.items():
         with warn_if_not_drawn(name):

@@ -14,7 +14,7 @@ class ThudError(Exception):
 
 
 class FitWarning(UserWarning):
-    """A fit has a result that is not reliable in every respect."""
+    """A result of a fit is unreliable in some respect."""
 
 
 class PlausibilityWarning(UserWarning):
@@ -22,7 +22,7 @@ class PlausibilityWarning(UserWarning):
 
 
 class ReportWarning(UserWarning):
-    """A figure, a file or characters of a report are missing, or it replaces another report."""
+    """A report lacks a figure, a file or characters, or replaces another report."""
 
 
 class LockWarning(RuntimeWarning):

@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-# Distributions by the name of the import, if they differ.
+# Names of distributions that differ from the name of the import.
 _DISTRIBUTIONS = {"sklearn": "scikit-learn"}
 
 
 @contextmanager
 def require_extra(extra: str) -> Iterator[None]:
-    """Raise InputError where a package is missing, with the packages of an extra."""
+    """Raise InputError, with the packages to install, if a package of an extra is missing."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -35,7 +35,7 @@ def require_extra(extra: str) -> Iterator[None]:
 def data_frame(
     columns: Mapping[str, NDArray[np.generic]], time: NDArray[np.float64] | None = None
 ) -> pd.DataFrame:
-    """Return columns as a table, over time, s, if stated; raise InputError without pandas."""
+    """Return columns as a table, indexed by time, s, if stated; raise InputError without pandas."""
     with require_extra("studies"):
         import pandas as pd
 
@@ -43,7 +43,7 @@ def data_frame(
 
 
 def packages(extra: str) -> list[str]:
-    """Return the names of the packages of an extra; none if thud is not installed."""
+    """Return the names of the packages of an extra; empty if thud is not installed."""
     from importlib.metadata import PackageNotFoundError, requires
 
     try:

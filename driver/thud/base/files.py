@@ -1,4 +1,4 @@
-"""Result files: written atomically, under locks, and never over files of the user."""
+"""Result files: written atomically and under locks; files of the user are not replaced."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ MANIFEST = ".thud"
 FIRST_LINE = "# files that thud has written, with checksums (CRC-32)"
 # Temporary name of a file in a result directory.
 TEMPORARY = f"{MANIFEST}.new"
-# Age from which a temporary file of another host is abandoned, s.
+# Age from which a temporary file of another host counts as abandoned, s.
 _MAX_AGE = 86400.0
 # Errors of a file system that has no locks.
 _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS, errno.EBADF, errno.EINVAL)
-# Errors of a path without a regular file.
+# Errors of a path that leads to no regular file.
 _NO_FILE = (
     errno.EINVAL, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR
 )  # fmt: skip
@@ -44,9 +44,9 @@ _NO_FILE = (
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Defer signals until a short operation is done; file libraries print errors otherwise.
+    """Defer signals until a short operation is done, as file libraries print errors if interrupted.
 
-    Only the main thread handles signals.
+    Other threads than the main thread receive no signals: there this does nothing.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -66,7 +66,7 @@ def uninterrupted() -> Iterator[None]:
 
 
 def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
-    """Write a file atomically, also over an existing one; an OSError names the path."""
+    """Write a file atomically, replacing an existing one; an OSError names the path."""
     try:
         target = Path(path)
         if target.exists():
@@ -77,9 +77,9 @@ def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
 
 
 class Page(ABC):
-    """Base of comparisons that are written as a figure and a page."""
+    """Base of comparisons that are saved as a figure and an HTML page."""
 
-    # The command that writes them.
+    # The subcommand of `thud` that saves the files.
     _command: ClassVar[str]
 
     @abstractmethod
@@ -87,10 +87,10 @@ class Page(ABC):
         """Return the contents of the files by name."""
 
     def save(self, directory: str | os.PathLike[str], *, replace: bool = False) -> list[Path]:
-        """Write the files of `files` and return their paths.
+        """Write the contents of `files` and return the paths.
 
-        Files that thud has not written are replaced with `replace` only. Raise InputError where a
-        file is in the way, and OSError where they cannot be written.
+        Files that thud has not written are replaced only if `replace` is true. Raise InputError if
+        such a file exists otherwise, and OSError if a file cannot be written.
         """
         return Results(Path(directory), self._command, replace=replace).write(self.files())
 
@@ -99,20 +99,20 @@ class Page(ABC):
 class Results:
     """A directory for results, in which thud replaces only files that it has written.
 
-    The manifest of the directory lists these with their checksums. Files that are not listed, have
-    changed since or are not regular belong to the user.
+    The manifest of the directory lists the names and checksums of its files. Files that are not
+    listed, not regular, or changed since thud wrote them belong to the user.
 
     Attributes
     ----------
     folder : Path
-        The directory, made where it is needed.
+        The directory; created if it is missing.
     command : str
-        The command that writes; empty for the results of a case and their figures, which the next
-        input replaces as a whole.
+        The subcommand that writes the files; empty for the results of a case and their figures,
+        which the next input replaces as a whole.
     inputs : tuple of path-like
         Files that the results depend on, never replaced.
     replace : bool
-        Replace also files that thud has not written.
+        Also replace files that thud has not written.
     is_locked : bool
         Whether the caller holds the lock of the directory.
     """
@@ -124,7 +124,10 @@ class Results:
     is_locked: bool = False
 
     def require(self, names: Iterable[str], listed: Mapping[str, Entry] | None = None) -> None:
-        """Raise InputError for an existing file that is not `listed`, by default the manifest."""
+        """Raise InputError for an existing file that may not be replaced.
+
+        `listed` are entries of files by thud, by default those of the manifest.
+        """
         listed = self._listed() if listed is None else listed
         for name in names:
             path = self.folder / name
@@ -137,21 +140,22 @@ class Results:
     def write(
         self, contents: Mapping[str, bytes], stale: Iterable[str] = (), marker: bytes | None = None
     ) -> list[Path]:
-        """Write files by name; return their paths.
+        """Write files and return their paths.
 
         Files named in `stale` are removed if an earlier call of the command has written them. For
         files that belong to the results of a case, `marker` is the content of ``effective.nml`` or
-        ``samples.nml``. Raise InputError where a file is in the way, or another run has replaced
-        the results of the case, and OSError where a file cannot be written.
+        ``samples.nml``, which identifies the results. Raise InputError if a file of the user
+        exists, or another run has replaced the results of the case, and OSError if a file cannot be
+        written.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         with nullcontext() if self.is_locked else locked(self.folder):
-            inputs = {content_of(self.folder / name) for name in ("effective.nml", "samples.nml")}
-            if marker not in {None, *inputs}:
+            markers = {content_of(self.folder / name) for name in ("effective.nml", "samples.nml")}
+            if marker not in {None, *markers}:
                 refuse(f"{self.folder} now holds results of another input", "run the case again")
             listed = self._listed()
             written = {n: Entry((checksum(c),), self.command) for n, c in contents.items()}
-            # A killed writer leaves old and new contents: both are listed.
+            # A killed writer leaves files with old or new contents: both checksums are listed.
             allowed = listed | {
                 n: Entry((*listed.get(n, Entry(())).checksums, *e.checksums), e.command)
                 for n, e in written.items()
@@ -188,13 +192,13 @@ class Results:
             return {}
 
     def require_no_input(self, path: Path) -> None:
-        """Raise InputError where a path is an input."""
+        """Raise InputError if a path is an input."""
         if is_one_of(path, self.inputs):
             refuse(f"{path} is an input, which is never replaced", "another directory")
 
 
 class Entry(NamedTuple):
-    """Entry of a manifest: allowed checksums of a file, and the command that has written it."""
+    """Entry of a manifest: allowed checksums of a file, and the subcommand that wrote it."""
 
     checksums: tuple[str, ...]
     command: str = ""
@@ -203,7 +207,7 @@ class Entry(NamedTuple):
 def refuse_foreign(path: Path) -> NoReturn:
     """Raise InputError for a file or directory that thud has not written."""
     if is_directory(path):
-        refuse(f"{path} is a directory of something else", "another directory")
+        refuse(f"{path} is a directory that thud has not written", "another directory")
     refuse(
         f"{path} is in the way: thud has not written it, or it has changed since",
         "another directory, or --replace (replace=True) to replace it",
@@ -211,7 +215,7 @@ def refuse_foreign(path: Path) -> NoReturn:
 
 
 def is_one_of(path: Path, others: Iterable[str | os.PathLike[str]]) -> bool:
-    """Whether a path leads to one of several files by any name."""
+    """Whether a path leads to one of several files, also by a link or another name."""
     for other in others:
         with suppress(OSError, ValueError):
             if path.samefile(other):
@@ -220,12 +224,12 @@ def is_one_of(path: Path, others: Iterable[str | os.PathLike[str]]) -> bool:
 
 
 def is_directory(path: Path) -> bool:
-    """Whether a path is a directory and no link."""
+    """Whether a path is a directory and not a symbolic link."""
     return path.is_dir() and not path.is_symlink()
 
 
 def is_regular(path: Path) -> bool:
-    """Whether a path is a regular file and no link; opening others could block."""
+    """Whether a path is a regular file and not a symbolic link; opening other files may block."""
     try:
         return stat.S_ISREG(path.lstat().st_mode)
     except (OSError, ValueError):
@@ -233,24 +237,24 @@ def is_regular(path: Path) -> bool:
 
 
 def is_temporary(name: str) -> bool:
-    """Whether a name is that of a temporary file, also of `own_path`."""
+    """Whether a name is that of a temporary file, such as one of `unique_path`."""
     return re.fullmatch(r"\.(thud\.new|.+\.part)(\..*)?", name) is not None
 
 
 def is_failure(error: BaseException) -> bool:
-    """Whether a reading error is a failure of the system rather than of the file."""
+    """Whether a reading error is a failure of the system, not a missing or unsuitable file."""
     return isinstance(error, OSError) and error.errno not in (None, *_NO_FILE)
 
 
 def read_input(path: Path) -> bytes:
-    """Return the content of an input; raise OSError where it is no regular file."""
+    """Return the content of an input file; raise OSError if it is not a regular file."""
     _require_regular(path.stat(), path)
     return path.read_bytes()
 
 
 def _require_unlinked(status: os.stat_result, part: Path) -> None:
     _require_regular(status, part)
-    # Writing would also change the file of the other name.
+    # The file has another name: writing would change it there too.
     if status.st_nlink > 1:
         raise OSError(errno.EEXIST, f"{part.name} is a link", str(part))
 
@@ -268,15 +272,15 @@ def content_of(path: Path) -> bytes | None:
 
 
 def checksum(content: bytes) -> str:
-    """Return the checksum of a content in manifests: CRC-32 in hexadecimal digits."""
+    """Return the checksum that a manifest lists for a content: CRC-32 in hexadecimal digits."""
     return f"{zlib.crc32(content):08X}"
 
 
 def read_manifest(folder: Path) -> dict[str, Entry]:
-    """Return the entries of the manifest of a directory, none without a manifest.
+    """Return the entries of the manifest of a directory; empty if there is no manifest.
 
-    The last checksum of a file is that of its latest content. Raise InputError where another file
-    has its name.
+    The last checksum of an entry is that of the latest content. Raise InputError if a file with
+    the name of a manifest is not by thud.
     """
     path = folder / MANIFEST
     if not os.path.lexists(path):
@@ -311,9 +315,9 @@ def _is_listed(path: Path, listed: Mapping[str, Entry]) -> bool:
 
 @contextmanager
 def locked(folder: Path, kind: int = fcntl.LOCK_EX) -> Iterator[None]:
-    """Hold the lock of a result directory, so that no other run replaces or extends it.
+    """Hold the lock of a result directory, so that no other run replaces or extends its files.
 
-    Raise BlockingIOError where another run holds it and `kind` has LOCK_NB.
+    Raise BlockingIOError if another run holds the lock and `kind` has LOCK_NB.
     """
     with _open_locked(folder, os.O_RDONLY | os.O_DIRECTORY, kind) as (_, _, is_locked):
         if kind & fcntl.LOCK_EX and not is_locked:
@@ -326,7 +330,7 @@ def locked(folder: Path, kind: int = fcntl.LOCK_EX) -> Iterator[None]:
 def _open_locked(path: Path, flags: int, kind: int) -> Iterator[tuple[Path, int, bool]]:
     """Open a path; yield the path, the descriptor, and whether the descriptor holds the lock.
 
-    Without locks a new file gets a unique name, as others may write to the same name.
+    On a file system without locks a new file gets a unique name, as other runs may write to `path`.
     """
     while True:
         descriptor = os.open(path, flags, 0o666)
@@ -334,9 +338,9 @@ def _open_locked(path: Path, flags: int, kind: int) -> Iterator[tuple[Path, int,
             is_locked = _flock(descriptor, kind)
             if flags & os.O_CREAT and not flags & os.O_EXCL and not is_locked:
                 path.unlink(missing_ok=True)
-                path, flags = own_path(path), flags | os.O_EXCL
-            # The previous holder of the lock may have renamed it, or switched the directory.
-            elif _leads_to(path, descriptor):
+                path, flags = unique_path(path), flags | os.O_EXCL
+            # The previous holder of the lock may have renamed the file or replaced the directory.
+            elif _is_open_as(path, descriptor):
                 yield path, descriptor, is_locked
                 return
         finally:
@@ -344,7 +348,7 @@ def _open_locked(path: Path, flags: int, kind: int) -> Iterator[tuple[Path, int,
 
 
 def _flock(descriptor: int, kind: int) -> bool:
-    """Lock an open file; return False where the file system has no locks."""
+    """Lock an open file; return False if the file system has no locks."""
     try:
         fcntl.flock(descriptor, kind)
     except OSError as error:
@@ -354,17 +358,17 @@ def _flock(descriptor: int, kind: int) -> bool:
     return True
 
 
-def _leads_to(path: Path, descriptor: int) -> bool:
+def _is_open_as(path: Path, descriptor: int) -> bool:
     try:
         return os.path.samestat(os.fstat(descriptor), path.stat())
     except FileNotFoundError:
         return False
 
 
-def own_path(part: Path) -> Path:
-    """Return a unique temporary path, and remove those of ended writers.
+def unique_path(part: Path) -> Path:
+    """Return a unique temporary path, after removing the temporary files of ended processes.
 
-    Its name begins with that of `part`, and ends with host and process of the writer.
+    The name begins with the name of `part` and ends with the host and the number of this process.
     """
     host = platform.node()
     for path in part.parent.iterdir():
@@ -382,13 +386,13 @@ def _is_running(process: int) -> bool:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
-    except PermissionError:  # of another user
+    except PermissionError:  # a process of another user
         pass
     return True
 
 
 def remove(path: Path) -> None:
-    """Remove a file or a directory, if it exists; an interrupt leaves all of it or nothing."""
+    """Remove a file or a directory if it exists; an interrupt leaves it complete or absent."""
     if is_directory(path):
         moved = path.with_name(f".{path.name}.part")
         shutil.rmtree(moved, ignore_errors=True)
@@ -401,7 +405,8 @@ def remove(path: Path) -> None:
 def _replace(target: Path, content: bytes, part: Path) -> None:
     """Write a file under a temporary name in the same directory, then rename it.
 
-    With locks all writers use the same name, one at a time, and overwrite what a killed one left.
+    If the file system has locks, all writers use the same temporary name, one after the other, and
+    overwrite what a killed writer left.
     """
     try:
         # Another user may have put a link to one of our files; opening a pipe could block.

@@ -1,4 +1,4 @@
-"""Base of the public types: read-only arrays, comparison by value."""
+"""Base of the public types, with read-only arrays and comparison by value."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 Array = TypeVar("Array", bound="NDArray[Any]")
 
-# Arrays that were frozen here, by identity: other read-only arrays may change.
+# Arrays that `freeze` has made read-only, by identity; others may change through another view.
 _FROZEN: WeakValueDictionary[int, NDArray[Any]] = WeakValueDictionary()
 
 
@@ -25,8 +25,8 @@ class Immutable:
     """Base of frozen dataclasses, which are declared with ``eq=False``.
 
     Arrays, also those in tuples, dictionaries and datasets, are read-only copies; lists become
-    tuples. Objects are equal where they are of one class and their fields are equal, NaN to NaN.
-    Their hash is that of the fields: objects that hold an array or a dictionary have none.
+    tuples. Objects are equal if their class and fields are equal; NaN equals NaN. The hash is the
+    hash of the fields, so objects that hold an array or a dictionary have none.
     """
 
     def __post_init__(self) -> None:
@@ -40,7 +40,7 @@ class Immutable:
         return array if _is_frozen(array) else freeze(array.copy())
 
     def __setstate__(self, state: dict[str, object]) -> None:
-        """Set the fields of a copy or a pickle, whose arrays are writable."""
+        """Restore the fields of a copy or a pickle and make their arrays read-only again."""
         vars(self).update(state)
         Immutable.__post_init__(self)
 
@@ -51,7 +51,7 @@ class Immutable:
         return all(map(_equal, _fields(self), _fields(other)))
 
     def __hash__(self) -> int:
-        """Return the hash of the fields; raise TypeError where a field has none."""
+        """Return the hash of the fields; raise TypeError if a field is not hashable."""
         return hash((type(self), *map(_hashed, _fields(self))))
 
 
@@ -64,9 +64,9 @@ class Plain(Immutable):
 
 
 def freeze(array: Array) -> Array:
-    """Make an array and the arrays that it views read-only, and return it.
+    """Make an array and the arrays that it views read-only, and return the array.
 
-    Objects store it and its views without a copy.
+    Immutable objects store a frozen array and its views without a copy.
     """
     owner: object = array
     while isinstance(owner, np.ndarray):
@@ -77,7 +77,7 @@ def freeze(array: Array) -> Array:
 
 
 def _is_frozen(array: NDArray[Any]) -> bool:
-    """Return whether an array, or the array that it views, was frozen here."""
+    """Return whether `freeze` has made an array, or the array that it views, read-only."""
     owner = array if array.base is None else array.base
     return _FROZEN.get(id(owner)) is owner and not (array.flags.writeable or owner.flags.writeable)
 
@@ -96,8 +96,8 @@ def _stored(value: object, store_array: Callable[[NDArray[Any]], object]) -> obj
 
 
 def _stored_table(value: object, store_array: Callable[[NDArray[Any]], object]) -> object:
-    """Return a dataset as a copy, and an object with values as a stored array."""
-    # A dataset exists only if xarray is imported.
+    """Return a copy of a dataset, the stored array of an array-like object, or another value."""
+    # If xarray is not imported, no dataset exists.
     xarray = sys.modules.get("xarray")
     if xarray is not None and isinstance(value, xarray.Dataset):
         dataset = value.copy(deep=True)
@@ -111,13 +111,13 @@ def _stored_table(value: object, store_array: Callable[[NDArray[Any]], object]) 
     return value
 
 
-def _fields(of: object) -> list[object]:
+def _fields(owner: object) -> list[object]:
     """Return the values of the fields that are compared."""
-    return [getattr(of, field.name) for field in fields(of) if field.compare]  # type: ignore[arg-type]
+    return [getattr(owner, field.name) for field in fields(owner) if field.compare]  # type: ignore[arg-type]
 
 
 def _equal(value: Any, other: Any) -> bool:  # noqa: ANN401 - values of any kind
-    """Return whether two values are equal, NaN to NaN."""
+    """Return whether two values are equal; NaN equals NaN."""
     if np.isscalar(value) and np.isscalar(other):
         return bool(value == other) or bool(value != value and other != other)  # noqa: PLR0124 - NaN
     if isinstance(value, np.ndarray) and isinstance(other, np.ndarray):
@@ -133,7 +133,7 @@ def _equal(value: Any, other: Any) -> bool:  # noqa: ANN401 - values of any kind
 
 
 def _hashed(value: object) -> object:
-    """Return a value that hashes alike for equal values; NaN hashes by its object otherwise."""
+    """Return a value with equal hashes for equal values; hashes of NaN differ between objects."""
     if isinstance(value, tuple):
         return tuple(map(_hashed, value))
     return "nan" if np.isscalar(value) and value != value else value  # noqa: PLR0124

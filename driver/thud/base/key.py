@@ -1,4 +1,4 @@
-"""Declaration of an input key, and the base of the classes with keys."""
+"""Declaration of an input key, and the base of the classes whose fields are keys."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class Key:
     Attributes
     ----------
     owner : str
-        Its user: a source model, a floor, ``"modes"``, ``"compression"``, ``"floor"`` or
-        ``"room"``; empty for keys of every impact.
+        What uses the key: a source model, a floor, ``"modes"``, ``"compression"``, ``"floor"`` or
+        ``"room"``; empty if every impact uses it.
     group, name : str
         Namelist group and name.
     kind : str
@@ -43,7 +43,7 @@ class Key:
         Limits of the allowed range; a limit that depends on other keys of the group is a product or
         quotient of numbers and names of keys.
     whole : bool
-        Whether it takes whole numbers only.
+        Whether only whole numbers are allowed.
     """
 
     owner: str
@@ -62,7 +62,7 @@ class Group(Plain):
     """Base of the dataclasses whose fields are keys, or groups of them."""
 
     def __new__(cls, *_: object, **keywords: object) -> Self:
-        """Raise InputError where a keyword is not a field."""
+        """Raise InputError if a keyword is not a field."""
         require_keywords(f"{cls.__name__}()", keywords, _names(cls))
         return super().__new__(cls)
 
@@ -72,7 +72,7 @@ def _names(group: type[Group]) -> list[str]:
 
 
 def require_keywords(label: str, keywords: Collection[str], allowed: Collection[str]) -> None:
-    """Raise InputError for an unknown keyword; name the classes that have it."""
+    """Raise InputError for an unknown keyword; its message names the classes with that field."""
     unknown = [word for word in keywords if word not in allowed]
     keys = {group.__name__: _names(group) for group in Group.__subclasses__()} if unknown else {}
     for word in unknown:
@@ -86,7 +86,7 @@ def require_keywords(label: str, keywords: Collection[str], allowed: Collection[
 
 
 def check_keywords(function: Callable[P, R]) -> Callable[P, R]:
-    """Let a function raise InputError for an unknown keyword."""
+    """Decorate a function so that it raises InputError for an unknown keyword."""
     allowed = list(inspect.signature(function).parameters)
 
     @wraps(function)

@@ -19,23 +19,24 @@ if TYPE_CHECKING:
 
 @contextmanager
 def process_pool(
-    width: int, prepare: Callable[[], object] | None = None
+    n_process: int, prepare: Callable[[], object] | None = None
 ) -> Iterator[ProcessPoolExecutor]:
-    """Open a pool of processes that call `prepare` first; an interrupt ends their work."""
-    # Forked processes would inherit locks of threads that they do not have.
+    """Open a pool of processes that call `prepare` first; an interrupt ends the processes."""
+    # Forked processes would inherit locks held by threads that they do not have.
     context = get_context("spawn")
-    end, release = context.Pipe(duplex=False)
-    with end, release, ProcessPoolExecutor(width, context, _start, (end, prepare)) as processes:
+    child_end, parent_end = context.Pipe(duplex=False)
+    start = (child_end, prepare)
+    with child_end, parent_end, ProcessPoolExecutor(n_process, context, _start, start) as processes:
         try:
             yield processes
         except KeyboardInterrupt:
-            release.close()
+            parent_end.close()
             raise
 
 
 @contextmanager
 def no_interrupt_in_processes() -> Iterator[None]:
-    """Block Ctrl-C, which terminals send to all processes, in processes started meanwhile."""
+    """Block Ctrl-C, which terminals send to all processes, in processes started in this context."""
     previous = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -43,15 +44,15 @@ def no_interrupt_in_processes() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, previous)
 
 
-def _start(end: connection.Connection, prepare: Callable[[], object] | None) -> None:
-    """End this process with its parent, or when the other end of a pipe closes."""
-    # The default lock is a semaphore of the system, which would remain after such an end.
+def _start(pipe: connection.Connection, prepare: Callable[[], object] | None) -> None:
+    """Let this process exit when the parent ends or closes its end of the pipe."""
+    # The default lock is a semaphore of the system, which would outlive such an exit.
     tqdm.set_lock(RLock())
 
-    def end_with_it() -> None:
-        end.poll(None)
+    def exit_with_parent() -> None:
+        pipe.poll(None)
         os._exit(1)
 
-    Thread(target=end_with_it, daemon=True).start()
+    Thread(target=exit_with_parent, daemon=True).start()
     if prepare:
         prepare()

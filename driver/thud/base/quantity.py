@@ -1,4 +1,4 @@
-"""Declaration of a result, as the table of quantities of the library has it."""
+"""Declaration of a quantity, an entry of the library's table of results."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ class Quantity:
     name, title : str
         Name in files and programs, and in tables for readers.
     symbol : str
-        Symbol in formulas, in the mathematical notation of matplotlib; empty where there is none.
+        Symbol in the mathematical notation of matplotlib; empty if there is none.
     unit : str
         SI unit, or dB; empty for pure numbers.
     display_unit : str
         Unit in tables for readers.
     display_scale : float
-        How many of them are one `unit`.
+        Number of display units in one `unit`.
     decimals : int
         Decimals in tables for readers.
     meaning : str
@@ -43,7 +43,7 @@ class Quantity:
         return f"{self.title}, {self.display_unit}".removesuffix(", ")
 
     def show(self, value: float) -> str:
-        """Return a value, in SI units, as tables show it in `display_unit`; empty if it is NaN."""
+        """Return the text of a value in SI units, converted to `display_unit`; empty for NaN."""
         if math.isnan(value):
             return ""
         shown = value * self.display_scale

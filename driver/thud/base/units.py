@@ -8,7 +8,7 @@ from decimal import Decimal
 
 from thud.base.checks import refuse, require_kind, shown, suggestion
 
-# By the unit of a key: allowed units and their powers of ten.
+# For the SI unit of a key, the allowed units and their powers of ten.
 MULTIPLES: dict[str, dict[str, int]] = {
     "m": {"m": 0, "cm": -2, "mm": -3, "um": -6},
     "s": {"s": 0, "ms": -3, "us": -6},
@@ -26,7 +26,7 @@ MULTIPLES: dict[str, dict[str, int]] = {
     "K": {"K": 0},
     "": {"1": 0, "%": -2},
 }
-# The number of a quantity.
+# The number at the beginning of a quantity.
 NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
 # Units of tables and figures, ascending.
 DISPLAY_UNITS = {
@@ -40,9 +40,9 @@ DISPLAY_UNITS = {
 
 
 def power_of(unit: object, key_unit: str, label: str) -> int:
-    """Return the power of ten that converts a unit to that of a key.
+    """Return the power of ten that converts a unit to the unit of a key.
 
-    Raise InputError where the unit does not fit; `label` names it in the message.
+    Raise InputError if the unit does not fit; its message begins with `label`.
     """
     # Other units have no multiples.
     multiples = MULTIPLES.get(key_unit, {key_unit: 0})
@@ -58,12 +58,12 @@ def quantity(text: str) -> float:
     Parameters
     ----------
     text
-        Number and unit of a study, such as ``"32 mm"``.
+        Number and unit, such as ``"32 mm"``.
 
     Raises
     ------
     InputError
-        Where it is no finite number, or the unit is unknown.
+        If the number is not finite, or the unit is unknown.
 
     Examples
     --------
@@ -97,7 +97,7 @@ def scaled(value: float, power: int) -> float:
 
 
 def display_unit(unit: str, value: float) -> tuple[str, float]:
-    """Return a unit in which a value is at least 1, and its size in SI units."""
+    """Return the largest unit in which a value is at least 1, and this unit in SI units."""
     sizes = {name: scaled(1.0, MULTIPLES[unit][name]) for name in DISPLAY_UNITS.get(unit, ())}
-    small = [(name, factor) for name, factor in sizes.items() if factor <= abs(value)]
-    return small[-1] if small and value else (unit, 1.0)
+    usable = [(name, size) for name, size in sizes.items() if size <= abs(value)]
+    return usable[-1] if usable and value else (unit, 1.0)

@@ -29,7 +29,7 @@ from thud.base._schema import (
 )
 from thud.base.bridge import ask, text
 from thud.base.checks import (
-    LARGEST,
+    MAX_NUMBER,
     refuse,
     refuse_value,
     require_choice,
@@ -47,12 +47,12 @@ if TYPE_CHECKING:
 
 # Values by group and key, as f90nml has them.
 Namelist: TypeAlias = "Mapping[str, Mapping[str, object]]"
-# The keys that take lists of numbers.
+# Names of the keys that take lists of numbers.
 LISTS = {key.name for key in KEYS if key.kind == "list"}
-# Optional groups of an impact, and of a case.
+# Optional groups of an impact, and all optional groups of a case.
 IMPACT_GROUPS: dict[str, type[Group]] = {"compression": Compression, "room": Room}
 OPTIONAL_GROUPS: dict[str, type[Group]] = {"modes": Modes, **IMPACT_GROUPS}
-# Keys of the mesh, which free modes and finite elements share.
+# Keys of the mesh, which is the same for free modes and finite elements.
 _MESH = tuple(option.name for option in fields(Modes) if "group" in option.metadata)
 
 
@@ -63,11 +63,11 @@ def group_of(model: str, option: Field[Any]) -> str:
 
 
 def new_model(model: str | ModelOptions, options: Mapping[str, object]) -> ModelOptions:
-    """Return the options of a model by its name; raise InputError where one is not known."""
+    """Return the options of a model by its name; raise InputError if a name is not known."""
     if isinstance(model, ModelOptions):
         if options:
-            problem = f"model is an object of {type(model).__name__} beside {', '.join(options)}"
-            refuse(problem, "options in the object, or beside the name of a model")
+            problem = f"model is an object of {type(model).__name__}, with {', '.join(options)}"
+            refuse(problem, "options in the object, or as keywords with the name of a model")
         return model
     require_choice("&model: name", model, MODELS)
     require_keywords(f"&{model}", options, [option.name for option in fields(MODELS[model])])
@@ -87,7 +87,7 @@ class Case(Group, Displayed):
     modes : Modes or None
         Options of the free modes; None: no free modes.
     floor : FloorOptions or None
-        Floor on which the ball is dropped too, beside the rigid one; None: no other.
+        Floor on which the ball is dropped in addition to the rigid floor; None: no other floor.
     room : Room or None
         Room below the floor; None: no level in a room.
     compression : Compression or None
@@ -129,9 +129,9 @@ class Case(Group, Displayed):
         return rows
 
     def to_namelist(self) -> Namelist:
-        """Return the case as a namelist with every key; its text is that of a file.
+        """Return the case as a namelist with every key, which prints as the text of a file.
 
-        Raise InputError where a value is not a number, text or, for keys that take one, a list of
+        Raise InputError if a value is not a number, a text or, if the key takes a list, a list of
         numbers.
         """
         for group, kind in GROUPS.items():
@@ -155,16 +155,16 @@ class Case(Group, Displayed):
                 value = getattr(self.model, option.name)
                 if self.modes and option.name in _MESH and values[option.name] != value:
                     refuse(
-                        f"&mesh: {option.name} = {value} of the model is not that of the modes, "
-                        f"{values[option.name]}",
-                        "one mesh for both",
+                        f"&mesh: {option.name} is {value} for the model and "
+                        f"{values[option.name]} for the modes",
+                        "the same mesh for both",
                     )
                 values[option.name] = value
         if self.floor:
             groups["floor"] = {"name": self.floor.name}
             groups |= {self.floor.name: options} if (options := vars(self.floor)) else {}
         groups |= {
-            group: vars(present) for group in IMPACT_GROUPS if (present := getattr(self, group))
+            group: vars(options) for group in IMPACT_GROUPS if (options := getattr(self, group))
         }
         namelist = f90nml.Namelist()
         for group, options in groups.items():
@@ -175,12 +175,12 @@ class Case(Group, Displayed):
 
     @classmethod
     def from_text(cls, content: str) -> Self:
-        """Return the case of the text of a namelist file; missing keys have their default."""
+        """Return the case in the text of a namelist file; missing keys have their default."""
         return cls.from_namelist(f90nml.reads(content))
 
     @classmethod
     def from_namelist(cls, namelist: Namelist) -> Self:
-        """Return the case of a namelist; missing keys have their default."""
+        """Return the case in a namelist; missing keys have their default."""
         content: dict[str, Any] = dict(namelist)
         groups = {
             group: kind(**content[group]) for group, kind in GROUPS.items() if group in content
@@ -205,20 +205,20 @@ class Case(Group, Displayed):
             for group, kind in IMPACT_GROUPS.items()
             if group in content
         }
-        title = content.get("case", {}).get("name", cls.name)
-        return cls(name=title, model=model, floor=floor, modes=modes, **groups, **optional)
+        name = content.get("case", {}).get("name", cls.name)
+        return cls(name=name, model=model, floor=floor, modes=modes, **groups, **optional)
 
 
 def tables_case(tables: Mapping[str, Any]) -> Case:
-    """Return the case of tables of keys by group, such as those of JSON or TOML; see `check_case`.
+    """Return the case in tables of keys by group, such as those of JSON or TOML.
 
-    Raise InputError where a group, or the name of model or floor, is not known, or a group is no
-    table.
+    Raise InputError if a group, or the name of model or floor, is not known, or a group is not a
+    table; `check_case` checks the values.
     """
     require_words("the case", tables, {key.group for key in KEYS} | {"model", "floor"})
     for group, keys in tables.items():
         if not isinstance(keys, Mapping):
-            refuse(f"&{group} = {shown(keys)} is no table", "keys and their values")
+            refuse(f"&{group} = {shown(keys)} is not a table", "keys and their values")
     for group, choices in (("model", MODELS), ("floor", FLOORS)):
         if group in tables:
             require_choice(f"&{group}: name", tables[group].get("name"), list(choices))
@@ -226,7 +226,7 @@ def tables_case(tables: Mapping[str, Any]) -> Case:
 
 
 def _with_lists(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values of keys as `f90nml` reads them, lists of one entry as lists."""
+    """Return values of keys as read by `f90nml`; single values of list keys become tuples."""
     return {
         key: (tuple(value) if isinstance(value, list) else (value,)) if key in LISTS else value
         for key, value in values.items()
@@ -234,13 +234,13 @@ def _with_lists(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _plain(group: str, key: str, value: object) -> float | str | list[float | str]:
-    """Return a value as a type that f90nml writes."""
+    """Return a value converted to a type that f90nml can write."""
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
     if isinstance(value, list | tuple) and key in LISTS:
         return [_plain(group, key, entry) for entry in value]  # type: ignore[misc]
     is_plain = isinstance(value, int | float) or (isinstance(value, str) and value.isprintable())
-    if not is_plain or (isinstance(value, int) and abs(value) > LARGEST):
+    if not is_plain or (isinstance(value, int) and abs(value) > MAX_NUMBER):
         refuse_value(f"&{group}: {key}", value, "a number or plain text")
     return value  # type: ignore[return-value]
 
@@ -256,32 +256,32 @@ def read_case(path: str | os.PathLike[str]) -> Case:
     Raises
     ------
     InputError
-        Names file, group, key, value and allowed range.
+        If the input is invalid; the message names file, group, key, value and allowed range.
     """
     return Case.from_text(text(ask("effective_case", path=os.fsencode(path))["case"]))
 
 
 def check_case(case: Case) -> None:
-    """Raise InputError with the message of the library where a case is invalid."""
+    """Raise InputError with the message of the library if a case is invalid."""
     ask("check", case=case_text(case))
 
 
 def write_case(case: Case, path: str | os.PathLike[str]) -> None:
-    """Write a case as a namelist file, completely or not at all.
+    """Write a case as a namelist file, atomically.
 
     Parameters
     ----------
     case
         The case.
     path
-        Path of the file; an older one is replaced.
+        Path of the file; an existing file is replaced.
 
     Raises
     ------
     InputError
-        Where the case holds a value that is not allowed; nothing is written.
+        If the case has a value that is not allowed; nothing is written.
     OSError
-        Where the file cannot be written.
+        If the file cannot be written.
     """
     check_case(case)
     replace_file(path, case_text(case))

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
 Value = float | int | str | bool
 
-# Group of the files that a run writes; it has no effect on samples.
-OF_FILES = "output"
+# Group of keys that select the files of a run; they have no effect on results.
+OUTPUT_GROUP = "output"
 
-# Names of persons and abbreviations, in lower case and as they are written.
+# Spelling of names of persons and abbreviations by their form in keys.
 _PROPER = {
     "youngs": "Young's",
     "poisson": "Poisson's",
@@ -35,30 +35,31 @@ _PROPER = {
     "fft": "FFT",
 }
 
-# Keys of studies only: they change the mass and the modulus of elasticity of the ball.
+# Parameters of studies only, which determine the mass and the elastic modulus of the ball.
 DENSITY = Key("", "ball", "density", "real", "kg/m3", "density of the wall")
 TEMPERATURE = Key("", "ball", "temperature", "real", "degC", "temperature of the ball")
 
 
 def key_owners(case: Case) -> tuple[str, ...]:
-    """Return the owners of keys in a case: its model, its floor and its room."""
+    """Return what has keys in a case: the names of its model and floor, and ``"room"``."""
     floor = case.floor.name if case.floor else ""
-    result = (case.model.name if case.model else "", floor, "room" if case.room else "")
-    return tuple(filter(None, result))
+    owners = (case.model.name if case.model else "", floor, "room" if case.room else "")
+    return tuple(filter(None, owners))
 
 
 @lru_cache
 def known_keys(owners: tuple[str, ...]) -> Mapping[str, Key]:
-    """Return the keys in which samples may differ, by name; see `key_owners`.
+    """Return the keys in which samples may differ, by name; for `owners` see `key_owners`.
 
-    Those of floor and room have names that begin with their group, such as ``"plate.thickness"``,
-    and their own where no other key has it.
+    Names of floor and room keys begin with the group, such as ``"plate.thickness"``; the group may
+    be omitted if no other key has the name.
     """
     model, *others = owners
     keys = {
         key.name: key
         for key in KEYS
-        if (key.owner == model or (not key.owner and key.group in GROUPS)) and key.group != OF_FILES
+        if (key.owner == model or (not key.owner and key.group in GROUPS))
+        and key.group != OUTPUT_GROUP
     }
     keys |= {key.name: key for key in (DENSITY, TEMPERATURE)}
     for key in KEYS:
@@ -69,9 +70,9 @@ def known_keys(owners: tuple[str, ...]) -> Mapping[str, Key]:
 
 
 def find_key(name: str, owners: tuple[str, ...]) -> tuple[Key, int | None]:
-    """Return a key by its name, and the entry of a list: of ``"frequency(2)"`` 2; see `key_owners`.
+    """Return a key by its name, and the number of a list entry: 2 for ``"frequency(2)"``.
 
-    Raise InputError with the groups that have keys where there is no such key.
+    Raise InputError, with the groups of the allowed keys, if the owners have no such key.
     """
     keys = known_keys(owners)
     match = re.fullmatch(r"(\w+(?:\.\w+)?)(?:\(([1-9]\d{0,3})\))?", str(name))
@@ -94,7 +95,7 @@ def _group_of(key: Key, case: Case) -> str:
 
 
 def with_values(case: Case, values: Mapping[str, object]) -> Case:
-    """Return a case with other values of some keys; entries of lists are named as in `find_key`."""
+    """Return a copy of a case with new values of some keys, named as in `find_key`."""
     assert case.model is not None  # noqa: S101 - studies have a model, see `read_study`
     groups: dict[str, dict[str, object]] = {}
     for name, value in values.items():
@@ -114,7 +115,7 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
 
 
 def value_in(case: Case, name: str) -> Value | None:
-    """Return the value of a key in a case; None where it has none, or a list of them."""
+    """Return the value of a key in a case; None if there is no value or a list."""
     key, entry = find_key(name, key_owners(case))
     value = getattr(getattr(case, _group_of(key, case)), key.name, None)
     if isinstance(value, tuple) and entry:
@@ -123,7 +124,7 @@ def value_in(case: Case, name: str) -> Value | None:
 
 
 def humanize(name: str) -> str:
-    """Return the name of a key, a model or a choice in words.
+    """Return the name of a key, a model or a choice with blanks and proper spelling.
 
     >>> humanize("youngs_modulus")
     "Young's modulus"
@@ -134,13 +135,13 @@ def humanize(name: str) -> str:
 
 
 def limits(key: Key, case: Case) -> tuple[float, float]:
-    """Return the limits of a key, evaluated for the other keys of a case."""
+    """Return the limits of a key, evaluated with the values of the other keys of a case."""
     group = getattr(case, _group_of(key, case))
-    return _end(key.lower, group), _end(key.upper, group)
+    return _limit(key.lower, group), _limit(key.upper, group)
 
 
-def _end(limit: float | str, group: object) -> float:
-    """Return a limit; a text is a product or quotient of numbers and keys."""
+def _limit(limit: float | str, group: object) -> float:
+    """Return a limit; a text is a product or quotient of numbers and names of keys."""
     if not isinstance(limit, str):
         return limit
     value, operator = 1.0, "*"

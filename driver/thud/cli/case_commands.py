@@ -17,7 +17,7 @@ from thud.base.bridge import ask, text
 from thud.base.checks import refuse
 from thud.base.display import draw_all, warn_if_not_drawn
 from thud.base.errors import InputError, PlausibilityWarning, ThudError
-from thud.base.files import Results, own_path
+from thud.base.files import Results, unique_path
 from thud.base.tables import format_rows
 from thud.case.case import Case, read_case
 from thud.cli.command import (
@@ -229,7 +229,7 @@ def copy_examples(options: argparse.Namespace) -> int:
         if not source.is_dir():
             refuse("this package has no inputs", "an installed one; in a clone they are in inputs/")
         target.parent.mkdir(parents=True, exist_ok=True)
-        partial = own_path(target.with_name(f".{target.name}.part"))
+        partial = unique_path(target.with_name(f".{target.name}.part"))
         try:
             # Installers compile Python scripts.
             shutil.copytree(source, partial, ignore=shutil.ignore_patterns("__pycache__"))

@@ -85,10 +85,10 @@ class BlockedForce(DropForce):
         Raises
         ------
         InputError
-            Where the format cannot hold the force, the file is the recording of the force, or the
+            If the format cannot hold the force, the file is the recording of the force, or the
             text beside a WAV file would replace one that is not of thud.
         OSError
-            Where a file cannot be written.
+            If a file cannot be written.
         """
         require_choice("kind", kind, EXPORTS)
         contents = EXPORTS[kind][1](self, os.fspath(path))
@@ -120,7 +120,7 @@ def blocked_force(
     Raises
     ------
     InputError
-        Where the drop or the rate are not possible.
+        If the drop or the rate are not possible.
     """
     require_kind("source", source, ImpactResult)
     force = BlockedForce(**vars(source.drop_force(drop)))

@@ -1,4 +1,4 @@
-"""Predictions of one impact for several floors and rooms, side by side."""
+"""Comparison of predictions for several floors and rooms."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FloorComparison(Displayed, Page):
-    """Predictions for several floors and rooms, side by side.
+    """Predictions for several floors and rooms, in columns of a table.
 
     Attributes
     ----------
     predictions : dict of str to RoomPrediction
-        The predictions, by the names of their cases.
+        The predictions by name.
     """
 
     predictions: dict[str, RoomPrediction]
@@ -39,7 +39,7 @@ class FloorComparison(Displayed, Page):
 
     @property
     def warnings(self) -> list[str]:
-        """Caveats of the numbers, with the names of the floors."""
+        """Warnings of the predictions, with the names of the floors."""
         return [
             f"{name}: {warning}"
             for name, prediction in self.predictions.items()
@@ -47,7 +47,7 @@ class FloorComparison(Displayed, Page):
         ]
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text; columns are the floors."""
+        """Return header and rows of text, with a column for each floor."""
         octaves = [f"{f:g} Hz octave, dB" for f in get_bands("octave").nominal[1:]]
         titles = (
             "", "floor", "force", "L_iA,Fmax, dB", "standardized, dB", *octaves,
@@ -84,19 +84,19 @@ class FloorComparison(Displayed, Page):
 def compare_floors(
     cases: Mapping[str, Case | RoomPrediction], *, progress: bool = False
 ) -> FloorComparison:
-    """Compare the levels of an impact below several floors.
+    """Compare the levels of impacts below several floors.
 
     Parameters
     ----------
     cases
-        Cases with floor and room, which are solved, or predictions, by their names.
+        Predictions, or cases with floor and room to compute, by name.
     progress
         Show a progress bar.
 
     Raises
     ------
     InputError
-        Where there are no cases, or a case has no room.
+        If there are no cases, or a case has no model, floor or room.
     """
     require_mapping("cases", cases, "cases or predictions")
     result: dict[str, RoomPrediction] = {}
@@ -108,7 +108,7 @@ def compare_floors(
             continue
         if entry.model is None or entry.floor is None or entry.room is None:
             refuse(
-                f"{name}: the case has no level in a room", "a case with &model, &floor and &room"
+                f"{name}: the case has no level in a room", "cases with &model, &floor and &room"
             )
         try:
             result[name] = predict_level(compute(entry))
@@ -119,7 +119,7 @@ def compare_floors(
 
 
 def _column(name: str, prediction: RoomPrediction) -> tuple[str, ...]:
-    """Return the texts of one floor in `FloorComparison.rows`."""
+    """Return the column of a floor in `FloorComparison.rows`."""
     return (
         name,
         prediction.floor.name.replace("_", " "),
@@ -134,7 +134,7 @@ def _column(name: str, prediction: RoomPrediction) -> tuple[str, ...]:
 
 
 def _tapping(prediction: RoomPrediction) -> str:
-    """Return the reference level of the tapping machine, of the floors that have one."""
+    """Return the level of the tapping machine below a floor; empty if it cannot be predicted."""
     if not has_tapping_level(prediction.floor):
         return ""
     result = tapping_level(prediction.floor, prediction.room)

@@ -1,4 +1,4 @@
-"""Impedance of a source during its impact, from the force on floors that are resistances."""
+"""Impedance of a source during its impact, from its force on resistive floors."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-# From floors that the ball barely leaves to floors that change a level by 0.01 dB, N s/m.
+# Resistances, N s/m: from floors that a ball hardly leaves to floors that change levels by 0.01 dB.
 RESISTANCES = np.geomspace(10**2.75, 1e6, 14)
-# Spectral lines in each band.
-_LINES_PER_BAND = 64
-# Fraction of the impact velocity below which the motion counts as that at maximum deflection.
+# Frequency points in each band.
+_POINTS_PER_BAND = 64
+# Fraction of the impact velocity below which samples are used for the tangent.
 _SLOW_FRACTION = 0.25
 
 
@@ -40,16 +40,16 @@ class BallImpedance(Displayed):
     """Impedance of a source during its impact, and the floors on which it matters.
 
     A linear source in permanent contact acts on a floor of impedance Z with the force
-    F = F_b/(1 + Z_B/Z); F_b is its force on a rigid floor, Z_B its own impedance. An impact is
-    nonlinear and ends. Its effective Z_B solves this equation in bands, F being the force on a
-    floor that is a resistance Z; it tends to a limit as Z grows.
+    F = F_b/(1 + Z_B/Z), where F_b is its force on a rigid floor and Z_B the impedance of the
+    source. For an impact, which is nonlinear and ends, the effective Z_B is the least-squares
+    solution of this equation in a band, with F on a resistive floor Z. It converges as Z increases.
 
     Attributes
     ----------
     case : Case
-        Case of the impact on a rigid floor.
+        Case of the impact.
     bands : str
-        Kind of the bands.
+        ``"octave"`` or ``"third"``.
     frequency : ndarray, shape (n_band,)
         Rounded mid frequencies, Hz.
     resistance : ndarray, shape (n_floor,)
@@ -57,10 +57,10 @@ class BallImpedance(Displayed):
     change : ndarray, shape (n_floor, n_band)
         Level of the contact force − level of the blocked force, dB.
     estimate : ndarray, shape (n_floor, n_band)
-        Complex impedance by the force on each floor, N s/m.
+        Complex impedance from the force on each floor, N s/m.
     tangent_mass, tangent_stiffness, tangent_damping : float
-        Mass, kg, stiffness, N/m, and damping, N s/m, of the source at maximum deflection on a rigid
-        floor.
+        Mass, kg, stiffness, N/m, and damping, N s/m, of the source about its maximum deflection on
+        a rigid floor.
     """
 
     case: Case
@@ -84,19 +84,19 @@ class BallImpedance(Displayed):
 
     @property
     def impedance(self) -> NDArray[np.complex128]:
-        """Complex impedance in bands, N s/m, shape (n_band,): that on the heaviest floor."""
+        """Complex impedance in bands, N s/m, shape (n_band,), from the highest resistance."""
         return np.asarray(self.estimate[-1])
 
     @property
     def tangent_loss_factor(self) -> float:
-        """Loss factor at the natural frequency of tangent mass and stiffness."""
+        """Loss factor at the natural frequency of the tangent mass and stiffness."""
         return self.tangent_damping / math.sqrt(self.tangent_stiffness * self.tangent_mass)
 
     def tangent(self, frequency: ArrayLike) -> NDArray[np.complex128]:
-        """Return the impedance of tangent mass behind spring and damper, N s/m, shape (n,).
+        """Return the impedance of the tangent mass on spring and damper, N s/m, shape (n,).
 
-        That of steady vibration about the maximum deflection, which no impact has time for, at
-        frequencies above 0, Hz.
+        It applies to steady vibration about the maximum deflection, not to the short impact.
+        Frequencies, Hz, are greater than 0.
         """
         values = require_real("frequency", require_array("frequency", frequency, dimensions=(1,)))
         if not (values > 0).all():
@@ -108,8 +108,8 @@ class BallImpedance(Displayed):
     def limit(self, decibels: float = 1.0) -> Array:
         """Return the resistance below which a floor changes the level, N s/m, shape (n_band,).
 
-        The logarithm of the change, dB, is interpolated over that of the resistance. NaN where no
-        floor changes the level so much.
+        The change, dB, is interpolated on logarithmic axes. NaN if no floor changes the level so
+        much.
         """
         if not 0 < decibels < math.inf:
             refuse_value("decibels", decibels, "above 0")
@@ -124,7 +124,9 @@ class BallImpedance(Displayed):
             i = above[-1]
             if i == len(log_resistance) - 1:
                 refuse_value(
-                    "decibels", decibels, f"above {10 ** column[i]:.2g}, the change by the heaviest"
+                    "decibels",
+                    decibels,
+                    f"above {10 ** column[i]:.2g}, the change at the highest resistance",
                 )
             fraction = (column[i] - log_change) / (column[i] - column[i + 1])
             result[band] = 10 ** (
@@ -133,7 +135,7 @@ class BallImpedance(Displayed):
         return result
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text, a band each."""
+        """Return the header and a row of text for each band."""
         header = ("band, Hz", "impedance, N s/m", "phase, degrees", "1 dB below, N s/m")
         lines = zip(self.frequency, self.impedance, self.limit(), strict=True)
         cells = [
@@ -144,12 +146,12 @@ class BallImpedance(Displayed):
         return [header, *cells]
 
     def plot(self, floors: Mapping[str, FloorOptions] | None = None) -> Figure:
-        """Draw the impedances of source and floors, and the change of the levels by floors.
+        """Draw the impedances of source and floors, and the change of levels by the floors.
 
         Parameters
         ----------
         floors
-            Floors by their names in the legend.
+            Floors by name in the legend.
         """
         from thud.plot.floor_figures import ball_impedances
 
@@ -161,25 +163,24 @@ def ball_impedance(
 ) -> BallImpedance:
     """Return the impedance of a source during its impact.
 
-    The source is dropped on floors that are resistances, as infinite plates are, and the forces are
-    compared with that on a rigid floor. Differences between the estimates on one floor and the next
-    show how far the source is from a linear one.
+    The forces on resistive floors (infinite plates) are compared with the force on a rigid floor.
+    Estimates from different floors differ if the source is nonlinear.
 
     Parameters
     ----------
     source
         Impact of a model whose force depends on the floor. Its record must last until the source
-        has left the lightest floor.
+        has left the floor of the lowest resistance.
     resistance : array_like, shape (n_floor,)
-        Resistances, ascending, N s/m; by default 14 from 562 to 1e6.
+        Resistances, ascending, N s/m; by default 14 values from 562 to 1e6.
     bands
         ``"octave"`` or ``"third"``.
 
     Raises
     ------
     InputError
-        Where the force of the model does not depend on the floor, a resistance is out of range, or
-        the source stays on a floor.
+        If the force of the model does not depend on the floor, a resistance is out of range, or
+        the source does not leave a floor.
 
     Examples
     --------
@@ -219,29 +220,29 @@ def ball_impedance(
 
 
 def _force_on(source: Impact, resistance: float) -> Array:
-    """Return the force of the same drop on a resistance, N, shape (n_sample,)."""
+    """Return the force of the same drop on a resistive floor, N, shape (n_sample,)."""
     case = replace(
         source.case, modes=None, compression=None, room=None, floor=InfinitePlate(resistance)
     )
-    moved = new_floor_impact(case, ask("floor_impact", case=case_text(case)), source.floor_force)
-    if moved is None:
+    impact = new_floor_impact(case, ask("floor_impact", case=case_text(case)), source.floor_force)
+    if impact is None:
         refuse(
-            "source: its model has one force on all floors",
+            "source: the force of its model is the same on all floors",
             "an impact of a model whose force depends on the floor",
         )
-    return moved.floor_force
+    return impact.floor_force
 
 
 def _band_spectra(force: Array, sample_rate: float, bands: BandSet) -> list[NDArray[np.complex128]]:
-    """Return the spectrum of a force in each band, at the same density of lines per band."""
+    """Return the spectrum of a force in each band, at the same number of frequency points."""
     edges = get_bands(bands)
     time = np.arange(len(force)) / sample_rate
     used = np.flatnonzero(force)
     end = used[-1] + 1 if len(used) else 1
     result: list[NDArray[np.complex128]] = []
     for low, high in zip(edges.lower, edges.upper, strict=True):
-        lines = low + (np.arange(_LINES_PER_BAND) + 0.5) * (high - low) / _LINES_PER_BAND
-        waves: NDArray[np.complex128] = np.exp(-2j * np.pi * np.outer(lines, time[:end]))
+        points = low + (np.arange(_POINTS_PER_BAND) + 0.5) * (high - low) / _POINTS_PER_BAND
+        waves: NDArray[np.complex128] = np.exp(-2j * np.pi * np.outer(points, time[:end]))
         result.append(waves @ force[:end])
     return result
 
@@ -249,18 +250,18 @@ def _band_spectra(force: Array, sample_rate: float, bands: BandSet) -> list[NDAr
 def _tangent(source: Impact) -> tuple[float, float, float]:
     """Return mass, stiffness and damping about the maximum deflection, by least squares.
 
-    F - F_max = k (d - d_max) + c d' and F = -m d'' where d' is below a quarter of its first value.
+    F - F_0 = k d + c d' and F = -m d'', while d' is less than a quarter of the impact velocity.
     """
     deepest = int(np.argmax(source.deflection))
     slow = np.abs(source.velocity) < _SLOW_FRACTION * source.impact_velocity
     first = deepest - int(np.argmin(slow[deepest::-1])) + 1
-    last = deepest + int(np.argmin(slow[deepest:]))
-    part = slice(first, last)
+    stop = deepest + int(np.argmin(slow[deepest:]))
+    span = slice(first, stop)
     columns = np.stack(
-        [np.ones(last - first), source.deflection[part], source.velocity[part]], axis=1
+        [np.ones(stop - first), source.deflection[span], source.velocity[span]], axis=1
     )
     scale = np.abs(columns).max(axis=0)
-    solution = np.linalg.lstsq(columns / scale, source.floor_force[part], rcond=None)[0] / scale
-    acceleration = np.gradient(source.velocity, 1 / source.sample_rate)[part]
-    mass = -float(source.floor_force[part] @ acceleration / (acceleration @ acceleration))
+    solution = np.linalg.lstsq(columns / scale, source.floor_force[span], rcond=None)[0] / scale
+    acceleration = np.gradient(source.velocity, 1 / source.sample_rate)[span]
+    mass = -float(source.floor_force[span] @ acceleration / (acceleration @ acceleration))
     return mass, float(solution[1]), float(solution[2])

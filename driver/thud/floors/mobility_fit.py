@@ -1,4 +1,4 @@
-"""From a table of a measured mobility to a floor: reading, vector fit, errors."""
+"""Fit of a floor to a measured mobility from a file."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 Quantity = Literal["mobility", "accelerance", "receptance"]
-# Powers of i omega that make a mobility of each.
+# Power of i omega by which a quantity is multiplied to convert it to a mobility.
 _POWERS = {"mobility": 0, "accelerance": -1, "receptance": 1}
-# Quantities by the type of the response in universal files: displacement, velocity, acceleration.
+# Quantity by the data type of a response in universal files: displacement, velocity, acceleration.
 _RESPONSES = {8: "receptance", 11: "mobility", 12: "accelerance"}
 _EXCITATION_FORCE = 13
 _REACTION_FORCE = 9
@@ -55,7 +55,7 @@ _TITLES = {
     "real": "real", "re": "real", "imaginary": "imaginary", "imag": "imaginary", "im": "imaginary",
     "magnitude": "magnitude", "mag": "magnitude", "abs": "magnitude", "phase": "phase",
 }  # fmt: skip
-# Words in a title that state another unit.
+# Words in a title that state a unit other than SI units and degrees.
 _OTHER_UNITS = {
     "khz", "mhz", "ghz", "rpm", "rad", "radian", "radians", "db", "mm", "cm", "um", "nm", "inch",
     "ft", "kn", "mn", "lbf", "lb", "g", "mg", "percent",
@@ -64,16 +64,16 @@ _OTHER_UNITS = {
 _ORDERS = (2, 4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64)
 # Numbers of poles without improvement after which the search ends.
 _STAGNATION_LIMIT = 5
-# Error at which the search ends: that of a table with eight digits.
+# Error at which the search ends: the rounding error of a table with eight digits.
 _MIN_ERROR = 1e-8
-# Error of the fit that raises a warning, and of the change that makes it passive.
+# Maximum error of the fit without a warning, and maximum factor by which passivity increases it.
 _MAX_ERROR = 0.1
 _MAX_INCREASE = 1.5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MobilityFit(Displayed):
-    """A measured mobility and the passive sum of poles that fits it.
+    """Measured mobility, and the fit by a passive sum of poles.
 
     Attributes
     ----------
@@ -84,9 +84,9 @@ class MobilityFit(Displayed):
     measured : ndarray, shape (n_point,)
         The measured mobility, m/(N s), complex.
     floor : MeasuredMobility
-        The floor, for `solve` and cases.
+        Floor with the fitted mobility, for `solve` and cases.
     free_error : float
-        Relative error before the fit was made passive, root of the mean square.
+        Relative error, root mean square, of the fit before it was made passive.
     """
 
     name: str
@@ -101,7 +101,7 @@ class MobilityFit(Displayed):
 
     @property
     def values(self) -> dict[str, float]:
-        """Parameters of the floor by name, entries of lists as ``"damping_ratio(1)"``."""
+        """Parameters of the floor by name; entries of lists are named ``"damping_ratio(1)"``."""
         result: dict[str, float] = {}
         for name, value in vars(self.floor).items():
             if isinstance(value, tuple):
@@ -112,15 +112,15 @@ class MobilityFit(Displayed):
 
     @property
     def error(self) -> float:
-        """Relative error, root of the mean square over the frequency points."""
+        """Relative error, root mean square over the frequency points."""
         return float(np.sqrt(np.mean(self._errors() ** 2)))
 
     def band_errors(self) -> dict[float, tuple[float, float]]:
         """Return errors in the octaves 31.5 to 500 Hz that the measurement covers.
 
-        By mid frequency, Hz: the relative error, root of the mean square, and fitted − measured
-        level of the real part, hence of the energy that a flat force injects, dB; NaN where one of
-        them is not positive.
+        The keys are mid frequencies, Hz. The values are the root mean square of the relative error,
+        and the level of the fitted − measured real part, which determines the energy into the
+        floor, dB; NaN if a real part is not positive.
         """
         result = {}
         errors = self._errors()
@@ -138,25 +138,25 @@ class MobilityFit(Displayed):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Possible faults of the fit, a sentence each."""
+        """Sentences on possible faults of the fit."""
         result = []
         negative = np.mean(self.measured.real < 0)
         if negative > 0:
             result.append(
                 f"the measured real part is negative at {100 * negative:.2g} % of the frequencies, "
-                "which no passive floor has: the fit has none"
+                "which is not possible for a floor: the fit is nowhere negative"
             )
         if self.error > _MAX_ERROR:
-            result.append(f"the fit misses the measurement by {100 * self.error:.0f} %")
+            result.append(f"the fit differs from the measurement by {100 * self.error:.0f} %")
         elif self.error > _MAX_INCREASE * self.free_error and self.error > _MIN_ERROR:
             result.append(
-                f"to be passive the fit gave up accuracy: {100 * self.error:.2g} % instead of "
-                f"{100 * self.free_error:.2g} %"
+                f"the condition of a passive floor increases the error of the fit from "
+                f"{100 * self.free_error:.2g} % to {100 * self.error:.2g} %"
             )
         return tuple(result)
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of a table of errors."""
+        """Return header and rows of text of the errors."""
         body = [
             (f"{band:g}", f"{100 * error:.2g}", "" if np.isnan(level) else f"{level:+.2f}")
             for band, (error, level) in self.band_errors().items()
@@ -166,7 +166,7 @@ class MobilityFit(Displayed):
     def to_dataframe(self) -> pd.DataFrame:
         """Return the measured mobility and the fit, m/(N s), complex.
 
-        Raise InputError where pandas is not installed.
+        Raise InputError if pandas is not installed.
         """
         fitted = self.mobility(self.frequency)
         return data_frame(
@@ -187,11 +187,11 @@ class MobilityFit(Displayed):
         return mobility_fit(self)
 
     def _errors(self) -> Array:
-        """Return the relative errors of the frequency points."""
+        """Return the relative errors at the frequency points."""
         return np.asarray(np.abs(self.mobility(self.frequency) / self.measured - 1))
 
     def __repr__(self) -> str:
-        """Show poles and error."""
+        """Return number of poles and error."""
         pairs = sum(ratio < 1 for ratio in self.floor.damping_ratio)
         order = len(self.floor.damping_ratio) + pairs
         return f"<MobilityFit {self.name}: {order} poles, error {100 * self.error:.2g} %>"
@@ -205,26 +205,26 @@ def fit_mobility(
 ) -> MobilityFit:
     """Fit a passive sum of poles to a measured mobility.
 
-    Relaxed vector fitting (Gustavsen 2006) with errors relative to the magnitude, then the least
-    change of the residues that makes the real part nowhere negative.
+    Relaxed vector fitting (Gustavsen 2006) minimizes the relative error. Then the residues are
+    changed as little as possible to make the real part nowhere negative.
 
     Parameters
     ----------
     table
-        A file, or frequencies, Hz, and complex values. Files are tables with the columns
-        ``frequency``, Hz, ``real`` and ``imaginary`` (or ``magnitude`` and ``phase``, degrees),
-        SI units, or universal files with a frequency response (data set 58).
+        A file, or a tuple of frequencies, Hz, and complex values. Files are tables in SI units with
+        the columns ``frequency``, Hz, ``real`` and ``imaginary`` (or ``magnitude`` and ``phase``,
+        degrees), or universal files with a frequency response (data set 58).
     quantity
-        Response over force: ``"mobility"``, m/(N s), ``"accelerance"``, 1/kg, or ``"receptance"``,
-        m/N. Universal files state it; the default of others is mobility.
+        Quantity of the table: ``"mobility"``, m/(N s), ``"accelerance"``, 1/kg, or
+        ``"receptance"``, m/N. By default what the file states, or ``"mobility"``.
     order
-        Number of poles, two for a pair; by default that with the minimum Bayesian information
-        criterion.
+        Number of poles, two for a complex pair; by default the number with the minimum Bayesian
+        information criterion.
 
     Raises
     ------
     InputError
-        Names the file, and the line, the column or the argument that is not allowed.
+        If the input is invalid; the message names the file, and the line, column or argument.
     """
     if quantity is not None:
         require_choice("quantity", quantity, get_args(Quantity))
@@ -244,15 +244,15 @@ def fit_mobility(
     values = values * (2j * np.pi * frequency) ** _POWERS[quantity or "mobility"]
     if len(frequency) <= 1:
         refuse(f"{label}: {len(frequency)} frequencies above 0 Hz", "two or more")
-    if not (good := np.isfinite(values) & (values != 0)).all():
-        worst = good.argmin()
-        shown = "not finite" if values[worst] else "0"
-        refuse(f"{label}: the value at {frequency[worst]:g} Hz is {shown}", "finite, not 0")
+    if not (is_valid := np.isfinite(values) & (values != 0)).all():
+        first = is_valid.argmin()
+        problem = "not finite" if values[first] else "0"
+        refuse(f"{label}: the value at {frequency[first]:g} Hz is {problem}", "finite, not 0")
     if order is not None:
         require_whole("order", order, 1, _ORDERS[-1])
     try:
         if order is None:
-            return _chosen(name, frequency, values)
+            return _fit_best_order(name, frequency, values)
         return _fit(name, frequency, values, order)
     except ThudError as error:
         message = f"{label}: {error}"
@@ -260,13 +260,13 @@ def fit_mobility(
 
 
 def _checked(table: tuple[ArrayLike, ...]) -> tuple[Array, NDArray[np.complex128]]:
-    """Return frequencies and complex values; raise InputError for other values."""
+    """Return the frequencies and complex values of a tuple after a check."""
     if len(table) != 2:  # noqa: PLR2004 - frequencies and values
-        refuse(f"a tuple of {len(table)}", "frequencies, Hz, and complex values")
+        refuse(f"table is a tuple of {len(table)}", "frequencies, Hz, and complex values")
     frequency = require_real("frequency", require_array("frequency", table[0], (1,)))
     values = require_array("values", table[1], (1,))
     if values.size and values.dtype.kind not in "iufc":
-        refuse("values is not an array of numbers", "complex numbers")
+        refuse("values are not numbers", "complex numbers")
     if frequency.shape != values.shape:
         refuse(
             f"frequencies of shape {frequency.shape} and values of shape {values.shape}",
@@ -275,32 +275,32 @@ def _checked(table: tuple[ArrayLike, ...]) -> tuple[Array, NDArray[np.complex128
     return frequency, values.astype(complex)
 
 
-def _chosen(name: str, frequency: Array, values: NDArray[np.complex128]) -> MobilityFit:
-    """Return the fit with the least information criterion for relative errors of equal size."""
-    best, least, worse = None, np.inf, 0
+def _fit_best_order(name: str, frequency: Array, values: NDArray[np.complex128]) -> MobilityFit:
+    """Return the fit with the minimum information criterion for relative errors of equal size."""
+    best, minimum, worse_count = None, np.inf, 0
     failure: ThudError | None = None
     orders = [order for order in _ORDERS if order < len(frequency)]
     for order in orders or [1]:
-        # Three values for each coefficient, or noise is fitted.
+        # With fewer than three values for each coefficient, noise would be fitted.
         if best is not None and (
-            worse == _STAGNATION_LIMIT or 3 * (2 * order + 1) > 2 * len(frequency)
+            worse_count == _STAGNATION_LIMIT or 3 * (2 * order + 1) > 2 * len(frequency)
         ):
             break
-        worse += 1
+        worse_count += 1
         try:
             result = _fit(name, frequency, values, order)
         except ThudError as error:
             failure = failure or error
             continue
-        miss = max(result.error, _MIN_ERROR)
+        fit_error = max(result.error, _MIN_ERROR)
         count = 2 * len(frequency)
-        criterion = count * np.log(miss**2) + (2 * order + 1) * np.log(count)
-        if criterion < least:
-            best, least, worse = result, criterion, 0
-        if miss <= _MIN_ERROR:
+        criterion = count * np.log(fit_error**2) + (2 * order + 1) * np.log(count)
+        if criterion < minimum:
+            best, minimum, worse_count = result, criterion, 0
+        if fit_error <= _MIN_ERROR:
             break
     if best is None:
-        raise failure or NumericalError("the mobility: no fit")
+        raise failure or NumericalError("no fit of the mobility exists")
     return best
 
 
@@ -317,7 +317,7 @@ def _fit(name: str, frequency: Array, values: NDArray[np.complex128], order: int
 
 
 def _read(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:
-    """Return frequencies, values and their quantity, None if the file does not state it."""
+    """Return frequencies, values and quantity, which is None if the file does not state it."""
     if path.suffix.lower() in {".uff", ".unv", ".uf"}:
         return _read_universal(path)
     titles, table = read_titled(path, _ALLOWED)
@@ -329,9 +329,9 @@ def _read(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:
     if double := {kind for kind in kinds if kind and kinds.count(kind) > 1}:
         refuse(f"{path}: more than one column of {min(double)}", _ALLOWED)
     if titles and len(titles) != table.shape[1]:
-        refuse(f"{path}: {len(titles)} titles over {table.shape[1]} columns", _ALLOWED)
+        refuse(f"{path}: {len(titles)} titles for {table.shape[1]} columns", _ALLOWED)
     columns = {kind: table[:, i] for i, kind in enumerate(kinds) if kind}
-    named = {word for title in words for word in title if word in _POWERS}
+    quantities = {word for title in words for word in title if word in _POWERS}
     if {"frequency", "real", "imaginary"} <= columns.keys():
         values = columns["real"] + 1j * columns["imaginary"]
     elif {"frequency", "magnitude", "phase"} <= columns.keys():
@@ -341,7 +341,7 @@ def _read(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:
             f"{path}: the columns are {shown(', '.join(titles)) if titles else 'without titles'}",
             _ALLOWED,
         )
-    quantity = min(named) if len(named) == 1 else None
+    quantity = min(quantities) if len(quantities) == 1 else None
     return columns["frequency"], values, quantity
 
 
@@ -360,10 +360,10 @@ def _read_universal(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity
     force = record["orddenom_spec_data_type"]
     if response not in _RESPONSES or force not in {_EXCITATION_FORCE, _REACTION_FORCE}:
         refuse(
-            f"{path}: a response of type {response} over one of type {force}",
-            "displacement, velocity or acceleration (8, 11, 12) over force (13)",
+            f"{path}: a response of data type {response} to an excitation of type {force}",
+            "displacement, velocity or acceleration (8, 11, 12) in response to a force (13)",
         )
-    # Directions of response and reference count with their signs.
+    # Opposite directions of response and excitation change the sign.
     sign = 1 if record["rsp_dir"] * record["ref_dir"] >= 0 else -1
     quantity: Quantity = _RESPONSES[response]  # type: ignore[assignment]
     return (

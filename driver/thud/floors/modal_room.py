@@ -1,9 +1,9 @@
-"""Levels in a modal room under a modal plate, by positions of ball and microphone.
+"""Levels in a modal room below a modal plate, for positions of ball and microphone.
 
-The deterministic counterpart of the statistical prediction at low frequencies. The plate is simply
-supported and covers the ceiling of a rectangular room with rigid walls. Both are sums of modes. The
-force acts on the plate, and the plate on the air; the air does not act on the plate, whose loss
-factor includes the radiation.
+This is the deterministic counterpart of the statistical prediction at low frequencies. The plate is
+simply supported and covers the ceiling of a rectangular room with rigid walls. The motion of plate
+and air is a sum of modes. The force drives the plate, and the plate drives the air; the reaction of
+the air is included only as radiation in the loss factor of the plate.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from scipy.signal import lfilter, sosfilt
 from thud.base._schema import Plate, Room
 from thud.base.bridge import ask
 from thud.base.checks import (
-    LARGEST_SEED,
+    MAX_SEED,
     refuse,
     refuse_value,
     require_array,
@@ -44,31 +44,33 @@ if TYPE_CHECKING:
 
 # Number of one-third-octave bands from 25 to 160 Hz.
 N_BAND = 9
-# Samples per second of the sound pressure, Hz: the filters of class 1 need four times 178 Hz.
+# Samples per second of the sound pressure, Hz: filters of class 1 need at least four times 178 Hz.
 SAMPLE_RATE = 1024.0
-# Modes up to this frequency, Hz. The filter of 160 Hz attenuates by 42 dB there.
+# Maximum frequency of modes, Hz, which the filter of the 160 Hz band attenuates by 42 dB.
 MAX_FREQUENCY = 400.0
 # Minimum distance of random positions from all boundaries, m (ISO 16283-2).
 BORDER = 0.5
-# Decay within the record, dB, and time constant of the Fast detector, s.
-DECAY_RANGE, TIME_CONSTANT = 60.0, 0.125
+# Decay within the record, dB.
+DECAY_RANGE = 60.0
+# Time constant of the Fast detector, s.
+TIME_CONSTANT = 0.125
 REFERENCE_PRESSURE = 2e-5
-# Maximum number of positions of either kind, of modes, and of modes times spectral lines: memory.
+# Limits of memory: positions of ball or microphone, modes, and modes times frequency points.
 MAX_POSITIONS, MAX_MODES, MAX_VALUES = 1000, 20000, 2 * 10**7
 
 
 class ModeCountError(InputError):
-    """A floor or a room has no modes in the bands, or more than can be computed."""
+    """A floor or a room has no modes in the bands, or more modes than can be computed."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ModalRoom(Displayed):
-    """Levels in a modal room under a modal plate, for positions of ball and microphone.
+    """Levels in a modal room below a modal plate, for positions of ball and microphone.
 
     Attributes
     ----------
     prediction : RoomPrediction
-        The statistical prediction for the same impact, floor and room.
+        Statistical prediction for the same impact, floor and room.
     size : tuple of float
         Length, width and height of the room, m.
     frequency : ndarray, shape (9,)
@@ -80,11 +82,12 @@ class ModalRoom(Displayed):
     level : ndarray, shape (n_ball, n_microphone, 9)
         Maximum Fast levels, dB re 20 uPa.
     floor_frequency, room_frequency : ndarray, shape (n_mode,)
-        Natural frequencies of plate and room up to 400 Hz, ascending; the room's begin with 0.
+        Natural frequencies of plate and room up to 400 Hz, ascending, Hz; the first one of the room
+        is 0.
     plate_energy : ndarray, shape (n_ball, 2)
-        Energy that each impact gives to the modes of the plate, and that they lose, J.
+        For each impact, energy input to the modes of the plate and their energy loss, J.
     room_energy : ndarray, shape (n_ball, 2)
-        Energy that the plate gives to the modes of the room, and that they lose, J.
+        For each impact, energy input to the modes of the room and their energy loss, J.
     """
 
     prediction: RoomPrediction
@@ -118,7 +121,7 @@ class ModalRoom(Displayed):
         return result
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text, a band each."""
+        """Return the header and a row of text for each band."""
         header = (
             "band, Hz", "mean, dB", "spread, dB", "minimum, dB", "maximum, dB",
             "statistical, dB", "its spread, dB",
@@ -155,35 +158,36 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
     microphones: int | ArrayLike = 32,
     seed: int = 0,
 ) -> ModalRoom:
-    """Compute levels below a floor by modes, for each pair of positions, in bands up to 160 Hz.
+    """Compute modal levels below a floor for pairs of positions, in bands up to 160 Hz.
 
-    The floor is simply supported and covers the room, whose height is its volume over the area of
-    the floor. Walls and ceilings of `room` are not part of it. Modes of the floor lose their energy
-    at the rate omega eta of the statistical prediction, those of the room at 6 ln 10/T.
+    The floor is simply supported and covers the room, whose height is its volume divided by the
+    area of the floor. Walls and ceilings of `room` are not used. The energy of floor modes decays
+    at the rate omega eta of the statistical prediction, the energy of room modes at 6 ln 10/T.
 
     Parameters
     ----------
     source
-        Impact of any model, or a recording. The force is that of the statistical prediction: on the
-        floor, where the model knows it.
+        Impact of any model, or a recording. As in the statistical prediction, the force is that on
+        the floor, or that on a rigid floor if the model has no other.
     floor, room
         Floor and room; by default those of the impact's case.
     balls : int or array_like, shape (n_ball, 2)
-        Number of random positions of the ball, or positions, m.
+        Number of random positions of the ball, or the positions, m.
     microphones : int or array_like, shape (n_microphone, 3)
-        The same of the microphones; the third coordinate is the height.
+        Number of random positions of the microphone, or the positions, m; the third coordinate is
+        the height.
     seed
-        Seed of the random positions, which keep 0.5 m from all boundaries.
+        Seed of the random positions, which are at least 0.5 m away from all boundaries.
 
     Returns
     -------
     ModalRoom
-        Its `level` has a maximum Fast level for each pair of positions.
+        Maximum Fast levels for each pair of positions.
 
     Raises
     ------
     InputError
-        Where the floor is no plate, a position lies outside, or the room has too many modes.
+        If the floor is not a plate, a position is outside, or the room has too many modes.
     """
     prediction = predict_level(source, floor, room)
     return positions_below(prediction, balls=balls, microphones=microphones, seed=seed)
@@ -196,12 +200,12 @@ def positions_below(
     microphones: int | ArrayLike = 32,
     seed: int = 0,
 ) -> ModalRoom:
-    """Compute `modal_room` for the impact, the floor and the room of a prediction."""
+    """Compute the `modal_room` for the impact, floor and room of a prediction."""
     floor, room = prediction.floor, prediction.room
     require_kind("floor", floor, Plate)
     assert isinstance(floor, Plate)  # noqa: S101 - for the type checker
     size = (floor.length, floor.width, room.volume / (floor.length * floor.width))
-    require_whole("seed", seed, 0, LARGEST_SEED)
+    require_whole("seed", seed, 0, MAX_SEED)
     generator = np.random.default_rng(seed)
     positions = _positions("balls", balls, size[:2], generator)
     receivers = _positions("microphones", microphones, size, generator)
@@ -213,19 +217,19 @@ def positions_below(
         frequency=np.maximum(plate_frequency, 1.0),
     )
     losses = 2 * np.pi * plate_frequency * result["loss_factor"]
-    decay = 6 * math.log(10) / _times(prediction, room_frequency)
+    decay = 6 * math.log(10) / _reverberation_times(prediction, room_frequency)
     duration = _duration(min(losses.min(), decay.min()))
     omega, force = _spectrum(prediction.source, duration)
     if len(omega) * len(orders) > MAX_VALUES:
         message = (
-            f"room: {len(orders)} modes below {MAX_FREQUENCY:g} Hz ring for {duration:.1f} s; "
-            "allowed: a smaller volume or reverberation time; in large rooms the statistical "
-            "prediction holds"
+            f"room: {len(orders)} modes below {MAX_FREQUENCY:g} Hz decay for {duration:.1f} s; "
+            "allowed: a smaller volume or reverberation time; for large rooms use the statistical "
+            "prediction"
         )
         raise ModeCountError(message)
     mass = result["surface_mass"] * floor.length * floor.width / 4
     plate = _receptance(omega, plate_frequency, losses) * (1j * omega) / mass
-    # Means of the squares of the room's modes.
+    # Mean squares of the mode shapes of the room.
     norms = np.prod(np.where(orders > 0, 0.5, 1.0), axis=1)
     stiffness = room.air_density * room.sound_speed**2 / (room.volume * norms)
     air = _receptance(omega, room_frequency, decay) * (1j * omega) * stiffness[:, None]
@@ -268,7 +272,7 @@ def positions_below(
 
 
 def plate_frequencies(floor: Plate, numbers: ArrayLike) -> Array:
-    """Return natural frequencies of a simply supported plate, Hz, by numbers of half-waves."""
+    """Return natural frequencies, Hz, of a simply supported plate for numbers of half-waves."""
     # omega**2 m'' = Bx kx**4 + 2 H kx**2 ky**2 + By ky**4, sqrt(B'/m'') = c_L h/sqrt(12).
     square = (np.pi * np.asarray(numbers) / (floor.length, floor.width)) ** 2
     x, y, ratio = square[..., 0], square[..., 1], math.sqrt(floor.stiffness_ratio)
@@ -278,7 +282,7 @@ def plate_frequencies(floor: Plate, numbers: ArrayLike) -> Array:
 
 def _plate_modes(floor: Plate) -> tuple[Array, Array]:
     """Return numbers of half-waves, shape (n, 2), and frequencies of the plate's modes, Hz."""
-    # Half-waves along one side alone at the highest frequency.
+    # The number of half-waves along a side is largest if there are none along the other side.
     unit = floor.wave_speed * floor.thickness * math.pi / (2 * math.sqrt(12))
     stretch = floor.stiffness_ratio**0.125
     sides = floor.length * stretch, floor.width / stretch
@@ -288,7 +292,7 @@ def _plate_modes(floor: Plate) -> tuple[Array, Array]:
     keep = frequency <= MAX_FREQUENCY
     if not keep.any():
         message = (
-            f"floor: its first natural frequency is {frequency.min():.0f} Hz; allowed: a floor "
+            f"floor: the first natural frequency is {frequency.min():.0f} Hz; allowed: a floor "
             f"with modes below {MAX_FREQUENCY:g} Hz"
         )
         raise ModeCountError(message)
@@ -299,7 +303,7 @@ def _plate_modes(floor: Plate) -> tuple[Array, Array]:
 def _room_modes(size: tuple[float, float, float], speed: float) -> tuple[Array, Array]:
     """Return numbers of half-waves, shape (n, 3), and frequencies of the room's modes, Hz."""
     counts = [1 + int(2 * side * MAX_FREQUENCY / speed) for side in size]
-    _require_modes("room: volume gives", math.prod(counts) // 3)
+    _require_modes("room: the volume has", math.prod(counts) // 3)
     orders = _grid(counts)
     frequency = speed / 2 * np.sqrt(((orders / size) ** 2).sum(axis=1))
     keep = frequency <= MAX_FREQUENCY
@@ -307,7 +311,7 @@ def _room_modes(size: tuple[float, float, float], speed: float) -> tuple[Array, 
 
 
 def _grid(counts: list[int]) -> Array:
-    """Return all combinations of whole numbers from 0 to below the counts."""
+    """Return all combinations of whole numbers, each from 0 to its count - 1."""
     grid = np.meshgrid(*(np.arange(float(count)) for count in counts), indexing="ij")
     return np.stack(grid, -1).reshape(-1, len(counts))
 
@@ -316,7 +320,7 @@ def _require_modes(label: str, count: int) -> None:
     if count > MAX_MODES:
         message = (
             f"{label} about {count} modes below {MAX_FREQUENCY:g} Hz; allowed: at most "
-            f"{MAX_MODES}; there the statistical prediction holds"
+            f"{MAX_MODES}; use the statistical prediction instead"
         )
         raise ModeCountError(message)
 
@@ -324,8 +328,8 @@ def _require_modes(label: str, count: int) -> None:
 def _coupling(orders: Array, numbers: Array, sides: tuple[float, ...]) -> Array:
     """Return the integrals of products of modes over the ceiling, m2, shape (n_room, n_plate).
 
-    The integral of sin(m pi x/L) cos(l pi x/L) is 2 L m/(pi (m**2 - l**2)) where m + l is odd,
-    else 0; the room's mode has the factor (-1)**n at the ceiling.
+    The integral of sin(m pi x/L) cos(l pi x/L) is 2 L m/(pi (m**2 - l**2)) if m + l is odd, else 0.
+    A room mode with n half-waves along the height has the factor (-1)**n at the ceiling.
     """
     total = (-1.0) ** orders[:, 2:]
     for axis, side in enumerate(sides):
@@ -337,16 +341,16 @@ def _coupling(orders: Array, numbers: Array, sides: tuple[float, ...]) -> Array:
 
 
 def _duration(slowest: float) -> float:
-    """Return a length of the record, s, after which the slowest mode has decayed.
+    """Return the length of the record, s, that includes the decay of the slowest mode by 60 dB.
 
-    The record is periodic: longer ringing would wrap around to before the impact. `slowest` is the
-    minimum rate of decay of an energy, 1/s; impact and detector take half a second.
+    The record is periodic: a longer decay would wrap around to its beginning. `slowest` is the
+    minimum rate of decay of energy, 1/s. Impact and detector take half a second.
     """
     return 0.5 + DECAY_RANGE * math.log(10) / (10 * slowest)
 
 
 def _receptance(omega: Array, frequency: Array, decay: Array) -> ComplexArray:
-    """Return 1/(w0**2 - w**2 + i w a), a the rate of decay of the energy; 0 at w = 0."""
+    """Return 1/(w0**2 - w**2 + i w a), with `decay` a of the energy, 1/s; 0 at w = 0."""
     natural = 2 * np.pi * frequency[:, None]
     divisor: ComplexArray = natural**2 - omega**2 + 1j * omega * decay[:, None]
     divisor[:, omega == 0] = 1.0
@@ -356,10 +360,10 @@ def _receptance(omega: Array, frequency: Array, decay: Array) -> ComplexArray:
 def _spectrum(source: ImpactResult, duration: float) -> tuple[Array, ComplexArray]:
     """Return angular frequencies, rad/s, and the Fourier transform of the force, N s."""
     force = source.force("floor")
-    # The inverse transform assumes an even number.
+    # The inverse transform assumes an even number of samples.
     n_sample = 2 * math.ceil(SAMPLE_RATE / 2 * max(duration, len(force) / source.sample_rate))
     omega = 2 * np.pi * np.arange(n_sample // 2 + 1) * SAMPLE_RATE / n_sample
-    # The same period in samples of the force; rounding moves a frequency by less than 1e-5.
+    # Number of force samples in the same period; rounding changes frequencies by less than 1e-5.
     count = round(n_sample * source.sample_rate / SAMPLE_RATE)
     return omega, np.fft.rfft(force, count)[: len(omega)] / source.sample_rate
 
@@ -379,8 +383,8 @@ def fast_levels(pressure: Array) -> Array:
     return np.array(levels)
 
 
-def _times(prediction: RoomPrediction, frequency: Array) -> Array:
-    """Return reverberation times at frequencies, s: those of the nearest bands."""
+def _reverberation_times(prediction: RoomPrediction, frequency: Array) -> Array:
+    """Return the reverberation times of the bands nearest to frequencies, s."""
     distance = abs(np.log(np.maximum(frequency, 1.0)[:, None] / prediction.frequency))
     return np.asarray(prediction.reverberation_time[distance.argmin(axis=1)])
 
@@ -388,7 +392,10 @@ def _times(prediction: RoomPrediction, frequency: Array) -> Array:
 def _positions(
     name: str, value: int | ArrayLike, size: tuple[float, ...], generator: np.random.Generator
 ) -> Array:
-    """Return positions, m, shape (n, len(size)), random or checked."""
+    """Return a number of random positions, or stated positions after a check, m.
+
+    The shape is (n, len(size)); `size` is the length of the sides, m.
+    """
     sides = np.array(size)
     if isinstance(value, int | np.integer | float | str):
         require_whole(name, value, 1, MAX_POSITIONS)

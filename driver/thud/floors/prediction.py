@@ -1,4 +1,4 @@
-"""Level in the room below, from a force by transient statistical energy analysis."""
+"""Level in the room below an impact, by transient statistical energy analysis."""
 
 from __future__ import annotations
 
@@ -28,28 +28,28 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 BANDS = BANDWIDTHS[1]
-# Change of the force by a yielding floor, dB, that raises a warning.
-MIN_CHANGE = 0.1
+# Maximum change of the peak force by the floor, dB, for which the blocked force raises no warning.
+MAX_CHANGE = 0.1
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class RoomPrediction(RoomLevel, Displayed):
     """Level that an impact causes in the room below.
 
-    It has the attributes of `RoomLevel`, and those below.
+    Attributes are those of `RoomLevel` and the following.
 
     Attributes
     ----------
     floor, room : Plate and Room
         Floor and room of the prediction.
     source : Impact or Recording
-        The impact on the floor whose force acts, or the impact or recording on a rigid one.
+        Impact or recording whose force is used.
     force : str
-        ``"contact"``: the prediction is of the force on the mobile floor; ``"blocked"``: of the
-        force on a rigid floor, as recordings and measured modes have it.
+        ``"contact"``: the force on the mobile floor is used; ``"blocked"``: the force on a rigid
+        floor, which is the only force of recordings and measured modes.
     force_change : float
-        Change of the peak of the force by the floor, dB; of a blocked force that which a linear
-        source with the mass and the contact time of the impact would have.
+        Change of the peak force by the floor, dB. If the force is blocked: the change for a linear
+        source with the mass and the contact time of the impact.
     """
 
     floor: FloorOptions
@@ -60,74 +60,72 @@ class RoomPrediction(RoomLevel, Displayed):
 
     @property
     def rating(self) -> Rating:
-        """Single numbers of the levels in the room."""
+        """Single-number rating of the levels in the room."""
         return rating(self.level, BANDS)
 
     @property
     def radiated_share(self) -> Array:
-        """Share of the floor's losses that it radiates into the room, shape (12,)."""
+        """Fraction of the energy loss of the floor that is radiated into the room, shape (12,)."""
         air = self.room.air_density * self.room.sound_speed
         omega = 2 * np.pi * self.frequency
         radiated = air * self.radiation_factor / (self.mass_per_area * omega)
-        # The floor loses at least what it dissipates and radiates to both sides.
+        # The loss is at least the internal loss plus the radiation to both sides.
         internal = getattr(self.floor, "loss_factor", 0.0)
         return radiated / np.maximum(self.loss_factor, internal + 2 * radiated)
 
     @property
     def octave_rating(self) -> Rating:
-        """Single numbers of the octaves in the room, with the Korean class."""
+        """Single-number rating of the octave levels in the room, with the Korean class."""
         return rating(self.octave_level, BANDWIDTHS[0])
 
     @property
     def standardized(self) -> Array:
-        """L'_i,Fmax,V,T, dB, shape (12,): in a room of 50 m3 and 0.5 s (ISO 16283-2)."""
+        """Standardized levels L'_i,Fmax,V,T, dB, shape (12,) (ISO 16283-2)."""
         return standardized_level(self.level, self.reverberation_time, self.room.volume)
 
     @property
     def standardized_rating(self) -> Rating:
-        """Single numbers of the standardized levels."""
+        """Single-number rating of the standardized levels."""
         return rating(self.standardized, BANDS)
 
     @property
     def has_few_modes(self) -> NDArray[np.bool_]:
-        """Whether a band has few modes of floor or room, shape (12,)."""
+        """Whether a band has fewer than `few_modes` of floor or room, shape (12,)."""
         return np.minimum(self.floor_modes, self.room_modes) < self.few_modes
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Caveats of the numbers."""
+        """Sentences on the validity of the prediction."""
         few = self.has_few_modes
         result = [*self.floor_warnings]
         if few.any():
             bands = ", ".join(f"{f:g}" for f in self.frequency[few])
             result.append(
                 f"fewer than {self.few_modes:g} modes of floor or room at {bands} Hz: levels there "
-                "are means over many floors and rooms; single positions are expected to differ "
-                f"with a standard deviation of {self.spread[few].max():.1f} to "
+                "are means over many floors and rooms; levels at single positions are expected to "
+                f"have a standard deviation of {self.spread[few].max():.1f} to "
                 f"{self.spread[few].min():.1f} dB"
             )
-        if self.force == "blocked" and abs(self.force_change) > MIN_CHANGE:
+        if self.force == "blocked" and abs(self.force_change) > MAX_CHANGE:
             result.append(
-                f"the floor yields: the peak of the force would change by about "
-                f"{self.force_change:.1f} dB, and the force on a rigid floor is used"
+                f"the floor is not rigid: its motion would change the peak force by about "
+                f"{self.force_change:.1f} dB, but the force on a rigid floor is used"
             )
         return tuple(result)
 
     def difference(self, measured: RoomLevels) -> Array:
-        """Return measured − predicted level, dB, shape (12,), in the room as it is.
+        """Return measured − predicted level, dB, shape (12,), without standardization.
 
-        Raise InputError where the measured levels are not in one-third-octave bands.
+        Raise InputError if the measured levels are not in one-third-octave bands.
         """
         require_kind("measured", measured, RoomLevels)
         if measured.bands != BANDS:
-            refuse(
-                "measured: the levels are octaves", "one-third-octave bands, as of the prediction"
-            )
+            refuse("measured: the bands of the levels are octaves", "one-third-octave bands")
         rated = np.isin(measured.frequency, self.frequency)
         return np.asarray(measured.level[rated] - self.level)
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text, a band each."""
+        """Return the header and a row of text for each band."""
         header = (
             "band, Hz", "L_i,Fmax, dB", "standardized, dB", "spread, dB", "energy, mJ",
             "floor modes",
@@ -141,13 +139,13 @@ class RoomPrediction(RoomLevel, Displayed):
         return [header, *zip((f"{f:g}" for f in self.frequency), *cells, strict=True)]
 
     def plot(self, measured: RoomLevels | None = None) -> Figure:
-        """Draw the chain: force, energy, floor and room, with measured levels if given."""
+        """Draw force, energy, floor and levels in the room, with measured levels if stated."""
         from thud.plot.room_figures import draw_prediction
 
         return draw_prediction(self, measured)
 
     def __repr__(self) -> str:
-        """Return the single numbers."""
+        """Return the single-number ratings."""
         return (
             f"<RoomPrediction: L_iA,Fmax {self.rating.rounded} dB, "
             f"standardized {self.standardized_rating.rounded} dB>"
@@ -159,10 +157,11 @@ def predict_level(
 ) -> RoomPrediction:
     """Predict the level that an impact causes in the room below.
 
-    Transient statistical energy analysis: the floor takes the energy of an infinite
-    plate, loses and radiates it after ISO 12354-1, the room decays with its reverberation time, and
-    the Fast detector shows its maximum. The force is that on the floor, where the model knows it;
-    for a floor other than that of the impact, the impact is computed again.
+    Transient statistical energy analysis: the floor absorbs the energy that an infinite plate would
+    absorb, and loses and radiates it according to ISO 12354-1. The energy in the room decays with
+    the reverberation time. The level is the maximum of the Fast detector. The force is that on the
+    floor, or that on a rigid floor if the model has no other; it is computed again if `floor` is
+    not the floor of the impact.
 
     Parameters
     ----------
@@ -174,42 +173,42 @@ def predict_level(
     Raises
     ------
     InputError
-        Where floor or room are missing or out of range.
+        If the floor or the room is missing or out of range.
     """
     require_kind("source", source, ImpactResult)
     case = source.case
     floor, room = floor or case.floor, room or case.room
     if floor is None or room is None:
         refuse(
-            f"{'floor' if floor is None else 'room'} is not given", "an object of Plate and of Room"
+            f"{'floor' if floor is None else 'room'} is missing", "a floor, such as Plate, and Room"
         )
     floor_case = replace(case, modes=None, floor=floor, room=room)
-    moved = _on_floor(source, floor_case)
+    impact = _on_floor(source, floor_case)
     level = source.room_level
     if level is None or (floor, room) != (case.floor, case.room):
-        levels = (moved or source).levels(BANDS, force="floor")
+        levels = (impact or source).levels(BANDS, force="floor")
         rated = np.isin(get_bands(BANDS).nominal, rated_bands(BANDS))
         level = new_room_level(ask("room_level", case=case_text(floor_case), levels=levels[rated]))
-        assert level is not None  # noqa: S101 - the library has answered
-    if moved:
+        assert level is not None  # noqa: S101 - the answer of this question has a room
+    if impact:
         blocked = (
             source.blocked_force.max() if isinstance(source, FloorImpact) else source.peak("floor")
         )
-        change = 20 * math.log10(moved.peak("floor") / blocked)
+        change = 20 * math.log10(impact.peak("floor") / blocked)
     else:
         change = _force_change(source.mass, source.contact_time, 1 / level.conductance.max())
     return RoomPrediction(
         **vars(level),
         floor=floor,
         room=room,
-        source=moved or source,
-        force="contact" if moved else "blocked",
+        source=impact or source,
+        force="contact" if impact else "blocked",
         force_change=change,
     )
 
 
 def _on_floor(source: ImpactResult, case: Case) -> FloorImpact | None:
-    """Return the impact on the floor of a case; None where its force is the blocked one."""
+    """Return the impact on the floor of a case; None if only the blocked force is known."""
     existing = source if isinstance(source, FloorImpact) else source.on_floor
     if source.case.model is None or source.case.floor == case.floor:
         return existing
@@ -219,11 +218,11 @@ def _on_floor(source: ImpactResult, case: Case) -> FloorImpact | None:
 
 
 def _force_change(mass: float, contact_time: float, resistance: float) -> float:
-    """Return the change of the peak force on a resistance, dB, of a linear source.
+    """Return the change of the peak force of a linear source by a resistive floor, dB.
 
-    F'' + (k/Z) F' + (k/M) F = 0 with F(0) = 0 and F'(0) = k v0. Relative to the rigid floor the
-    peak is exp(-b arctan(w/b)/w), b = k/(2 Z), w**2 = k/M - b**2; on a floor so light that the
-    force does not oscillate, exp(-b artanh(w/b)/w) with w**2 = b**2 - k/M.
+    F'' + (k/Z) F' + (k/M) F = 0 with F(0) = 0 and F'(0) = k v0. The ratio of the peak to that on a
+    rigid floor is exp(-b arctan(w/b)/w) with b = k/(2 Z), w**2 = k/M - b**2; if the force does not
+    oscillate, exp(-b artanh(w/b)/w) with w**2 = b**2 - k/M.
     """
     stiffness = mass * (math.pi / contact_time) ** 2
     decay = stiffness / (2 * resistance)

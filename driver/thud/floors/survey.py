@@ -1,7 +1,7 @@
-"""Levels measured in a room below: mean of positions, background, standardization, rating.
+"""Evaluation of levels measured in a room below a floor.
 
-The chain is that of ISO 16283-2 for the rubber ball: energy mean over the positions, correction for
-the background, standardization by reverberation time and volume, rating of ISO 717-2 annex D.
+According to ISO 16283-2 for the rubber ball: energy mean over the positions, correction for
+background, standardization by reverberation time and volume, and rating by ISO 717-2 annex D.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-# Rounded mid frequencies in a decade (ISO 3, R10), and the relative tolerance of a stated one.
+# Rounded mid frequencies in a decade (ISO 3, R10), and the relative tolerance of frequencies.
 R10 = np.array([1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0])
 FREQUENCY_TOLERANCE = 0.03
 # Minimum number of positions (ISO 16283-2).
 MIN_POSITIONS = 4
-# Columns other than levels, by their titles in lower case without units.
+# Kinds of columns by title, in lower case without unit; other columns are levels.
 TITLES = {
     "frequency": "frequency", "f": "frequency", "band": "frequency", "hz": "frequency",
     "reverberation time": "time", "t": "time", "t20": "time", "t30": "time", "t60": "time",
@@ -44,19 +44,18 @@ TITLES = {
     "background": "background", "background level": "background", "noise": "background",
 }  # fmt: skip
 ALLOWED = (
-    "a header row, and for each band a line of frequency, Hz, levels, dB, of one or "
-    "more positions, and where they are known the columns background, dB, and "
-    "reverberation_time, s"
+    "a header row, and for each band a row of frequency, Hz, levels, dB, of one or "
+    "more positions, and, if known, the columns background, dB, and reverberation_time, s"
 )
-# Units of the columns, and words in a title that state another unit.
+# Units of the kinds of columns, and words in a title that state another unit.
 UNITS = {"frequency": "Hz", "time": "s", "background": "dB", "level": "dB"}
 OTHER_UNITS = {"khz", "ms", "min", "pa", "mpa", "upa", "np"}
-# Words in the titles of columns that are no positions, where there are several columns.
+# Words in titles of columns that are not levels of a position.
 NO_POSITION = {
     "mean", "average", "median", "standardized", "spread", "std", "sd", "stdev",
     "deviation", "uncertainty", "edt", "nominal",
 }  # fmt: skip
-# Maximum plausible difference of two positions, dB, mean over the bands.
+# Maximum plausible difference between levels of two positions, dB, mean over the bands.
 MAX_DIFFERENCE = 15.0
 # Plausible levels, dB, and times, s.
 LEVEL_RANGE, TIME_RANGE = (-50.0, 200.0), (0.01, 100.0)
@@ -73,7 +72,7 @@ class RoomLevels(Displayed):
     bands : str
         ``"octave"`` or ``"third"``.
     frequency : ndarray, shape (n_band,)
-        Rounded mid frequencies, Hz, ascending; the rated ones or more.
+        Rounded mid frequencies, Hz, ascending; all rated bands, perhaps more.
     positions : ndarray, shape (n_position, n_band)
         Maximum Fast levels of each position, dB re 20 uPa.
     background, reverberation_time : ndarray, shape (n_band,), or None
@@ -92,12 +91,12 @@ class RoomLevels(Displayed):
 
     @property
     def measured(self) -> Array:
-        """Energy mean of the positions, with the background, dB, shape (n_band,)."""
+        """Energy mean of the positions, not corrected for background, dB, shape (n_band,)."""
         return np.asarray(10 * np.log10((10 ** (self.positions / 10)).mean(axis=0)))
 
     @property
     def level(self) -> Array:
-        """Energy mean L_i,Fmax without the background, dB, shape (n_band,)."""
+        """Energy mean L_i,Fmax, corrected for background, dB, shape (n_band,)."""
         return self._corrected()[0]
 
     @property
@@ -107,33 +106,33 @@ class RoomLevels(Displayed):
 
     @property
     def standardized(self) -> Array | None:
-        """L'_i,Fmax,V,T, dB, shape (n_band,); None without reverberation time or volume."""
+        """Standardized levels L'_i,Fmax,V,T, dB, shape (n_band,); None without time or volume."""
         if self.reverberation_time is None or self.volume is None:
             return None
         return standardized_level(self.level, self.reverberation_time, self.volume)
 
     @property
     def spread(self) -> Array | None:
-        """Standard deviation of the positions' levels, dB, shape (n_band,); None for one."""
+        """Standard deviation over the positions, dB, shape (n_band,); None for one position."""
         return self.positions.std(axis=0, ddof=1) if len(self.positions) > 1 else None
 
     @property
     def rating(self) -> Rating:
-        """Single numbers of the levels as they are in the room."""
+        """Single-number rating of the levels without standardization."""
         return rating(self.level[self._rated], self.bands)
 
     @property
     def standardized_rating(self) -> Rating | None:
-        """Single numbers of the standardized levels; None where there are none."""
+        """Single-number rating of the standardized levels; None without these levels."""
         levels = self.standardized
         return None if levels is None else rating(levels[self._rated], self.bands)
 
     @property
     def position_uncertainty(self) -> float | None:
-        """Standard uncertainty of the single numbers by the scatter of positions, dB.
+        """Standard uncertainty of the ratings by the scatter of positions, dB.
 
-        The standard error of the mean A-weighted energy over the positions. It excludes the
-        instruments and the reverberation time; None for one position.
+        It is the standard error of the mean A-weighted energy over the positions; None for one
+        position. It excludes instruments and reverberation time.
         """
         count = len(self.positions)
         if count == 1:
@@ -145,17 +144,17 @@ class RoomLevels(Displayed):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Caveats of the numbers."""
+        """Sentences on possible faults of the levels and ratings."""
         result = []
         if len(self.positions) < MIN_POSITIONS:
             result.append(
                 f"levels of {self._count}; ISO 16283-2 asks for {MIN_POSITIONS} positions of the "
                 "source or more"
             )
-        different = float(np.ptp(self.positions.mean(axis=1)))
-        if different > MAX_DIFFERENCE:
+        difference = float(np.ptp(self.positions.mean(axis=1)))
+        if difference > MAX_DIFFERENCE:
             result.append(
-                f"the levels of two positions differ by {different:.0f} dB in the mean: check that "
+                f"the levels of two positions differ by {difference:.0f} dB on average: check that "
                 "every column without a known title has the levels of a position"
             )
         if self.background is None:
@@ -163,8 +162,8 @@ class RoomLevels(Displayed):
         elif self.is_upper_bound.any():
             bands = ", ".join(f"{f:g}" for f in self.frequency[self.is_upper_bound])
             result.append(
-                f"less than 6 dB above the background at {bands} Hz: levels there are upper "
-                "bounds, and so are the ratings"
+                f"less than 6 dB above the background at {bands} Hz: levels there and the ratings "
+                "are upper bounds"
             )
         missing = [
             name
@@ -174,11 +173,11 @@ class RoomLevels(Displayed):
             if value is None
         ]  # fmt: skip
         if missing:
-            result.append(f"not standardized: {' and '.join(missing)} not given")
+            result.append(f"not standardized: {' and '.join(missing)} not stated")
         return tuple(result)
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text, a band each."""
+        """Return the header and a row of text for each band."""
         standardized = self.standardized
         columns = {
             "mean, dB": self.measured,
@@ -202,13 +201,13 @@ class RoomLevels(Displayed):
         return [header, *zip((f"{f:g}" for f in self.frequency), *cells, strict=True)]
 
     def plot(self) -> Figure:
-        """Draw the levels of positions, their mean, the standardized ones and the background."""
+        """Draw the levels of positions, their mean, the standardized levels and the background."""
         from thud.plot.room_figures import room_levels
 
         return room_levels(self)
 
     def __repr__(self) -> str:
-        """Return the single numbers."""
+        """Return the single-number ratings."""
         standardized = self.standardized_rating
         suffix = "" if standardized is None else f", standardized {standardized.rounded} dB"
         return f"<RoomLevels, {self._count}: L_iA,Fmax {self.rating.rounded} dB{suffix}>"
@@ -236,24 +235,24 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     ----------
     path
         Columns with a header row: ``frequency``, Hz; ``background``, dB, and
-        ``reverberation_time``, s, where they are known; every other column holds the levels of a
-        position, dB. The bands are those that a rating needs, or more.
+        ``reverberation_time``, s, if known; every other column holds the levels of a position, dB.
+        There is a row for each rated band, and optionally for other bands.
     volume
         Volume of the room, m3.
 
     Raises
     ------
     InputError
-        Names the file, and the column or band that is missing, double or not plausible.
+        If a column or band is missing, duplicate or not plausible; the message names it.
     """
     titles, table = read_titled(path, ALLOWED)
     if len(titles) != table.shape[1]:
-        refuse(f"{path}: {len(titles)} titles over {table.shape[1]} columns", ALLOWED)
+        refuse(f"{path}: {len(titles)} titles for {table.shape[1]} columns", ALLOWED)
     kinds = [_kind(title, path) for title in titles]
     positions = [title for title, kind in zip(titles, kinds, strict=True) if kind == "level"]
     other = next((title for title in positions if NO_POSITION & {*_plain(title).split()}), "")
     if other and len(positions) > 1:
-        refuse(f"{path}: {other.strip()!r} is no position", ALLOWED)
+        refuse(f"{path}: column {other.strip()!r} is not a position", ALLOWED)
     if double := [kind for kind in UNITS if kind != "level" and kinds.count(kind) > 1]:
         refuse(f"{path}: more than one column of {double[0]}", ALLOWED)
     if "frequency" not in kinds or not positions:
@@ -280,7 +279,7 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
 
 
 def levels_csv(result: RoomLevels) -> bytes:
-    """Return the levels as a table with titles."""
+    """Return the levels as a CSV table with a header row."""
     columns = {
         "nominal_Hz": result.frequency, "mean_dB": result.measured, "spread_dB": result.spread,
         "background_dB": result.background, "level_dB": result.level,
@@ -293,7 +292,7 @@ def levels_csv(result: RoomLevels) -> bytes:
 
 
 def rating_table(result: RoomLevels) -> list[tuple[str, ...]]:
-    """Return header and rows of the single numbers."""
+    """Return header and rows of the single-number ratings."""
     standardized = result.standardized_rating
     rows = [*result.rating.rows()]
     if standardized is not None:
@@ -305,7 +304,7 @@ def rating_table(result: RoomLevels) -> list[tuple[str, ...]]:
 
 
 def _kind(title: str, path: object) -> str:
-    """Return the kind of a column; raise InputError where its title has another unit."""
+    """Return the kind of a column; raise InputError if its title states another unit."""
     kind = TITLES.get(_plain(title), "level")
     if OTHER_UNITS & {word.lower() for word in re.findall(r"[A-Za-z]+", title)[1:]}:
         refuse(f"{path}: {title.strip()!r} is not in {UNITS[kind]}", f"{kind} in {UNITS[kind]}")
@@ -323,7 +322,7 @@ def _plain(title: str) -> str:
 
 
 def _nominal(frequency: float, path: object) -> float:
-    """Return the nearest rounded mid frequency."""
+    """Return the nearest rounded mid frequency; raise InputError if none is near."""
     if 1 <= frequency < 1e5:  # noqa: PLR2004 - bands of sound
         decade = 10.0 ** math.floor(math.log10(frequency))
         candidates = np.append(R10, 10) * decade
@@ -337,10 +336,10 @@ def _nominal(frequency: float, path: object) -> float:
 
 
 def _bands_of(frequency: Array, path: object) -> BandSet:
-    """Return the set of bands; raise InputError where rated ones are missing or double."""
-    double = frequency[1:][np.diff(frequency) <= 0]
-    if double.size:
-        refuse(f"{path}: frequency {double[0]:g} Hz is given twice", "each band once")
+    """Return the set of bands; raise InputError if a rated band is missing or a band duplicate."""
+    duplicates = frequency[1:][np.diff(frequency) <= 0]
+    if duplicates.size:
+        refuse(f"{path}: frequency {duplicates[0]:g} Hz occurs twice", "each band once")
     steps = np.diff(np.log10(frequency))
     bands: BandSet = BANDWIDTHS[0] if steps.size and steps.min() > 0.2 else BANDWIDTHS[1]  # noqa: PLR2004
     rated = rated_bands(bands)

@@ -1,4 +1,4 @@
-"""Level of the tapping machine below a floor, for reference beside the ball's (ISO 12354-2)."""
+"""Level of the tapping machine below a floor (ISO 12354-2), for comparison with ball levels."""
 
 from __future__ import annotations
 
@@ -19,19 +19,20 @@ if TYPE_CHECKING:
     from thud.base._schema import FloorOptions
 
 
-# One-third-octave bands 50 to 3150 Hz: rounded mid frequencies; those from 100 Hz on are rated.
+# Rounded mid frequencies of the one-third-octave bands 50 to 3150 Hz; bands from 100 Hz are rated.
 FREQUENCY = np.array(
     [50, 63, 80, 100, 125, 160, 200, 250, 315, 400, 500, 630, 800, 1000, 1250, 1600, 2000, 2500,
      3150], dtype=float,
 )  # fmt: skip
 RATED = slice(3, None)
-# Reference curve from 100 to 3150 Hz, dB (ISO 717-2), its value at 500 Hz, and the allowed sum of
-# the excesses.
+# Reference curve from 100 to 3150 Hz, dB (ISO 717-2), its value at 500 Hz, and the maximum sum of
+# levels above the curve.
 CURVE = np.array([62, 62, 62, 62, 62, 62, 61, 60, 59, 58, 57, 54, 51, 48, 45, 42], dtype=float)
 AT_500, MAX_EXCESS = 60, 32.0
-# Ratio of wave speed, m/s, and density, kg/m3, of concrete, which the constant of the formula
-# includes, and the factor by which that of a floor may differ, which changes the level by 1 dB.
-CONCRETE, MAX_RATIO = 3500 / 2300, 1.26
+# Wave speed divided by density of concrete, m4/(kg s), which the constant of the formula includes.
+CONCRETE = 3500 / 2300
+# Maximum factor by which this quotient may differ; the factor changes the level by 1 dB.
+MAX_RATIO = 1.26
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -51,9 +52,9 @@ class TappingLevel(Displayed):
 
     @property
     def weighted(self) -> int:
-        """L_n,w, dB: the reference curve of ISO 717-2 shifted by whole decibels."""
+        """L_n,w, dB: value at 500 Hz of the shifted reference curve of ISO 717-2."""
         excess = self._tenths - 10 * CURVE
-        # From where every excess is above the allowed sum.
+        # Start with a shift at which every excess exceeds the allowed sum.
         shift = int(np.floor(excess.min() / 10 - MAX_EXCESS))
         while np.maximum(excess - 10 * shift, 0).sum() > 10 * MAX_EXCESS:
             shift += 1
@@ -62,44 +63,44 @@ class TappingLevel(Displayed):
     @property
     def adaptation(self) -> int:
         """Spectrum adaptation term C_I, dB, from 100 to 2500 Hz (ISO 717-2 annex A)."""
-        # Without that of 3150 Hz.
+        # Without the band 3150 Hz.
         total = 10 * np.log10((10 ** (self._tenths[:-1] / 100)).sum())
         return int(np.floor(total + 0.5)) - 15 - self.weighted
 
     @property
     def _tenths(self) -> NDArray[np.float64]:
-        """Rated levels to one decimal, a half rounded up (ISO 717-2), in tenths of a decibel."""
+        """Rated levels in tenths of a decibel, rounded half up (ISO 717-2)."""
         return np.asarray(np.floor(10 * self.level[RATED] + 0.5))
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text, a band each."""
+        """Return the header and a row of text for each band."""
         result = zip(self.frequency, self.level, strict=True)
         return [("band, Hz", "L_n, dB"), *((f"{f:g}", f"{level:.1f}") for f, level in result)]
 
     def __repr__(self) -> str:
-        """Return the single numbers."""
+        """Return weighted level and adaptation term."""
         return f"<TappingLevel: L_n,w {self.weighted} dB, C_I {self.adaptation} dB>"
 
 
 def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
     """Return the level of the tapping machine below a homogeneous concrete floor.
 
-    L_n = 155 - 30 lg m'' + 10 lg T_s + 10 lg sigma + 10 lg(f/1000 Hz), T_s = 2.2/(f eta), with the
-    radiation and losses of the prediction of heavy impacts (ISO 12354-2 annex B). The constant
-    includes density and wave speed of concrete; the floor is the bare plate, without floating
-    floor, ceiling or flanking walls.
+    L_n = 155 - 30 lg m'' + 10 lg T_s + 10 lg sigma + 10 lg(f/1000 Hz) with T_s = 2.2/(f eta)
+    (ISO 12354-2 annex B). Radiation factor sigma and loss factor eta are those of `predict_level`.
+    The constant includes density and wave speed of concrete. The floor is the bare plate, without
+    floating floor, ceiling or flanking walls.
 
     Parameters
     ----------
     floor
-        A plate.
+        The plate.
     room
-        Room whose air is used (default: that of `Room`).
+        Room, of which only the properties of air are used; by default `Room()`.
 
     Raises
     ------
     InputError
-        Where the floor is no plate, or out of range.
+        If the floor is not a plate, or its keys are out of range.
 
     Examples
     --------
@@ -108,9 +109,9 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
     <TappingLevel: L_n,w 71 dB, C_I -11 dB>
     """
     require_kind("floor", floor, Plate)
-    if not _is_near_concrete(floor):
+    if not _is_like_concrete(floor):
         refuse(
-            f"floor: wave_speed/density = {floor.wave_speed / floor.density:.3g} is not that of "
+            f"floor: wave_speed/density = {floor.wave_speed / floor.density:.3g} differs from "
             "concrete, for which the formula of ISO 12354-2 is valid",
             f"{CONCRETE / MAX_RATIO:.2f} to {CONCRETE * MAX_RATIO:.2f} m4/(kg s)",
         )
@@ -130,11 +131,11 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
 
 
 def has_tapping_level(floor: FloorOptions) -> TypeGuard[Plate]:
-    """Whether `tapping_level` is for a floor: an isotropic plate, near concrete."""
-    return isinstance(floor, Plate) and _is_near_concrete(floor) and _is_isotropic(floor)
+    """Whether `tapping_level` applies to a floor: an isotropic plate similar to concrete."""
+    return isinstance(floor, Plate) and _is_like_concrete(floor) and _is_isotropic(floor)
 
 
-def _is_near_concrete(floor: Plate) -> bool:
+def _is_like_concrete(floor: Plate) -> bool:
     return 1 / MAX_RATIO <= floor.wave_speed / floor.density / CONCRETE <= MAX_RATIO
 
 

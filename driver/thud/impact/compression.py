@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class CompressionCurve(Displayed):
-    """Force against deflection of the ball between two rigid plates without friction.
+    """Force and deflection of a ball between two rigid plates without friction.
 
     Attributes
     ----------
     case : Case
         The input.
     deflection : ndarray, shape (n,)
-        Approach of the plates, m, from 0 on; each pole moves by half of it.
+        Approach of the plates, m, ascending from 0; each pole moves by half the approach.
     force : ndarray, shape (n,)
         Force on each plate, N.
     """
@@ -41,15 +41,15 @@ class CompressionCurve(Displayed):
     force: NDArray[np.float64]
 
     def __repr__(self) -> str:
-        """Return model and end of the curve."""
+        """Return the model and the last point of the curve."""
         model = self.case.model.name if self.case.model else ""
         end = f"{self.force[-1]:.1f} N at {1e3 * self.deflection[-1]:.1f} mm"
         return f"<CompressionCurve, {model}: {end}>"
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text, about ten of them."""
-        every = range(0, len(self.force), max(1, len(self.force) // 10))
-        rows = [(f"{1e3 * self.deflection[i]:.2f}", f"{self.force[i]:.2f}") for i in every]
+        """Return the header and about ten rows of text."""
+        indices = range(0, len(self.force), max(1, len(self.force) // 10))
+        rows = [(f"{1e3 * self.deflection[i]:.2f}", f"{self.force[i]:.2f}") for i in indices]
         return [("deflection, mm", "force, N"), *rows]
 
     def plot(self) -> Figure:
@@ -61,7 +61,7 @@ class CompressionCurve(Displayed):
     def to_dataframe(self) -> pd.DataFrame:
         """Return the columns of ``compression.csv``.
 
-        Raise InputError where pandas is not installed.
+        Raise InputError if pandas is not installed.
         """
         return data_frame({"deflection_m": self.deflection, "force_N": self.force})
 
@@ -77,23 +77,24 @@ def compress(
 ) -> CompressionCurve:
     """Compress a ball quasi-statically between two rigid plates without friction.
 
-    Viscosity has relaxed: the force is that of the long-term modulus, which is the modulus of the
-    ball for Kelvin–Voigt damping, and less than its storage modulus for Maxwell branches.
-    Fractional damping, the default of finite elements, enters with its modulus at about 1 Hz.
+    Viscous stresses have relaxed: the force depends on the long-term modulus. For Kelvin–Voigt
+    damping this is the modulus of the ball; for Maxwell branches it is less than their storage
+    modulus. For fractional damping, the default of finite elements, the modulus at about 1 Hz is
+    used.
 
     Parameters
     ----------
     ball
-        By default the rubber ball of the paper.
+        Ball, by default the rubber ball of the paper.
     model
         Name or options of the source model; ``"measured_modes"`` has no compression.
     max_deflection
         Maximum approach of the plates, m.
     points
-        Points of the curve, the undeformed ball included.
+        Number of points of the curve, including the undeformed ball.
     gas
-        ``"vented"``: the gas leaves by the hole; ``"isothermal"`` and ``"adiabatic"``: it is
-        sealed in.
+        ``"vented"``: the gas escapes through the hole; ``"isothermal"`` and ``"adiabatic"``: the
+        gas is enclosed.
 
     Returns
     -------
@@ -103,9 +104,9 @@ def compress(
     Raises
     ------
     InputError
-        Names group, key, value and allowed range.
+        If the input is invalid; the message names group, key, value and allowed range.
     NumericalError
-        Where the ball cannot be compressed so far.
+        If no solution exists up to the maximum deflection.
     """
     case = Case(
         ball=Ball() if ball is None else ball,

@@ -1,4 +1,4 @@
-"""Impacts of cases, and from bundles of the library."""
+"""Computation of the impact of a case."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
 
 
 def compute(case: Case) -> Impact:
-    """Compute the impact of a case without warnings."""
+    """Compute the impact of a case without raising its warnings."""
     require_kind("case", case, Case)
     if case.model is None:
         refuse("&model is missing", "a case with a source model")
-    # Free modes and compression of the case have their own functions.
+    # `free_modes` and `compress` compute the other results of a case.
     plain = replace(case, modes=None, compression=None)
     return new_impact(case, ask("solve", case=case_text(plain)))
 
 
 def new_impact(case: Case, answer: Bundle) -> Impact:
-    """Return the impact in a bundle of the library."""
+    """Return the impact from a bundle of the library."""
     warnings = tuple(map(text, answer.get("warnings", {}).values()))
     common = history(case, answer, warnings)
     return Impact(

@@ -38,12 +38,12 @@ if TYPE_CHECKING:
     from thud.impact.outcomes import Ensemble
     from thud.level.impact_result import ImpactResult
 
-# Name and unit of a history.
+# Name and unit in the column name of a history.
 _HISTORY = re.compile(r"(.*?)_((?:m|s|N|Pa|J|Hz|kg)(?:_per_\w+)?)")
 
 
 def impact_dataset(impact: Impact, histories: Mapping[str, NDArray[np.float64]]) -> xr.Dataset:
-    """Return the dataset of an impact and of its histories, by name and unit."""
+    """Return the dataset of an impact and its histories; their names end with units."""
     variables: dict[str, Any] = {}
     for column, values in histories.items():
         match = _HISTORY.fullmatch(column)
@@ -60,14 +60,14 @@ def impact_dataset(impact: Impact, histories: Mapping[str, NDArray[np.float64]])
     coordinates = {"time": _time(impact.time), **band_coordinates(BANDWIDTHS)}
     warnings = {"warnings": "\n".join(impact.warnings)}
     dataset = xr.Dataset(
-        variables, coordinates, origin(impact.case) | impact.model_quantities | warnings
+        variables, coordinates, case_attributes(impact.case) | impact.model_quantities | warnings
     )
-    # The arrays of the impact are read-only.
+    # The dataset is writable, unlike the arrays of the impact.
     return dataset.copy(deep=True)
 
 
 def recording_dataset(recording: ImpactResult) -> xr.Dataset:
-    """Return the dataset of a force on the floor, its levels and its numbers."""
+    """Return the dataset of a recording: force on the floor, levels and known quantities."""
     variables: dict[str, Any] = {
         "floor_force": ("time", recording.force(), _attributes("N", "floor force")),
         **{
@@ -87,7 +87,7 @@ def recording_dataset(recording: ImpactResult) -> xr.Dataset:
 
 
 def ensemble_dataset(ensemble: Ensemble) -> xr.Dataset:
-    """Return the dataset of many drops, along the dimension ``sample``."""
+    """Return the dataset of an ensemble, with the dimension ``sample``."""
     assert ensemble.case.model is not None  # noqa: S101 - `solve_many` has set it
     coordinates, variables = sample_variables(sample_results(ensemble))
     for name, values in ensemble.parameters.items():
@@ -99,11 +99,11 @@ def ensemble_dataset(ensemble: Ensemble) -> xr.Dataset:
             coordinates["time"] = _time(seconds)
             attrs = _attributes("N", f"{force} force")
             variables[f"{force}_force"] = (("sample", "time"), values, attrs)
-    return xr.Dataset(variables, coordinates, origin(ensemble.case)).copy(deep=True)
+    return xr.Dataset(variables, coordinates, case_attributes(ensemble.case)).copy(deep=True)
 
 
 def sample_variables(results: Mapping[str, NDArray[Any]]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the coordinates of the bands, and the variables of `sample_results`."""
+    """Return the coordinates of the bands and the variables for results of `sample_results`."""
     variables: dict[str, Any] = {}
     for name, values in results.items():
         dimensions = ("sample", DIMENSIONS[name]) if name in DIMENSIONS else ("sample",)
@@ -127,18 +127,18 @@ def _attributes(unit: str, meaning: str) -> dict[str, str]:
 
 
 def coordinate(parameter: str, key: Key) -> str:
-    """Return the name of a parameter's coordinate; some keys are named as results are."""
+    """Return the name of a parameter's coordinate, which differs from the names of results."""
     name = parameter.replace("(", "_").replace(".", "_").rstrip(")")
     return f"{key.group}_{name}" if name in ALL_QUANTITIES else name
 
 
 def band_coordinates(kinds: Iterable[BandSet]) -> dict[str, Any]:
-    """Return the nominal frequencies of bands by the names of their dimensions."""
+    """Return the coordinates of band sets: nominal frequencies by the name of the dimension."""
     return {bands: _frequencies(bands, get_bands(bands).nominal) for bands in kinds}
 
 
 def room_coordinates() -> dict[str, Any]:
-    """Return the nominal frequencies of the bands in a room by the name of their dimension."""
+    """Return the coordinate of the bands in a room, as `band_coordinates` does."""
     return {ROOM_BAND: _frequencies(ROOM_BAND, rated_bands(BANDWIDTHS[1]))}
 
 
@@ -148,8 +148,8 @@ def _frequencies(
     return dimension, nominal, _attributes("Hz", "nominal frequency")
 
 
-def origin(case: Case) -> dict[str, str]:
-    """Return the case of results and the software that computed them."""
+def case_attributes(case: Case) -> dict[str, str]:
+    """Return the case and the software of results as attributes of a dataset."""
     return {
         "model": case.model.name if case.model else "",
         "assessed_force": case.levels.force,

@@ -1,4 +1,4 @@
-"""Many drops at once, with levels and verdicts, by any source model."""
+"""Many drops in one call, with levels and verdicts, by any source model."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from thud.impact.outcomes import Ensemble
 from thud.impact.quantities import RATING, ROOM_LEVEL
 from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 
-# Not empty in a forked process.
+# Not empty if this process is a fork of another.
 _FORKED: list[bool] = []
 os.register_at_fork(after_in_child=lambda: _FORKED.append(True))
 
@@ -42,10 +42,10 @@ if TYPE_CHECKING:
     from thud.base.key import Key
 
 MAX_THREADS = 1024
-# Approximate time of one call of the library, s: interrupts are handled between calls.
+# Approximate duration of one call of the library, s; interrupts are handled between calls.
 _CALL_TIME = 1.0
-# Maximum number of samples of one call, and of values of their forces, which the library holds.
-_MAX_CALL = 2**17
+# Limits of the memory of one call: number of samples, and number of values of their forces.
+_MAX_SAMPLES = 2**17
 _MAX_VALUES = 2**26
 
 
@@ -65,52 +65,51 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     source: LimitsSource | None = None,
     progress: bool = False,
 ) -> Ensemble:
-    """Drop many balls on a rigid floor, and on the floor of the case.
+    """Compute many drops on a rigid floor and on the floor of the case.
 
-    Results equal those of `solve`: for the shell model, which is computed in batches, to 1e-10 in
-    forces and 1e-6 dB in the levels of bands that hold 1e-8 or more of the energy of the force, for
-    the others bit for bit. Rounding counts in bands that hold less, as of slow contacts at 500 Hz:
-    10 times less energy makes the difference 10 times greater. Results do not depend on the number
-    of threads or on the order of the samples.
+    Results are identical to those of `solve`, except for the shell model, which is computed in
+    batches: its forces agree to 1e-10, and its levels to 1e-6 dB in bands with at least 1e-8 of the
+    energy of the force. In bands with less energy, such as 500 Hz for slow contacts, the difference
+    is inversely proportional to the energy. Results do not depend on the number of threads or on
+    the order of the samples.
 
     Parameters
     ----------
     parameters
-        Arrays of one dimension, or scalars, by the names of keys, such as the columns of a
-        pandas.DataFrame (entries of lists as
-        ``"frequency(2)"``; keys of floor and room whose name another key has with their group, as
-        ``"plate.loss_factor"``); they are broadcast against each other.
+        Scalars or arrays of one dimension by the names of keys, such as a pandas.DataFrame; they
+        are broadcast against each other. Entries of lists are named as ``"frequency(2)"``. A key of
+        floor or room whose name is not unique has its group, as ``"plate.loss_factor"``.
     case
-        All other keys; by default the paper's ball and drop.
+        All other keys; by default the ball and the drop of the paper.
     model
-        Source model; with its default options unless it is that of the case.
+        Source model in place of the model of the case, with its default options.
     threads
-        Threads to use; all processors by default. A forked process has one: the threads that its
-        parent had started are not there.
+        Number of threads; by default the number of processors. A forked process uses one thread, as
+        the threads of its parent do not exist in it.
     levels
-        Compute levels and verdicts too; without them it is faster.
+        Also compute levels and verdicts, which takes longer.
     bands
         Bands of the levels in addition to octaves, such as ``"third"``; by default those of the
         case.
     forces
-        Keep the force histories: 16 bytes for each instant of each sample.
+        Return the force histories, which take 16 bytes for each instant of each sample.
     sample_rate, duration, substeps
-        As in `solve`, shared by all samples; by default those of the case.
+        As in `solve`, for all samples; by default those of the case.
     source
-        ``"rubber_ball"`` or ``"tyre"``: the limits that apply; by default those of the case.
+        ``"rubber_ball"`` or ``"tyre"``, whose limits apply; by default the source of the case.
     progress
         Show a progress bar.
 
     Returns
     -------
     Ensemble
-        Quantities, levels and verdicts. Samples that fail have a status, a reason and NaN, and do
-        not affect the others.
+        Quantities, levels and verdicts. Failed samples have a status, a reason and NaN, and do not
+        affect other samples.
 
     Raises
     ------
     InputError
-        Where a key is not known, arrays are not numeric or do not broadcast, the case, the bands
+        If a key is not known, arrays are not numeric or do not broadcast, the case, the bands
         or the number of threads are invalid, or the results do not fit in memory.
     """
     from tqdm import tqdm
@@ -120,7 +119,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     if bands is not None:
         get_bands(bands)
     if base.model is None and base.modes is not None and model is None:
-        refuse("the case computes no impact", "a case with a model, or model = its name")
+        refuse("the case has no source model", "a case with a model, or model = its name")
     sampling = {"sample_rate": sample_rate, "duration": duration, "substeps": substeps}
     keywords = {name: value for name, value in sampling.items() if value is not None}
     base = replace(
@@ -144,17 +143,17 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         refuse("the parameters do not fit in memory", "fewer samples", error)
     for name in columns:
         if name in keywords or (name == "source" and source is not None):
-            refuse(f"{name!r} is given twice", "once, as a parameter or as a keyword")
+            refuse(f"{name!r} is stated twice", "once, as a parameter or as a keyword")
     cost = _cost(content, columns)
     width = min(len(os.sched_getaffinity(0)), MAX_THREADS) if threads is None else threads
     require_whole("threads", width, 1, MAX_THREADS)
     width = 1 if _FORKED else width
     length = int(cost["force_length"]) if forces else 0
-    max_count = min(_MAX_CALL, _MAX_VALUES // max(1, len(FORCES) * length))
+    max_count = min(_MAX_SAMPLES, _MAX_VALUES // max(1, len(FORCES) * length))
     work = int(np.clip(_CALL_TIME * width / cost["cost"], 1, max(1, max_count)))
     blocks = []
     try:
-        # Results that do not fit are refused before they are computed.
+        # Raises MemoryError before the computation if the results do not fit.
         np.empty((len(numbers), len(FORCES), length))
         with tqdm(total=len(numbers), unit="sample", disable=not progress, leave=False) as bar:
             for start in range(0, max(len(numbers), 1), work):
@@ -172,7 +171,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         size = f"{len(numbers)} samples"
         size += f" with forces of {length} values" if forces else ""
         refuse(f"forces = {forces} for {size} does not fit in memory", "fewer samples", error)
-    # Forces may fill the memory: they are not copied.
+    # Forces may fill the memory; frozen arrays are not copied.
     force = freeze(results["force"])
     return Ensemble(
         case=base,
@@ -214,7 +213,7 @@ def _floor_results(values: NDArray[np.float64], case: Case) -> dict[str, Any]:
 def _by_bands(
     level: NDArray[np.float64], requested: LevelsBands
 ) -> dict[tuple[LevelsForce, BandSet], NDArray[np.float64]]:
-    """Return levels by force and bands: octaves first, then other requested bands."""
+    """Return levels by force and bands; the columns hold octaves, then other requested bands."""
     result = {}
     start = 0
     for bands in BANDWIDTHS:
@@ -226,7 +225,7 @@ def _by_bands(
     return result
 
 
-def _compute(  # noqa: PLR0913 - those of the library
+def _compute(  # noqa: PLR0913 - the arguments of the library
     content: bytes,
     keys: Iterable[str],
     numbers: NDArray[np.float64],
@@ -235,10 +234,10 @@ def _compute(  # noqa: PLR0913 - those of the library
     levels: bool,
     forces: bool,
 ) -> dict[str, NDArray[Any]]:
-    """Return the results of some samples, the samples first."""
+    """Return the results of a block of samples; the first dimension is the sample."""
     answer = ask(
-        "samples", case=content, **_named(keys), values=numbers.T, threads=threads, levels=levels,
-        forces=forces,
+        "samples", case=content, **_key_arguments(keys), values=numbers.T, threads=threads,
+        levels=levels, forces=forces,
     )  # fmt: skip
     status = answer["status"].astype(np.int32)
     reason = np.full(len(numbers), "", dtype=object)
@@ -258,24 +257,24 @@ def _compute(  # noqa: PLR0913 - those of the library
 
 def _cost(content: bytes, keys: Iterable[str]) -> Bundle:
     """Return the cost of a sample, s on one core, and the length of its forces."""
-    return ask("samples", case=content, **_named(keys))
+    return ask("samples", case=content, **_key_arguments(keys))
 
 
-def _named(keys: Iterable[str]) -> dict[str, Any]:
-    """Return keys as the library reads them."""
+def _key_arguments(keys: Iterable[str]) -> dict[str, Any]:
+    """Return the names of keys as arguments of `ask`."""
     names = list(keys)
     return {"keys": ",".join(names).encode("ascii", "replace"), "key_count": len(names)}
 
 
 def get_cost(case: Case, keys: Iterable[str]) -> float:
-    """Return the estimated time of one of many drops that differ in some keys, on one core, s."""
+    """Return the estimated time per sample, s, on one core, if samples differ in some keys."""
     return float(_cost(case_text(case), keys)["cost"])
 
 
 def _columns(
     parameters: Mapping[str, ArrayLike], case: Case
 ) -> tuple[dict[str, NDArray[Any]], NDArray[np.float64]]:
-    """Return one array per key, all of one length, and their numbers for the library."""
+    """Return an array for each key, all of the same length, and their numbers for the library."""
     assert case.model is not None  # noqa: S101 - `solve_many` has set it
     keys = [find_key(name, key_owners(case))[0] for name in parameters]
     for key in keys:
@@ -293,7 +292,7 @@ def _columns(
 
 
 def _numbers(key: Key, array: NDArray[Any]) -> NDArray[np.float64]:
-    """Return the numbers of one parameter; of a choice its index, from 1."""
+    """Return the numbers of a parameter; a choice is represented by its index, from 1."""
     if key.kind == "choice":
         choices, index = np.unique(array.astype(str), return_inverse=True)
         for choice in choices:

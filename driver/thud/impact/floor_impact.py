@@ -28,18 +28,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class FloorEnergy(Immutable):
-    """Energy that a force gives to a floor, in bands.
+    """Energy that a force transfers to a floor, in bands.
 
     Attributes
     ----------
     frequency : ndarray, shape (n_band,)
         Rounded mid frequencies, Hz.
     by_motion : ndarray, shape (n_band,)
-        Integral of the force times the velocity of the floor, both in the band, J.
+        Time integral of force times velocity of the floor, both filtered into the band, J.
     by_mobility : ndarray, shape (n_band,)
-        The same by the mobility Y of the floor, ``2 integral |F|**2 Re Y df``, J.
+        Energy by the mobility Y of the floor, the integral of ``2 |F|**2 Re Y df``, J.
     conductance : ndarray, shape (n_band,)
-        Mean of Re Y, m/(N s).
+        Mean of Re Y over the band, m/(N s).
     """
 
     frequency: NDArray[np.float64]
@@ -50,9 +50,9 @@ class FloorEnergy(Immutable):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FloorImpact(Impact):
-    """Impact on a mobile floor: `floor_force` is the contact force.
+    """Impact on a mobile floor; `floor_force` is the contact force.
 
-    The standards assess the force on a rigid floor, that of the `Impact` whose `on_floor` this is.
+    It is `on_floor` of the `Impact` on a rigid floor, whose force the standards assess.
 
     Attributes
     ----------
@@ -61,9 +61,9 @@ class FloorImpact(Impact):
     floor_displacement, floor_velocity : ndarray, shape (n_sample,)
         Displacement, m, and velocity, m/s, of the floor under the source, downwards.
     floor_work : float
-        Energy that the source gives to the floor, J.
+        Energy that the source transfers to the floor, J.
     point_velocity : ndarray, shape (n_point, n_sample)
-        Velocity of the points of the floor, ``point_x`` and ``point_y``, m/s.
+        Velocity at the points ``point_x``, ``point_y`` of the floor, m/s.
     """
 
     blocked_force: NDArray[np.float64]
@@ -83,7 +83,7 @@ class FloorImpact(Impact):
     @property
     def floor(self) -> FloorOptions:
         """Floor of the case."""
-        assert self.case.floor is not None  # noqa: S101 - there is no such impact without
+        assert self.case.floor is not None  # noqa: S101 - for the type checker
         return self.case.floor
 
     def blocked_levels(
@@ -96,11 +96,11 @@ class FloorImpact(Impact):
     def difference(
         self, bands: BandSet = "octave", method: LevelsMethod | None = None
     ) -> NDArray[np.float64]:
-        """Return contact − blocked level, dB, shape (n_band,)."""
+        """Return level of the contact force − level of the blocked force, dB, shape (n_band,)."""
         return self.levels(bands, method, "floor") - self.blocked_levels(bands, method)
 
     def injected_energy(self, bands: BandSet = "octave") -> FloorEnergy:
-        """Return the energy that goes into the floor in bands, by two methods."""
+        """Return the energy that the force transfers to the floor, by two methods."""
         answer = ask(
             "floor_energy", case=case_text(Case(floor=self.floor)), bands=bands,
             force=self.floor_force, velocity=self.floor_velocity, sample_rate=self.sample_rate,
@@ -110,13 +110,13 @@ class FloorImpact(Impact):
     def mobility(
         self, frequency: ArrayLike, point: tuple[float, float] | None = None
     ) -> NDArray[np.complex128]:
-        """Return the mobility of the floor under the source, or to a point; see `mobility`."""
+        """Return the mobility of the floor at the source or at a point; see `mobility`."""
         return mobility(self.floor, frequency, point)
 
     def velocity_at(self, x: float, y: float) -> NDArray[np.float64]:
-        """Return the velocity of a point of a floor with sides, m/s, shape (n_sample,).
+        """Return the velocity at a point of a rectangular floor, m/s, shape (n_sample,).
 
-        Raise InputError where the floor has no such point.
+        Raise InputError if the point, m, is outside or the floor is not rectangular.
         """
         answer = ask(
             "point_velocity", case=case_text(Case(floor=self.floor)), force=self.floor_force,
@@ -125,7 +125,7 @@ class FloorImpact(Impact):
         return np.asarray(answer["velocity"])
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text, an octave each."""
+        """Return the header and a row of text for each octave."""
         energy = self.injected_energy()
         columns = (self.blocked_levels(), self.levels(force="floor"), self.difference())
         header = ("octave, Hz", "blocked, dB", "contact, dB", "difference, dB", "energy, J")
@@ -134,7 +134,7 @@ class FloorImpact(Impact):
         return [header, *zip((f"{f:g}" for f in energy.frequency), *cells, energies, strict=True)]
 
     def _floor_histories(self) -> dict[str, NDArray[np.float64]]:
-        """Return the force on a rigid floor and the motion of this one."""
+        """Return the force on a rigid floor and the motion of this floor."""
         points = enumerate(self.point_velocity, 1)
         return {
             "blocked_force_N": self.blocked_force,
@@ -161,17 +161,17 @@ class FloorImpact(Impact):
 def new_floor_impact(
     case: Case, answer: Bundle, blocked_force: NDArray[np.float64]
 ) -> FloorImpact | None:
-    """Return the impact on a mobile floor in a bundle of the library; None without one."""
+    """Return the impact on a mobile floor from a bundle of the library; None without one."""
     prefix = "on_floor."
-    moving = {key[len(prefix) :]: answer[key] for key in answer if key.startswith(prefix)}
-    if not moving:
+    floor_answer = {key[len(prefix) :]: answer[key] for key in answer if key.startswith(prefix)}
+    if not floor_answer:
         return None
-    common = history(case, moving, ())
+    common = history(case, floor_answer, ())
     points = zip(
         getattr(case.floor, "point_x", ()), getattr(case.floor, "point_y", ()), strict=True
     )
     impact = FloorImpact(
-        **common, **moving["floor"], blocked_force=blocked_force,
+        **common, **floor_answer["floor"], blocked_force=blocked_force,
         point_velocity=np.empty((0, len(blocked_force))),
     )  # fmt: skip
     if velocities := [impact.velocity_at(x, y) for x, y in points]:

@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class FreeModes(Displayed):
-    """Axisymmetric elastic modes without twist, in ascending order, without the rigid motion.
+    """Axisymmetric elastic modes without twist, by ascending frequency.
 
-    Nodes run from the lowest point to the highest and from the inner surface to the outer one;
-    components are the distance from the axis and the height.
+    Nodes are ordered from the lowest point to the highest and from the inner surface to the outer
+    surface. The components of vectors are the distance from the axis and the height.
 
     Attributes
     ----------
@@ -38,16 +38,16 @@ class FreeModes(Displayed):
     harmonic : ndarray, shape (n_mode,)
         Order of the Legendre polynomial that dominates at the outer surface.
     participation : ndarray, shape (n_mode,)
-        Mass of the ball times the squared amplitude of the lowest point at unit modal mass: how
-        strongly a contact there drives the mode; 1 for the rigid motion.
+        Mass of the ball times the squared amplitude of the lowest point at unit modal mass, which
+        states how strongly a force there excites the mode; 1 for the rigid motion.
     rigid_frequency : float
-        Computed frequency of the rigid motion, Hz; the exact one is 0.
+        Computed frequency of the rigid motion, Hz; the exact frequency is 0.
     start : ndarray, shape (n_line, n_ring, 2)
-        Nodes relative to the center of the ball, m; nine per element.
+        Positions of the nodes, nine per element, relative to the center of the ball, m.
     shape : ndarray, shape (n_mode, n_line, n_ring, 2)
-        Displacements of maximum length 1, the lowest point moving upwards.
+        Displacements of the nodes; the maximum length is 1, and the lowest point moves upwards.
     warnings : tuple of str
-        As `Impact.warnings`.
+        Sentences on implausible input.
     """
 
     ball: Ball
@@ -83,7 +83,7 @@ def free_modes(
     Parameters
     ----------
     ball
-        By default the rubber ball of the paper. Poisson's ratio may be 1/2.
+        Ball, by default the rubber ball of the paper. Poisson's ratio may be 1/2.
     count
         Number of elastic modes.
     radial_elements, polar_elements
@@ -97,14 +97,14 @@ def free_modes(
     Raises
     ------
     InputError
-        Names group, key, value and allowed range.
+        If the input is invalid; the message names group, key, value and allowed range.
     NumericalError
-        Where the modes cannot be computed.
+        If the modes cannot be computed.
 
     Warns
     -----
     PlausibilityWarning
-        As `FreeModes.warnings`.
+        For each entry of `FreeModes.warnings`.
     """
     case = Case(
         ball=Ball() if ball is None else ball,
@@ -138,14 +138,14 @@ def loss_factors(model: FiniteElement, frequency: ArrayLike) -> NDArray[np.float
     Parameters
     ----------
     model
-        The model, of which the options of ``&material`` are used.
+        The model; its options of the group ``&material`` are used.
     frequency : array_like, shape (n,)
         Frequencies, Hz.
 
     Returns
     -------
     ndarray, shape (n,)
-        Loss modulus over storage modulus.
+        Loss modulus divided by storage modulus.
     """
     require_kind("model", model, FiniteElement)
     try:

@@ -36,10 +36,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Impact(ImpactQuantities, Displayed):
-    """Force and motion of one impact, sampled from first touch on.
+    """Force and motion of an impact, sampled from first touch on.
 
-    It has the attributes of `ImpactQuantities`, and those below. Peak forces of finite elements
-    are those of the force below 1.25 kHz, which a force plate records.
+    Attributes are those of `ImpactQuantities` and the following. The peak force of finite elements
+    is the maximum of the force below 1.25 kHz, which a force plate records.
 
     Attributes
     ----------
@@ -52,22 +52,22 @@ class Impact(ImpactQuantities, Displayed):
     elastic_force : ndarray, shape (n_sample,)
         Force of shell and gas, the ball force of the paper (eq. 1), N.
     floor_force : ndarray, shape (n_sample,)
-        Total force on the floor, flux of momentum included, N.
+        Total force on the floor, including the flux of momentum, N.
     components : dict of str to ndarray, shape (n_sample,)
-        Components of the force that the model distinguishes, N.
+        Components of the force, which depend on the model, N.
     model_histories : dict of str to ndarray, shape (n_sample,)
         Other histories of the model, such as the contact radius; the names end with units.
     model_quantities : dict of str to float
-        Other numbers of the model, such as the bulk modulus; SI units.
+        Other scalars of the model, such as the bulk modulus; SI units.
     warnings : tuple of str
-        Implausible input, such as a wall whose density no rubber has.
+        Sentences on implausible input, such as a density of the wall that no rubber has.
     motion : Motion or None
-        Snapshots of the deformed ball; None where the model has none.
+        Snapshots of the deformed ball; None if the model has none.
     on_floor : FloorImpact or None
-        The same drop on the floor of the case; None where there is none, it is rigid, or the model
-        knows the force on a rigid floor only.
+        The same drop on the floor of the case; None if the case has no floor or a rigid one, or the
+        model computes the force on a rigid floor only.
     room_level : RoomLevel or None
-        Level in the room of the case; None without a room, and of results that were read.
+        Level in the room of the case; None without a room or if the results were read from files.
     """
 
     case: Case
@@ -96,7 +96,7 @@ class Impact(ImpactQuantities, Displayed):
 
     @property
     def velocity_tolerance(self) -> float:
-        """Relative tolerance of the impact velocity: none."""
+        """Relative difference up to which two impact velocities count as equal: 0."""
         return 0.0
 
     @property
@@ -106,7 +106,7 @@ class Impact(ImpactQuantities, Displayed):
 
     @property
     def measured_contact_time(self) -> float:
-        """Contact time as a recording gives it (`thud.impact.contact_time`), s."""
+        """Contact time by the definition for recordings (`thud.impact.contact_time`), s."""
         first = round(self.touch_time * self.sample_rate)
         last = math.ceil((self.touch_time + self.exact_contact_time) * self.sample_rate)
         begin, end = contact_span(self.floor_force[first : last + 1], self.sample_rate)
@@ -137,7 +137,7 @@ class Impact(ImpactQuantities, Displayed):
 
     @property
     def flux_force(self) -> NDArray[np.float64]:
-        """Flux of momentum of the wall into the floor F_M, N, shape (n_sample,)."""
+        """Force F_M by the momentum flux of the wall into the floor, N, shape (n_sample,)."""
         return self._component("flux_force")
 
     def _component(self, name: str) -> NDArray[np.float64]:
@@ -147,24 +147,21 @@ class Impact(ImpactQuantities, Displayed):
         return self.components[name]
 
     def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:
-        """Return the ``"floor"`` or the ``"elastic"`` force, N, shape (n_sample,).
-
-        By default that which the case assesses.
-        """
+        """Return the ``"floor"`` or ``"elastic"`` force, N, by default the assessed force."""
         return self.elastic_force if self.assessed_force(kind) == "elastic" else self.floor_force
 
     def peak(self, force: LevelsForce | None = None) -> float:
-        """Return the maximum of a force, N; see `force` and `peak_force`."""
+        """Return the maximum of a force, N, by default of the assessed force."""
         return (
             self.peak_elastic_force if self.assessed_force(force) == "elastic" else self.peak_force
         )
 
     def quantity(self, name: str) -> float:
-        """Return a quantity of the table by its name, SI units; NaN if unknown."""
+        """Return the value of a quantity, SI units, by its name in the table; NaN if unknown."""
         return float(getattr(self, name, math.nan))
 
     def assessed_force(self, force: LevelsForce | None = None) -> LevelsForce:
-        """Return a force, checked, or without it that which the case assesses."""
+        """Return `force` after a check, or the kind of force that the case assesses if None."""
         chosen = self.case.levels.force if force is None else force
         require_choice("force", chosen, FORCES)
         return chosen
@@ -187,9 +184,9 @@ class Impact(ImpactQuantities, Displayed):
         bands
             ``"octave"`` (31.5 to 500 Hz) or ``"third"`` (25 to 630 Hz).
         method
-            ``"exact"`` or ``"fft"``; by default that of the case.
+            ``"exact"`` or ``"fft"``; by default the method of the case.
         force
-            ``"floor"`` or ``"elastic"``; by default that of the case.
+            ``"floor"`` or ``"elastic"``; by default the assessed force.
         """
         method = method or self.level_method
         return force_exposure_levels(self.force(force), self.sample_rate, bands, method)
@@ -197,14 +194,14 @@ class Impact(ImpactQuantities, Displayed):
     def assess(
         self, source: LimitsSource | None = None, force: LevelsForce | None = None
     ) -> Verdict:
-        """Return the verdict of the standards.
+        """Assess the source by the criteria of the standards.
 
         Parameters
         ----------
         source
-            ``"rubber_ball"`` or ``"tyre"``; by default that of the case.
+            ``"rubber_ball"`` or ``"tyre"``, whose limits apply; by default the source of the case.
         force
-            ``"floor"`` or ``"elastic"``; by default that of the case.
+            ``"floor"`` or ``"elastic"``; by default the assessed force.
         """
         return assess(
             self.levels(force=force),
@@ -217,7 +214,7 @@ class Impact(ImpactQuantities, Displayed):
         )
 
     def drop_force(self, drop: int = 1) -> DropForce:
-        """Return the force that the case assesses; the only drop is 1."""
+        """Return the assessed force; `drop` must be 1."""
         require_whole("drop", drop, 1, 1)
         case = self.case
         model = case.model.name if case.model else ""
@@ -232,15 +229,15 @@ class Impact(ImpactQuantities, Displayed):
         )
 
     def plot(self) -> Figure:
-        """Return a figure of the force that the case assesses, and of its octave levels."""
+        """Return a figure of the assessed force and its octave levels."""
         from thud.plot.impact_figures import overview
 
         return overview(self)
 
     def to_xarray(self) -> xr.Dataset:
-        """Return histories, levels of both forces and numbers, with units and provenance.
+        """Return histories, levels of both forces and scalars, with units and provenance.
 
-        Snapshots are left out. Raise InputError where xarray is not installed.
+        Snapshots are not included. Raise InputError if xarray is not installed.
         """
         with require_extra("studies"):
             from thud.impact.datasets import impact_dataset
@@ -248,14 +245,14 @@ class Impact(ImpactQuantities, Displayed):
         return impact_dataset(self, self.histories())
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return the histories over time, with the columns of ``force.csv`` and `model_histories`.
+        """Return a table of the columns of ``force.csv`` and `model_histories`, indexed by time.
 
-        Raise InputError where pandas is not installed.
+        Raise InputError if pandas is not installed.
         """
         return data_frame(self.histories(), self.time)
 
     def histories(self) -> dict[str, NDArray[np.float64]]:
-        """Return the histories by name and unit, shape (n_sample,)."""
+        """Return the histories, shape (n_sample,), by names that end with units."""
         return {
             "deflection_m": self.deflection,
             "velocity_m_per_s": self.velocity,
@@ -272,7 +269,7 @@ class Impact(ImpactQuantities, Displayed):
 
 
 def history(case: Case, answer: Bundle, warnings: tuple[str, ...]) -> dict[str, Any]:
-    """Return the fields of `Impact` and `FloorImpact` that a bundle of the library holds."""
+    """Return the fields of an `Impact` or `FloorImpact` from a bundle of the library."""
     samples, quantities = answer["samples"], answer["quantities"]
     return {
         "case": case,

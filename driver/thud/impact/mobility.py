@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def mobility(
     floor: FloorOptions, frequency: ArrayLike, point: tuple[float, float] | None = None
 ) -> NDArray[np.complex128]:
-    """Return the mobility of a floor, velocity over force, under the source or to a point.
+    """Return the mobility of a floor: velocity, at the source or a point, divided by the force.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def mobility(
     frequency : array_like, shape (n,)
         Frequencies, Hz.
     point
-        Position along length and width, m, of floors with sides; None: under the source.
+        Position along length and width of a rectangular floor, m; None: at the source.
 
     Returns
     -------
@@ -37,7 +37,7 @@ def mobility(
     Raises
     ------
     InputError
-        Where a key of the floor is out of range, or the floor has no such point.
+        If a key of the floor is out of range, the point is outside, or the floor has no sides.
 
     Examples
     --------

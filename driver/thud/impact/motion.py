@@ -1,4 +1,4 @@
-"""Motion of the ball in an impact."""
+"""Motion of the ball during an impact."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Motion(Immutable):
-    """Snapshots of the half section of the ball, the floor at rest at height 0.
+    """Snapshots of the half section of the ball; the undisplaced floor is at height 0.
 
-    Nodes run from the lowest point to the highest and from the inner surface to the outer one;
-    components are the distance from the axis and the height.
+    Nodes are ordered from the lowest point to the highest and from the inner surface to the outer
+    surface. The components of vectors are the distance from the axis and the height.
 
     Attributes
     ----------
@@ -33,11 +33,11 @@ class Motion(Immutable):
     contact_pressure : ndarray, shape (n_snapshot, n_line)
         Pressure on the floor at the nodes of the outer surface, Pa.
     contact_shear : ndarray, shape (n_snapshot, n_line)
-        Radial stress of the floor on the same nodes, positive outwards, Pa.
+        Radial stress of the floor on these nodes, positive outwards, Pa.
     cavity_pressure : ndarray, shape (n_snapshot,)
         Overpressure of the gas in the ball, Pa.
     floor_displacement : ndarray, shape (n_snapshot,)
-        Displacement of the floor under the ball, downwards, m; 0 on a rigid floor.
+        Downward displacement of the floor under the ball, m; 0 for a rigid floor.
     """
 
     time: NDArray[np.float64]

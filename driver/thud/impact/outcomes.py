@@ -23,44 +23,45 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Ensemble(SampleQuantities, Displayed):
-    """Results of many samples of a case; NaN where a sample could not be computed.
+    """Results of many samples of a case; NaN for samples that could not be computed.
 
-    It has the attributes of `SampleQuantities`, and those below.
+    Attributes are those of `SampleQuantities` and the following.
 
     Attributes
     ----------
     case : Case
         All other keys.
     parameters : dict of str to ndarray, shape (n_sample,)
-        Parameters in which the drops differ.
+        Values of the keys in which the samples differ.
     status : ndarray of int, shape (n_sample,)
-        0, or the exit code of the error: 1 bad input, 2 numerical failure.
+        0, or the exit code of the error: 1 invalid input, 2 numerical failure.
     reason : ndarray of str, shape (n_sample,)
-        The message of the error.
+        Message of the error; empty without an error.
     levels : dict of (force, bands) to ndarray, shape (n_sample, n_band)
-        Force exposure levels, dB: of ``"elastic"`` and ``"floor"``, in octaves, on which the
-        verdict is based, and in the other bands of the case.
+        Force exposure levels, dB, of the ``"elastic"`` and the ``"floor"`` force: octaves, which
+        are assessed, and other requested bands.
     margin : ndarray, shape (n_sample,)
-        Minimum distance of an octave level of the assessed force to its limits, dB; positive
-        inside.
+        Minimum distance of the octave levels of the assessed force from their limits, dB; negative
+        outside the limits.
     conforms : ndarray of bool, shape (n_sample,)
-        Verdict of the standards on the force that the case assesses.
+        Whether all criteria are met with the force that the case assesses.
     elastic_conforms, floor_conforms : ndarray of bool, shape (n_sample,)
-        The same on the elastic force and on the force on the floor.
+        Whether all criteria are met with the elastic force, and with the force on the floor.
     elastic_force, floor_force : ndarray, shape (n_sample, n_time), or None
         Forces, N; None unless requested.
     sample_rate : float
         Samples per second, Hz.
     contact_levels : dict of bands to ndarray, shape (n_sample, n_band)
-        Of cases with a floor: levels of the force on it, dB; on a rigid floor, and of models that
-        have no other, those of the force there.
+        Levels of the force on the floor of the case, dB; equal to those on a rigid floor if the
+        model has no other force. Empty without a floor.
     floor_work : ndarray, shape (n_sample,), or None
-        Likewise the energy that the source gives to the floor, J.
+        Energy that the source transfers to the floor, J; None without a floor.
     room_level : ndarray, shape (n_sample, 12), or None
-        Of cases with a room: maximum Fast levels of the one-third-octave bands 50 to 630 Hz, dB
-        re 20 uPa.
+        Maximum Fast levels in the room, dB re 20 uPa, in the one-third-octave bands 50 to 630 Hz;
+        None without a room.
     room_rating, standardized_rating : ndarray, shape (n_sample,), or None
-        Their A-weighted sum L_iA,Fmax, dB, and that of the standardized levels; see `rating`.
+        A-weighted sums L_iA,Fmax of the levels in the room and of the standardized levels, dB; see
+        `rating`.
     """
 
     case: Case
@@ -86,10 +87,10 @@ class Ensemble(SampleQuantities, Displayed):
         return len(self.status)
 
     def __repr__(self) -> str:
-        """Return the parameters, and how many drops conform."""
+        """Return the parameters and the number of drops that conform."""
         names = ", ".join(self.parameters)
         failed = f", {np.sum(self.status != 0)} failed" if self.status.any() else ""
-        # Without levels the margins of drops that were computed are not known.
+        # If no levels were computed, all margins are NaN.
         is_assessed = np.isfinite(self.margin).any() or (self.status != 0).all()
         verdict = f"{self.conforms.sum()} conform" if is_assessed else "not assessed"
         return f"<Ensemble: {len(self)} drops by {names}; {verdict}{failed}>"
@@ -102,18 +103,18 @@ class Ensemble(SampleQuantities, Displayed):
             values = getattr(self, name)
             if name == ROOM_LEVEL or values is None:
                 continue
-            known = values[self.status == 0]
-            known = known[np.isfinite(known)]
-            if not known.size:
+            computed = values[self.status == 0]
+            computed = computed[np.isfinite(computed)]
+            if not computed.size:
                 continue
-            quantiles = np.quantile(known, [0, 0.5, 1])
+            quantiles = np.quantile(computed, [0, 0.5, 1])
             rows.append((quantity.label, *map(quantity.show, quantiles)))
         return rows
 
     def to_xarray(self) -> xr.Dataset:
         """Return the results along the dimension ``sample``, with units and provenance.
 
-        Raise InputError where xarray is not installed.
+        Raise InputError if xarray is not installed.
         """
         with require_extra("studies"):
             from thud.impact.datasets import ensemble_dataset

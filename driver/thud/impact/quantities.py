@@ -1,4 +1,4 @@
-"""The table of quantities with levels, and the quantities of each kind of result."""
+"""Tables of the quantities and levels that the kinds of results have."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 ROOM_LEVEL = "room_level"
 RATING = "standardized_rating"
-# Dimensions that are bands: those of the levels, and the one-third-octave bands in a room.
+# Dimensions of bands: octaves and one-third-octave bands of forces, and rated bands in a room.
 BANDS = (*BANDWIDTHS, ROOM_BAND := "room_third")
-# Force and bands of the levels that a sample may have, by name.
+# Force and bands of the levels of a sample, by name.
 LEVELS = {
     f"{force}_level" if bands == BANDWIDTHS[0] else f"{force}_{bands}_level": (force, bands)
     for bands in BANDWIDTHS
@@ -25,20 +25,20 @@ LEVELS = {
 }
 # Bands of the levels of the contact force, by name.
 CONTACT_LEVELS = {f"contact_{bands}_level": bands for bands in BANDWIDTHS}
-# Dimension that a result has beside that of the samples.
+# Second dimension of results; the first is the sample.
 DIMENSIONS: dict[str, str] = {
     **{name: bands for name, (_, bands) in LEVELS.items()}, **CONTACT_LEVELS, ROOM_LEVEL: ROOM_BAND
 }  # fmt: skip
 
 
 def _level(name: str, force: str) -> Quantity:
-    """Return the level of a force in bands."""
+    """Return the declaration of the levels of a force."""
     meaning = f"force exposure level of the {force} force, re 1 N and 1 s"
     return Quantity(name, name.replace("_", " "), "L_{FE}", "dB", "dB", 1.0, 2, meaning)
 
 
 def _number(name: str, meaning: str) -> Quantity:
-    """Return a pure number, a truth value or a text."""
+    """Return the declaration of a pure number, a truth value or a text."""
     return Quantity(name, name, "", "", "", 1.0, 0, meaning)
 
 
@@ -52,7 +52,7 @@ SAMPLE_RESULTS = {
     "status": _number("status", "0: computed; otherwise the exit code of the error"),
     "reason": _number("reason", "why there are no results"),
 }
-# Additional results of drops on a floor, other than levels of the contact force.
+# Additional results of drops on a floor, except levels of the contact force.
 FLOOR_QUANTITIES = {
     "floor_work": QUANTITIES["floor_work"],
     ROOM_LEVEL: Quantity(
@@ -62,7 +62,7 @@ FLOOR_QUANTITIES = {
     "room_rating": QUANTITIES["room_rating"],
     RATING: QUANTITIES[RATING],
 }  # fmt: skip
-# With those on floors, of surrogates and of their training.
+# All results of samples, including those of surrogates and of their training.
 ALL_QUANTITIES = {
     **SAMPLE_RESULTS,
     **{name: _level(name, "contact") for name in CONTACT_LEVELS},
@@ -80,5 +80,6 @@ def sample_results(ensemble: Ensemble) -> dict[str, NDArray[Any]]:
             results[name] = getattr(ensemble, name)
         elif LEVELS[name] in ensemble.levels:
             results[name] = ensemble.levels[LEVELS[name]]
-    results |= {f"contact_{bands}_level": v for bands, v in ensemble.contact_levels.items()}
-    return results | {n: v for n in FLOOR_QUANTITIES if (v := getattr(ensemble, n)) is not None}
+    results |= {f"contact_{bands}_level": level for bands, level in ensemble.contact_levels.items()}
+    floor_results = {name: getattr(ensemble, name) for name in FLOOR_QUANTITIES}
+    return results | {name: v for name, v in floor_results.items() if v is not None}

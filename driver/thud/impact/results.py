@@ -1,4 +1,4 @@
-"""Reads the results of a run back from its directory."""
+"""Reader of the results of a run in a directory."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Its scanner prints its tables on the screen before it refuses a damaged text.
+# The scanner of f90nml prints its tables on the screen before it raises an error.
 f90nml.scanner.print = lambda *_: None
 
-# Columns of every history, by the names of an impact; components follow the first three.
+# Columns of ``force.csv`` for fields of `Impact`; columns of components follow the first three.
 _COLUMNS = {
     "time": "time_s",
     "deflection": "deflection_m",
@@ -37,11 +37,11 @@ _COLUMNS = {
     "elastic_force": "elastic_force_N",
     "floor_force": "floor_force_N",
 }
-_MOTION = ("time", "deflection", "velocity")
+_N_MOTION_COLUMN = 3
 
 
 def read_results(directory: str | os.PathLike[str]) -> Impact:
-    """Read the impact that ``thud`` or ``thud-driver run`` has written, without loss of digits.
+    """Read the impact that ``thud`` or ``thud-driver run`` has written, in full precision.
 
     Parameters
     ----------
@@ -51,18 +51,18 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
     Returns
     -------
     Impact
-        The same as `solve` gives.
+        The same impact as the return value of `solve`, without `room_level`.
 
     Raises
     ------
     InputError
-        Where the directory does not hold the results of an impact, or one of the files is not as
-        the run has written it.
+        If the directory does not hold the results of an impact, or a file has changed since the run
+        wrote it.
 
     Warns
     -----
     PlausibilityWarning
-        Where the file that says so, ``.thud``, is missing; also in `Impact.warnings`.
+        If the file with the checksums, ``.thud``, is missing; also in `Impact.warnings`.
     """
     try:
         folder = Path(directory)
@@ -72,13 +72,13 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
         raise
     except FileNotFoundError as error:
         refuse(f"{error.filename}: there is no such file", "the results of an impact", error)
-    except Exception as error:  # noqa: BLE001 - parsers of damaged files raise anything
+    except Exception as error:  # noqa: BLE001 - parsers of damaged files raise various errors
         reason = f"{type(error).__name__}: {error}".partition("\n")[0]
         refuse(f"{directory}: cannot be read ({reason})", "the results of an impact", error)
 
 
 class _Files:
-    """Files of a result directory, each compared with its checksum as it is read."""
+    """Files of a result directory; the checksum of each file is checked when it is read."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -89,17 +89,17 @@ class _Files:
         return name in self.listed if self.listed else (self.folder / name).exists()
 
     def read(self, name: str) -> str:
-        """Return the text of a file; raise InputError where the run has not written it."""
+        """Return the text of a file; raise InputError if its checksum is not that of the run."""
         if Path(name).name != name:
             refuse(
-                f"{self.folder}: {shown(name)} is named as a file of it",
+                f"{self.folder}: {shown(name)} is not the name of a file in this directory",
                 "names without directories",
             )
         content = read_input(self.folder / name)
-        known = self.listed[name].checksums if name in self.listed else ("",)
-        if self.listed and checksum(content) != known[-1]:
+        allowed = self.listed[name].checksums if name in self.listed else ("",)
+        if self.listed and checksum(content) != allowed[-1]:
             refuse(
-                f"{self.folder / name} is not as the run has written it",
+                f"{self.folder / name} has changed since the run wrote it",
                 "results of one run; run the case again",
             )
         return content.decode()
@@ -117,8 +117,8 @@ def _new_impact(files: _Files) -> Impact:
         messages += (warning,)
     on_floor = None
     if "floor_summary" in numbers:
-        scalars, own = numbers["floor_summary"], numbers.get("floor_model_quantities", {})
-        moving, columns = _read_history(files, "floor_", scalars, own)
+        scalars, others = numbers["floor_summary"], numbers.get("floor_model_quantities", {})
+        floor_history, columns = _read_history(files, "floor_", scalars, others)
         on_floor = FloorImpact(
             case=case,
             warnings=(),
@@ -126,8 +126,8 @@ def _new_impact(files: _Files) -> Impact:
             floor_displacement=columns.pop("floor_displacement_m"),
             floor_velocity=columns.pop("floor_velocity_m_per_s"),
             floor_work=scalars["floor_work"],
-            point_velocity=np.array([*columns.values()]).reshape(-1, len(moving["time"])),
-            **moving,
+            point_velocity=np.array([*columns.values()]).reshape(-1, len(floor_history["time"])),
+            **floor_history,
         )
     return Impact(case=case, warnings=messages, on_floor=on_floor, **history)
 
@@ -135,17 +135,17 @@ def _new_impact(files: _Files) -> Impact:
 def _read_history(
     files: _Files, prefix: str, scalars: Mapping[str, float], model_quantities: Mapping[str, float]
 ) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:
-    """Return the fields of a history, and the other columns of its forces."""
+    """Return fields of `Impact` from the files with a prefix, and the columns of a floor."""
     force = _table(files.read(f"{prefix}force.csv"))
     file_name = f"{prefix}model_histories.csv"
     histories = _table(files.read(file_name)) if file_name in files else {}
-    # Components of the force precede the force; other columns follow it.
+    # Columns: motion, components of the force, total forces, motion of the floor.
     columns = list(force)
     last = columns.index("floor_force_N")
     history = {
         **{name: force[column] for name, column in _COLUMNS.items()},
         "components": {
-            name[: -len("_N")]: force[name] for name in columns[len(_MOTION) : last - 1]
+            name[: -len("_N")]: force[name] for name in columns[_N_MOTION_COLUMN : last - 1]
         },
         "model_histories": {name: values for name, values in histories.items() if name != "time_s"},
         "model_quantities": dict(model_quantities),
@@ -156,7 +156,7 @@ def _read_history(
 
 
 def _texts(value: str | list[str]) -> tuple[str, ...]:
-    """Return the texts of a key; f90nml gives one text without its list."""
+    """Return the texts of a key; f90nml returns a single text as a string, not as a list."""
     return (value,) if isinstance(value, str) else tuple(value)
 
 
@@ -175,7 +175,7 @@ def _read_motion(files: _Files, prefix: str) -> Motion:
     text = files.read(f"{prefix}snapshots.xmf")
     _, *grids = ET.fromstring(text).iter("Grid")  # noqa: S314 - expat limits entities
     snapshots = [_read_grid(grid) for grid in grids]
-    # The first element has its first two nodes on neighboring rings.
+    # Node 0 is on the first ring; the second node of the first element starts the next ring.
     stride = int(snapshots[0]["Topology"][0, 1])
     size = (len(snapshots[0]["Geometry"]) // stride, stride)
     plane = {
@@ -203,7 +203,7 @@ def _read_motion(files: _Files, prefix: str) -> Motion:
 
 
 def _read_grid(grid: ET.Element) -> dict[str, NDArray[np.float64]]:
-    """Return the arrays of a grid as thud writes it."""
+    """Return the arrays of a grid by name."""
     time, *elements = grid
     arrays = {"Time": np.array(float(time.attrib["Value"]))}
     for element in elements:

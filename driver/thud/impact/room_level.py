@@ -1,4 +1,4 @@
-"""Level in the room below a floor, as the library predicts it from a force."""
+"""Level in the room below a floor, predicted by the library from a force."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class RoomLevel(Immutable):
-    """Level in the room below: energy means over positions, in bands.
+    """Level in the room below, in bands: energy mean over positions.
 
     Attributes
     ----------
@@ -28,9 +28,9 @@ class RoomLevel(Immutable):
     level : ndarray, shape (12,)
         Maximum Fast levels L_i,Fmax, dB re 20 uPa.
     time_of_maximum : ndarray, shape (12,)
-        Their times after the impact, s.
+        Times of these maxima after the impact, s.
     energy : ndarray, shape (12,)
-        Energy that the impact gives to the floor, J.
+        Energy that the impact transfers to the floor, J.
     radiation_factor, loss_factor : ndarray, shape (12,)
         Radiation factor and total loss factor of the floor.
     reverberation_time : ndarray, shape (12,)
@@ -38,23 +38,23 @@ class RoomLevel(Immutable):
     floor_modes, room_modes : ndarray, shape (12,)
         Expected number of modes in each band.
     few_modes : float
-        Number of modes below which the statistical answer of a band is uncertain.
+        Number of modes below which the statistical prediction of a band is uncertain.
     mass_per_area : float
-        Mass of the radiating plate over its area, kg/m2.
+        Mass per unit area of the radiating plate, kg/m2.
     spread : ndarray, shape (12,)
-        Expected standard deviation of the level for one position of the source and one of the
-        microphone, dB: theory of the variance by modal overlap (Langley and Cotoni 2004).
+        Expected standard deviation of the level at a single position of source and microphone, dB,
+        by the modal overlap (Langley and Cotoni 2004).
     octave_level, octave_time : ndarray, shape (4,)
-        Maximum Fast levels of the octaves 63 to 500 Hz, dB, and their times, s: maxima of the sums
-        of their bands.
+        Maximum Fast levels of the octaves 63 to 500 Hz, dB, and the times of these maxima, s. The
+        level of an octave is the energy sum of its bands at an instant.
     history_time : ndarray, shape (n_time,)
         Instants after the impact, s.
     history : ndarray, shape (n_time, 12)
-        What the Fast detector shows in each band then, dB.
+        Fast levels of the bands at these instants, dB.
     conductance : ndarray, shape (12,)
-        Power that a force of unit mean square gives to the floor, m/(N s).
+        Real part of the mobility: power into the floor per mean square of the force, m/(N s).
     floor_warnings : tuple of str
-        Where the model of the floor is not valid.
+        Sentences on conditions in which the model of the floor is not valid.
     """
 
     frequency: Array
@@ -78,7 +78,7 @@ class RoomLevel(Immutable):
 
 
 def new_room_level(answer: Bundle) -> RoomLevel | None:
-    """Return the level in a bundle of the library; None without one."""
+    """Return the level from a bundle of the library; None without one."""
     if "room" not in answer:
         return None
     bands = {**answer["room_bands"]}

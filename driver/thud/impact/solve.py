@@ -1,4 +1,4 @@
-"""`thud.solve`; the stub beside this file has its calls by model."""
+"""`thud.solve`; the stub ``solve.pyi`` declares its keywords for each model."""
 
 from thud.impact.solve_case import solve
 

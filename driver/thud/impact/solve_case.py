@@ -1,4 +1,4 @@
-"""One drop by its keywords."""
+"""Computation of a drop by keywords."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     Parameters
     ----------
     ball, drop
-        By default the rubber ball of the paper, from 1 m. `ball` may instead be a `Case`; then no
-        other argument is allowed.
+        Ball and drop, by default the rubber ball of the paper from 1 m. `ball` may instead be a
+        `Case`, without any other argument.
     model
         ``"hollow_sphere"`` (the analytical model of the paper, the default), ``"modal_ball"`` (the
-        improved one), ``"finite_element"``, ``"measured_modes"``, ``"hunt_crossley"`` or
+        improved model), ``"finite_element"``, ``"measured_modes"``, ``"hunt_crossley"`` or
         ``"two_mass"``; or an object of the classes below, which holds the options.
     sample_rate
         Samples per second, Hz.
@@ -45,12 +45,12 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     substeps
         Integration steps per sampling interval.
     floor
-        Floor on which the ball is dropped too, an object of `Rigid`, `InfinitePlate`, `Oscillator`,
-        `Plate`, `FloatingFloor`, `JoistFloor` or `MeasuredMobility`; the standards assess the force
-        on a rigid one.
+        Floor on which the ball is dropped in addition to a rigid floor, on which the standards
+        assess the force. An object of `Rigid`, `InfinitePlate`, `Oscillator`, `Plate`,
+        `FloatingFloor`, `JoistFloor` or `MeasuredMobility`.
     **options
-        Options of the model, see `HollowSphere`, `ModalBall`, `FiniteElement`, `MeasuredModes`,
-        `HuntCrossley` and `TwoMass`; such as ``momentum_flux="retarding"``.
+        Options of the model, such as ``momentum_flux="retarding"``; see `HollowSphere`,
+        `ModalBall`, `FiniteElement`, `MeasuredModes`, `HuntCrossley` and `TwoMass`.
 
     Returns
     -------
@@ -60,20 +60,20 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     Raises
     ------
     InputError
-        Names group, key, value and allowed range.
+        If the input is invalid; the message names group, key, value and allowed range.
     NumericalError
-        Where the drop leaves the range of the model or the steps are too coarse.
+        If the drop leaves the range of the model or the time steps are too long.
 
     Warns
     -----
     PlausibilityWarning
-        As `Impact.warnings`.
+        For each entry of `Impact.warnings`.
     """
     sampling = {"sample_rate": sample_rate, "duration": duration, "substeps": substeps}
     settings = {name: value for name, value in sampling.items() if value is not None}
     if isinstance(ball, Case):
         if settings or options or any(value is not None for value in (drop, model, floor)):
-            refuse("solve() takes a case or the parts of one, not both", "solve(case)")
+            refuse("solve() has other arguments in addition to a case", "solve(case)")
         case = ball
     else:
         case = Case(

@@ -1,4 +1,4 @@
-"""Assessment of a source by the criteria of the standards, computed or measured."""
+"""Assessment of a computed or measured source by the criteria of the standards."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ _MAX_PEAKS = 2**31
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Criterion(Displayed):
-    """One quantity and the range that the standards require.
+    """Quantity of a source and the range that the standards require.
 
     Attributes
     ----------
     name : str
         Name of the quantity.
     estimate : Estimate
-        Value of the source with its uncertainty; levels in dB re 1 N.
+        Value of the source with its uncertainty; levels in dB re 1 N and 1 s.
     lower, upper : float
-        Limits, which are allowed values.
+        Limits of the range, which includes them.
     """
 
     name: str
@@ -58,9 +58,9 @@ class Criterion(Displayed):
 
     @property
     def result(self) -> str:
-        """``"conforms"``, ``"does not conform"`` or ``"inconclusive"`` at 95 %.
+        """``"conforms"``, ``"does not conform"`` or ``"inconclusive"`` at 95 % confidence.
 
-        The guard band is the expanded uncertainty (JCGM 106). An upper bound can only fail.
+        The guard band is the expanded uncertainty (JCGM 106). An upper bound cannot conform.
         """
         value, expanded = self.value, self.estimate.expanded
         conforms, fails, inconclusive = RESULTS
@@ -81,7 +81,7 @@ class Criterion(Displayed):
 
     @property
     def margin(self) -> float:
-        """Distance of the value to the nearer limit; negative outside."""
+        """Distance of the value from the nearer limit; negative outside the range."""
         return min(self.value - self.lower, self.upper - self.value)
 
     @property
@@ -153,8 +153,8 @@ class Verdict(Displayed):
     def __repr__(self) -> str:
         """Return the result and the criteria that cause it."""
         names = [criterion.name for criterion in self.criteria if criterion.result == self.result]
-        where = "" if self.conforms else f" in {', '.join(names)}"
-        return f"<Verdict, {self.source}: {self.result}{where}>"
+        causes = "" if self.conforms else f" in {', '.join(names)}"
+        return f"<Verdict, {self.source}: {self.result}{causes}>"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
@@ -174,11 +174,11 @@ def assess(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     *,
     limits: Mapping[str, tuple[float, float]] | None = None,
 ) -> Verdict:
-    """Assess a source by the criteria of the standards, at 95 % if there are uncertainties.
+    """Assess a source by the criteria of the standards, with the stated uncertainties at 95 %.
 
     A criterion conforms if the value and its expanded uncertainty lie within the limits, does not
     conform if they lie outside, and is inconclusive otherwise (guard band, JCGM 106) or if value or
-    uncertainty are unknown, NaN. Plain numbers are exact.
+    uncertainty are NaN (unknown). Plain numbers have no uncertainty.
 
     Parameters
     ----------
@@ -197,12 +197,12 @@ def assess(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     source
         ``"rubber_ball"`` or ``"tyre"``.
     limits
-        Minimum and maximum by criterion that replace those of the standards.
+        Minimum and maximum by the name of a criterion, in place of the limits of the standards.
 
     Raises
     ------
     InputError
-        Where the source is not known, `levels` are not five, or a value is not a number.
+        If the source is not known, `levels` has not five entries, or a value is not a number.
     """
     standard = get_criteria(source)
     octaves = [_estimate("levels", level, "dB") for level in levels]
@@ -230,7 +230,7 @@ def assess(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
 
 
 def get_criteria(source: LimitsSource) -> tuple[Criterion, ...]:
-    """Return the criteria of the standards for a source, their values unknown."""
+    """Return the criteria of the standards for a source, with unknown values."""
     require_choice("source", source, SOURCES)
     return _criteria(source)
 
@@ -251,7 +251,7 @@ def octave_limits(source: LimitsSource) -> tuple[NDArray[np.float64], NDArray[np
 
 
 def _estimate(name: str, value: Any, unit: str) -> Estimate:  # noqa: ANN401 - of a user
-    """Return a value as an estimate with a unit; raise InputError where it is no number."""
+    """Return a value as an estimate with a unit; raise InputError if it is not a number."""
     if not isinstance(value, Estimate):
         return Estimate(to_float(name, value), unit=unit)
     return value if value.unit == unit else replace(value, unit=unit)

@@ -13,18 +13,19 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True, eq=False)
 class Contribution(Immutable):
-    """One line of an uncertainty budget.
+    """Contribution to the uncertainty of a value, a line of an uncertainty budget.
 
     Attributes
     ----------
     name : str
         Source of uncertainty.
     uncertainty : float
-        Standard uncertainty of the value due to it, in the unit of the value; NaN if unknown.
+        Standard uncertainty of the value due to this source, in the unit of the value; NaN if
+        unknown.
     freedom : float
-        Degrees of freedom; infinite if it is not estimated from a scatter (type B).
+        Degrees of freedom; infinite if not estimated from scatter (type B).
     counted : bool
-        Whether it adds to the combined uncertainty. False if the repeatability includes it.
+        Whether the combined uncertainty includes it; false if the repeatability already does.
     """
 
     name: str
@@ -35,7 +36,7 @@ class Contribution(Immutable):
 
 @dataclass(frozen=True, eq=False)
 class Estimate(Immutable):
-    """A value and its uncertainty; computed values have none.
+    """Value and its uncertainty, which is 0 for computed values.
 
     Attributes
     ----------
@@ -50,8 +51,8 @@ class Estimate(Immutable):
     contributions : tuple of Contribution
         Independent contributions to the uncertainty; empty if none is stated.
     upper_bound : bool
-        The true value lies at or below `value`, within its uncertainty, by an unknown amount (a
-        level in the background).
+        Whether `value` is only an upper bound of the true value, such as of a level masked by the
+        background; the uncertainty is that of the bound.
     """
 
     value: float
@@ -65,7 +66,7 @@ class Estimate(Immutable):
     def from_budget(
         cls, value: float, *contributions: Contribution, upper_bound: bool = False
     ) -> Self:
-        """Combine the contributions (JCGM 100, 5.1.2 and, by Welch-Satterthwaite, G.4.1)."""
+        """Combine contributions (JCGM 100, 5.1.2; degrees of freedom by G.4.1)."""
         terms = [term for term in contributions if term.counted and term.uncertainty]
         combined = math.sqrt(sum(term.uncertainty**2 for term in terms))
         inverse = sum((term.uncertainty / combined) ** 4 / term.freedom for term in terms)
@@ -79,12 +80,12 @@ class Estimate(Immutable):
 
     @property
     def coverage_factor(self) -> float:
-        """Quantile of Student's t for 95 %."""
+        """Quantile of Student's t distribution for a two-sided coverage of 95 %."""
         from scipy.special import stdtrit
 
         return float(stdtrit(self.freedom, (1 + CONFIDENCE) / 2)) if self.freedom > 0 else math.nan
 
     @property
     def expanded(self) -> float:
-        """Expanded uncertainty: value ± this holds the true value with 95 %."""
+        """Expanded uncertainty: half the width of the interval with 95 % coverage."""
         return self.coverage_factor * self.uncertainty if self.uncertainty else 0.0

@@ -1,4 +1,4 @@
-"""Interface of every impact, computed by a model or recorded."""
+"""Interface of computed and recorded impacts."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ class DropForce(Immutable):
     sample_rate : float
         Samples per second, Hz.
     start : float
-        Time of the first sample since first touch, s.
+        Time of the first sample, s; first touch is at 0.
     kind : str
         ``"floor"`` or ``"elastic"``.
     origin : str
-        Case or file that the force comes from.
+        Case or file of the force.
     checksum : str
         SHA-256 of the case as `thud.write_case` writes it, or of the file.
     date : str
         Date of the measurement; empty if unknown.
     notes : tuple of str
-        Processing of the force, a sentence each.
+        Sentences on the processing of the force.
     """
 
     name: str
@@ -68,8 +68,8 @@ class DropForce(Immutable):
 class ImpactResult(Protocol):
     """Result of a drop: an `Impact` of a model, or a `Recording` of one or more drops.
 
-    A recording has the force of its first drop, and averages over its drops of all else. Its force
-    is that on the floor, whatever `force` is.
+    For a recording, the force is that of the first drop, and all other results are averages over
+    the drops. It has the force on the floor only, which it returns for every `force`.
     """
 
     @property
@@ -78,7 +78,7 @@ class ImpactResult(Protocol):
 
     @property
     def case(self) -> Case:
-        """Case of the model; one without a model of a recording."""
+        """Input of the impact; without a model for a recording."""
 
     @property
     def time(self) -> NDArray[np.float64]:
@@ -102,7 +102,7 @@ class ImpactResult(Protocol):
 
     @property
     def velocity_tolerance(self) -> float:
-        """Relative tolerance of the impact velocity: two results within it are of one drop."""
+        """Relative difference up to which two impact velocities count as equal."""
 
     @property
     def contact_time(self) -> float:
@@ -130,27 +130,27 @@ class ImpactResult(Protocol):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Possible faults, a sentence each."""
+        """Sentences on possible faults."""
 
     @property
     def on_floor(self) -> FloorImpact | None:
         """The same drop on the mobile floor of the case; None without one."""
 
     def quantity(self, name: str) -> float:
-        """Return a quantity of the table by its name, SI units; NaN if unknown."""
+        """Return the value of a quantity, SI units, by its name in the table; NaN if unknown."""
 
     @property
     def room_level(self) -> RoomLevel | None:
         """Level in the room of the case; None if it is not known."""
 
     def assessed_force(self, force: LevelsForce | None = None) -> LevelsForce:
-        """Return a kind of force, by default the assessed one."""
+        """Return `force`, or the kind of the assessed force if it is None."""
 
     def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:
-        """Return a force, by default the assessed one, N, shape (n_sample,)."""
+        """Return a force, by default the assessed force, N, shape (n_sample,)."""
 
     def peak(self, force: LevelsForce | None = None) -> float:
-        """Return the maximum of a force, by default of the assessed one, N."""
+        """Return the maximum of a force, by default of the assessed force, N."""
 
     def levels(
         self,
@@ -166,13 +166,13 @@ class ImpactResult(Protocol):
         """Assess the source by the criteria of the standards."""
 
     def drop_force(self, drop: int = 1) -> DropForce:
-        """Return the assessed force of a drop by its number, from 1."""
+        """Return the assessed force of a drop, counted from 1."""
 
     def plot(self) -> Figure:
         """Return a figure of the result."""
 
     def to_xarray(self) -> xr.Dataset:
-        """Return forces, levels and numbers, with units and provenance."""
+        """Return a dataset of forces, levels and scalars, with units and provenance."""
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return the histories over time."""
+        """Return a table of the histories, indexed by time."""

@@ -67,7 +67,7 @@ def get_bands(bands: BandSet = "octave") -> Bands:
     Raises
     ------
     InputError
-        Where `bands` is unknown.
+        If `bands` is unknown.
     """
     require_choice("bands", bands, BANDWIDTHS)
     return _bands(bands)
@@ -87,7 +87,7 @@ def force_exposure_levels(
 ) -> NDArray[np.float64]:
     """Return the force exposure levels of a force record.
 
-    The level of a band is 10 lg of its energy, 2 * integral of abs(F(f))**2 df, over 1 N2 s
+    The level of a band is 10 lg(E/(1 N2 s)), with E the integral of 2 abs(F(f))**2 df over the band
     (JIS A 1418-2). The force is zero before the first and after the last sample.
 
     Parameters
@@ -105,13 +105,13 @@ def force_exposure_levels(
     Returns
     -------
     ndarray, shape (n_band,)
-        Levels in ascending bands, dB re 1 N and 1 s. The rounding error, 156 dB below the total
-        energy, is the minimum level of a band.
+        Levels of the bands in ascending order, dB re 1 N and 1 s. No level is lower than the
+        rounding error, 156 dB below the total level.
 
     Raises
     ------
     InputError
-        Where the record is empty, zero throughout, not finite or not one-dimensional, or the
+        If the record is empty, zero throughout, not finite or not one-dimensional, or the
         rate, the bands or the method are invalid.
     """
     require_choice("bands", bands, BANDWIDTHS)
@@ -125,7 +125,7 @@ def force_exposure_levels(
 def low_pass(
     force: NDArray[np.float64], sample_rate: float, cutoff: float = RECORDED_BAND
 ) -> NDArray[np.float64]:
-    """Return a force low-passed at a frequency, by default as a force plate records it.
+    """Return a force low-passed at a cutoff, by default the limit of a force plate.
 
     Forces, N, have the shape (n_sample,) and start and end at zero; rate and cutoff are in Hz.
     """
@@ -134,11 +134,11 @@ def low_pass(
 
 
 def peak_count(force: ArrayLike, sample_rate: float) -> int:
-    """Return the number of peaks of a force: maxima with a drop of 10 % on both sides.
+    """Return the number of peaks of a force: maxima with a decrease by 10 % on both sides.
 
     The force, N, shape (n_sample,), starts and ends at zero; only content below 1.25 kHz is used.
-    Raise InputError where it is empty, not finite or not one-dimensional, or the rate, Hz, is not
-    positive.
+    Raise InputError if the force is empty, not finite or not one-dimensional, or the rate, Hz, is
+    not positive.
     """
     record = _record(force)
     if not record.size or not np.isfinite(record).all():
@@ -151,12 +151,12 @@ def peak_count(force: ArrayLike, sample_rate: float) -> int:
 
 
 def _record(values: ArrayLike, name: str = "force") -> NDArray[np.float64]:
-    """Return a record as a contiguous array."""
+    """Return a record as a contiguous array; raise InputError if it is not one."""
     return require_real(name, require_array(name, values, dimensions=(1,)))
 
 
 def to_float(name: str, value: object) -> float:
-    """Return a number as float; raise InputError where it is not one."""
+    """Return a value as float; raise InputError if it is not a number."""
     try:
         return float(value)  # type: ignore[arg-type]
     except (OverflowError, TypeError, ValueError) as error:

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
     from thud.base._schema import BandSet
 
-# Maximum absolute level of sound, dB.
+# Maximum magnitude of a sound level, dB.
 MAX_LEVEL = 1000.0
-# Names of the Korean classes.
+# Names of the Korean classes; the index is the class, 0 for none.
 CLASSES = ("none", *(f"{i}" for i in range(1, len(CLASS_LIMITS) + 1)))
 
 
@@ -35,13 +35,13 @@ class Rating(Displayed):
     a_weighted : float
         A-weighted maximum level L_iA,Fmax, dB (ISO 717-2 annex D).
     rounded : int
-        The same, rounded half up, dB.
+        `a_weighted`, rounded half up, dB.
     korean_class : int or None
-        Class 1 to 4 of KS F 2863-2 by A-weighted level (at most 37, 41, 45 and 49 dB), 0 for none;
-        None for one-third octaves, which that standard does not use. It applies to levels that are
-        not standardized.
+        Class 1 to 4 of KS F 2863-2 by A-weighted level (at most 37, 41, 45 and 49 dB), 0 for none.
+        It applies to levels that are not standardized. None for one-third octaves, which KS F
+        2863-2 does not use.
     curve : int or None
-        Inverse-A curve rating of octaves, dB, of former editions of KS F 2863-2.
+        Inverse-A curve rating, dB, of former editions of KS F 2863-2; None for one-third octaves.
     """
 
     bands: BandSet
@@ -51,7 +51,7 @@ class Rating(Displayed):
     curve: int | None
 
     def __repr__(self) -> str:
-        """Return the numbers."""
+        """Return rating and class."""
         korea = "" if self.korean_class is None else f", Korean class {CLASSES[self.korean_class]}"
         return (
             f"<Rating, {self.bands}s: L_iA,Fmax {self.rounded} dB ({self.a_weighted:.2f}){korea}>"
@@ -74,14 +74,14 @@ class Rating(Displayed):
 def rated_bands(bands: BandSet) -> NDArray[np.float64]:
     """Return the rounded mid frequencies of the rated bands, Hz.
 
-    Raise InputError where `bands` is not known.
+    Raise InputError if `bands` is not known.
     """
     require_choice("bands", bands, RATED_BANDS)
     return np.array(RATED_BANDS[bands])
 
 
 def rating(levels: ArrayLike, bands: BandSet = "octave") -> Rating:
-    """Rate levels in the room below.
+    """Return the single-number rating of levels in the room below.
 
     Parameters
     ----------
@@ -89,13 +89,13 @@ def rating(levels: ArrayLike, bands: BandSet = "octave") -> Rating:
         Maximum Fast levels of the octaves 63 to 500 Hz, or of the one-third octaves 50 to 630 Hz,
         dB re 20 uPa, as measured or standardized.
     bands
-        ``"octave"`` or ``"third"``. Maxima of one-third octaves do not add up to those of octaves:
-        each set of bands has its own rating.
+        ``"octave"`` or ``"third"``. Each band is weighted on its own, as the maxima of one-third
+        octaves do not add up to those of octaves.
 
     Raises
     ------
     InputError
-        Where the number of levels is wrong, or one is no level of sound.
+        If the number of levels is wrong, or a value is not a plausible sound level.
 
     Examples
     --------
@@ -127,10 +127,10 @@ def rating(levels: ArrayLike, bands: BandSet = "octave") -> Rating:
 def standardized_level(
     level: ArrayLike, reverberation_time: ArrayLike, volume: float
 ) -> NDArray[np.float64]:
-    """Return levels in a room of 50 m3 with a reverberation time of 0.5 s (ISO 16283-2).
+    """Standardize levels to a room of 50 m3 with a reverberation time of 0.5 s (ISO 16283-2).
 
     L'_i,Fmax,V,T = L_i,Fmax + 10 lg(V/V0) - 10 lg(g(C)/g(C0)) with C = T/1.7275 s and
-    g(C) = C**(-1/(C - 1)), the response of the Fast detector to a decay.
+    g(C) = C**(-1/(C - 1)), the maximum response of the Fast detector to a decay.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def standardized_level(
     Raises
     ------
     InputError
-        Where a value is not finite, a time or the volume is not positive, or shapes differ.
+        If a value is not finite, a time or the volume is not positive, or the lengths differ.
     """
     values = _finite("level", np.atleast_1d(np.asarray(level)))
     times = _finite("reverberation_time", np.atleast_1d(np.asarray(reverberation_time)))
@@ -169,7 +169,7 @@ def standardized_level(
 
 
 def require_volume(volume: Any) -> float:  # noqa: ANN401 - of a user
-    """Return a volume, m3; raise InputError where it is not positive and finite."""
+    """Return a volume, m3; raise InputError if it is not positive and finite."""
     try:
         value = float(volume)
     except (TypeError, ValueError, OverflowError):
@@ -180,7 +180,7 @@ def require_volume(volume: Any) -> float:  # noqa: ANN401 - of a user
 
 
 def _finite(name: str, values: ArrayLike) -> NDArray[np.float64]:
-    """Return an array of finite numbers; raise InputError for others."""
+    """Return an array of finite numbers; raise InputError if it is empty or not finite."""
     array = require_real(name, require_array(name, values, dimensions=(1,)))
     if not array.size or not np.isfinite(array).all():
         refuse(

@@ -11,7 +11,7 @@ from scipy.linalg import solve_triangular
 from scipy.special import ndtri
 from scipy.stats import qmc
 
-from thud.impact.contact_time import AVERAGED, THRESHOLD, average_within
+from thud.impact.contact_time import AVERAGING_WIDTH, THRESHOLD, average_within
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -321,7 +321,7 @@ def _spread(kind: _Kind) -> NDArray[np.float64]:
 def _paths() -> NDArray[np.float64]:
     """Return the shapes averaged over AVERAGED, at the delays: [n_delay, n_column]."""
     time = np.arange(0, DELAY[-1] + 1, 2 * TICK)
-    return average_within(_shapes(time, 0), time, DELAY, 1e3 * AVERAGED)
+    return average_within(_shapes(time, 0), time, DELAY, 1e3 * AVERAGING_WIDTH)
 
 
 SPREADS = np.array([_spread(kind) for kind in KINDS])

@@ -20,11 +20,11 @@ from thud.base.files import (
     is_failure,
     is_regular,
     is_temporary,
-    own_path,
     read_input,
     remove,
     replace_file,
     uninterrupted,
+    unique_path,
 )
 from thud.studies.backends import run_blocks
 from thud.studies.dataset import disk_space, grid_of, in_order, new_dataset
@@ -113,7 +113,7 @@ class Blocks:
         part = self.path.with_name(f".{self.path.name}.part")
         # An interrupted removal may have left this directory.
         shutil.rmtree(part, ignore_errors=True)
-        part = own_path(part)
+        part = unique_path(part)
         with _open(paths[0]) as first:
             sizes = {str(name): values.nbytes for name, values in first.data_vars.items()}
         names = list(sizes)

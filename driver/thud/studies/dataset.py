@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from thud.impact.datasets import attributes, origin, sample_variables
+from thud.impact.datasets import attributes, case_attributes, sample_variables
 from thud.impact.quantities import ALL_QUANTITIES, BANDS
 from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 from thud.studies.sampling import sampler_versions
@@ -78,7 +78,7 @@ def provenance(study: SampleStudy) -> dict[str, str]:
         "parameters": " ".join(parameter.coordinate for parameter in study.parameters),
         **({"surrogate": study.surrogate.accuracy} if study.surrogate else {}),
         **sampler_versions(study.design),
-        **origin(study.case),
+        **case_attributes(study.case),
     }
 
 

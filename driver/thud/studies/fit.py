@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Unpack
 
-from thud.base.checks import LARGEST_SEED, refuse, refuse_value, require_kind, require_whole
+from thud.base.checks import MAX_SEED, refuse, refuse_value, require_kind, require_whole
 from thud.base.errors import FitWarning, InputError
 from thud.base.files import read_input
 from thud.base.key import check_keywords
@@ -184,7 +184,7 @@ def _require_options(options: Mapping[str, Any]) -> None:
     require_confidence(options["confidence"])
     require_whole("starts", options["starts"], 1, _MAXIMUM)
     require_whole("max_steps", options["max_steps"], 1, _MAXIMUM)
-    require_whole("seed", options["seed"], 0, LARGEST_SEED)
+    require_whole("seed", options["seed"], 0, MAX_SEED)
 
 
 @dataclass(frozen=True)

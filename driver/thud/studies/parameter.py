@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from thud.base.checks import (
-    LARGEST,
+    MAX_NUMBER,
     refuse,
     refuse_value,
     require_choice,
@@ -238,7 +238,7 @@ def checked(label: str, key: Key, value: object, power: int) -> Value:
     """Return a value in the unit of its key; raise InputError if the key has another kind."""
     number = math.nan
     if isinstance(value, int | float) and not isinstance(value, bool):
-        number = scaled(value, power) if -LARGEST < value < LARGEST else math.inf
+        number = scaled(value, power) if -MAX_NUMBER < value < MAX_NUMBER else math.inf
     valid, allowed, result = {
         "choice": (value in key.choices, ", ".join(map(repr, key.choices)), value),
         "flag": (isinstance(value, bool), "true, false", value),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, Unpack
 
 from thud.base._schema import KEYS
 from thud.base.checks import refuse, require_choice
-from thud.case.keys import DENSITY, OF_FILES, key_owners, value_in
+from thud.case.keys import DENSITY, OUTPUT_GROUP, key_owners, value_in
 from thud.studies.backends import checked_backend
 from thud.studies.blocks import compute_samples, read_identity, result_names
 from thud.studies.dataset import disk_space
@@ -76,7 +76,7 @@ class DropsKind(Kind[SampleStudy, R]):
         # Samples need no snapshots, free modes or compression.
         case = replace(study.case, modes=None, compression=None)
         model_keys = (key for key in KEYS if key.owner == study.model)
-        files = {key.name: 0.0 for key in model_keys if key.group == OF_FILES}
+        files = {key.name: 0.0 for key in model_keys if key.group == OUTPUT_GROUP}
         if case.model and files:
             case = replace(case, model=replace(case.model, **files))  # type: ignore[arg-type]
         common = {**vars(study), "case": case}

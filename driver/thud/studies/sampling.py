@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base.checks import LARGEST_SEED, refuse, refuse_value, require_whole, require_words
+from thud.base.checks import MAX_SEED, refuse, refuse_value, require_whole, require_words
 from thud.studies.parameter import MAX_VALUES, Parameter
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def read_design(
     size, seed = table.get("size", 0), table.get("seed", 0)
     minimum = MIN_BASE_SAMPLES if design == "saltelli" else 1
     require_whole("[design] size", size, minimum, MAX_VALUES)
-    require_whole("[design] seed", seed, 0, LARGEST_SEED)
+    require_whole("[design] seed", seed, 0, MAX_SEED)
     if design in {"sobol", "saltelli"} and size & (size - 1):
         near = 1 << size.bit_length() - 1
         refuse(

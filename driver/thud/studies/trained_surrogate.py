@@ -14,7 +14,7 @@ from scipy.stats import binom
 
 from thud.base.bridge import version
 from thud.base.checks import (
-    LARGEST_SEED,
+    MAX_SEED,
     refuse,
     refuse_value,
     require_kind,
@@ -25,7 +25,7 @@ from thud.base.checks import (
 from thud.base.extras import require_extra
 from thud.base.files import is_failure, read_input, replace_file
 from thud.case.case import Case, case_text
-from thud.case.keys import OF_FILES, value_in, with_values
+from thud.case.keys import OUTPUT_GROUP, value_in, with_values
 from thud.level.assessment import get_criteria
 from thud.level.levels import get_bands
 from thud.studies.study_result import StudyResult
@@ -388,7 +388,7 @@ def keys_of(case: Case) -> dict[str, str]:
     return {
         f"&{group}: {key}": f"{value!r}"
         for group, keys in groups.items()
-        if group not in {"case", "limits", OF_FILES}
+        if group not in {"case", "limits", OUTPUT_GROUP}
         for key, value in keys.items()
     }
 
@@ -479,5 +479,5 @@ def read_plan(table: Mapping[str, object], folder: Path) -> Plan | Surrogate:
     if not error > 0:  # type: ignore[operator]
         refuse_value(f"{label} error", error, "numbers above 0, dB")
     require_whole(f"{label} size", size, MIN_DROPS, MAX_DROPS)
-    require_whole(f"{label} seed", seed, 0, LARGEST_SEED)
+    require_whole(f"{label} seed", seed, 0, MAX_SEED)
     return Plan(float(error), size, seed)  # type: ignore[arg-type]

@@ -280,7 +280,7 @@ def _convert_each(block: list[str], first: int, table: _Table) -> NDArray[np.flo
         used = [cells[i] for i in table.used if i < len(cells)]
         row = [to_number(cell, table.decimal.mark) for cell in used]
         if None in row:
-            wrong = table.decimal.wrong(shown_text(used[row.index(None)]))
+            wrong = table.decimal.explain(shown_text(used[row.index(None)]))
             refuse(f"{table.name}: line {number}: {wrong}", ALLOWED)
         if len(cells) != table.width:
             count = f"{len(cells)} columns, {table.width} in the lines above"
