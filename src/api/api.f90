@@ -2,7 +2,7 @@
 !> hold named texts, numbers and arrays.
 !>
 !> `ask` stores the bundle in the library and returns its handle and sizes; `collect` hands it over and deallocates it.
-!> `status` is 0; or the error code, and the bundle holds only the text `message`.
+!> `status` is 0 or the error code; after an error the bundle holds only the text `message`.
 !> Procedures marked `threadsafe` let other Python threads run meanwhile.
 module thud_api
    use thud_answer, only: get_answer
@@ -11,7 +11,7 @@ module thud_api
    use thud_kinds, only: int64, int8, wp
    use thud_progress, only: latest_progress
    use thud_request, only: request_type
-   use thud_system, only: begin_call, end_call, end_all_calls => end_calls
+   use thud_system, only: begin_call, end_call, interrupt_calls
    implicit none (type, external)
    private
 
@@ -78,7 +78,7 @@ contains
    !> Interrupts the calls that are running in other threads.
    subroutine end_calls()
 
-      call end_all_calls()
+      call interrupt_calls()
    end subroutine end_calls
 
    !> Progress of the latest long work of this process.

@@ -149,6 +149,7 @@ contains
    end subroutine answer_radiator
 
    !> Fits a floor with `order` poles to the mobility `real` + i `imaginary`, m/(N s), at the frequencies `frequency`, Hz.
+   !> `free_error` of the answer is the relative error before the fit was made passive.
    subroutine answer_mobility_fit(request, bundle, error)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle

@@ -94,7 +94,7 @@ contains
       end do
    end subroutine find
 
-   !> Value of a number in digits.
+   !> Value of a number written in decimal digits.
    pure function get_count(digits) result(count)
       character(len=*), intent(in) :: digits
       integer :: count

@@ -9,7 +9,7 @@ module thud_bundle
 
    public :: bundle_type, retrieve, store
 
-   !> Numbers of one item, in `values` or in `cube`.
+   !> A number or an array, in `values` or in `cube`.
    type :: item_type
       !> The numbers, in Fortran's array order: [n].
       real(wp), allocatable :: values(:)
@@ -20,8 +20,8 @@ module thud_bundle
    !> Texts and arrays, each with its name.
    type :: bundle_type
       private
-      !> One line per item: name, tab, and for a text `t` and its length, for an array its extents, each with a comma
-      !> behind it, for a single number nothing.
+      !> One line per text, number or array: name, tab and form. The form is `t` and the length for a text, the extents, each
+      !> followed by a comma, for an array, and empty for a number.
       character(len=:), allocatable, public :: header
       !> All texts, concatenated.
       character(len=:), allocatable, public :: text
@@ -99,7 +99,7 @@ contains
    !> Adds a line to the header.
    subroutine add_line(self, name, form)
       type(bundle_type), intent(inout) :: self
-      !> Name and form of the item.
+      !> Name and form, as in the header.
       character(len=*), intent(in) :: name, form
 
       if (.not. allocated(self%header)) self%header = ''

@@ -16,8 +16,7 @@ module thud_constants
    !> Reference time of the force exposure level, s (JIS A 1418-2).
    real(wp), parameter :: reference_time = 1.0_wp
 
-   !> Upper end of the frequency range in which force plates are read, Hz (paper section 3); the standards' limits end at
-   !> 707 Hz.
+   !> Upper limit of the frequency range of force plate records, Hz (paper section 3); the standards' limits end at 707 Hz.
    real(wp), parameter :: recorded_band = 1250.0_wp
 
    !> Version of thud; pyproject.toml and CMakeLists.txt read it from here.

@@ -31,14 +31,14 @@ contains
       character(len=*), intent(in) :: message
       type(error_type) :: error
       character(len=len(message)) :: text
-      integer :: i, last
+      integer :: i, max_code
 
       text = message
       ! Replace bytes of the input that cannot be shown: control characters, the zero byte, which would end the message,
       ! and invalid UTF-8, which also arises when a shortened value ends within a character.
-      last = merge(255, 126, is_utf8(text))
+      max_code = merge(255, 126, is_utf8(text))
       do i = 1, len(text)
-         if (iachar(text(i:i)) < 32 .or. iachar(text(i:i)) == 127 .or. iachar(text(i:i)) > last) text(i:i) = '?'
+         if (iachar(text(i:i)) < 32 .or. iachar(text(i:i)) == 127 .or. iachar(text(i:i)) > max_code) text(i:i) = '?'
       end do
       error = error_type(code=bad_input, message=text)
    end function input_error

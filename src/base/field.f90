@@ -44,7 +44,8 @@ module thud_field
       character(len=key_length) :: group = ''
       !> Key within the group.
       character(len=key_length) :: key = ''
-      !> What uses the key: a source model, a floor, `modes`, `compression`, `floor`, `room`; blank for every impact.
+      !> What uses the key: the name of a source model or of a floor, or `modes`, `compression`, `floor` or `room`; blank if
+      !> every impact uses it.
       character(len=key_length) :: owner = ''
       !> SI unit, empty for pure numbers and text.
       character(len=8) :: unit = ''

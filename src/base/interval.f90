@@ -26,7 +26,7 @@ module thud_interval
       procedure :: resolve
    end type interval_type
 
-   !> Value of an expression for one value of each key, or for each row of a table of them.
+   !> Value of an expression for one value of each key, or for each row of a table of values.
    interface evaluate
       module procedure evaluate_row, evaluate_rows
    end interface evaluate

@@ -35,23 +35,24 @@ contains
    pure function get_distance(first, second) result(distance)
       character(len=*), intent(in) :: first, second
       integer :: distance
-      ! Element (j, i): distance between the first i letters of `one` and the first j of `other`.
-      integer :: row(0:len(second), 0:len(first))
+      ! Element (j, i): distance between the first i letters of `first` and the first j letters of `second`.
+      integer :: table(0:len(second), 0:len(first))
       integer :: i, j, p, q
       logical :: swapped
 
-      row(:, 0) = [(j, j=0, len(second))]
+      table(:, 0) = [(j, j=0, len(second))]
       do i = 1, len(first)
-         row(0, i) = i
+         table(0, i) = i
          do j = 1, len(second)
-            row(j, i) = min(row(j, i - 1) + 1, row(j - 1, i) + 1, row(j - 1, i - 1) + merge(0, 1, first(i:i) == second(j:j)))
+            table(j, i) = min(table(j, i - 1) + 1, table(j - 1, i) + 1, &
+               table(j - 1, i - 1) + merge(0, 1, first(i:i) == second(j:j)))
             p = max(i - 1, 1)
             q = max(j - 1, 1)
             swapped = min(i, j) > 1 .and. first(i:i) == second(q:q) .and. first(p:p) == second(j:j)
-            if (swapped) row(j, i) = min(row(j, i), row(q - 1, p - 1) + 1)
+            if (swapped) table(j, i) = min(table(j, i), table(q - 1, p - 1) + 1)
          end do
       end do
-      distance = row(len(second), len(first))
+      distance = table(len(second), len(first))
    end function get_distance
 
 end module thud_suggestion

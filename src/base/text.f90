@@ -165,32 +165,34 @@ contains
    !> Whether the bytes of a text are UTF-8.
    pure function is_utf8(text) result(valid)
       character(len=*), intent(in) :: text
-      !> True for the shortest forms of valid characters only.
+      !> False also for characters encoded in more bytes than needed.
       logical :: valid
-      integer :: i, first, second, more
+      integer :: i, code, next_code
+      ! Number of bytes that the current character still needs.
+      integer :: n_left
 
       valid = .true.
-      more = 0
+      n_left = 0
       do i = 1, len(text)
-         first = iachar(text(i:i))
-         if (more > 0) then
-            valid = valid .and. iand(first, 192) == 128
-            more = more - 1
+         code = iachar(text(i:i))
+         if (n_left > 0) then
+            valid = valid .and. iand(code, 192) == 128
+            n_left = n_left - 1
             cycle
          end if
-         more = count(first >= [194, 224, 240])
-         valid = valid .and. (first < 128 .or. more > 0) .and. first < 245
-         if (more == 0 .or. i == len(text)) cycle
+         n_left = count(code >= [194, 224, 240])
+         valid = valid .and. (code < 128 .or. n_left > 0) .and. code < 245
+         if (n_left == 0 .or. i == len(text)) cycle
          ! Invalid: longer forms than needed, surrogates, and code points beyond the last character.
-         second = iachar(text(i + 1:i + 1))
-         valid = valid .and. .not. any([first == 224 .and. second < 160, first == 237 .and. second > 159, &
-            first == 240 .and. second < 144, first == 244 .and. second > 143])
+         next_code = iachar(text(i + 1:i + 1))
+         valid = valid .and. .not. any([code == 224 .and. next_code < 160, code == 237 .and. next_code > 159, &
+            code == 240 .and. next_code < 144, code == 244 .and. next_code > 143])
       end do
-      valid = valid .and. more == 0
+      valid = valid .and. n_left == 0
    end function is_utf8
 
-   !> Whether a text is one number. List-directed `read` would take other characters as repeats or names, signs as
-   !> exponents without a letter, and skip a single sign or point without an error.
+   !> Whether a text is one number. List-directed `read` alone would also accept repeat counts, names, exponents without a
+   !> letter (`1-5`), and a single sign or point.
    pure function is_number(text) result(yes)
       !> The text, without blanks around it.
       character(len=*), intent(in) :: text

@@ -43,9 +43,9 @@ module thud_compute
       type(band_type), allocatable :: bands(:)
       !> Index of the first band that the case asks for.
       integer :: first_band = 1
-      !> Levels, dB: [n_band, force_count].
+      !> Levels of the forces in `force_names`, dB: [n_band, force_count].
       real(wp), allocatable :: level(:, :)
-      !> Criteria, octave levels first: [criterion_count, force_count].
+      !> Criteria of these forces, octave levels first: [criterion_count, force_count].
       type(criterion_type) :: criteria(criterion_count, force_count)
    end type assessment_type
 
@@ -147,7 +147,7 @@ contains
          allocate (on_floor)
          call model%solve(case%ball, case%drop, case%sampling, on_floor, error, receiver)
       end associate
-      ! A model may couple by default but ignore the receiver; then it has computed a drop on a rigid floor.
+      ! `couples` is true by default: a model that ignores the receiver has computed the drop on a rigid floor.
       if (.not. allocated(on_floor%floor_velocity)) deallocate (on_floor)
    end subroutine drop_on_floor
 

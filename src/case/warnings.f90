@@ -1,4 +1,5 @@
-!> Warnings on possible but implausible cases: balls unlike rubber, moduli of another model, forces of no real source.
+!> Warnings on cases that are allowed but implausible: a ball unlike rubber, a modulus of elasticity that belongs to another
+!> model, a force that no real source has.
 module thud_warnings
    use thud_ball, only: get_density
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
@@ -33,7 +34,7 @@ module thud_warnings
    real(wp), parameter :: same_modulus = 0.02_wp
 
    !> Levels over all frequencies of a conforming ball and a conforming tyre, dB re 1 N and 1 s: [2]. They are 4.4 dB above
-   !> the sums of the nominal octave levels, as for the flagship case and for a half sine of 20 ms.
+   !> the sums of the nominal octave levels, as for the standard ball and for a half sine of 20 ms.
    real(wp), parameter :: source_level(2) = [44.0_wp, 52.0_wp]
 
    !> Distance from `source_level` beyond which the units of the input are probably wrong, dB.
@@ -91,7 +92,7 @@ contains
 
       associate (model => case%models(get_model_number(case))%model)
          limits = [get_rate_limit(case%sampling), model%get_validity_limits(case%ball, case%drop, case%sampling, history), &
-            validity_limit_type('model', 'restitution less 1', history%restitution - 1, highest=restitution_error, &
+            validity_limit_type('model', 'restitution minus 1', history%restitution - 1, highest=restitution_error, &
             reason='it gives energy to the source'), &
             validity_limit_type('floor', 'restitution', history%restitution, lowest=-restitution_error, &
             reason='the source goes on downwards with a floor too light for it')]
@@ -124,7 +125,7 @@ contains
       if (allocated(error)) return
       first = findloc(levels < total - max_decline, .true., dim=1)
       if (first > 0) call add(warnings, 'octaves from '//trim(get_band_name(bands(first))) &
-         //' Hz on hold less than 1e-12 of the energy of the force: rounding counts in their levels')
+         //' Hz on hold less than 1e-12 of the energy of the force: rounding errors affect their levels')
    end subroutine add_level_warnings
 
    !> Adds warnings on octaves of the standard in which the floor model is not valid.

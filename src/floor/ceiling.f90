@@ -1,4 +1,4 @@
-!> A light ceiling without rigid connection to the floor: its mass on the stiffness of the cavity, and the sound in there.
+!> A light ceiling without rigid connection to the floor: its mass on the cavity's stiffness, and the sound in the cavity.
 module thud_ceiling
    use thud_constants, only: pi
    use thud_field, only: field_type
@@ -38,7 +38,7 @@ contains
 
    !> Ratio of the squared velocity of the ceiling to that of the floor, averaged over a band. The floor drives the ceiling
    !> through the stiffness of the air; the ceiling's mass and radiation rho0 c0 sigma react:
-   !> abs((1 + i eta)/(1 + i eta + i k d sigma - (f/f0)**2))**2, f0 = sqrt(rho0 c0**2/(depth mass))/(2 pi).
+   !> abs((1 + i eta)/(1 + i eta + i k depth sigma - (f/f0)**2))**2, f0 = sqrt(rho0 c0**2/(depth mass))/(2 pi).
    elemental function get_forced_fraction(ceiling, air, radiation_factor, lower, upper) result(fraction)
       type(ceiling_type), intent(in) :: ceiling
       type(air_type), intent(in) :: air
@@ -55,7 +55,7 @@ contains
       damping = ceiling%loss_factor + 2*pi*sqrt(lower*upper)*ceiling%depth*radiation_factor/air%sound_speed
       associate (low => lower*period, high => upper*period)
          ! 1/((1 - x**2)**2 + damping**2) = Im(1/(b**2 - x**2))/damping with b**2 = 1 - i damping. The difference of
-         ! atanh(x/b) at both ends is written as one atanh: the imaginary parts lie between 0 and pi/2.
+         ! atanh(x/b) at both ends is one atanh on the same branch, because their imaginary parts lie between 0 and pi/2.
          b = sqrt(cmplx(1.0_wp, -damping, wp))
          fraction = (1 + ceiling%loss_factor**2)/(damping*(high - low))*aimag(atanh((high - low)*b/(b**2 - low*high))/b)
       end associate

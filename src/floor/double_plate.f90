@@ -6,7 +6,7 @@ module thud_double_plate
    use thud_kinds, only: wp
    use thud_modal_receiver, only: new_modal_receiver
    use thud_plate, only: air_type, get_bending_stiffness, get_surface_mass, get_total_loss, plate_type
-   use thud_plate_modes, only: get_far_compliance, get_half_waves, get_modal_stiffness, get_shape, mode_limit, &
+   use thud_plate_modes, only: get_unsummed_compliance, get_half_waves, get_modal_stiffness, get_shape, mode_limit, &
       residual_corner, sum_limit_factor
    use thud_receiver, only: receiver_type
    implicit none (type, external)
@@ -49,8 +49,8 @@ contains
       gain = 4/(floor%upper%length*floor%upper%width)*modal_square &
          *spread(get_shape(m, n, source)*get_shape(m, n, point), 2, 2)
       compliance = sum(gain/omega**2, mask=.not. individual)
-      ! At the source the modes above the sum add their compliances; at other points these cancel.
-      if (all(abs(source - point) < epsilon(1.0_wp))) compliance = compliance + get_far_compliance(floor%upper)
+      ! At the source, the modes above the summed ones add their compliances; at other points these cancel on average.
+      if (all(abs(source - point) < epsilon(1.0_wp))) compliance = compliance + get_unsummed_compliance(floor%upper)
       call new_modal_receiver('floating_floor', pack(gain, individual), pack(omega, individual), &
          pack(loss_factor, individual), [compliance, residual_corner], receiver, error)
    end subroutine new_double_receiver

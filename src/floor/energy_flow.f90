@@ -10,9 +10,9 @@ module thud_energy_flow
    type :: energy_flow_type
       !> Modes per hertz of the subsystems, s: [n].
       real(wp), allocatable :: mode_density(:)
-      !> Total loss rates of the first subsystems, including the flow to others, 1/s: [at most n].
+      !> Minimum total loss rates, including the flow to others, 1/s; the last subsystems may have none: [at most n].
       real(wp), allocatable :: total(:)
-      !> Minimum rate of losses that go to no other subsystem, 1/s: [n].
+      !> Minimum rates of the losses that go to no other subsystem, 1/s: [n].
       real(wp), allocatable :: internal_loss(:)
       !> Rate at which energy flows from j to i, 1/s: [n, n].
       real(wp), allocatable :: rate(:, :)
@@ -24,9 +24,9 @@ contains
    pure function new_energy_flow(mode_density, total, internal_loss) result(flow)
       !> Modes per hertz, s: [n].
       real(wp), intent(in) :: mode_density(:)
-      !> Total loss rates of the first subsystems, 1/s: [at most n].
+      !> Minimum total loss rates, 1/s; the last subsystems may have none: [at most n].
       real(wp), intent(in) :: total(:)
-      !> Rates of the losses that go to no other subsystem, 1/s: [n].
+      !> Minimum rates of the losses that go to no other subsystem, 1/s: [n].
       real(wp), intent(in) :: internal_loss(:)
       type(energy_flow_type) :: flow
 

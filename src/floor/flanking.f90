@@ -72,8 +72,8 @@ contains
       end do
    end function get_walls
 
-   !> Vibration reduction index from floor to wall (ISO 12354-1 annex E): 8.7 + 5.7 M**2 dB for a rigid cross,
-   !> 5.7 + 5.7 M**2 dB for a rigid T, M being the decimal logarithm of the mass ratio, or the given index; at least
+   !> Vibration reduction index from floor to wall (ISO 12354-1 annex E): the given index, or 8.7 + 5.7 M**2 dB for a rigid
+   !> cross and 5.7 + 5.7 M**2 dB for a rigid T, M being the decimal logarithm of the mass ratio. The minimum is
    !> 10 lg(l l0 (1/S1 + 1/S2)), l0 = 1 m.
    pure function get_vibration_reduction(walls, floor, wall) result(index)
       type(walls_type), intent(in) :: walls

@@ -1,8 +1,8 @@
 !> The abstract floor: options from a namelist group, mobility at the source, and the plate that radiates into the room.
 !>
 !> A floor `<name>` is a type `<name>_floor_type` that extends this one, in the module `thud_<name>_floor` (a name that ends
-!> with `_floor` gets no second suffix). The list `floor_models` in src/CMakeLists.txt registers it. The namelist group of
-!> its options has its name. The descriptions of arguments in this file hold for every floor.
+!> with `_floor` gets no second suffix). The list `floor_models` in src/CMakeLists.txt registers it. Its options form the
+!> namelist group `&<name>`. The descriptions of arguments in this file hold for every floor.
 module thud_floor_model
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type
@@ -95,7 +95,7 @@ contains
    subroutine check(options, error)
       !> The options, each inside its own range.
       class(floor_model_type), intent(in) :: options
-      !> Set if they contradict each other; names group, key, value and allowed range.
+      !> Set if they contradict each other; the message names group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
 
    end subroutine check
@@ -109,7 +109,8 @@ contains
       !> Set if the floor has no such point.
       type(error_type), allocatable, intent(out) :: error
 
-      error = input_error('&floor: name: this floor has no points but that under the source; allowed: a rectangular one')
+      error = input_error('&floor: name: this floor has no point except the one under the source; allowed: a ' &
+         //'rectangular floor')
    end subroutine get_transfer
 
    !> The plate that radiates into the room below, and its conductance: the power into this plate per mean-square force,

@@ -31,7 +31,7 @@ contains
          'driving-point resistance: force divided by velocity', '[1, 1e15]')]
    end function get_fields
 
-   !> The mobility has a direct part only.
+   !> The mobility is constant: it has no poles.
    subroutine get_receiver(options, receiver, error)
       class(infinite_plate_floor_type), intent(in) :: options
       type(receiver_type), intent(out) :: receiver

@@ -1,5 +1,5 @@
-!> Energy that a force injects into a receiver in frequency bands, by the motion and by the mobility: both integrate
-!> 2 Re(F* V) over the band, with the recorded velocity V of the floor or with V = Y F.
+!> Energy that a force injects into a receiver in frequency bands, computed twice. Both results integrate 2 Re(F* V) over
+!> the band: by the motion with the recorded velocity V of the floor, by the mobility with V = Y F.
 !>
 !> Over a step of 1/(2 D), D being the duration of the force, the spectrum of the force is a polynomial of degree 15, to
 !> 2e-15. The mobility is a sum of poles. Poles near the step are integrated with the polynomial in closed form, by Legendre
@@ -166,7 +166,7 @@ contains
       real(wp), intent(in) :: middle, half
       !> By the motion and by the mobility, J: [2].
       real(wp) :: energy(2)
-      complex(wp), dimension(n_node) :: s, phase_factor, last, force, velocity, mobility
+      complex(wp), dimension(n_node) :: s, phase_factor, end_factor, force, velocity, mobility
       complex(wp), dimension(0:n_node - 1) :: by_force, by_square, second
       complex(wp) :: z, started
       integer :: k
@@ -175,9 +175,9 @@ contains
       phase_factor = exp(-s/record%sample_rate)
       associate (duration => (size(record%force) - 1)/record%sample_rate, &
                  record_time => (size(record%velocity) - 1)/record%sample_rate)
-         last = exp(-s*record_time)
+         end_factor = exp(-s*record_time)
          force = get_sums(record%force, phase_factor)/record%sample_rate
-         velocity = get_recorded_velocity(record, s, phase_factor, last)
+         velocity = get_recorded_velocity(record, s, phase_factor, end_factor)
          mobility = record%direct
          by_force = matmul(rule%coefficient, conjg(force))
          by_square = matmul(rule%coefficient, abs(force)**2)
@@ -187,9 +187,9 @@ contains
                z = (cmplx(pole%im, -pole%re, wp)/(2*pi) - middle)/half
                if (abs(z - 1) + abs(z + 1) > near) then
                   mobility = mobility + residue/(s - pole)
-                  velocity = velocity + record%end_of_record(k)*last/(s - pole)
+                  velocity = velocity + record%end_of_record(k)*end_factor/(s - pole)
                else
-                  ! Motion after the record: a free decay since the start of the record (a pole) minus its recorded part.
+                  ! Motion after the record: free decay extended back to the start of the record, minus its recorded part.
                   started = record%end_of_force(k)*exp(-pole*duration)
                   velocity = velocity - started*record_time*get_phi_1((pole - s)*record_time)
                   call get_second_legendre(z, second)
@@ -203,18 +203,18 @@ contains
    end function get_step_energies
 
    !> Transform of the velocity up to the end of the record, by the trapezoidal rule with end correction.
-   pure function get_recorded_velocity(record, s, phase_factor, last) result(velocity)
+   pure function get_recorded_velocity(record, s, phase_factor, end_factor) result(velocity)
       type(record_type), intent(in) :: record
       !> Frequencies i w, 1/s; exp(-s t) after one sample and after the record: [n_node].
-      complex(wp), intent(in) :: s(n_node), phase_factor(n_node), last(n_node)
+      complex(wp), intent(in) :: s(n_node), phase_factor(n_node), end_factor(n_node)
       !> The transform, m: [n_node].
       complex(wp) :: velocity(n_node)
       real(wp) :: acceleration
 
       acceleration = real(sum(record%pole*record%end_of_record), wp)
       associate (final => record%velocity(size(record%velocity)), rate => record%sample_rate)
-         velocity = (get_sums(record%velocity, phase_factor) - last*final/2)/rate &
-            - last*(acceleration - s*final)/(12*rate**2)
+         velocity = (get_sums(record%velocity, phase_factor) - end_factor*final/2)/rate &
+            - end_factor*(acceleration - s*final)/(12*rate**2)
       end associate
    end function get_recorded_velocity
 

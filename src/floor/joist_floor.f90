@@ -93,16 +93,18 @@ contains
    pure function get_smeared(options) result(plate)
       class(joist_floor_type), intent(in) :: options
       type(plate_type) :: plate
-      real(wp) :: across, along, torsion, upper, lower, eccentricity, below, mass
+      real(wp) :: across, along, torsion, sheathing_axial, joist_axial, eccentricity, joist_offset, mass
 
       across = get_sheathing_stiffness(options)
       associate (e => options%joist_modulus, b => options%joist_width, h => options%joist_height, &
          t => options%sheathing_thickness, a => options%spacing)
-         upper = options%connection*options%sheathing_modulus*t*a
-         lower = e*b*h
+         ! Axial stiffness, N, of the connected fraction of the sheathing and of a joist; distance of the joist's axis from
+         ! the neutral axis, m.
+         sheathing_axial = options%connection*options%sheathing_modulus*t*a
+         joist_axial = e*b*h
          eccentricity = (h + t)/2
-         below = upper*eccentricity/(upper + lower)
-         along = across + (e*b*h**3/12 + upper*(eccentricity - below)**2 + lower*below**2)/a
+         joist_offset = sheathing_axial*eccentricity/(sheathing_axial + joist_axial)
+         along = across + (e*b*h**3/12 + sheathing_axial*(eccentricity - joist_offset)**2 + joist_axial*joist_offset**2)/a
          torsion = across + shear_ratio*e*get_torsion_constant(b, h)/(2*a)
          mass = options%sheathing_density*t + options%joist_density*b*h/a
       end associate
@@ -197,7 +199,8 @@ contains
       corner = 1/(get_sheathing_resistance(options)*sqrt(2.0_wp)*get_local_compliance(options))
    end function get_local_corner
 
-   !> The smeared plate; its conductance is that of the infinite plate plus, for a source on it, that of the sheathing.
+   !> The smeared plate. Its conductance is that of the infinite plate, plus that of the sheathing if the source is between
+   !> two joists.
    subroutine get_radiator(options, frequency, plate, conductance, error)
       class(joist_floor_type), intent(in) :: options
       real(wp), intent(in) :: frequency(:)

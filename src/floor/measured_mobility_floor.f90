@@ -93,7 +93,7 @@ contains
          receiver%residue = cmplx(options%residue_real%values(:n), options%residue_imaginary%values(:n), wp)
          where (.not. receiver%pole%im > 0.0_wp) receiver%residue = real(receiver%residue, wp)
       end associate
-      ! The test needs a positive direct part; this one is below rounding.
+      ! The test needs a positive direct part: it is raised by less than rounding.
       regularization = rounding*(receiver%direct + sum(abs(receiver%residue/receiver%pole)))
       call find_violations(receiver%pole, receiver%residue, receiver%direct + regularization, omega, failed)
       if (failed) then

@@ -48,7 +48,7 @@ contains
          receiver%pole(i) = pole
          receiver%residue(i) = gain(i)*cmplx(1.0_wp, -pole%re/pole%im, wp)
       end do
-      ! Minus the direct part G, the quotient is -G (w s/sqrt(2) + w**2)/(s**2 + ...). Its doubled residue at the pole
+      ! Without its direct part G, the quotient is -G (w s/sqrt(2) + w**2)/(s**2 + ...). Its doubled residue at the pole
       ! w (i - 1)/sqrt(2) is -G w (1 - i)/sqrt(2).
       associate (compliance => residual(1), corner => residual(2))
          receiver%direct = sqrt(2.0_wp)*compliance*corner

@@ -11,9 +11,9 @@ module thud_oscillator_floor
 
    public :: oscillator_floor_type
 
-   !> Minimum half distance of the poles, divided by their mean: near critical damping they are set this far apart. The
-   !> mobility changes by the square of this; cancellation in the sum of both poles has an error of the same size.
-   real(wp), parameter :: apart = 6.0e-6_wp
+   !> Minimum distance of a pole from the mean of both, divided by this mean: near critical damping the poles are moved this
+   !> far. The mobility changes by the square of this; cancellation in the sum of both poles has an error of the same size.
+   real(wp), parameter :: min_separation = 6.0e-6_wp
 
    !> The floor; the default resonates at 25 Hz with a loss factor of 0.05.
    type, extends(floor_model_type) :: oscillator_floor_type
@@ -54,14 +54,14 @@ contains
       if (.not. (options%damping > 0.0_wp .or. options%stiffness > 0.0_wp)) then
          receiver%pole = [(0.0_wp, 0.0_wp)]
          receiver%residue = [cmplx(1/options%mass, kind=wp)]
-      else if (square > (apart*decay)**2) then
+      else if (square > (min_separation*decay)**2) then
          fast = -decay - sqrt(square)
          ! From the product of the poles, because their sum would cancel.
          slow = options%stiffness/(options%mass*fast)
          receiver%pole = cmplx([fast, slow], kind=wp)
          receiver%residue = cmplx([fast, -slow]/(options%mass*(fast - slow)), kind=wp)
       else
-         pole = cmplx(-decay, max(sqrt(max(-square, 0.0_wp)), apart*decay), wp)
+         pole = cmplx(-decay, max(sqrt(max(-square, 0.0_wp)), min_separation*decay), wp)
          receiver%pole = [pole]
          receiver%residue = [2*pole/(options%mass*cmplx(0.0_wp, 2*pole%im, wp))]
       end if

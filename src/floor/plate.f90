@@ -196,7 +196,7 @@ contains
       real(wp), intent(in) :: frequency
       !> The factor, at most 2.
       real(wp) :: sigma
-      real(wp), dimension(n_direction) :: along, across, slowness, critical
+      real(wp), dimension(n_direction) :: cos_squared, sin_squared, slowness, critical
       real(wp) :: mean, stretch
       integer :: i
 
@@ -205,11 +205,11 @@ contains
          sigma = get_radiation_factor(frequency, mean, plate%length, plate%width, air%sound_speed)
          return
       end if
-      along = [(cos((i - 0.5_wp)*pi/(2*n_direction))**2, i=1, n_direction)]
-      across = 1 - along
+      cos_squared = [(cos((i - 0.5_wp)*pi/(2*n_direction))**2, i=1, n_direction)]
+      sin_squared = 1 - cos_squared
       stretch = plate%stiffness_ratio**0.25_wp
-      slowness = 1/sqrt(along**2 + 2*plate%torsion_ratio*along*across + across**2)
-      critical = mean*(along*stretch + across/stretch)*slowness
+      slowness = 1/sqrt(cos_squared**2 + 2*plate%torsion_ratio*cos_squared*sin_squared + sin_squared**2)
+      critical = mean*(cos_squared*stretch + sin_squared/stretch)*slowness
       sigma = sum(slowness*get_radiation_factor(frequency, critical, plate%length, plate%width, air%sound_speed)) &
          /sum(slowness)
    end function get_plate_radiation

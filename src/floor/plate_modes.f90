@@ -11,7 +11,7 @@ module thud_plate_modes
    implicit none (type, external)
    private
 
-   public :: check_mode_count, get_far_compliance, get_half_waves, get_modal_stiffness, get_shape, new_plate_receiver
+   public :: check_mode_count, get_unsummed_compliance, get_half_waves, get_modal_stiffness, get_shape, new_plate_receiver
 
    !> Modes up to this frequency are treated individually, Hz; higher modes add their static compliance. On average, this
    !> omits 0.3 (f/mode_limit)**3 of the mobility of the infinite plate at a frequency f: 0.4 % at 707 Hz.
@@ -35,7 +35,7 @@ contains
       !> Namelist group, for messages.
       character(len=*), intent(in) :: group
       type(plate_type), intent(in) :: plate
-      !> Set if there are too many; names length and width.
+      !> Set if there are too many; the message names length and width.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: count
 
@@ -163,7 +163,7 @@ contains
       residual_terms = [sum(gain/omega**2, mask=.not. individual), residual_corner]
       ! The modes that are not summed cancel on average, except at the source.
       if (.not. present(max_across) .and. all(abs(source - point) < epsilon(1.0_wp))) then
-         residual_terms(1) = residual_terms(1) + get_far_compliance(plate)
+         residual_terms(1) = residual_terms(1) + get_unsummed_compliance(plate)
       end if
       if (present(residual)) residual_terms = residual
       associate (omega => pack(omega, individual))
@@ -173,12 +173,12 @@ contains
    end subroutine new_plate_receiver
 
    !> Static compliance of the modes above the summed ones, averaged over positions.
-   elemental function get_far_compliance(plate) result(compliance)
+   elemental function get_unsummed_compliance(plate) result(compliance)
       type(plate_type), intent(in) :: plate
       !> The compliance, m/N.
       real(wp) :: compliance
 
       compliance = 2/(pi*get_resistance(plate)*2*pi*mode_limit*sum_limit_factor)
-   end function get_far_compliance
+   end function get_unsummed_compliance
 
 end module thud_plate_modes

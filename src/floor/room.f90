@@ -113,7 +113,7 @@ contains
    !> Checks the number of reverberation times.
    subroutine check_room(room, error)
       type(room_type), intent(in) :: room
-      !> Set if it is neither 0 nor that of the bands.
+      !> Set if it is neither 0 nor the number of bands.
       type(error_type), allocatable, intent(out) :: error
       type(band_type), allocatable :: bands(:)
 
@@ -138,8 +138,8 @@ contains
          error = input_error('&room: wall_lengths are '//to_text(walls)//' m together, longer than the edges of the ' &
             //'floor; allowed: up to '//to_text(2*(plate%length + plate%width))//' m')
       else if (room%ceiling%mass > 0.0_wp .and. room%ceiling%depth > height) then
-         error = input_error('&room: ceiling_depth = '//to_text(room%ceiling%depth)//' m is more than volume over area of ' &
-            //'the floor; allowed: up to '//to_text(height)//' m')
+         error = input_error('&room: ceiling_depth = '//to_text(room%ceiling%depth)//' m is more than the volume ' &
+            //'divided by the area of the floor; allowed: up to '//to_text(height)//' m')
       end if
    end subroutine check_below
 

@@ -24,7 +24,8 @@ module thud_transient_energy
 
 contains
 
-   !> Maximum of the Fast detector's response y to a weighted sum of energies: dE/dt = -A E, y' = 8/s (w.E - y), y(0) = 0.
+   !> Maximum of the Fast detector's response y to a weighted sum of energies: dE/dt = -A E,
+   !> y' = fast_rate (w.E - y), y(0) = 0.
    pure subroutine get_fast_maximum(loss, start, weight, maximum, time)
       !> A, 1/s; column j: total loss of subsystem j on the diagonal, minus its flows to the others elsewhere: [n, n].
       real(wp), intent(in) :: loss(:, :)
@@ -38,7 +39,7 @@ contains
       real(wp), dimension(size(start) + 1) :: state, next
       integer :: i
 
-      step = get_exponential(search_step*get_detector(loss, weight))
+      step = get_exponential(search_step*get_system_matrix(loss, weight))
       state = [start, 0.0_wp]
       maximum = 0.0_wp
       time = 0.0_wp
@@ -65,7 +66,7 @@ contains
       real(wp) :: step(size(start) + 1, size(start) + 1), state(size(start) + 1)
       integer :: i
 
-      step = get_exponential(interval*get_detector(loss, weight))
+      step = get_exponential(interval*get_system_matrix(loss, weight))
       state = [start, 0.0_wp]
       do i = 1, n_step
          state = matmul(step, state)
@@ -74,7 +75,7 @@ contains
    end function get_fast_history
 
    !> Matrix M of energies and detector: [E, y]' = M [E, y].
-   pure function get_detector(loss, weight) result(matrix)
+   pure function get_system_matrix(loss, weight) result(matrix)
       !> A: [n, n].
       real(wp), intent(in) :: loss(:, :)
       !> Weights: [n].
@@ -88,7 +89,7 @@ contains
          matrix(n + 1, :n) = fast_rate*weight
          matrix(n + 1, n + 1) = -fast_rate
       end associate
-   end function get_detector
+   end function get_system_matrix
 
    !> Slope of the response, divided by `fast_rate`: w.E - y.
    pure function get_rise(weight, state) result(rise)
@@ -114,7 +115,7 @@ contains
       real(wp) :: low, high, offset, rise, next_offset
       integer :: i
 
-      matrix = get_detector(loss, weight)
+      matrix = get_system_matrix(loss, weight)
       low = 0.0_wp
       high = search_step
       offset = search_step/2

@@ -11,8 +11,8 @@ module thud_force_history
    public :: check_samples, clear_flight, continue_to_zero, force_count, force_history_type, force_names, holds_impulse
    public :: max_residual, new_force_history
 
-   !> Residual of the balances of impulse and energy above which models that integrate or sum one equation of motion return
-   !> an error; at the default step the residual is below 1e-9.
+   !> Residual of the balances of impulse and energy above which all models except the finite elements return an error; it
+   !> is below 1e-9 at the default step.
    real(wp), parameter :: max_residual = 1.0e-6_wp
 
    !> Fraction of the impulse that samples may miss; with eight samples in a contact they miss up to 0.006.
@@ -29,7 +29,7 @@ module thud_force_history
 
    !> Force of one impact, and numbers that describe it.
    type :: force_history_type
-      !> Samples per second, Hz; sample i belongs to the time (i - 1)/sample_rate after first touch.
+      !> Samples per second, Hz; sample i belongs to the time (i - 1)/sample_rate in the record.
       real(wp) :: sample_rate = 0.0_wp
       !> Deflection of the source, m: [n_sample].
       real(wp), allocatable :: deflection(:)
@@ -65,7 +65,7 @@ module thud_force_history
       real(wp) :: touch_time = 0.0_wp
       !> Time from first touch to release, s.
       real(wp) :: contact_time = 0.0_wp
-      !> Contact time between steps, if `contact_time` is a number of whole steps, s; 0 if `contact_time` is exact.
+      !> Contact time resolved between steps, s, if `contact_time` is a whole number of steps; 0 if `contact_time` is exact.
       real(wp) :: exact_contact_time = 0.0_wp
       !> Maximum force on the floor, N; low-passed if the model has spikes that no force plate records.
       real(wp) :: peak_force = 0.0_wp
@@ -87,7 +87,7 @@ contains
 
    !> Whether samples represent the impulse of a force.
    elemental function holds_impulse(sampled, impulse) result(yes)
-      !> Sum of the samples over their rate, and time integral of the force, N s.
+      !> Sum of the samples divided by the sampling rate, and time integral of the force, N s.
       real(wp), intent(in) :: sampled, impulse
       logical :: yes
 
@@ -98,7 +98,7 @@ contains
    subroutine check_samples(history, error)
       !> The history, complete.
       type(force_history_type), intent(in) :: history
-      !> Set if the impulses differ; names both.
+      !> Set if the impulses differ; the message states both.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: sampled
 

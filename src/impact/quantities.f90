@@ -26,12 +26,16 @@ module thud_quantities
       integer :: decimals = 3
       !> Meaning.
       character(len=72) :: meaning = ''
-      !> Results with this quantity: `of_sample`, `of_impact` or `of_others`.
+      !> Which results have this quantity: `of_sample`, `of_impact` or `of_others`.
       integer :: results = 0
    end type quantity_type
 
-   !> Results with the quantity: every sample of a sweep and every impact, every impact, or another result.
-   integer, parameter :: of_sample = 1, of_impact = 2, of_others = 3
+   !> Every impact, including the samples of a sweep.
+   integer, parameter :: of_sample = 1
+   !> Every impact, but not the samples of a sweep.
+   integer, parameter :: of_impact = 2
+   !> Other results only.
+   integer, parameter :: of_others = 3
 
    !> The quantities: first those of samples, then those of impacts, in the order of `get_quantities`, then all others.
    type(quantity_type), parameter :: quantities(*) = [ &
@@ -55,7 +59,7 @@ module thud_quantities
       'relative residual of the momentum balance', of_impact), &
       quantity_type('energy_residual', 'energy residual', '', '', '', 1.0_wp, 6, &
       'relative residual of the energy balance', of_impact), &
-      quantity_type('peak_count', 'peaks of the force', '', '', '', 1.0_wp, 0, &
+      quantity_type('peak_count', 'number of force peaks', '', '', '', 1.0_wp, 0, &
       'number of peaks of the assessed force', of_others), &
       quantity_type('mass', 'mass', 'M', 'kg', 'kg', 1.0_wp, 3, 'mass of the source', of_others), &
       quantity_type('drop_height', 'drop height', 'h', 'm', 'm', 1.0_wp, 3, 'drop height', of_others), &
@@ -70,8 +74,9 @@ module thud_quantities
       quantity_type('standardized_rating', 'standardized level', "L'_{iA,Fmax,V,T}", 'dB', 'dB', 1.0_wp, 1, &
       'A-weighted maximum Fast level, standardized, re 20 uPa', of_others)]
 
-   !> Numbers of quantities of every sample, and of every impact.
+   !> Number of quantities of a sample of a sweep.
    integer, parameter :: sample_quantity_count = count(quantities%results == of_sample)
+   !> Number of quantities of an impact, which has those of a sample too.
    integer, parameter :: history_quantity_count = count(quantities%results <= of_impact)
 
 contains

@@ -18,7 +18,7 @@ module thud_sampling
    !> Maximum number of integration steps of a record; more would run for minutes.
    real(wp), parameter :: max_steps = 1.0e8_wp
 
-   !> Relative rounding error of a number of samples: of duration and rate, which are decimal numbers, and of products.
+   !> Relative rounding error of a number of samples: of the decimal numbers duration and rate, and of their product.
    real(wp), parameter :: rounding = 4*epsilon(1.0_wp)
 
    !> Minimum number of samples of a contact: fewer show only a few spikes.
@@ -54,7 +54,7 @@ contains
    subroutine check_sampling(sampling, error)
       !> The sampling, each value inside its own range.
       type(sampling_type), intent(in) :: sampling
-      !> Set if there are too many; names the keys, their product and the allowed range.
+      !> Set if there are too many; the message names the keys, their product and the allowed range.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: samples
 
@@ -75,7 +75,7 @@ contains
       type(sampling_type), intent(in) :: sampling
       !> Contact time, s.
       real(wp), intent(in) :: contact_time
-      !> Set if there are too few; names the required rate.
+      !> Set if there are too few; the message names the required rate.
       type(error_type), allocatable, intent(out) :: error
 
       if (contact_time*sampling%sample_rate >= min_contact_samples) return

@@ -1,8 +1,8 @@
 !> The abstract source model: options from namelist groups, and the force of one drop.
 !>
 !> A model is a type `<name>_type` that extends this one, in the module `thud_<name>`; the list of names in
-!> src/CMakeLists.txt registers it. The namelist group of its options has its name unless stated otherwise. The descriptions
-!> of arguments in this file hold for every model.
+!> src/CMakeLists.txt registers it. Its options form the namelist group `&<name>` unless stated otherwise. The
+!> descriptions of arguments in this file hold for every model.
 module thud_source_model
    use thud_ball, only: ball_type
    use thud_drop, only: drop_type
@@ -18,7 +18,7 @@ module thud_source_model
 
    public :: source_model_type
 
-   !> Typical duration that is computed for a drop on a rigid floor, s.
+   !> Typical simulated duration of a drop on a rigid floor, s, for estimates of the computing time.
    real(wp), parameter, public :: typical_contact = 0.025_wp
 
    !> A source model with its options as components.
@@ -73,7 +73,7 @@ contains
       !> The options, each inside its own range.
       class(source_model_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> Set if they do not fit; names group, key, value and allowed range.
+      !> Set if they do not fit; the message names group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
 
    end subroutine check
@@ -116,7 +116,7 @@ contains
       modulus = 0.0_wp
    end function get_paper_modulus
 
-   !> Validity limits of the model for a result; by default that of neglected gravity.
+   !> Validity limits of the model for a result; by default only the limit for neglecting gravity during the contact.
    function get_validity_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop

@@ -47,7 +47,7 @@ module thud_band
    !> Nominal mid frequencies in a decade, the series R10 of ISO 3.
    real(wp), parameter :: rounded(*) = [1.0_wp, 1.25_wp, 1.6_wp, 2.0_wp, 2.5_wp, 3.15_wp, 4.0_wp, 5.0_wp, 6.3_wp, 8.0_wp]
 
-   !> Indices of a set and of a band in the table below.
+   !> Index of a set; distance of a band from 1 kHz in tenths of a decade.
    integer :: i, k
 
    !> Bands of all sets, with mid frequencies 1000 * 10^(k/10) Hz.

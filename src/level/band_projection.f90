@@ -7,8 +7,8 @@
 !> is projected on the sequences once for all bands; the spectrum of the projection at Gauss-Legendre nodes gives the
 !> energies. The sequences are symmetric or antisymmetric, so records are folded first, which halves the work.
 !>
-!> The omitted sequences change the square root of a band's energy by at most sqrt(dropped) times the norm of the record, see
-!> `dropped`; the quadrature errs by less than `quadrature_error`.
+!> The omitted sequences change the square root of a band's energy by at most sqrt(max_dropped) times the norm of the record;
+!> the quadrature errs by less than `quadrature_error`.
 module thud_band_projection
    use thud_band, only: band_type
    use thud_constants, only: pi
@@ -18,17 +18,17 @@ module thud_band_projection
    implicit none (type, external)
    private
 
-   public :: band_projection_type, get_band_energies, get_class_window, get_window_class, is_projected, &
+   public :: band_projection_type, get_band_energies, get_window_length, get_window_index, is_projected, &
       new_band_projection
 
    !> The last sequences are omitted if their energy in all bands together is below this fraction of the maximum energy of a
    !> sequence.
-   real(wp), parameter :: dropped = 1.0e-22_wp
+   real(wp), parameter :: max_dropped = 1.0e-22_wp
 
    !> Error of a quadrature over a band, relative to the maximum of its integrand.
    real(wp), parameter :: quadrature_error = 1.0e-17_wp
 
-   !> Number of sequences computed in addition to 2 W T. This is enough: `dropped` is reached after 12 to 20 of them.
+   !> Number of sequences computed in addition to 2 W T. This is enough: `max_dropped` is reached after 12 to 20 of them.
    integer, parameter :: margin = 32
 
    !> Maximum product of the number of samples and the squared number of sequences, which takes some two seconds. More
@@ -60,8 +60,8 @@ module thud_band_projection
 
 contains
 
-   !> Index of the shortest window that holds the samples, from 1.
-   elemental function get_window_class(n_sample) result(window)
+   !> Class of a record: index, from 1, of the shortest window that holds its samples.
+   elemental function get_window_index(n_sample) result(window)
       !> Samples of the record.
       integer, intent(in) :: n_sample
       integer :: window
@@ -70,18 +70,18 @@ contains
       if (n_sample <= shortest_window) return
       window = floor(windows_per_octave*log(real(n_sample, wp)/shortest_window)/log(2.0_wp)) + 1
       ! Lengths are rounded: the next window may be the right one.
-      if (get_class_window(window) < n_sample) window = window + 1
-   end function get_window_class
+      if (get_window_length(window) < n_sample) window = window + 1
+   end function get_window_index
 
-   !> Length of a window.
-   elemental function get_class_window(window) result(n_sample)
+   !> Length of the window of a class.
+   elemental function get_window_length(window) result(n_sample)
       !> Index of the window, from 1.
       integer, intent(in) :: window
       !> Samples, even.
       integer :: n_sample
 
       n_sample = 2*nint(shortest_window/2*2.0_wp**(real(window - 1, wp)/windows_per_octave))
-   end function get_class_window
+   end function get_window_length
 
    !> Whether to project records of this length: the matrices must be computed quickly.
    pure function is_projected(n_sample, sample_rate, bands) result(projected)
@@ -238,7 +238,7 @@ contains
       integer :: count
 
       energy = sum(spectra**2, dim=2)
-      count = findloc(energy > dropped*maxval(energy), .true., dim=1, back=.true.)
+      count = findloc(energy > max_dropped*maxval(energy), .true., dim=1, back=.true.)
       sequences = sequences(:, :count)
       spectra = spectra(:count, :)
    end subroutine drop_sequences

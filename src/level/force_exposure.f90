@@ -104,14 +104,14 @@ contains
       else if (size(force) == 0 .or. size(force) > max_samples) then
          error = input_error('the force has '//to_text(size(force))//' samples; allowed: 1 to '//to_text(max_samples))
       else if (total > 2*min_energy .and. total < huge(1.0_wp)/size(force)/sample_rate**2) then
-         continue  ! Every term of such a sum is finite and small enough.
+         continue  ! With such a sum, every sample is finite and small enough.
       else if (.not. all(ieee_is_finite(force))) then
          error = input_error('the force holds a value that is not finite, first at sample ' &
             //to_text(findloc(ieee_is_finite(force), .false., dim=1))//'; allowed: finite numbers')
       else if (.not. maxval(abs(force)) < sqrt(huge(1.0_wp)/real(size(force), wp))/sample_rate) then
          error = input_error('the force is too large for its energy to be computed; allowed: forces in N')
       else if (.not. sum(force**2) > min_energy) then
-         error = input_error('the force is zero throughout, or next to it, and has no level; allowed: a force that is not')
+         error = input_error('the force is zero or nearly zero throughout and has no level; allowed: a force with a level')
       end if
    end subroutine check_record
 

@@ -53,8 +53,10 @@ module thud_rating
    !> Allowed sum of the excesses over the curve, dB.
    real(wp), parameter :: max_excess = 8.0_wp
 
-   !> Differences to the background, dB: a level is corrected below the first; the correction is constant below the second.
-   real(wp), parameter :: clear_difference = 15.0_wp, min_difference = 6.0_wp
+   !> Difference to the background below which a level is corrected, dB.
+   real(wp), parameter :: clear_difference = 15.0_wp
+   !> Difference to the background below which the correction is constant, dB.
+   real(wp), parameter :: min_difference = 6.0_wp
 
 contains
 
@@ -130,8 +132,8 @@ contains
 
    !> Standardized level minus measured level: 10 lg(V/V0) - 10 lg(g(C)/g(C0)) (ISO 16283-2).
    !>
-   !> g(C) is the maximum that the Fast detector shows of a decay with the reverberation time T, divided by that of a steady
-   !> sound: C**(-1/(C - 1)) with C = T/1.7275 s; the standard prints the same with more terms.
+   !> g(C) is the maximum of the Fast detector for a decay with the reverberation time T, divided by its value for a steady
+   !> sound with the initial energy: C**(-1/(C - 1)) with C = T/1.7275 s; the standard prints the same with more terms.
    elemental function get_standardization(reverberation_time, volume) result(difference)
       !> Reverberation time, s; volume, m3.
       real(wp), intent(in) :: reverberation_time, volume

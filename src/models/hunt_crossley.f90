@@ -112,7 +112,7 @@ contains
       real(wp), intent(in) :: state(:)
       !> k d^n and k d^n * 3/2 alpha d', N: [2].
       real(wp), intent(out) :: components(:)
-      !> Sum of the components, the whole force: there is no flux of momentum, N.
+      !> The whole force including damping, as there is no flux of momentum to leave out, N.
       real(wp), intent(out) :: elastic_force
       real(wp) :: force(3)
 

@@ -21,7 +21,7 @@ module thud_measured_modes
 
    public :: measured_modes_type
 
-   !> Relative error of the sum of effective masses that printed digits explain.
+   !> Maximum relative error of the sum of effective masses: published values are rounded.
    real(wp), parameter :: mass_tolerance = 1.0e-3_wp
 
    !> Evaluations per shortest period in the search for the first zero of the force.

@@ -29,7 +29,7 @@ module thud_single_mass
          real(wp), intent(in) :: state(:)
          !> Components of the force on the floor, N: [n_component].
          real(wp), intent(out) :: components(:)
-         !> Elastic force, N.
+         !> Force without the flux of momentum, N.
          real(wp), intent(out) :: elastic_force
       end subroutine get_components_interface
    end interface

@@ -23,8 +23,8 @@ module thud_two_mass
    public :: two_mass_type
 
    !> Indices in the state: displacement since first touch (m) and velocity (m/s) of belt and rim towards the floor, relative
-   !> to a mobile one; impulse on the floor (N s); energy lost (J); gap between belt and floor (m), which falls to zero at
-   !> touch.
+   !> to the floor if it is mobile; impulse on the floor (N s); energy lost (J); gap between belt and floor (m), which falls
+   !> to zero at touch.
    integer, parameter :: at_belt = 1, at_belt_velocity = 2, at_rim = 3, at_rim_velocity = 4, at_impulse = 5, at_loss = 6, &
       at_gap = 7, n_state = 7
 
@@ -144,7 +144,7 @@ contains
       if (allocated(error)) return
       call solve_lumped(tyre, drop, sampling, [character(len=14) :: 'pressure_force', 'carcass_force', 'damping_force'], &
          history, error, receiver, n_step, [character(len=19) :: 'belt_displacement_m', 'rim_displacement_m'])
-      ! Without flux of momentum the elastic force is the whole force.
+      ! There is no flux of momentum: the "elastic" force is the whole force, including damping.
       history%peak_elastic_force = history%peak_force
    end subroutine solve
 

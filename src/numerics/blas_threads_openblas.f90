@@ -8,7 +8,7 @@ module thud_blas_threads
    public :: restore_blas_threads, use_one_blas_thread
 
    !> Number of callers that use one thread now.
-   integer :: n_work = 0
+   integer :: n_caller = 0
    !> Number of threads before the first of them.
    integer(c_int) :: count_before = 1_c_int
 
@@ -31,19 +31,19 @@ contains
    !> Limits OpenBLAS to the calling thread, in the whole process, until `restore_blas_threads`.
    subroutine use_one_blas_thread()
       !$omp critical (blas_threads)
-      if (n_work == 0) then
+      if (n_caller == 0) then
          count_before = openblas_get_num_threads()
          call openblas_set_num_threads(1_c_int)
       end if
-      n_work = n_work + 1
+      n_caller = n_caller + 1
       !$omp end critical (blas_threads)
    end subroutine use_one_blas_thread
 
    !> Ends `use_one_blas_thread`; after the last caller, the process has its former number of threads.
    subroutine restore_blas_threads()
       !$omp critical (blas_threads)
-      n_work = n_work - 1
-      if (n_work == 0) call openblas_set_num_threads(count_before)
+      n_caller = n_caller - 1
+      if (n_caller == 0) call openblas_set_num_threads(count_before)
       !$omp end critical (blas_threads)
    end subroutine restore_blas_threads
 

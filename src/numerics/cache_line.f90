@@ -13,7 +13,7 @@ module thud_cache_line
 
 contains
 
-   !> First element of a buffer at the beginning of a cache line; up to `line_length` elements are skipped.
+   !> Index of the first element of a buffer that lies at the beginning of a cache line, at most `line_length`.
    function get_aligned_start(buffer) result(first)
       !> The beginning of the buffer: [line_length].
       real(wp), intent(in), target :: buffer(line_length)

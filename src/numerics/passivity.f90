@@ -78,7 +78,7 @@ contains
       real(wp), intent(inout) :: direct
       !> True if LAPACK finds no eigenvalues, violations remain, or an interrupt came.
       logical, intent(out) :: failed
-      real(wp), allocatable :: normal(:, :), omega(:), held(:), x(:), length(:)
+      real(wp), allocatable :: normal(:, :), omega(:), constrained(:), x(:), length(:)
       complex(wp), allocatable :: basis(:, :)
       real(wp) :: minimum
       integer :: i, n
@@ -95,14 +95,14 @@ contains
          normal(i, i) = normal(i, i) + ridge
       end do
       minimum = margin*sum(abs([(get_response(pole, residue, direct, frequency(i)), i=1, size(frequency))]))/size(frequency)
-      allocate (held(0))
+      allocate (constrained(0))
       do i = 1, n_round
          direct = max(direct, minimum)
          call find_violations(pole, residue, direct, omega, failed)
          failed = failed .or. is_interrupted()
          if (failed .or. size(omega) == 0) return
-         held = [held, omega]
-         x = get_correction(pole, residue, direct, held, normal, length, minimum)
+         constrained = [constrained, omega]
+         x = get_correction(pole, residue, direct, constrained, normal, length, minimum)
          residue = residue + get_residues(pole, x(:n - 1))
          direct = direct + x(n)
       end do
@@ -123,9 +123,9 @@ contains
       complex(wp), intent(in) :: pole(:), residue(:)
       !> Constant part.
       real(wp), intent(in) :: direct
-      !> The angular frequencies, rad/s: [n_held].
+      !> The angular frequencies, rad/s: [n_constrained].
       real(wp), intent(in) :: omega(:)
-      !> N for coefficients multiplied by the lengths: [n_x, n_x]; the lengths: [n_x].
+      !> N for basis functions scaled to unit length: [n_x, n_x]; their weighted lengths before scaling: [n_x].
       real(wp), intent(in) :: normal(:, :), length(:)
       !> Minimum of the real part.
       real(wp), intent(in) :: minimum
@@ -154,7 +154,7 @@ contains
    !> Multipliers of constraints, none of them negative, that raise every constraint by at least its deficit, and by exactly
    !> that if its multiplier is positive: Hildreth's method.
    subroutine solve_dual(gram, deficit, multiplier, n_sweep)
-      !> Change of each constraint by the unit multiplier of each, symmetric: [n, n].
+      !> gram(i, j): change of constraint i by a unit multiplier of constraint j; symmetric: [n, n].
       real(wp), intent(in), contiguous :: gram(:, :)
       !> Deficits of the constraints: [n].
       real(wp), intent(in) :: deficit(:)

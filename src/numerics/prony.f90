@@ -15,10 +15,10 @@ module thud_prony
    !> Band in which a series fits a fractional law, Hz.
    real(wp), parameter, public :: series_from = 5.0_wp, series_to = 3000.0_wp
 
-   !> Number of branches for a fractional law. With a spring and a viscosity for all times beyond, they keep the complex
-   !> modulus within 0.8 % for any order (4 branches: 2.2 %, 6: 0.5 %).
+   !> Number of branches for a fractional law. With a spring for longer relaxation times and a viscosity for shorter ones,
+   !> they keep the complex modulus within 0.8 % for any order (4 branches: 2.2 %, 6: 0.5 %).
    integer, parameter :: n_fractional = 5
-   !> Factor by which the outer branches lie outside the band: the nearest spacing that spreads the error evenly.
+   !> Factor by which the outer branches lie outside the band: the closest spacing that spreads the error evenly.
    real(wp), parameter :: outside = 1.26_wp
 
    !> Band in which the loss factor is constant, Hz.
@@ -80,9 +80,10 @@ contains
       do i = 1, n_frequency
          omega = 2*pi*lowest*(highest/lowest)**((i - 1)/real(n_frequency - 1, wp))
          omega_tau = omega*time
-         ! Division by the storage modulus at constant loss factor gives all equations the same weight.
          matrix(i, :) = (omega_tau - loss_factor*omega_tau**2)/(1 + omega_tau**2)
          right(i) = loss_factor
+         ! Divided by the storage modulus of a constant loss factor, proportional to omega**(2/pi atan(loss_factor)), all
+         ! equations have the same weight.
          matrix(i, :) = matrix(i, :)*omega**(-2/pi*atan(loss_factor))
          right(i) = right(i)*omega**(-2/pi*atan(loss_factor))
       end do
@@ -113,8 +114,8 @@ contains
 
    !> Series of a fractional law from 5 to 3000 Hz: a spring, branches and a viscosity in parallel.
    !>
-   !> Least squares of the complex power law over logarithmically spaced frequencies, relative to its magnitude. The spring
-   !> of the law only reduces the relative error of the whole.
+   !> Least squares of the complex power law over logarithmically spaced frequencies, relative to its magnitude. The fit
+   !> omits the spring of the law, which only reduces the relative error of the sum.
    subroutine fit_fractional_loss(law, relative_modulus, time, viscosity)
       type(fractional_loss_type), intent(in) :: law
       !> Relative moduli of the branches: [n_branch].
@@ -126,18 +127,18 @@ contains
       integer, parameter :: n_term = n_fractional + 2
       real(wp), parameter :: rounding = 1.0e-12_wp
       real(wp), parameter :: span = series_to/series_from*outside**2
-      real(wp) :: omega, last, spring
+      real(wp) :: omega, omega_max, spring
       complex(wp) :: power
       complex(wp) :: term(n_term)
       real(wp) :: matrix(2*n_frequency, n_term), right(2*n_frequency), work(64*n_term)
       integer :: i, info
 
       allocate (time, source=[(outside/(2*pi*series_from*span**((i - 1)/real(n_fractional - 1, wp))), i=1, n_fractional)])
-      last = 2*pi*series_to
+      omega_max = 2*pi*series_to
       do i = 1, n_frequency
          omega = 2*pi*series_from*(series_to/series_from)**((i - 1)/real(n_frequency - 1, wp))
-         term = [cmplx(1.0_wp, 0.0_wp, wp), 1 - 1/cmplx(1.0_wp, omega*time, wp), cmplx(0.0_wp, omega/last, wp)]
-         term = term*(last/omega)**law%order
+         term = [cmplx(1.0_wp, 0.0_wp, wp), 1 - 1/cmplx(1.0_wp, omega*time, wp), cmplx(0.0_wp, omega/omega_max, wp)]
+         term = term*(omega_max/omega)**law%order
          power = exp(cmplx(0.0_wp, pi/2*law%order, wp))
          matrix(i, :) = real(term)
          matrix(n_frequency + i, :) = aimag(term)
@@ -146,12 +147,12 @@ contains
       end do
       ! The columns are independent, and the moduli are positive for any order (see the tests).
       call dgels('N', size(right), n_term, 1, matrix, size(right), right, size(right), work, size(work), info)
-      right = max(right, 0.0_wp)*law%springpot*(last/law%omega)**law%order
+      right = max(right, 0.0_wp)*law%springpot*(omega_max/law%omega)**law%order
       spring = law%spring + right(1)
       ! The spring-pot of order 1 is a viscosity: its branches are rounding errors.
       time = pack(time, right(2:n_term - 1) > rounding*sum(right(:n_term)))
       relative_modulus = pack(right(2:n_term - 1), right(2:n_term - 1) > rounding*sum(right(:n_term)))/spring
-      viscosity = right(n_term)/(last*spring)
+      viscosity = right(n_term)/(omega_max*spring)
    end subroutine fit_fractional_loss
 
 end module thud_prony

@@ -11,13 +11,13 @@ module thud_transform
 
    include 'fftw3.f03'
 
-   !> Number of lengths whose plans are kept; more only if more threads use plans at the same time.
+   !> Number of lengths whose plans are kept, or more if more lengths are in use at the same time.
    integer, parameter :: kept_count = 16
 
    !> Maximum length of a transform whose plans are kept: longer plans take much memory.
    integer, parameter :: max_kept_length = 2**18
 
-   !> Plans for one length. They fit all arrays that the compiler allocates: FFTW needs alignment to 16 bytes.
+   !> Plans for one length. They fit all allocated arrays, because these are aligned to 16 bytes, as FFTW needs.
    type :: plans_type
       !> Number of samples; 0 means no plans.
       integer :: length = 0

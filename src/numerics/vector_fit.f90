@@ -89,9 +89,9 @@ contains
       pole = pole*scale
    end subroutine fit_rational
 
-   !> Lightly damped poles across the band; frequencies are divided by the last one.
+   !> Lightly damped poles across the band; all frequencies are divided by the highest frequency of the data.
    pure function get_first_poles(lowest, order, logarithmic) result(pole)
-      !> The first frequency.
+      !> Lowest frequency of the data.
       real(wp), intent(in) :: lowest
       integer, intent(in) :: order
       !> True for even spacing of the logarithm.
@@ -133,8 +133,8 @@ contains
       call get_basis(pole, s, basis)
       allocate (matrix(2*n_frequency + 1, 2*n + 2), right(2*n_frequency + 1), zero(n))
       do j = 1, n + 1
-         matrix(:2*n_frequency, j) = halves(weight*basis(:, j))
-         matrix(:2*n_frequency, n + 1 + j) = halves(-weight*response*basis(:, j))
+         matrix(:2*n_frequency, j) = real_and_imaginary(weight*basis(:, j))
+         matrix(:2*n_frequency, n + 1 + j) = real_and_imaginary(-weight*response*basis(:, j))
       end do
       norm = norm2(weight*abs(response))
       matrix(2*n_frequency + 1, :n + 1) = 0.0_wp
@@ -176,9 +176,9 @@ contains
       call get_basis(pole, s, basis)
       allocate (matrix(2*size(s), size(basis, 2)))
       do j = 1, size(basis, 2)
-         matrix(:, j) = halves(weight*basis(:, j))
+         matrix(:, j) = real_and_imaginary(weight*basis(:, j))
       end do
-      allocate (right, source=halves(weight*response))
+      allocate (right, source=real_and_imaginary(weight*response))
       call solve_least_squares(matrix, right, failed)
       coefficient = right(:size(basis, 2))
       misfit = norm2(weight*abs(matmul(basis, coefficient) - response))/norm2(weight*abs(response))
@@ -207,12 +207,12 @@ contains
    end subroutine solve_least_squares
 
    !> Real parts, then imaginary parts: [2 n].
-   pure function halves(values) result(parts)
+   pure function real_and_imaginary(values) result(parts)
       !> Complex values: [n].
       complex(wp), intent(in) :: values(:)
       real(wp) :: parts(2*size(values))
 
       parts = [real(values), aimag(values)]
-   end function halves
+   end function real_and_imaginary
 
 end module thud_vector_fit

@@ -1,4 +1,4 @@
-!> Samples of a case as samples of the shell model, which `thud_ensemble` computes in batches.
+!> Converts samples of a case into samples of the shell model, which `thud_ensemble` computes in batches.
 module thud_batch_samples
    use thud_case, only: case_type, get_active_fields, get_model_number
    use thud_column, only: column_type

@@ -5,7 +5,7 @@
 !> own column in arrays of fixed shape or, for levels of a long contact, from its own record.
 module thud_ensemble
    use thud_band, only: band_type, get_octaves, octave_count
-   use thud_band_projection, only: band_projection_type, get_band_energies, get_class_window, get_window_class, &
+   use thud_band_projection, only: band_projection_type, get_band_energies, get_window_length, get_window_index, &
       is_projected, new_band_projection
    use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
    use thud_cache_line, only: get_aligned_start, line_length
@@ -26,7 +26,8 @@ module thud_ensemble
 
    public :: are_alike, new_projections, projections_type, solve_ensemble
 
-   !> Matrices that give the levels, one per window length, computed when first needed.
+   !> Matrices that give the levels, one per window length, computed when first needed; `thud_band_projection` explains
+   !> windows and folding.
    type :: projections_type
       !> Samples per second, Hz.
       real(wp) :: sample_rate = 0.0_wp
@@ -38,9 +39,9 @@ module thud_ensemble
 
    !> Workspace of one thread.
    type :: workspace_type
-      !> Forces, N, with space for alignment: [2 block_size n_row + line_length].
+      !> Forces, N, with space for alignment: [2 block_size n_time + line_length].
       real(wp), allocatable :: force(:)
-      !> Folded forces, N: [2 block_size n_row].
+      !> Folded forces, N: [2 block_size n_time].
       real(wp), allocatable :: folded(:)
       !> Index of the last force sample that is not zero.
       integer :: n_written = 0
@@ -66,7 +67,7 @@ contains
       allocate (projections%bands(octave_count + size(bands)))
       projections%bands(:octave_count) = get_octaves()
       projections%bands(octave_count + 1:) = bands
-      allocate (projections%window(get_window_class(n_time)))
+      allocate (projections%window(get_window_index(n_time)))
    end function new_projections
 
    !> Whether two sets of matrices are interchangeable: same rate, bands and longest window.
@@ -132,7 +133,7 @@ contains
          type(workspace_type) :: workspace
          integer :: block
 
-         call set_workspace(workspace, sampling, limits, get_class_window(size(projections%window)))
+         call set_workspace(workspace, sampling, limits, get_window_length(size(projections%window)))
          !$omp do schedule(dynamic)
          do block = 1, size(first) - 1
             call check_interrupt(workspace%error)
@@ -174,19 +175,19 @@ contains
    end subroutine solve_ensemble
 
    !> Allocates a workspace. Its memory beyond the longest contact is never touched.
-   subroutine set_workspace(workspace, sampling, limits, n_row)
+   subroutine set_workspace(workspace, sampling, limits, n_time)
       !> The workspace, with `error` set if memory is lacking.
       type(workspace_type), intent(out) :: workspace
       !> The sampling, for the error message.
       type(sampling_type), intent(in) :: sampling
       type(source_limits_type), intent(in) :: limits
-      !> Number of samples of the longest window.
-      integer, intent(in) :: n_row
+      !> Length of the longest window.
+      integer, intent(in) :: n_time
       character(len=128) :: message
       integer :: status
 
-      allocate (workspace%force(force_count*block_size*n_row + line_length), stat=status, errmsg=message)
-      if (status == 0) allocate (workspace%folded(force_count*block_size*n_row), stat=status, errmsg=message)
+      allocate (workspace%force(force_count*block_size*n_time + line_length), stat=status, errmsg=message)
+      if (status == 0) allocate (workspace%folded(force_count*block_size*n_time), stat=status, errmsg=message)
       if (status /= 0) workspace%error = input_error('&sampling: duration = '//to_text(sampling%duration) &
          //' s at sample_rate = '//to_text(sampling%sample_rate)//' Hz gives the forces of '//to_text(block_size) &
          //' samples no space in memory; allowed: shorter records, or fewer threads')
@@ -209,7 +210,7 @@ contains
       !> The source conforms, by each force: [force_count, n_sample].
       logical, intent(out) :: met(:, :)
       real(wp), pointer, contiguous :: force(:, :)
-      integer :: class(size(samples))
+      integer :: window_index(size(samples))
       integer :: i, j, n_written, window
 
       force => get_force(workspace)
@@ -218,23 +219,23 @@ contains
       met = .false.
       workspace%n_written = n_written
       if (.not. with_levels) return
-      class = 0
+      window_index = 0
       do i = 1, size(samples)
          if (.not. outcomes(i)%computed) cycle
-         class(i) = get_window_class(min(int(outcomes(i)%contact_time*sampling%sample_rate) + 1, size(force, 2)))
+         window_index(i) = get_window_index(min(int(outcomes(i)%contact_time*sampling%sample_rate) + 1, size(force, 2)))
       end do
-      force(:, n_written + 1:get_class_window(max(1, maxval(class)))) = 0.0_wp
+      force(:, n_written + 1:get_window_length(max(1, maxval(window_index)))) = 0.0_wp
       ! Each sample has its own window, so that its levels do not depend on the other samples of the block.
-      do window = minval(class, mask=class > 0), maxval(class)
-         if (.not. any(class == window)) cycle
-         if (is_projected(get_class_window(window), projections%sample_rate, projections%bands)) then
-            call project(workspace, force, window, class == window, projections, levels)
+      do window = minval(window_index, mask=window_index > 0), maxval(window_index)
+         if (.not. any(window_index == window)) cycle
+         if (is_projected(get_window_length(window), projections%sample_rate, projections%bands)) then
+            call project(workspace, force, window, window_index == window, projections, levels)
          else
-            call get_single_levels(workspace, force, window, class == window, projections, levels)
+            call get_levels_one_by_one(workspace, force, window, window_index == window, projections, levels)
          end if
          if (allocated(workspace%error)) return
          do i = 1, size(samples)
-            if (class(i) /= window) cycle
+            if (window_index(i) /= window) cycle
             do j = 1, force_count
                met(j, i) = is_conforming(workspace%criteria, samples(i), outcomes(i), levels(:, j, i), &
                   force(:, :n_written), i + (j - 1)*block_size, sampling)
@@ -246,8 +247,9 @@ contains
    !> Levels of all samples with the same window, by matrix products.
    subroutine project(workspace, force, window, chosen, projections, levels)
       type(workspace_type), intent(inout) :: workspace
-      !> Forces, N: [force_count block_size, n_row].
+      !> Forces, N: [force_count block_size, n_time].
       real(wp), intent(in), contiguous :: force(:, :)
+      !> Index of the window.
       integer, intent(in) :: window
       !> The sample has this window: [n_sample].
       logical, intent(in) :: chosen(:)
@@ -270,8 +272,8 @@ contains
       end do
    end subroutine project
 
-   !> The levels of `project`, record by record as for single drops; fails only after an interrupt.
-   subroutine get_single_levels(workspace, force, window, chosen, projections, levels)
+   !> Computes the same levels as `project`, but one record at a time; fails only after an interrupt.
+   subroutine get_levels_one_by_one(workspace, force, window, chosen, projections, levels)
       type(workspace_type), intent(inout) :: workspace
       !> As in `project`.
       real(wp), intent(in) :: force(:, :)
@@ -284,17 +286,17 @@ contains
       do i = 1, size(chosen)
          if (.not. chosen(i)) cycle
          do j = 1, force_count
-            call get_force_exposure_levels(force(i + (j - 1)*block_size, :get_class_window(window)), &
+            call get_force_exposure_levels(force(i + (j - 1)*block_size, :get_window_length(window)), &
                projections%sample_rate, projections%bands, 'exact', levels(:, j, i), workspace%error)
             if (allocated(workspace%error)) return
          end do
       end do
-   end subroutine get_single_levels
+   end subroutine get_levels_one_by_one
 
    !> The forces of the block in a workspace, as an array.
    function get_force(workspace) result(force)
       type(workspace_type), intent(in), target :: workspace
-      !> Elastic forces, then forces on the floor, N: [force_count block_size, n_row].
+      !> Elastic forces, then forces on the floor, N: [force_count block_size, n_time].
       real(wp), pointer, contiguous :: force(:, :)
       integer :: first
 
@@ -306,6 +308,7 @@ contains
    !> Computes the matrices of a window unless they exist.
    subroutine require_window(projections, window, error)
       type(projections_type), intent(inout) :: projections
+      !> Index of the window.
       integer, intent(in) :: window
       !> Set if the matrices cannot be computed.
       type(error_type), allocatable, intent(inout) :: error
@@ -313,11 +316,11 @@ contains
 
       !$omp critical (thud_projections)
       failed = .false.
-      if (projections%window(window)%n_sample == 0) call new_band_projection(get_class_window(window), &
+      if (projections%window(window)%n_sample == 0) call new_band_projection(get_window_length(window), &
          projections%sample_rate, projections%bands, projections%window(window), failed)
       !$omp end critical (thud_projections)
       if (failed) error = numerical_error('&sampling: sample_rate: the matrices of the levels for ' &
-         //to_text(get_class_window(window))//' samples cannot be made; allowed: other rates')
+         //to_text(get_window_length(window))//' samples cannot be made; allowed: other rates')
    end subroutine require_window
 
    !> Whether a sample meets all criteria. Peaks are counted last, as this takes longer than all other criteria.

@@ -58,7 +58,7 @@ contains
       type(case_type), intent(in) :: case
       !> Number of bands of the levels.
       integer, intent(in) :: n_band
-      !> Levels have been computed; otherwise all values except the energy are NaN.
+      !> Levels have been computed; otherwise all values except `floor_work_J` are NaN.
       logical, intent(in) :: levels
       !> The drop on a rigid floor, used if `on_floor` is not allocated.
       type(impact_type), intent(in) :: impact

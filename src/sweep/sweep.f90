@@ -75,7 +75,8 @@ module thud_sweep
       real(wp), allocatable :: force(:, :, :)
    end type sweep_type
 
-   !> Results of an earlier call, for reuse; `acquire_sweep` moves them to one thread at a time.
+   !> Sweep of an earlier call, for reuse of its matrices and latest drop on a rigid floor; `acquire_sweep` moves it to one
+   !> thread at a time.
    type(sweep_type), allocatable :: kept
 
 contains
@@ -87,7 +88,7 @@ contains
       type(column_type), intent(in) :: columns(:)
       !> Levels and verdicts are wanted.
       logical, intent(in) :: levels
-      !> Results of an earlier call, reused if they fit, or an empty sweep.
+      !> A sweep of an earlier call, whose matrices are reused if they fit, or an empty sweep.
       type(sweep_type), intent(inout) :: sweep
       type(projections_type) :: wanted
 
@@ -101,9 +102,9 @@ contains
       if (.not. are_alike(wanted, sweep%projections)) sweep%projections = wanted
    end subroutine new_sweep
 
-   !> Takes the reusable results of an earlier call.
+   !> Takes the sweep of an earlier call.
    subroutine acquire_sweep(sweep)
-      !> Results of an earlier call, or an empty sweep.
+      !> The sweep, without results of samples; empty if there is none.
       type(sweep_type), allocatable, intent(out) :: sweep
 
       !$omp critical (thud_sweep)
@@ -112,9 +113,9 @@ contains
       if (.not. allocated(sweep)) allocate (sweep)
    end subroutine acquire_sweep
 
-   !> Stores the reusable results for a later call.
+   !> Deallocates the results of samples, and stores the sweep for a later call.
    subroutine release_sweep(sweep)
-      !> The results, not allocated afterwards.
+      !> The sweep, not allocated afterwards.
       type(sweep_type), allocatable, intent(inout) :: sweep
 
       call clear(sweep)
@@ -157,7 +158,7 @@ contains
       if (suits_batch(case, columns)) then
          call solve_batch(case, columns, values, threads, sweep, error)
          if (allocated(error)) return
-         ! The single solver repeats failed samples, for their error messages.
+         ! Failed samples are repeated one by one, for their error messages.
          remaining = pack(remaining, sweep%status /= 0)
       end if
       !$omp parallel num_threads(threads) if (size(remaining) > 1)
@@ -251,7 +252,7 @@ contains
       sweep%floor_value = not_a_number
    end subroutine set_size
 
-   !> Computes one sample by the single solver.
+   !> Computes one sample, not in a batch.
    subroutine solve_sample(case, fields, columns, values, sample, blocked, sweep)
       !> The case; the keys of the columns are overwritten.
       type(case_type), intent(inout), target :: case

@@ -10,11 +10,11 @@ module thud_memory
    public :: require_memory
 
    interface
-      function c_has_memory(bytes, behind) bind(c, name='thud_has_memory') result(yes)
+      function c_has_memory(bytes, check_available) bind(c, name='thud_has_memory') result(yes)
          import :: c_double, c_int
          implicit none (type, external)
          real(c_double), value :: bytes
-         integer(c_int), value :: behind
+         integer(c_int), value :: check_available
          integer(c_int) :: yes
       end function c_has_memory
    end interface
@@ -25,17 +25,19 @@ contains
    subroutine require_memory(bytes, purpose, allowed, error, mostly_unused)
       !> Memory needed at a time, bytes.
       real(wp), intent(in) :: bytes
-      !> What needs the memory, in the plural; what would need less.
-      character(len=*), intent(in) :: purpose, allowed
+      !> What needs the memory, in the plural.
+      character(len=*), intent(in) :: purpose
+      !> What would need less.
+      character(len=*), intent(in) :: allowed
       type(error_type), allocatable, intent(out) :: error
-      !> Little of the memory is written to, so that addresses are enough (default: false).
+      !> Little of the memory is written to: check only the address space (default: false).
       logical, intent(in), optional :: mostly_unused
-      integer(c_int) :: behind
+      integer(c_int) :: check_available
 
-      behind = 1
-      if (present(mostly_unused)) behind = merge(0, 1, mostly_unused)
-      if (c_has_memory(real(bytes, c_double), behind) == 0) error = numerical_error(purpose//' need '//fixed(bytes, 0) &
-         //' bytes of memory, more than there is; allowed: '//allowed)
+      check_available = 1
+      if (present(mostly_unused)) check_available = merge(0, 1, mostly_unused)
+      if (c_has_memory(real(bytes, c_double), check_available) == 0) error = numerical_error(purpose//' need ' &
+         //fixed(bytes, 0)//' bytes of memory, more than there is; allowed: '//allowed)
    end subroutine require_memory
 
 end module thud_memory

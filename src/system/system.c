@@ -21,6 +21,7 @@
 // Number of the signal that asks to end the work, 0 for none; long loops check it through the module thud_interrupt.
 volatile sig_atomic_t thud_latest_signal = 0;
 
+// Whether interrupts are deferred, and the message if they are not.
 static volatile sig_atomic_t deferred = 0;
 static const char *volatile interruption = "\nthud: interrupted; nothing was written\n";
 static const int ending_signals[] = {SIGINT, SIGTERM};
@@ -37,7 +38,7 @@ static void interrupt(int number)
       first = now.tv_sec;
       return;
    }
-   // Some callers send a signal both to the process and to its group.
+   // Some callers send a signal both to the process and to its group: ignore the second.
    if (deferred && now.tv_sec <= first + 1) return;
 
    // On a terminal, begin a new line after ^C and a progress line.
@@ -70,9 +71,9 @@ void thud_end_process(int code)
    _exit(code);
 }
 
-// 1 if addresses for that many bytes are available and, if `behind` is set, also the memory behind them as far as the
-// system reports it.
-int thud_has_memory(double bytes, int behind)
+// 1 if there is address space for that many bytes and, if `check_available` is set, the system does not report that less
+// memory is available.
+int thud_has_memory(double bytes, int check_available)
 {
    size_t wanted = bytes < 1e18 ? (size_t)bytes : (size_t)1e18;
    void *block = mmap(NULL, wanted, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
@@ -82,7 +83,7 @@ int thud_has_memory(double bytes, int behind)
 
    if (block == MAP_FAILED) return 0;
    munmap(block, wanted);
-   if (!behind) return 1;
+   if (!check_available) return 1;
    // Linux promises more memory than it has, and ends a process that then writes to it.
    file = fopen("/proc/meminfo", "re");
    if (!file) return 1;
@@ -175,7 +176,7 @@ void thud_begin_call(void)
 }
 
 // Interrupts the running calls.
-void thud_end_calls(void)
+void thud_interrupt_calls(void)
 {
    if (running) thud_latest_signal = SIGINT;
 }
@@ -189,7 +190,7 @@ void thud_end_call(void)
 }
 
 // From now on an interrupt is deferred: it only stops `thud_write`.
-void thud_keep_interrupts(void)
+void thud_defer_interrupts(void)
 {
    deferred = 1;
 }
@@ -393,7 +394,7 @@ int thud_can_exchange(const char *path, const char *target)
    return rename(from, to) != 0 && errno != EXDEV;
 }
 
-// Exchanges two directories in one step; the first gets owner and permissions of the second.
+// Gives a directory the owner and permissions of another one, and exchanges the two in one step.
 int thud_exchange(const char *path, const char *target)
 {
    struct stat there;

@@ -8,9 +8,9 @@ module thud_system
    private
 
    public :: standard_error, standard_output
-   public :: add_to_checksum, begin_call, can_exchange, close_descriptor, create_file, directory_exists, end_call
-   public :: end_calls, end_process, exchange_directories, flush_directory, get_file_checksum, get_file_size, get_free_bytes
-   public :: get_system_message, is_closed, is_missing, is_regular_file, is_same_file, is_terminal, keep_interrupts
+   public :: add_to_checksum, begin_call, can_exchange, close_descriptor, create_file, defer_interrupts, directory_exists
+   public :: end_call, end_process, exchange_directories, flush_directory, get_file_checksum, get_file_size, get_free_bytes
+   public :: get_system_message, interrupt_calls, is_closed, is_missing, is_regular_file, is_same_file, is_terminal
    public :: link_file, list_directory, lock_directory, open_descriptor, open_end
    public :: pass_interrupts, prepare_process, read_bytes, remove_file, rename_file, resolve_path, write_text
 
@@ -74,14 +74,14 @@ module thud_system
    !> Turns signals of full and closed outputs into errors; SIGINT and SIGTERM then end the process with a message.
    procedure(plain_call), bind(c, name='thud_prepare_process') :: prepare_process
    !> From now on an interrupt does not end the process; it stops `write_text`.
-   procedure(plain_call), bind(c, name='thud_keep_interrupts') :: keep_interrupts
-   !> Marks a call as running: signals that the process handles also set `latest_signal`, and forks wait for the call.
-   !> Every call from Python that computes begins with it (not `collect`, `get_progress` and `end_calls`).
+   procedure(plain_call), bind(c, name='thud_defer_interrupts') :: defer_interrupts
+   !> Marks the beginning of a call of the library: until its end, SIGINT and SIGTERM also set `latest_signal` if the process
+   !> handles them, and forks wait. All calls from Python begin with it except `collect`, `get_progress` and `end_calls`.
    procedure(plain_call), bind(c, name='thud_begin_call') :: begin_call
    !> Marks the end of a call.
    procedure(plain_call), bind(c, name='thud_end_call') :: end_call
    !> Interrupts all running calls.
-   procedure(plain_call), bind(c, name='thud_end_calls') :: end_calls
+   procedure(plain_call), bind(c, name='thud_interrupt_calls') :: interrupt_calls
 
    interface
       !> Ends the process immediately; buffered output would be lost.
@@ -327,7 +327,7 @@ contains
             if (n == size(names)) names = [names, names]
             n = n + 1
             names(n) = name(:length)
-            ! A zero byte keeps a blank at the end of the name.
+            ! A zero byte keeps `trim` from removing a blank at the end of the name.
             if (name(length:length) == ' ') names(n)(min(length + 1, name_length):) = c_null_char
          end do
          if (c_closedir(directory) /= 0) n = 0
@@ -365,18 +365,18 @@ contains
    !> Whether `exchange_directories` may succeed.
    function can_exchange(path, other) result(yes)
       character(len=*), intent(in) :: path
-      !> Path of the other.
+      !> Path of the other directory.
       character(len=*), intent(in) :: other
-      !> True if the other is missing, or on the same mount and not the working directory.
+      !> True if the other directory is missing, or on the same mount and not the working directory.
       logical :: yes
 
       yes = c_can_exchange(path//c_null_char, other//c_null_char) == 1
    end function can_exchange
 
-   !> Exchanges two directories in one step; the first gets owner and permissions of the second.
+   !> Gives a directory the owner and permissions of another one, and exchanges the two in one step.
    subroutine exchange_directories(path, other, done)
       character(len=*), intent(in) :: path
-      !> Path of the other.
+      !> Path of the other directory.
       character(len=*), intent(in) :: other
       !> The directories have been exchanged.
       logical, intent(out) :: done
@@ -454,7 +454,7 @@ contains
    !> Whether two paths lead to the same file, perhaps by links.
    function is_same_file(path, other) result(yes)
       character(len=*), intent(in) :: path
-      !> Path of the other.
+      !> Path of the other file.
       character(len=*), intent(in) :: other
       logical :: yes
 

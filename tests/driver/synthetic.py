@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from thud.level.estimate import Estimate
-from thud.recordings.contact import Contact, uniform_edges
+from thud.recordings.contact import Contact, uniform_bounds
 from thud.recordings.measured_drop import Drop
 from thud.recordings.noise import Background, Noise
 
@@ -139,7 +139,7 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
     gate = (round(before * rate) - 4, round((before + 0.02) * rate) + 5)
     draws = np.array([[max(density or 2 * deviation**2 / rate, 1e-30), 0, 0, 0, 0]])
     # The offset of white noise, from all the quiet.
-    n_cell = len(uniform_edges(*gate, rate)) - 1
+    n_cell = len(uniform_bounds(*gate, rate)) - 1
     offset = np.full((n_cell, n_cell), draws[0, 0] / 2 * rate / quiet.sum())
     touch, release = Estimate(0, 0), Estimate(0.02, 0)
     force = half_sine(rate, before, len(time)) + noise
@@ -152,7 +152,7 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
         gate=gate,
         contact_time=release,
         restitution=Estimate.unknown(),
-        restitution_shared={},
+        shared_effects={},
         restitution_method="",
         restitutions={},
         peak_force=Estimate(1500, 0),

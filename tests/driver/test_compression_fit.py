@@ -9,7 +9,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.stats import t
 
 import thud
-from thud.studies.compression_fit import _ratio, _warnings
+from thud.studies.compression_fit import _warnings, _work_ratio
 
 TRUE = thud.Ball(youngs_modulus=1.83e6)
 START = thud.Ball(youngs_modulus=3e6)
@@ -131,11 +131,11 @@ def test_search_starts_with_the_work_of_the_measured_curve() -> None:
     depth = np.linspace(0, 0.02, 41)
     force = np.interp(depth, curve.deflection, curve.force)
     for factor in (0.4, 1.0, 3.0):
-        assert _ratio(curve, depth + 0.1, factor * force) == pytest.approx(factor)
+        assert _work_ratio(curve, depth + 0.1, factor * force) == pytest.approx(factor)
     # Where the work is next to nothing, a hundredth of the last force times the way.
     last = np.append(np.zeros(40), 100.0)
     work = np.trapezoid(force, depth)
-    assert _ratio(curve, depth, last - 2 * (depth < 0.01)) == pytest.approx(
+    assert _work_ratio(curve, depth, last - 2 * (depth < 0.01)) == pytest.approx(
         0.01 * 100 * 0.02 / work
     )
 

@@ -60,7 +60,7 @@ def test_zarr_holds_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert (tmp_path / "a.zarr").is_dir()
     assert values(found).identical(expected)
     # Whatever is larger than a byte is Zarr now, and written one variable at a time.
-    monkeypatch.setattr("thud.studies.blocks.LARGE", 1)
+    monkeypatch.setattr("thud.studies.blocks.MAX_NETCDF_SIZE", 1)
     found = thud.sweep({"name": "b", **HEIGHTS}, tmp_path).dataset
     assert names_in(tmp_path) == ["a.zarr", "b.zarr"]
     assert values(found).identical(expected)
@@ -77,7 +77,7 @@ def test_blocks_are_compared_with_their_checksums_once_for_all_variables(
     )
     monkeypatch.setattr(blocks, "grid_of", lambda *some: (written.append(some), grid(*some))[1])
     # Each variable is written by itself.
-    monkeypatch.setattr(blocks, "LARGE", 1)
+    monkeypatch.setattr(blocks, "MAX_NETCDF_SIZE", 1)
     thud.sweep({"name": "a", **HEIGHTS}, tmp_path)
     assert len(written) > 2
     # The first block also tells what there is.

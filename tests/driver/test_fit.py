@@ -254,7 +254,7 @@ def test_ranges_start_inside_and_spread_to_half_and_double() -> None:
 def test_starts_are_the_given_one_and_a_latin_hypercube_over_the_spread() -> None:
     given = {"height": thud.Parameter(2.0), "mass": thud.Parameter(2.5, 2.0, 4.0)}
     ranges = get_ranges(thud.Case(), bound_parameters(thud.Case(), given))
-    first, *others = search._spread(ranges, 9, 0)  # noqa: SLF001
+    first, *others = search._starts(ranges, 9, 0)  # noqa: SLF001
     assert first == pytest.approx([1.0, 1.0])
     # Of height from half to double, of mass inside its limits: one in each eighth.
     for column, (low, high) in zip(np.transpose(others), ((0.5, 2.0), (0.8, 1.6)), strict=True):

@@ -11,7 +11,7 @@ from conftest import quiet_fit
 from scipy import stats
 
 import thud
-from thud.plot.fit_figures import LINE, _label, confidence, draw_fit, target_and_fit
+from thud.plot.fit_figures import MAX_CHARACTERS, _label, confidence, draw_fit, target_and_fit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,8 +47,8 @@ def test_noise_is_that_of_the_band() -> None:
 
 
 def test_labels_break_where_they_do_not_fit() -> None:
-    assert _label("youngs_modulus", "MPa", LINE / 2) == "Young's modulus, MPa"
-    assert _label("youngs_modulus", "MPa", LINE / 3) == "Young's modulus,\nMPa"
+    assert _label("youngs_modulus", "MPa", MAX_CHARACTERS / 2) == "Young's modulus, MPa"
+    assert _label("youngs_modulus", "MPa", MAX_CHARACTERS / 3) == "Young's modulus,\nMPa"
     figure = confidence(fit_with_noise(5.0, "youngs_modulus", "height"))
     shown = {axes.get_xlabel() for axes in figure.axes} | {
         axes.get_ylabel() for axes in figure.axes

@@ -50,7 +50,7 @@ def test_examples_are_measured_as_they_were_made(
     monkeypatch.chdir(tmp_path)
     files = [str(FOLDER / drop["file"]) for drop in DROPS]
     config = str(FOLDER / "lab.toml")
-    monkeypatch.setattr("thud.cli.recording_commands.SHOWN", 2)
+    monkeypatch.setattr("thud.cli.recording_commands.MAX_PRINTED", 2)
     # The ball of finite elements with its default law lies 0.3 dB below the limit at 500 Hz.
     assert cli.main(["measure", *files, "--config", config, "--check", "-o", "out"]) == 3
     shown = capsys.readouterr().out
@@ -301,11 +301,11 @@ def test_weights_of_the_restitution_hold_the_calibration() -> None:
             weight = other.uncertainty**2 / (by.uncertainty**2 + scale**2 + other.uncertainty**2)
             expected = weight * by.value + (1 - weight) * other.value
             assert drop.restitution.value == pytest.approx(expected, abs=1e-9)
-            found = drop.restitution_shared.get("calibration", 0.0)
+            found = drop.shared_effects.get("calibration", 0.0)
             assert found == pytest.approx(weight * scale, rel=1e-9)
         budget = recording.estimates["restitution"].contributions
         shares = {part.name: part.uncertainty for part in budget}
-        mean = np.mean([d.restitution_shared.get("calibration", 0.0) for d in recording.drops])
+        mean = np.mean([d.shared_effects.get("calibration", 0.0) for d in recording.drops])
         assert shares.get("calibration", 0.0) == pytest.approx(mean)
 
 
@@ -315,7 +315,10 @@ def test_restitution_of_a_slower_bounce_is_not_assessed() -> None:
     assert np.isnan(recording.restitution)
     (decision,) = [d for d in recording.assess().criteria if d.name == "restitution"]
     assert decision.result == "inconclusive"
-    assert sum(bool(re.search(r"bounce.* 0\.8", warning)) for warning in recording.warnings) == 3
+    assert (
+        sum(bool(re.search(r"second impact.* 0\.8", warning)) for warning in recording.warnings)
+        == 3
+    )
 
 
 def test_drops_without_a_restitution_are_told() -> None:

@@ -13,7 +13,7 @@ from synthetic import half_sine, make_drop
 
 from thud.level.levels import low_pass
 from thud.recordings import calibration, contact, drops, flanks, measured_drop
-from thud.recordings.contact import Contact, cells_between, uniform_edges
+from thud.recordings.contact import Contact, cells_between, uniform_bounds
 from thud.recordings.plate import Plate, correct_plate
 from thud.recordings.signal import Signal
 
@@ -22,7 +22,7 @@ RATE = 25600.0
 
 def test_quiet_cells_grow_away_from_the_contact() -> None:
     """Of 0.5 ms up to 5 ms, 2 ms up to 25 ms, 3 ms up to 0.1 s."""
-    edges = contact._background_edges(int(RATE), RATE) / RATE  # noqa: SLF001
+    edges = contact._background_bounds(int(RATE), RATE) / RATE  # noqa: SLF001
     width, begin = np.diff(edges), edges[:-1]
     assert edges[0] == 0
     assert edges[-1] == pytest.approx(0.1, abs=1.5 / RATE)
@@ -31,11 +31,11 @@ def test_quiet_cells_grow_away_from_the_contact() -> None:
         np.testing.assert_allclose(width[inside], expected, atol=1.01 / RATE)
         assert width[inside].sum() == pytest.approx(high - low, abs=1.01 / RATE)
     # What is longer than the quiet is left out.
-    assert contact._background_edges(100, RATE)[-1] <= 100  # noqa: SLF001
+    assert contact._background_bounds(100, RATE)[-1] <= 100  # noqa: SLF001
 
 
 def test_cells_have_their_samples_and_means() -> None:
-    edges = uniform_edges(10, 10 + int(0.0203 * RATE), RATE)
+    edges = uniform_bounds(10, 10 + int(0.0203 * RATE), RATE)
     assert (edges[0], edges[-1]) == (10, 10 + int(0.0203 * RATE))
     # 101.5 cells of 0.2 ms.
     assert len(edges) - 1 == round(int(0.0203 * RATE) / RATE / 2e-4)
@@ -54,8 +54,8 @@ def test_cells_have_their_samples_and_means() -> None:
 
 def test_flank_cells_are_fine_around_the_touch() -> None:
     bounds = (0.0100, 0.0104)
-    fine = contact.flank_edges(200, bounds, 0.015, 96_000.0, fine=True) / 96_000
-    coarse = contact.flank_edges(200, bounds, 0.015, 96_000.0, fine=False) / 96_000
+    fine = contact.flank_bounds(200, bounds, 0.015, 96_000.0, fine=True) / 96_000
+    coarse = contact.flank_bounds(200, bounds, 0.015, 96_000.0, fine=False) / 96_000
     assert fine[0] == coarse[0] == 200 / 96_000
     for edges in (fine, coarse):
         assert 0.015 <= edges[-1] < 0.0153

@@ -218,7 +218,7 @@ def test_uncertainties_of_mass_and_height_follow_the_formulas() -> None:
 
     for key, unit, name in (("mass", 2.5, "mass"), ("height", 1.0, "drop height")):
         fall = DropConditions(1.0, 2.5, **{f"{key}_uncertainty": step * unit})
-        shared = fall.shared(at().restitutions, impulse)
+        shared = fall.shared_effects(at().restitutions, impulse)
         low, high = (at(**{key: unit * (1 + sign * step)}) for sign in (-1, 1))
         for way, parts in shared.items():
             slope = (high.restitutions[way].value - low.restitutions[way].value) / 2
@@ -276,7 +276,7 @@ def test_restitution_by_impulse_and_flight_has_the_uncertainty_of_both() -> None
     assert not told
     same(ways["impulse"], propagated(by_impulse, IMPULSE, CONTACT))
     same(ways["bounces"], propagated(by_flight, FLIGHTS[0]))
-    shared = CONDITIONS.shared(ways, IMPULSE)
+    shared = CONDITIONS.shared_effects(ways, IMPULSE)
     # Of the force, the mass and the height alone, with their signs.
     gain = by_impulse(22.0 * (1 + 1e-6), 0.02) - by_impulse(22.0 * (1 - 1e-6), 0.02)
     slopes = {
@@ -301,7 +301,7 @@ def test_restitution_by_impulse_and_flight_has_the_uncertainty_of_both() -> None
 
 def test_mean_of_two_ways_weighs_their_whole_uncertainty() -> None:
     ways, _ = CONDITIONS.restitutions(IMPULSE, CONTACT, FLIGHTS)
-    shared = CONDITIONS.shared(ways, IMPULSE)
+    shared = CONDITIONS.shared_effects(ways, IMPULSE)
     whole = {w: ways[w].uncertainty ** 2 + np.sum(np.square([*shared[w].values()])) for w in ways}
     weights = {w: 1 / whole[w] / sum(1 / one for one in whole.values()) for w in ways}
     mean, parts = CONDITIONS.mean(ways, IMPULSE)
@@ -336,7 +336,7 @@ def fallen(impulse: float, flight: float) -> Drop:
     mass = CONDITIONS.effective_mass(force, CONTACT, ways["bounces"])
     return replace(
         make_drop(), impulse=force, restitutions=ways, restitution=mean, effective_mass=mass,
-        restitution_shared=shared,
+        shared_effects=shared,
     )  # fmt: skip
 
 
@@ -355,24 +355,24 @@ def test_mean_restitution_has_what_all_drops_share_and_what_differs_between_the_
     noise = [np.hypot(*(way.uncertainty for way in drop.restitutions.values())) for drop in found]
     assert named["noise"] == pytest.approx(np.hypot.reduce(noise) / 3)
     for name in ("calibration", "mass", "drop height"):
-        shared = [CONDITIONS.shared(drop.restitutions, drop.impulse) for drop in found]
+        shared = [CONDITIONS.shared_effects(drop.restitutions, drop.impulse) for drop in found]
         expected = np.mean([s["impulse"][name] - s["bounces"].get(name, 0.0) for s in shared])
         assert named[name] == pytest.approx(abs(expected))
-        expected = abs(np.mean([drop.restitution_shared[name] for drop in found]))
+        expected = abs(np.mean([drop.shared_effects[name] for drop in found]))
         parts = {part.name: part.uncertainty for part in mean.contributions}
         assert parts[name] == pytest.approx(expected)
     # A rectangle from one way to the other where they differ beyond doubt.
-    exact = replace(CONDITIONS, calibration=0.0, mass_uncertainty=0.0, height_uncertainty=0.0)
+    exact = replace(
+        CONDITIONS, calibration_uncertainty=0.0, mass_uncertainty=0.0, height_uncertainty=0.0
+    )
     wrong, apart = average_restitution(found, exact)
     assert abs(apart.value) > apart.expanded
     parts = {part.name: part.uncertainty for part in wrong.contributions}
     assert parts["impulse against bounces"] == pytest.approx(abs(apart.value) / np.sqrt(3))
     # The calibration moves only the drops that it is part of.
-    some = [found[0], replace(found[1], restitution_shared={})]
+    some = [found[0], replace(found[1], shared_effects={})]
     parts = {p.name: p.uncertainty for p in average_restitution(some, CONDITIONS)[0].contributions}
-    assert parts["calibration"] == pytest.approx(
-        abs(found[0].restitution_shared["calibration"]) / 2
-    )
+    assert parts["calibration"] == pytest.approx(abs(found[0].shared_effects["calibration"]) / 2)
 
 
 def test_mean_mass_has_calibration_and_height() -> None:

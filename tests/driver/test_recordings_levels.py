@@ -22,7 +22,7 @@ from thud.level.estimate import Contribution, Estimate
 from thud.level.levels import RECORDED_BAND
 from thud.recordings.band_noise import band_noise
 from thud.recordings.budgets import average_estimates, find_deviant, level_estimates
-from thud.recordings.contact import cells_between, uniform_edges
+from thud.recordings.contact import cells_between, uniform_bounds
 from thud.recordings.filters import low_pass_attenuation, low_pass_force
 from thud.recordings.noise import Background
 from thud.recordings.outliers import find_outliers
@@ -202,7 +202,7 @@ def test_noise_that_rises_towards_0_hz() -> None:
     quiet = [np.arange(0, drop.gate[0], 8), np.arange(drop.gate[1], len(drop.time), 8)]
     cells = [cells_between(edges, rate, middle) for edges in quiet]
     both = tuple(np.concatenate(pair) for pair in zip(*cells, strict=True))
-    inner = uniform_edges(*drop.gate, rate)
+    inner = uniform_bounds(*drop.gate, rate)
     contact = cells_between(inner, rate, middle)
     draws = np.array([[1e-9, 0, density, 0, 0]])
     rng = np.random.default_rng(3)

@@ -34,7 +34,7 @@ from thud.recordings.recording import Recording
 from thud.report.contents import read_date, report_data
 from thud.report.fonts import missing_characters
 from thud.report.notes import group_messages, shorten
-from thud.report.page import _range
+from thud.report.page import _range, report_page
 from thud.report.write import write_report
 
 if TYPE_CHECKING:
@@ -88,6 +88,12 @@ def many(one: Recording, count: int, **config: Any) -> Recording:  # noqa: ANN40
         for i, drop in enumerate(drops)
     ]
     return Recording("many", tuple(drops), tuple(origins), replace(LAB, **config), 0.01)
+
+
+def test_page_lists_the_requirements_that_the_plate_meets(one: Recording) -> None:
+    plate = PlateConfig(full_scale=6000.0)
+    data = report_data(replace(one, config=replace(LAB, plate=plate)))
+    assert "the plate reads up to 6000 N" in report_page(data, [], "")
 
 
 def crowded(one: Recording) -> Recording:

@@ -94,7 +94,7 @@ def test_probability_lies_in_the_range_that_is_stated(
     wrong = (result.dataset["conforms"] != direct.dataset["conforms"]).values[sure].mean()
     assert wrong <= 7 * 0.05
     assert abs(result.probability - direct.probability) <= high - low + wrong
-    assert result.rows()[-1][0] == "  by errors of the surrogate"
+    assert result.rows()[-1][0] == "  with errors of the surrogate"
     assert "surrogate of" in result.dataset.attrs["surrogate"]
 
 
@@ -371,7 +371,7 @@ def test_map_shows_undecided_verdicts(trained: thud.Surrogate) -> None:
         undecided, near & (found.dataset["margin"] >= -error) & rest[0] & rest[1]
     )
     assert 0 < int(undecided.sum()) < undecided.size
-    assert ("undecided by the surrogate", f"{int(undecided.sum())}") in found.rows()
+    assert ("undecided because of the surrogate", f"{int(undecided.sum())}") in found.rows()
     labels = [text.get_text() for text in thud.plot.draw_design(found).legends[0].get_texts()]
     assert "Undecided by surrogate" in labels
 

@@ -112,5 +112,5 @@ def _outside(impact: thud.Impact) -> dict[str, bool]:
         "check the units of the input": not 3.9 < total < 92.1,
         "hold less than 1e-12": lowest < total - 120.1,
         "&floor: restitution is": on_floor is not None and on_floor.restitution < -1e-5,
-        "&model: restitution less 1 is": on_floor is not None and on_floor.restitution > 1 + 1e-5,
+        "&model: restitution minus 1 is": on_floor is not None and on_floor.restitution > 1 + 1e-5,
     }  # fmt: skip

@@ -204,7 +204,7 @@ def oracle_drop(  # noqa: PLR0913, PLR0917 - what is known of a recording
     finally:
         contact_module.BACKGROUND_CELLS = saved
     background = Background(quiet, mean, variances[None], peak)
-    edges = contact_module.uniform_edges(first, last, rate)
+    edges = contact_module.uniform_bounds(first, last, rate)
     _, covariance = background.predict(contact_module.cells_between(edges, rate, middle))
     contact = Contact(
         Estimate(onset, 0),
@@ -246,7 +246,7 @@ def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray) -> tuple[float, f
     saved = contact_module.BACKGROUND_CELLS
     contact_module.BACKGROUND_CELLS = (*saved, (4e-3, 1.0))
     try:
-        found = contact_module.find_posteriors(window, record, contact.background, passes=2)
+        found = contact_module.find_edges(window, record, contact.background, passes=2)
     finally:
         contact_module.BACKGROUND_CELLS = saved
     spread = float(np.hypot(*(edge.edge()[1][1] for edge in (found.touch, found.release))))

@@ -1,15 +1,16 @@
-"""The filter bank against a published library, PyOctaveBand, where it is installed."""
+"""The filter bank against a published library, PyOctaveBand."""
 
 from __future__ import annotations
 
 import numpy as np
+import pyoctaveband
 import pytest
 
 import thud
 from thud.level.levels import BANDWIDTHS
 from thud.recordings.filters import filter_levels
 
-library = pytest.importorskip("pyoctaveband")
+pytestmark = pytest.mark.slow
 
 REFERENCE_PRESSURE = 2e-5
 SECONDS = 10
@@ -33,7 +34,7 @@ def recording(force: str, rate: int) -> np.ndarray:
 def library_levels(force: np.ndarray, rate: int, bands: str, **options: object) -> np.ndarray:
     """Return levels of an energy, from the library's levels of a mean square pressure."""
     fraction, limits = BANDS[bands]
-    bank = library.OctaveFilterBank(rate, fraction=fraction, limits=limits, **options)
+    bank = pyoctaveband.OctaveFilterBank(rate, fraction=fraction, limits=limits, **options)
     levels = np.asarray(bank.filter(force, detrend=False)[0])
     assert len(levels) == len(thud.get_bands(bands).nominal)
     return levels + 20 * np.log10(REFERENCE_PRESSURE) + 10 * np.log10(SECONDS)

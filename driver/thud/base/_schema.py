@@ -917,7 +917,7 @@ QUANTITIES = {
     "sample_rate": Quantity("sample_rate", "sample rate", "f_s", "Hz", "kHz", 0.001, 3, "samples per second"),
     "impulse_residual": Quantity("impulse_residual", "impulse residual", "", "", "", 1.0, 6, "relative residual of the momentum balance"),
     "energy_residual": Quantity("energy_residual", "energy residual", "", "", "", 1.0, 6, "relative residual of the energy balance"),
-    "peak_count": Quantity("peak_count", "peaks of the force", "", "", "", 1.0, 0, "number of peaks of the assessed force"),
+    "peak_count": Quantity("peak_count", "number of force peaks", "", "", "", 1.0, 0, "number of peaks of the assessed force"),
     "mass": Quantity("mass", "mass", "M", "kg", "kg", 1.0, 3, "mass of the source"),
     "drop_height": Quantity("drop_height", "drop height", "h", "m", "m", 1.0, 3, "drop height"),
     "effective_mass": Quantity("effective_mass", "effective mass", "M", "kg", "kg", 1.0, 3, "impulse divided by the change of velocity"),

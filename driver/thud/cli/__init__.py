@@ -22,7 +22,7 @@ from thud.cli.command import (
     exit_code,
     message_of,
     output,
-    print_at_once,
+    print_immediately,
 )
 from thud.cli.explore_command import EXPLORE
 from thud.cli.floor_commands import FLOOR, MOBILITY, RATE
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from _typeshed import SupportsWrite
 
-# Exit code after an interrupt: this, plus the number of the signal.
+# Exit code after a signal: this plus the number of the signal.
 INTERRUPTED = 128
 
 COMMANDS = {
@@ -44,7 +44,7 @@ COMMANDS = {
         (
             argument("cases", nargs="+", metavar="CASE.nml", help="namelist files"),
             *output(
-                "the results; one below it for each of several cases (default: outputs/<case name>)"
+                "the results; several cases have a subdirectory each (default: outputs/<case name>)"
             ),
             argument("--check", action="store_true", help="exit with 3 unless all sources conform"),
             NO_FIGURES,
@@ -52,18 +52,20 @@ COMMANDS = {
             argument(
                 "--all",
                 action="store_true",
-                help="write also quantities of the model against time (model_histories.csv) and "
+                help="also write quantities of the model against time (model_histories.csv) and "
                 "every figure",
             ),
             argument(
-                "--animation", action="store_true", help="also motion.gif, of cases with snapshots"
+                "--animation",
+                action="store_true",
+                help="also write motion.gif of cases with snapshots",
             ),
             QUIET,
         ),
         run_cases,
     ),
     "compare": Command(
-        "models and recordings of one drop on one page",
+        "compare models and recordings of the same drop on one page",
         (
             argument(
                 "cases",
@@ -75,12 +77,12 @@ COMMANDS = {
             argument(
                 "--force",
                 choices=FORCES,
-                help="force that is compared (default: that of each case, &levels force)",
+                help="force to compare (default: &levels force of each case)",
             ),
             argument(
                 "--source",
                 choices=SOURCES,
-                help="source of the limits (default: that of the cases, &limits source)",
+                help="source of the limits (default: &limits source of the cases)",
             ),
             QUIET,
         ),
@@ -98,7 +100,7 @@ COMMANDS = {
                 "reports",
                 nargs="+",
                 metavar="REPORT",
-                help="report.json files, or directories that hold them",
+                help="report.json files, or directories with such files",
             ),
             *output("the chart (default: outputs/history)"),
             argument(
@@ -135,7 +137,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if folder is not None and not folder.strip():
                 message = "--output has no value; allowed: a directory"
                 raise InputError(message)
-            with print_at_once():
+            with print_immediately():
                 code = command.function(options)
         sys.stdout.flush()
     except KeyboardInterrupt as interrupt:
@@ -149,23 +151,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return exit_code(error)
     except MemoryError as error:
         cause = f" ({error})" if str(error) else ""
-        message = f"the memory does not suffice{cause}; allowed: a smaller task, or more memory"
+        message = f"not enough memory{cause}; allowed: a smaller task, or more memory"
         print(f"thud-driver: {message}", file=sys.stderr)
         return NumericalError.exit_code
     return code
 
 
 def _parse(arguments: Sequence[str] | None) -> argparse.Namespace | int:
-    """Return the options, or an exit code where argparse has shown its text."""
+    """Return the options, or an exit code if argparse has printed help or an error."""
     try:
         return new_parser().parse_args(arguments)
     except SystemExit as stop:
-        # argparse exits with 2 for bad usage, which is a numerical failure here.
+        # argparse exits with 2 for bad usage; here 2 means a numerical failure.
         return InputError.exit_code if stop.code else 0
 
 
 class _Parser(argparse.ArgumentParser):
-    """Parser that suggests the word probably meant, and raises if the output is full or closed."""
+    """Parser that suggests a similar word, and raises if its output cannot be written."""
 
     def error(self, message: str) -> NoReturn:
         match = re.search(r"(?:invalid choice: '|unrecognized arguments: )([\w-]+)", message)
@@ -176,7 +178,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _words() -> list[str]:
-    """Return commands, their options, and the choices of these."""
+    """Return all commands, options, and choices of options."""
     arguments = [entry for command in COMMANDS.values() for entry in command.arguments]
     options = [name for names, _ in arguments for name in names if name.startswith("--")]
     choices = [choice for _, settings in arguments for choice in settings.get("choices", ())]

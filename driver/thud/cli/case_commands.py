@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 
 def run_cases(options: argparse.Namespace) -> int:
-    """Run all cases, even where one fails; return the exit code."""
+    """Run all cases, even if one fails; return the exit code."""
     worst = 0
     options.done = {}
     for path in tqdm(
@@ -65,15 +65,15 @@ def run_cases(options: argparse.Namespace) -> int:
 
 
 def _run_case(path: str, options: argparse.Namespace) -> bool:
-    """Run one case as the executable does, draw its figures; return whether it conforms."""
+    """Run a case like the executable and draw its figures; return whether it conforms."""
     case = read_case(path)
     output = options.output or ""
     if output and len(options.cases) > 1:
         output = os.path.join(output, case.name)  # noqa: PTH118 - may be ""
     if case.name in options.done:
         message = (
-            f"{path}: its name {case.name!r} is that of {options.done[case.name]}, "
-            "whose results it would replace; allowed: different names, or separate runs"
+            f"{path}: {case.name!r} is also the name of {options.done[case.name]}, "
+            "whose results would be replaced; allowed: different names, or separate runs"
         )
         raise InputError(message)
     options.done[case.name] = path
@@ -94,7 +94,7 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
 
 
 def _figures(answer: Bundle, options: argparse.Namespace) -> dict[str, bytes]:
-    """Return the files of the figures of a run, drawn from its results in memory."""
+    """Draw the figures of a run from its results in memory."""
     contents: dict[str, bytes] = {}
     if options.no_figures and not options.animation:
         return contents
@@ -157,7 +157,7 @@ def draw_figures(options: argparse.Namespace) -> int:
     return 0
 
 
-# Meaning of the options for formats.
+# Help of the options that choose formats.
 KINDS = {
     "wav": "32-bit floats, with their scale in a text file beside it",
     "csv": "table of time and force",
@@ -188,7 +188,7 @@ def run_export(options: argparse.Namespace) -> int:
 
 
 def _read_source(path: str, config: str | None) -> ImpactResult:
-    """Return the impact of a case, or the recording, of a file."""
+    """Return the recording in a file, or the impact of the case in it."""
     from thud.recordings.formats import FORMATS
     from thud.recordings.read_recording import read_recording
 
@@ -196,7 +196,7 @@ def _read_source(path: str, config: str | None) -> ImpactResult:
     if os.path.splitext(path)[1].lower() in endings:  # noqa: PTH122 - may hold a zero byte
         return read_recording(path, config=config)
     if config is not None:
-        refuse(f"{path}: --config {config} is of recordings", "none for a case")
+        refuse(f"{path}: --config {config} is for recordings only", "none for a case")
     return compute(read_case(path))
 
 
@@ -210,7 +210,9 @@ EXPORT = Command(
         ),
         *output("the files (default: outputs/export)"),
         argument("--rate", type=float, metavar="HZ", help="resample to this rate"),
-        argument("--drop", type=int, default=1, help="drop of a recording (default: 1)"),
+        argument(
+            "--drop", type=int, default=1, help="index of the drop in a recording (default: 1)"
+        ),
         argument("--config", metavar="LAB.toml", help="configuration of a recording"),
         QUIET,
     ),
@@ -227,15 +229,15 @@ def copy_examples(options: argparse.Namespace) -> int:
         if not source.is_dir():
             refuse("this package has no inputs", "an installed one; in a clone they are in inputs/")
         target.parent.mkdir(parents=True, exist_ok=True)
-        part = unique_path(target.with_name(f".{target.name}.part"))
+        partial = unique_path(target.with_name(f".{target.name}.part"))
         try:
-            # Installers compile the scripts.
-            shutil.copytree(source, part, ignore=shutil.ignore_patterns("__pycache__"))
-            part.rename(target)
+            # Installers compile Python scripts.
+            shutil.copytree(source, partial, ignore=shutil.ignore_patterns("__pycache__"))
+            partial.rename(target)
         except shutil.Error as error:
-            refuse(f"{target} cannot be written", "a place with space that you may write to", error)
+            refuse(f"{target} cannot be written", "a writable directory with free space", error)
         finally:
-            shutil.rmtree(part, ignore_errors=True)
+            shutil.rmtree(partial, ignore_errors=True)
     if not options.quiet:
         print(f"Inputs: {target}")
     return 0

@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
 # Exit code of `--check` if a source does not conform.
 NOT_CONFORMING = 3
-# Names or flags of an argument, and its settings for argparse.
+# Names or flags of an argument, and its keywords for `add_argument`.
 Argument = tuple[tuple[str, ...], dict[str, Any]]
 
 
 class Command(NamedTuple):
-    """A command; `after_interrupt` says what an interrupt leaves of its results."""
+    """A command; `after_interrupt` is its message after an interrupt."""
 
     help: str
     arguments: tuple[Argument, ...]
@@ -47,7 +47,9 @@ def output(meaning: str) -> tuple[Argument, Argument]:
     return (
         argument("-o", "--output", metavar="DIR", help=f"directory for {meaning}"),
         argument(
-            "--replace", action="store_true", help="replace also files that thud has not written"
+            "--replace",
+            action="store_true",
+            help="also replace files that were not written by thud",
         ),
     )
 
@@ -55,7 +57,7 @@ def output(meaning: str) -> tuple[Argument, Argument]:
 def results_of(
     options: argparse.Namespace, default: str, inputs: Iterable[str | None] = ()
 ) -> Results:
-    """Return the results directory of a command, by default one below ``outputs``.
+    """Return the results directory of a command, by default in ``outputs``.
 
     The input files of the command are never replaced.
     """
@@ -70,7 +72,7 @@ def results_of(
 # Endings of the files of a page.
 PAGE = (".svg", ".html")
 QUIET = argument("-q", "--quiet", action="store_true", help="show only errors and warnings")
-NO_FIGURES = argument("--no-figures", action="store_true", help="results only")
+NO_FIGURES = argument("--no-figures", action="store_true", help="write only the results")
 FORMAT = argument(
     "--format",
     choices=("svg", "png", "pdf"),
@@ -80,14 +82,14 @@ FORMAT = argument(
 
 
 def print_notes(warnings: Iterable[object]) -> None:
-    """Print warnings; a progress bar stays below them."""
+    """Print warnings above any progress bar."""
     for warning in warnings:
         tqdm.write(f"thud-driver: {warning}", file=sys.stderr)
 
 
 @contextmanager
-def print_at_once() -> Iterator[None]:
-    """Print warnings of reports and locks at once, while the work goes on."""
+def print_immediately() -> Iterator[None]:
+    """Print warnings of reports and locks as soon as they arise."""
     usual = warnings.showwarning
     kinds = ReportWarning, LockWarning
 
@@ -104,7 +106,7 @@ def print_at_once() -> Iterator[None]:
         yield
 
 
-def save_result(  # noqa: PLR0913, PLR0917 - differ between commands
+def save_result(  # noqa: PLR0913, PLR0917 - all differ between commands
     options: argparse.Namespace,
     source: str,
     result: MobilityFit | RoomLevels,
@@ -114,7 +116,7 @@ def save_result(  # noqa: PLR0913, PLR0917 - differ between commands
 ) -> int:
     """Save file and figure of a result, print text and warnings; return the exit code.
 
-    The source is the input file.
+    `source` is the path of the input file.
     """
     results = results_of(options, result.name, [source])
     contents = dict([file])

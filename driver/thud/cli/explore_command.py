@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     import argparse
     from collections.abc import Iterator
 
-# Names of this machine for itself in addresses.
+# Host names that are reachable from this machine only.
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 
 
 def explore(options: argparse.Namespace) -> int:
-    """Serve the page until an interrupt; return the exit code."""
+    """Serve the page until interrupted; return the exit code."""
     with require_extra("explorer"):
         from thud.explorer.connections import run_server
         from thud.explorer.server import new_application, start_with
@@ -34,22 +34,22 @@ def explore(options: argparse.Namespace) -> int:
     host = f"[{options.host}]" if version_6 else options.host
     hosts = LOOPBACK if host in LOOPBACK else ("*",)
     if not 0 <= options.port < 2**16:
-        refuse(f"--port = {options.port} is no port", f"0 (any that is free) to {2**16 - 1}")
+        refuse(f"--port = {options.port} is not a port", f"0 (any free port) to {2**16 - 1}")
     try:
         listener = socket.create_server(
             (options.host, options.port), family=socket.AF_INET6 if version_6 else socket.AF_INET
         )
     except OSError as error:
-        refuse(f"{host}:{options.port} cannot be listened on", "a free port", error)
+        refuse(f"{host}:{options.port} is not available", "a free port", error)
     address = f"http://{host}:{listener.getsockname()[1]}/#token={token}"
     if not options.quiet:
         print(f"Page: {address}")
-        print("Ctrl-C ends it.")
+        print("Press Ctrl-C to stop.")
         sys.stdout.flush()
     if hosts == ("*",):
         print(
-            "thud-driver: other machines can reach the page, which is not encrypted; anybody with "
-            "the address can compute here",
+            "thud-driver: other machines can reach the page, which is not encrypted; anyone with "
+            "the address can run computations here",
             file=sys.stderr,
         )
     application = new_application(start, token=token, hosts=hosts)
@@ -64,7 +64,6 @@ def explore(options: argparse.Namespace) -> int:
 
 @contextmanager
 def _temporary_files_in(folder: Path) -> Iterator[None]:
-    """Put temporary files in a directory."""
     before = tempfile.tempdir
     tempfile.tempdir = str(folder)
     try:
@@ -91,7 +90,7 @@ EXPLORE = Command(
             "case",
             nargs="?",
             metavar="CASE.nml|RESULTS",
-            help="case, or directory of results, to begin with (default: the ball of the paper)",
+            help="case, or directory of results, to start with (default: the ball of the paper)",
             type=Path,
         ),
         argument(
@@ -99,9 +98,7 @@ EXPLORE = Command(
             default=LOOPBACK[0],
             help=f"address to listen on (default: {LOOPBACK[0]}, this machine only)",
         ),
-        argument(
-            "--port", type=int, default=0, help="port to listen on (default: any that is free)"
-        ),
+        argument("--port", type=int, default=0, help="port to listen on (default: any free port)"),
         argument("--no-browser", action="store_true", help="only print the address"),
         QUIET,
     ),

@@ -52,7 +52,7 @@ def compare_floor_cases(options: argparse.Namespace) -> int:
 
 
 FLOOR = Command(
-    "floors and rooms of several cases on one page",
+    "compare floors and rooms of several cases on one page",
     (
         argument("cases", nargs="+", metavar="CASE.nml", help="namelist files with floor and room"),
         *output("the page (default: outputs/floors)"),
@@ -70,7 +70,7 @@ def rate(options: argparse.Namespace) -> int:
     room = read_room_levels(options.levels, volume=options.volume)
     shown = f"{format_rows(room.rows())}\n\n{format_rows(rating_table(room))}"
     if (scatter := room.position_uncertainty) is not None:
-        shown += f"\n\n  Standard uncertainty by the scatter of positions: {scatter:.1f} dB"
+        shown += f"\n\n  Standard uncertainty from the scatter of the positions: {scatter:.1f} dB"
     file = "room_levels.csv", levels_csv(room)
     return save_result(options, options.levels, room, shown, file, "room_levels")
 
@@ -81,7 +81,7 @@ RATE = Command(
         argument(
             "levels",
             metavar="LEVELS.csv",
-            help="frequency, levels of positions, and optionally background, reverberation_time",
+            help="frequency, levels at positions; optional: background, reverberation_time",
         ),
         argument("--volume", type=float, metavar="M3", help="volume of the room"),
         *output("the results (default: outputs/<name of the file>)"),
@@ -103,12 +103,12 @@ def fit_mobility_table(options: argparse.Namespace) -> int:
 
 
 MOBILITY = Command(
-    "fit poles to a measured mobility, as a floor for cases",
+    "fit poles to a measured mobility and save it as a floor for cases",
     (
         argument(
             "table",
             metavar="TABLE.csv|TABLE.uff",
-            help="frequency, real, imaginary (or magnitude, phase), or a universal file",
+            help="columns frequency, real, imaginary (or magnitude, phase), or a universal file",
         ),
         argument(
             "--quantity",

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 # Maximum number of drops that are printed.
-SHOWN = 50
+MAX_PRINTED = 50
 
 
 def measure(options: argparse.Namespace) -> int:
@@ -66,9 +66,9 @@ def measure(options: argparse.Namespace) -> int:
         recording_files.save(recording, files, figures=figures)
     if not options.quiet:
         rows = recording_files.drop_table(recording)
-        print(format_rows(rows[: SHOWN + 1]))
-        if len(rows) > SHOWN + 1:
-            print(f"and {len(rows) - SHOWN - 1} more drops, in {folder / 'report.json'}")
+        print(format_rows(rows[: MAX_PRINTED + 1]))
+        if len(rows) > MAX_PRINTED + 1:
+            print(f"and {len(rows) - MAX_PRINTED - 1} more drops, in {folder / 'report.json'}")
         print()
         print(format_rows(recording_files.table(recording)))
         print()
@@ -85,15 +85,22 @@ def measure(options: argparse.Namespace) -> int:
 MEASURE = Command(
     "levels, verdict and calibration report of recorded drops",
     (
-        argument(
-            "drops", nargs="+", metavar="FILE", help="recordings, with one or many drops each"
-        ),
+        argument("drops", nargs="+", metavar="FILE", help="recordings of one or more drops each"),
         argument("--source", choices=SOURCES, help="source of the limits (default: rubber_ball)"),
         argument("--mass", type=float, metavar="KG", help="mass of the source"),
         argument("--height", type=float, metavar="M", help="drop height"),
-        argument("--mass-uncertainty", type=float, metavar="KG", help="its standard uncertainty"),
-        argument("--height-uncertainty", type=float, metavar="M", help="its standard uncertainty"),
-        argument("--config", metavar="LAB.toml", help="laboratory, instruments, calibration"),
+        argument(
+            "--mass-uncertainty", type=float, metavar="KG", help="standard uncertainty of the mass"
+        ),
+        argument(
+            "--height-uncertainty",
+            type=float,
+            metavar="M",
+            help="standard uncertainty of the height",
+        ),
+        argument(
+            "--config", metavar="LAB.toml", help="file on laboratory, instruments, calibration"
+        ),
         argument("--channel", metavar="NAME|NUMBER", help="channel of the force"),
         argument("--unit", help="unit of the recorded values, if the file does not state it"),
         argument(
@@ -108,9 +115,16 @@ MEASURE = Command(
         argument(
             "--polarity", choices=("positive", "negative"), help="sign of a compression in the file"
         ),
-        argument("--sample-rate", type=float, metavar="HZ", help="if the file does not state it"),
         argument(
-            "--low-pass", action="store_true", help="levels of the force low-passed at 1.25 kHz"
+            "--sample-rate",
+            type=float,
+            metavar="HZ",
+            help="sample rate, if the file does not state it",
+        ),
+        argument(
+            "--low-pass",
+            action="store_true",
+            help="compute levels of the force low-passed at 1.25 kHz",
         ),
         argument(
             "--workers", type=int, metavar="N", help="processes (default: one for each processor)"
@@ -150,14 +164,14 @@ CALIBRATE = Command(
     "calibration from a record of a known force applied to or removed from the plate",
     (
         argument("record", metavar="FILE", help="record of the known force"),
-        argument("--mass", type=float, metavar="KG", help="known mass"),
-        argument("--force", type=float, metavar="N", help="or known force"),
+        argument("--mass", type=float, metavar="KG", help="mass that exerts the known force"),
+        argument("--force", type=float, metavar="N", help="known force, if no mass is given"),
         argument(
             "--uncertainty",
             type=float,
             default=0.0,
             metavar="FRACTION",
-            help="its relative standard uncertainty, such as 0.001",
+            help="relative standard uncertainty of the mass or force, such as 0.001",
         ),
         argument("--channel", metavar="NAME|NUMBER", help="channel of the force"),
         argument("--unit", help="unit of the recorded values, if the file does not state it"),
@@ -170,15 +184,15 @@ CALIBRATE = Command(
 
 def run_history(options: argparse.Namespace) -> int:
     """Draw the control chart of the reports of a ball; return the exit code."""
-    # Matplotlib and SciPy take their time.
+    # Matplotlib and SciPy are slow to import.
     from thud.plot.save_figures import figure_files
     from thud.report.ball_history import read_history
     from thud.report.ball_history_figure import draw_history
 
     history = read_history(options.reports, different_balls=options.different_balls)
     results = results_of(options, "history", options.reports)
-    drawn = draw_all({"history": partial(draw_history, history)})
-    paths = results.write(figure_files(drawn))
+    figures = draw_all({"history": partial(draw_history, history)})
+    paths = results.write(figure_files(figures))
     if not options.quiet:
         print(history.title)
         print(format_rows(history.table()))

@@ -28,7 +28,11 @@ _SAMPLES = (
         help="how samples are computed; the results are the same (default: threads)",
     ),
     argument("--workers", type=int, metavar="N", help="threads or processes"),
-    argument("--scheduler", metavar="ADDRESS", help="of Dask, tcp://host:8786"),
+    argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="address of a Dask scheduler, such as tcp://host:8786",
+    ),
 )
 
 

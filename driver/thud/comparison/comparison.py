@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from thud.base._schema import LevelsForce, LimitsSource
     from thud.level.assessment import Criterion
 
-# Endings of namelist files; all others are recordings.
+# Endings of namelist files; all other files are read as recordings.
 NAMELISTS = (".nml", ".namelist", "")
 
 
@@ -50,9 +50,9 @@ class Comparison(Displayed, Page):
     run_times : dict of str to float
         Computing time of each model, s.
     force : str or None
-        ``"floor"`` or ``"elastic"``: the force that is compared; None: that of each case.
+        The compared force, ``"floor"`` or ``"elastic"``; None: the assessed force of each case.
     source : str
-        Source of the limits.
+        Impact source whose limits apply.
     """
 
     impacts: dict[str, ImpactResult]
@@ -67,13 +67,13 @@ class Comparison(Displayed, Page):
         return [f"{name}: {warning}" for name, i in self.impacts.items() for warning in i.warnings]
 
     def __repr__(self) -> str:
-        """Return the names of what is compared."""
+        """Return the names of the compared impacts."""
         return f"<Comparison: {', '.join(self.impacts)}>"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return rows of text: names, force, method, criteria, quantities, times, verdicts.
 
-        There is a column for each impact, and a last one for the limits.
+        Each impact has a column; the last column has the limits.
         """
         impacts = self.impacts.values()
         verdicts = [impact.assess(self.source, self.force) for impact in impacts]
@@ -81,14 +81,14 @@ class Comparison(Displayed, Page):
         peak = QUANTITIES["peak_force"]
         rows = [
             ("", *self.impacts, f"limits, {self.source.replace('_', ' ')}"),
-            ("force", *(impact.assessed_force(self.force) for impact in impacts), ""),
-            ("levels", *(impact.level_method for impact in impacts), ""),
+            ("assessed force", *(impact.assessed_force(self.force) for impact in impacts), ""),
+            ("method of the levels", *(impact.level_method for impact in impacts), ""),
             *(_criterion_row(row) for row in zip(*(v.criteria for v in verdicts), strict=True)),
             (peak.label, *(peak.show(impact.peak(self.force)) for impact in impacts), ""),
             *_quantity_rows(impacts),
         ]
         if any(times):
-            rows.append(("computed in, ms", *(f"{1e3 * t:.1f}" if t else "" for t in times), ""))
+            rows.append(("computing time, ms", *(f"{1e3 * t:.1f}" if t else "" for t in times), ""))
         return [*rows, ("verdict", *(verdict.result for verdict in verdicts), "")]
 
     def figure(self) -> Figure:
@@ -105,31 +105,30 @@ class Comparison(Displayed, Page):
 
 
 def _criterion_row(criteria: tuple[Criterion, ...]) -> tuple[str, ...]:
-    """Return the row of one criterion."""
     name = criteria[0].name
     band = name.removeprefix("octave_").replace("_", ".")
     level = Quantity(name, f"{band} Hz", "", "dB", "dB", 1.0, 2, "")
     quantity = QUANTITIES.get(name, level)
-    ends = [f"{end * quantity.display_scale:g}" for end in (criteria[0].lower, criteria[0].upper)]
+    limits = [f"{end * quantity.display_scale:g}" for end in (criteria[0].lower, criteria[0].upper)]
     cells = [_cell(criterion, quantity) for criterion in criteria]
-    return (quantity.label, *cells, " to ".join(dict.fromkeys(ends)))
+    return (quantity.label, *cells, " to ".join(dict.fromkeys(limits)))
 
 
 def _cell(criterion: Criterion, quantity: Quantity) -> str:
-    """Return the value of a criterion, and in which way it misses its limits."""
+    """Return the value of a criterion, and whether it is too low, too high or undecided."""
     if np.isnan(criterion.value):
-        return "not known"
+        return "unknown"
     if criterion.conforms:
-        word = ""
+        state = ""
     elif criterion.value < criterion.lower:
-        word = "low"
+        state = "low"
     else:
-        word = "high" if criterion.value > criterion.upper else "open"
-    return f"{criterion.value * quantity.display_scale:z.{quantity.decimals}f} {word}".rstrip()
+        state = "high" if criterion.value > criterion.upper else "undecided"
+    return f"{criterion.value * quantity.display_scale:z.{quantity.decimals}f} {state}".rstrip()
 
 
 def _quantity_rows(impacts: Iterable[ImpactResult]) -> list[tuple[str, ...]]:
-    """Return the rows of the known quantities that have no other row."""
+    """Return rows of the known quantities that have no other row."""
     other_rows = {"peak_force", "peak_elastic_force", *(name for name, *_ in LIMITS[SOURCES[0]])}
     rows = []
     for name in SAMPLE_QUANTITIES:
@@ -168,10 +167,10 @@ def compare(
     Parameters
     ----------
     impacts
-        One or more cases (which are solved), impacts and recordings, by name or in a list; in a
-        list, impacts have the names of their cases.
+        Cases (which are solved), impacts and recordings: a mapping by names, or a list with the
+        names of the cases.
     force
-        ``"floor"`` or ``"elastic"``; by default that of each case.
+        ``"floor"`` or ``"elastic"``; by default the assessed force of each case.
     source
         ``"rubber_ball"`` or ``"tyre"``: source of the limits; by default that of the cases and
         recordings.
@@ -186,8 +185,8 @@ def compare(
     Raises
     ------
     InputError
-        If there is nothing to compare, or the drops or the limits differ; the height of a recording
-        counts if it is known.
+        If there is nothing to compare, or the drops or the limits differ. Recordings of unknown
+        height are not checked.
 
     Warns
     -----
@@ -230,7 +229,7 @@ def _require_same_drop(impacts: Mapping[str, ImpactResult]) -> None:
         listed = ", ".join(f"{n} falls with {i.impact_velocity:.4g} m/s" for n, i in known.items())
         refuse(
             f"&drop: height or gravity differs ({listed})",
-            f"the same drop, here within {tolerance:.1%} of the speed",
+            f"the same drop: impact velocities within {tolerance:.1%}",
         )
 
 
@@ -260,7 +259,7 @@ def _named(impacts: object) -> dict[str, Case | ImpactResult]:
 
 
 def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | ImpactResult]:
-    """Read namelist files (``.nml``) and recordings; their names are those of cases and files.
+    """Read namelist files (``.nml``) and recordings, by the names of the cases and the files.
 
     Raises
     ------
@@ -273,7 +272,7 @@ def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Impact
         if path.suffix.lower() in NAMELISTS:
             item = read_case(path)
         else:
-            # SciPy takes its time.
+            # SciPy is slow to import.
             from thud.recordings.read_recording import read_recording
 
             item = read_recording(path)

@@ -1,7 +1,7 @@
 """Figures by theme: impacts, ball, floors, rooms, recordings, fits, studies, pages.
 
-`case_figures` has the figures of a case by the names of their files; `thud.plot.documentation` has
-those of the paper and of the documentation.
+`case_figures` draws the figures of a case, `thud.plot.documentation` the figures of the paper and
+of the documentation.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ if TYPE_CHECKING:
     from thud.impact.free_modes import FreeModes
     from thud.impact.impact import Impact
 
-# Figures that a run draws by default: the first of these that the case has.
+# Maximum number of figures that a run draws by default.
 DEFAULT_COUNT = 3
 
 
@@ -111,14 +111,14 @@ def case_figures(
     Returns
     -------
     dict of str to Figure
-        Figures by the names of their files, without those that, with a warning, cannot be drawn.
+        Figures by the names of their files; a warning replaces a figure that cannot be drawn.
     """
     draws: dict[str, Callable[[], Figure | None]] = {}
     if impact:
         draws["force"] = partial(force_history, named(impact))
         draws["levels"] = partial(levels, named(impact))
     if impact and impact.case.room:
-        # SciPy takes its time.
+        # SciPy is slow to import.
         from thud.floors.prediction import predict_level
 
         with warn_if_not_drawn("the level in the room"):

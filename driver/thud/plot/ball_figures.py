@@ -40,7 +40,7 @@ INSTANTS = 9
 ARROWS = (6, 4)
 FRAMES_PER_SECOND = 12
 DISPLACEMENT = "Displacement of the material, mm"
-# Drawn maximum displacement of a mode, as fraction of the radius.
+# Maximum displacement of a mode in its figure, as a fraction of the radius.
 AMPLITUDE = 0.3
 
 
@@ -56,7 +56,6 @@ def _draw_section(
 
 
 def _add_colorbar(figure: Figure, panels: Iterable[Axes], scale: Normalize, label: str) -> None:
-    """Add the color bar below the panels."""
     figure.colorbar(
         ScalarMappable(scale), ax=[*panels], location="bottom", shrink=0.7, aspect=30, pad=0.02,
         label=label,
@@ -72,28 +71,28 @@ def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
     impact
         An impact with snapshots.
     instants
-        Number of instants, at even times from first touch to release.
+        Number of instants, evenly spaced from first touch to release.
 
     Returns
     -------
     Figure
-        Half sections over the floor; displacement since first touch in mm, time in ms.
+        Half sections above the floor; displacement since first touch in mm, time in ms.
 
     Raises
     ------
     InputError
         If the impact has no snapshots, or there are too many instants.
     """
-    shown = _snapshots(impact)
+    snapshots = _snapshots(impact)
     require_whole("instants", instants, 1, MAX_PANELS)
     times = impact.touch_time + np.linspace(0, impact.contact_time, instants)
-    # Fewer panels where there are fewer snapshots.
-    chosen = sorted({int(np.argmin(np.abs(shown.time - time))) for time in times})
+    # There are fewer panels if there are fewer snapshots than instants.
+    chosen = sorted({int(np.argmin(np.abs(snapshots.time - time))) for time in times})
     rows = -(-len(chosen) // 3)
     figure = new_figure(0.6 + 1.6 * rows)
     panels = figure.subplots(rows, 3, squeeze=False).ravel()
-    scale = _scale(shown, chosen)
-    depth = shown.floor_displacement[chosen].max()
+    scale = _scale(snapshots, chosen)
+    depth = snapshots.floor_displacement[chosen].max()
     for axes, i in zip(panels, chosen, strict=False):
         arrows = _draw_instant(axes, impact, i, scale, depth)
     for axes in panels:
@@ -117,22 +116,22 @@ def animate(impact: Impact, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     InputError
-        If the impact has no snapshots or the path another ending.
+        If the impact has no snapshots, or the path does not end with ``.gif``.
     OSError
         If the file cannot be written.
     """
     if Path(path).suffix.lower() != ".gif":
         message = f"{path}: this ending is not known; allowed: .gif"
         raise InputError(message)
-    shown = _snapshots(impact)
+    snapshots = _snapshots(impact)
     figure, axes = empty_axes(WIDTH)
-    count = len(shown.time)
-    scale = _scale(shown, range(count))
+    count = len(snapshots.time)
+    scale = _scale(snapshots, range(count))
     _add_colorbar(figure, [axes], scale, DISPLACEMENT)
 
     def draw(i: int) -> list[Any]:
         axes.clear()
-        depth = shown.floor_displacement.max()
+        depth = snapshots.floor_displacement.max()
         _add_key(axes, _draw_instant(axes, impact, i, scale, depth), impact)
         axes.set_axis_off()
         return []
@@ -145,7 +144,7 @@ def animate(impact: Impact, path: str | os.PathLike[str]) -> None:
 
 
 def _snapshots(impact: Impact) -> Motion:
-    """Return the snapshots of an impact; raise InputError where it has none."""
+    """Return the snapshots of an impact; raise InputError if it has none."""
     require_kind("impact", impact, Impact)
     if impact.motion is None:
         message = (
@@ -155,36 +154,38 @@ def _snapshots(impact: Impact) -> Motion:
     return impact.motion
 
 
-def _scale(shown: Motion, chosen: list[int] | range) -> Normalize:
-    """Return the scale of the colors of some snapshots, mm."""
-    return Normalize(0, 1e3 * max(_displacement(shown, i).max() for i in chosen))
+def _scale(snapshots: Motion, chosen: list[int] | range) -> Normalize:
+    """Return the color scale of some snapshots, mm."""
+    return Normalize(0, 1e3 * max(_displacement(snapshots, i).max() for i in chosen))
 
 
-def _displacement(shown: Motion, i: int) -> NDArray[np.float64]:
+def _displacement(snapshots: Motion, i: int) -> NDArray[np.float64]:
     """Return the displacements since first touch, m, shape (n_line, n_ring)."""
-    touching = shown.start - [0, shown.start[..., 1].min()]
-    length: NDArray[np.float64] = np.hypot(*(shown.position[i] - touching).T).T
-    return length
+    touch_position = snapshots.start - [0, snapshots.start[..., 1].min()]
+    distance: NDArray[np.float64] = np.hypot(*(snapshots.position[i] - touch_position).T).T
+    return distance
 
 
 def _draw_instant(axes: Axes, impact: Impact, i: int, scale: Normalize, depth: float) -> Quiver:
     """Draw the ball, its velocities and the floor, down to a depth, m; return the arrows."""
     radius = impact.case.ball.outer_radius
-    shown = _snapshots(impact)
-    position = shown.position[i]
-    floor = -shown.floor_displacement[i]
-    _draw_section(axes, position, 1e3 * _displacement(shown, i), scale)
+    snapshots = _snapshots(impact)
+    position = snapshots.position[i]
+    floor = -snapshots.floor_displacement[i]
+    _draw_section(axes, position, 1e3 * _displacement(snapshots, i), scale)
     shown_nodes = (slice(None, None, ARROWS[0]), slice(None, None, ARROWS[1]))
-    start, velocity = (field[shown_nodes].reshape(-1, 2) for field in (position, shown.velocity[i]))
+    start, velocity = (
+        field[shown_nodes].reshape(-1, 2) for field in (position, snapshots.velocity[i])
+    )
     # At first touch an arrow is as long as a third of the radius.
-    unit = 3 * impact.impact_velocity / radius
-    above = start[:, 1] + velocity[:, 1] / unit >= floor
+    velocity_scale = 3 * impact.impact_velocity / radius
+    above_floor = start[:, 1] + velocity[:, 1] / velocity_scale >= floor
     arrows = axes.quiver(
-        *start[above].T,
-        *velocity[above].T,
+        *start[above_floor].T,
+        *velocity[above_floor].T,
         angles="xy",
         scale_units="xy",
-        scale=unit,
+        scale=velocity_scale,
         width=0.014,
         color="0.1",
         # A light edge shows arrows on dark colors.
@@ -192,8 +193,8 @@ def _draw_instant(axes: Axes, impact: Impact, i: int, scale: Normalize, depth: f
     )
     lowest = -depth - 0.12 * radius
     axes.fill_between([-0.05 * radius, 1.4 * radius], lowest, floor, color="0.6", linewidth=0)
-    since = 1e3 * (shown.time[i] - impact.touch_time)
-    axes.set_title(f"{since:.1f} ms")
+    elapsed = 1e3 * (snapshots.time[i] - impact.touch_time)
+    axes.set_title(f"{elapsed:.1f} ms")
     axes.set_xlim(-0.05 * radius, 1.4 * radius)
     axes.set_ylim(lowest - 0.03 * radius, 2.4 * radius)
     axes.set_aspect("equal")
@@ -205,7 +206,7 @@ def _add_key(axes: Axes, arrows: Quiver, impact: Impact) -> None:
     velocity = float(f"{impact.impact_velocity:.1g}")
     figure = axes.get_figure(root=True)
     assert figure is not None  # noqa: S101 - the axes are new
-    # In fractions of the figure: a key in inches would be lost where notebooks crop the figure.
+    # In fractions of the figure: a key in inches would be lost if a notebook crops the figure.
     x, y = (WIDTH - 0.52, 0.11) / figure.get_size_inches()
     axes.quiverkey(
         arrows, x, y, velocity, f"{velocity:g} m/s", labelpos="E", coordinates="figure",
@@ -215,7 +216,7 @@ def _add_key(axes: Axes, arrows: Quiver, impact: Impact) -> None:
 
 @own_style()
 def mode_shapes(modes: FreeModes, columns: int = 3) -> Figure:
-    """Draw mode shapes as half sections over the outline of the ball at rest (paper, figure 4).
+    """Draw mode shapes as half sections, with the outline of the ball at rest (paper, figure 4).
 
     Parameters
     ----------
@@ -227,12 +228,12 @@ def mode_shapes(modes: FreeModes, columns: int = 3) -> Figure:
     Returns
     -------
     Figure
-        One half section for each mode; the color is the displacement over its maximum.
+        One half section for each mode; the color is the displacement divided by its maximum.
     """
     require_kind("modes", modes, FreeModes)
     require_whole("columns", columns, 1, MAX_PANELS)
     rows = -(-len(modes.frequency) // columns)
-    # More than three side by side need more than a column.
+    # More than three shapes side by side are wider than a column.
     figure = new_figure(0.45 + 1.75 * rows, WIDTH * max(1, columns / 3))
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     radius = modes.ball.outer_radius
@@ -260,7 +261,7 @@ def loss_factor(models: Mapping[str, FiniteElement]) -> Figure:
     Parameters
     ----------
     models
-        Models with a material by their names in the legend.
+        Finite-element models by their names in the legend.
 
     Returns
     -------
@@ -270,7 +271,7 @@ def loss_factor(models: Mapping[str, FiniteElement]) -> Figure:
     Raises
     ------
     InputError
-        If `models` is not a mapping of names to such models, or empty.
+        If `models` is not a mapping of names to models, or empty.
     """
     require_mapping("models", models, "models")
     figure, axes = empty_axes(2.5)

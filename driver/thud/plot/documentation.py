@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 @lru_cache(maxsize=4)
 def _solve_published(viscosity: FiniteElementViscosity = "fractional") -> Impact:
-    """Return the impact of the ball of the published modes by finite elements."""
+    """Return the impact of the ball with the published modes, by finite elements."""
     return solve(
         Ball.standard(), model="finite_element", viscosity=viscosity, snapshot_interval=1e-3
     )
@@ -48,7 +48,7 @@ def _solve_published(viscosity: FiniteElementViscosity = "fractional") -> Impact
 
 @cache
 def _solve_chipboard() -> FloorImpact:
-    """Return the same impact on chipboard of 22 mm, far from its joists: 1600 N s/m."""
+    """Return the impact of this ball on 22 mm of chipboard far from joists, 1600 N s/m."""
     model = FiniteElement(snapshot_interval=1e-3)
     impact = solve(Ball.standard(), model=model, floor=InfinitePlate(resistance=1600.0)).on_floor
     assert impact is not None  # noqa: S101 - the floor is mobile
@@ -56,13 +56,11 @@ def _solve_chipboard() -> FloorImpact:
 
 
 def _draw_heights() -> Figure:
-    """Draw the three heights of the paper."""
     impacts = {f"{height:.2f} m": solve(drop=Drop(height)) for height in (0.1, 1, 1.6)}
     return force_history(impacts, "elastic")
 
 
 def _draw_viscosity() -> Figure:
-    """Draw the effect of the viscosity of the rubber on the force."""
     return force_history({"viscous": _solve_published(), "elastic": _solve_published("none")})
 
 
@@ -74,20 +72,19 @@ def _draw_shell() -> Figure:
 
 
 def _draw_models() -> Figure:
-    """Draw the model of the paper, its improvement, and the finite elements."""
-    # The ends of the band of inputs/studies/law_of_loss.toml.
-    ends = {
+    """Draw the levels of the model of the paper, the modal ball, and finite elements."""
+    # The two extreme damping laws of inputs/studies/law_of_loss.toml.
+    extremes = {
         f"finite elements, order {order:g}": FiniteElement(
             viscosity="fractional", fractional_order=order, loss_factor=loss_factor
         )
         for order, loss_factor in ((0.15, 0.1305), (1.0, 0.2041))
     }
-    elements = {name: solve(Ball.standard(), model=model) for name, model in ends.items()}
+    elements = {name: solve(Ball.standard(), model=model) for name, model in extremes.items()}
     return levels({"hollow sphere": solve(), "modal ball": solve(model="modal_ball"), **elements})
 
 
 def _draw_tires() -> Figure:
-    """Draw the tire as one mass and as belt and rim."""
     tire, drop = Ball(mass=7.3), Drop(0.85)
     impacts = {
         "one mass": solve(tire, drop, "hunt_crossley", contact_time=0.02, restitution=0.8),
@@ -106,7 +103,7 @@ def _draw_fluxes() -> Figure:
 
 
 def _draw_families() -> Figure:
-    """Draw which modes carry which octave: quasi-static families, one at a time."""
+    """Draw how levels change if one family of modes at a time is quasi-static."""
     static = {f"n = {n} static": [n] for n in range(2, 7)}
     static["all static"] = list(range(ModalBall.harmonics + 1))
     impacts = {
@@ -117,7 +114,6 @@ def _draw_families() -> Figure:
 
 
 def _draw_laws() -> Figure:
-    """Draw the damping laws."""
     laws = {
         f"Fractional, order {order:g}": FiniteElement(
             viscosity="fractional", fractional_order=order, loss_factor=loss
@@ -135,7 +131,7 @@ def _draw_laws() -> Figure:
 
 
 def _draw_compressions() -> Figure:
-    """Draw the ball of the paper by each model, at one modulus, without viscosity."""
+    """Draw the paper's ball by each model, with one modulus, undamped."""
     ball = Ball(poisson_ratio=0.49)
     models: dict[str, ModelName] = {"shell": "hollow_sphere", "modal ball": "modal_ball"}
     curves = {name: compress(ball, model) for name, model in models.items()}
@@ -146,7 +142,6 @@ def _draw_compressions() -> Figure:
 
 
 def _draw_floors() -> Figure:
-    """Draw floors of the folder inputs/floors."""
     concrete = Plate(source_x=0.4, source_y=0.35)
     timber = replace(concrete, edges="absorption")
     return floor_mobilities(
@@ -172,7 +167,6 @@ def _draw_floors() -> Figure:
 
 
 def _draw_impedances() -> Figure:
-    """Draw three models of the ball, and floors from chipboard to concrete."""
     resistance = [560.0, 1e3, 2e3, 5e3, 1e5]
     sources = {
         "shell": ball_impedance(solve(), resistance),

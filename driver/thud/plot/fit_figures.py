@@ -12,7 +12,7 @@ from thud.plot.style import (
     BAND_NAMES,
     COLORS,
     FORCE_NAMES,
-    GREY,
+    GRAY,
     LEVEL,
     WIDTH,
     legend_above,
@@ -33,11 +33,11 @@ if TYPE_CHECKING:
 
 # Maximum number of bands whose names are not rotated.
 MAX_UPRIGHT = 5
-# Names that are too long for the axis.
-BROKEN = {"contact time": "contact\ntime", "restitution": "resti-\ntution"}
+# Line breaks in names that are too long for the axis.
+WRAPPED_NAMES = {"contact time": "contact\ntime", "restitution": "resti-\ntution"}
 # Median difference, relative to the maximum force, above which the unfiltered record is drawn too.
-VISIBLE = 0.003
-# Time that is drawn before and after the contact, as fraction of it.
+MIN_DIFFERENCE = 0.003
+# Drawn time before and after the contact, as fractions of the contact time.
 BEFORE, AFTER = 0.15, 0.4
 
 
@@ -76,7 +76,7 @@ def _draw_force(fitted: FittedTarget, deviation: float, above: Axes, below: Axes
     time = 1e3 * column["time_s"]
     record, target = column["record_N"], column["target_N"]
     band = f"below {misfit.below / 1e3:.3g} kHz"
-    if np.median(np.abs(record - target)) > VISIBLE * target.max():
+    if np.median(np.abs(record - target)) > MIN_DIFFERENCE * target.max():
         above.plot(time, record / 1e3, color="0.6", linewidth=0.5, label="Record")
     above.plot(
         time, target / 1e3, color=COLORS[5], linewidth=2.8, alpha=0.6, label=f"Record {band}"
@@ -84,7 +84,7 @@ def _draw_force(fitted: FittedTarget, deviation: float, above: Axes, below: Axes
     fit = column["model_N"] + column["background_N"]
     above.plot(time, fit / 1e3, color=COLORS[1], linestyle="--", linewidth=1.1, label="Fit")
     width = 2 * misfit.band_fraction * deviation
-    below.axhspan(-width, width, color=GREY, linewidth=0)
+    below.axhspan(-width, width, color=GRAY, linewidth=0)
     below.plot(time, column["residual_N"], color=COLORS[6], linewidth=0.7)
     contact, touch = fitted.impact.contact_time, fitted.own_value(SHIFT, 0.0)
     begin, end = touch - BEFORE * contact, touch + (1 + AFTER) * contact
@@ -95,7 +95,7 @@ def _draw_force(fitted: FittedTarget, deviation: float, above: Axes, below: Axes
     limit = 1.1 * max(np.abs(column["residual_N"]).max(), width)
     below.set_ylim(-limit, limit)
     # A label in the lower panel would cover the curve.
-    above.fill_between([], [], color=GREY, linewidth=0, label=f"Noise {band}, ±2σ")
+    above.fill_between([], [], color=GRAY, linewidth=0, label=f"Noise {band}, ±2σ")
     legend_above(above)
 
 
@@ -124,11 +124,11 @@ def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: Axes) -
         x[:count], values["model"][:count], color=COLORS[1], linestyle="--", linewidth=1,
         marker="o", markersize=4, label="Fit",
     )  # fmt: skip
-    below.axhspan(-1, 1, color=GREY, linewidth=0)
+    below.axhspan(-1, 1, color=GRAY, linewidth=0)
     below.plot(x, residuals, color=COLORS[1], marker="o", markersize=4, linestyle="none")
     limit = 1.2 * max(1.2, np.abs(residuals).max())
     below.set_ylim(-limit, limit)
-    below.set_xticks(x, [BROKEN.get(name, name) for name in names], fontsize="small")
+    below.set_xticks(x, [WRAPPED_NAMES.get(name, name) for name in names], fontsize="small")
     below.xaxis.set_minor_locator(NullLocator())
     below.set_xlim(-0.6, len(names) - 0.4)
     if count > MAX_UPRIGHT:
@@ -141,8 +141,8 @@ def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: Axes) -
 
 # Maximum number of parameters with confidence regions; more have a table of correlations.
 MAX_PARAMETERS = 5
-# Characters of a label along all panels.
-LINE = 44
+# Maximum number of characters of a label as wide as all panels.
+MAX_CHARACTERS = 44
 
 
 @own_style()
@@ -165,7 +165,7 @@ def confidence(fit: Fit) -> Figure:
                 axes.remove()
                 continue
             _draw_pair(fit, axes, (column, row))
-    letters = LINE / (count - 1)
+    letters = MAX_CHARACTERS / (count - 1)
     labels = [_label(name, unit, letters) for name, (unit, _) in fit.display_units.items()]
     for row in range(1, count):
         panels[row - 1, 0].set_ylabel(labels[row])
@@ -190,7 +190,7 @@ def _draw_pair(fit: Fit, axes: Axes, pair: tuple[int, int]) -> None:
     x, y = (
         np.array(intervals[fit.names[i]]) / scale for i, scale in zip(pair, factor, strict=True)
     )
-    style: dict[str, Any] = {"color": GREY, "alpha": 0.5, "linewidth": 0, "zorder": 0}
+    style: dict[str, Any] = {"color": GRAY, "alpha": 0.5, "linewidth": 0, "zorder": 0}
     axes.axvspan(*x, label=f"{100 * fit.confidence:g} % interval of each", **style)
     axes.axhspan(*y, **style)
     half = 1.25 * np.sqrt(square * np.diag(block))
@@ -200,13 +200,13 @@ def _draw_pair(fit: Fit, axes: Axes, pair: tuple[int, int]) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(ticks))
     axes.yaxis.set_major_locator(MaxNLocator(ticks + 1))
     axes.ticklabel_format(useOffset=False)
-    share = fit.correlation[pair]
-    digits = 2 if abs(share) < 0.99 else 4  # noqa: PLR2004 - 1.00 would hide a difference
-    axes.set_title(f"Correlation {share:z.{digits}f}".replace("-", "−"))
+    correlation = fit.correlation[pair]
+    digits = 2 if abs(correlation) < 0.99 else 4  # noqa: PLR2004 - 1.00 would hide a difference
+    axes.set_title(f"Correlation {correlation:z.{digits}f}".replace("-", "−"))
 
 
 def _squared_radius(fit: Fit) -> float:
-    """Return the quantile of chi-square with 2 degrees of freedom, or twice that of Fisher's F."""
+    """Return the quantile of chi-square, or twice that of Fisher's F if the noise is estimated."""
     logarithm = np.log1p(-fit.confidence)
     if fit.known_noise:
         return float(-2 * logarithm)
@@ -218,13 +218,14 @@ def _add_ellipse(
     axes: Axes, center: NDArray[np.float64], block: NDArray[np.float64], label: str
 ) -> None:
     """Draw the ellipse (x - center) block^-1 (x - center) = 1."""
-    # Scaled by its deviations, an ellipse has its axes on the diagonals: no loss of digits.
+    # An ellipse that is scaled by its deviations has diagonal axes: no loss of digits.
     x, y = np.sqrt(np.diag(block))
     angle = np.linspace(0, 2 * np.pi, 181)
-    share = block[0, 1] / (x * y)
+    correlation = block[0, 1] / (x * y)
     axes.fill(
         center[0] + x * np.cos(angle),
-        center[1] + y * (share * np.cos(angle) + np.sqrt(max(0, 1 - share**2)) * np.sin(angle)),
+        center[1]
+        + y * (correlation * np.cos(angle) + np.sqrt(max(0, 1 - correlation**2)) * np.sin(angle)),
         facecolor="none",
         edgecolor=COLORS[0],
         linewidth=1.2,
@@ -233,11 +234,10 @@ def _add_ellipse(
 
 
 def _draw_correlation(fit: Fit) -> Figure:
-    """Draw the correlations of all parameters as a table of colors."""
     figure = new_figure(WIDTH)
     axes = figure.add_subplot()
     shown = np.ma.masked_invalid(fit.correlation)
-    axes.set_facecolor(GREY)
+    axes.set_facecolor(GRAY)
     axes.imshow(shown, cmap="RdBu_r", vmin=-1, vmax=1)
     names = [name.replace("_", "\n") for name in fit.names]
     axes.set_xticks(range(len(names)), names, fontsize="small", rotation=90)
@@ -254,7 +254,7 @@ def _draw_correlation(fit: Fit) -> Figure:
 
 
 def _label(name: str, unit: str, letters: float) -> str:
-    """Return a parameter with its unit, on two lines where it does not fit on one."""
+    """Return a parameter with its unit, on two lines if it does not fit on one."""
     text = humanize(name).capitalize()
     if not unit:
         return text

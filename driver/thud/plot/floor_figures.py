@@ -39,11 +39,11 @@ if TYPE_CHECKING:
 
 
 THIRDS = BANDWIDTHS[1]
-# Drawn time, in contact times.
+# Drawn time, as a multiple of the contact time.
 _SHOWN = 1.5
 # Maximum number of mode shapes, and points along a side of the plate.
 MAX_SHAPES, POINTS = 30, 60
-# Frequencies per octave of a drawn mobility: peaks of lightly damped floors are narrow.
+# Frequencies per octave in plots of a mobility: peaks of lightly damped floors are narrow.
 _DENSITY = 400
 
 
@@ -118,7 +118,7 @@ def plate_modes(floor: Plate, count: int = 6, columns: int = 3) -> Figure:
     columns
         Shapes side by side.
     """
-    # SciPy takes its time.
+    # SciPy is slow to import.
     from thud.floors.modal_room import plate_frequencies
 
     require_kind("floor", floor, Plate)
@@ -178,19 +178,19 @@ def mobility_fit(fit: MobilityFit) -> Figure:
     """Draw magnitude and phase of measurement and fit against frequency."""
     figure = new_figure(3.6)
     upper, lower = figure.subplots(2, sharex=True)
-    lines = np.geomspace(fit.frequency[0], fit.frequency[-1], 2000)
-    fitted = fit.mobility(lines)
+    frequency = np.geomspace(fit.frequency[0], fit.frequency[-1], 2000)
+    fitted = fit.mobility(frequency)
     upper.loglog(
         fit.frequency, abs(fit.measured), ".", color="0.55", markersize=2.5, label="measured"
     )
     upper.loglog(
-        lines, abs(fitted), color=COLORS[0],
+        frequency, abs(fitted), color=COLORS[0],
         label=f"fitted: relative error {100 * fit.error:.2g} %",
     )  # fmt: skip
     lower.semilogx(
         fit.frequency, np.degrees(np.angle(fit.measured)), ".", color="0.55", markersize=2.5
     )
-    lower.semilogx(lines, np.degrees(np.angle(fitted)), color=COLORS[0])
+    lower.semilogx(frequency, np.degrees(np.angle(fitted)), color=COLORS[0])
     upper.set_ylabel("Mobility, m/(N s)")
     lower.set_ylabel("Phase, degrees")
     lower.set_yticks([-90, 0, 90])
@@ -207,7 +207,7 @@ _FREQUENCIES = np.geomspace(22.0, 720.0, 1000)
 def ball_impedances(
     sources: Mapping[str, BallImpedance], floors: Mapping[str, FloorOptions]
 ) -> Figure:
-    """Draw the impedances of sources, filled markers, and of floors, lines.
+    """Draw the impedances of sources as filled markers, and of floors as lines.
 
     Floors below the open markers change the level of the force by more than 1 dB.
     """
@@ -220,12 +220,12 @@ def ball_impedances(
     frequency = np.array([])
     for i, (name, source) in enumerate(sources.items()):
         frequency = source.frequency
-        # Markers side by side where sources agree.
+        # Markers side by side: equal impedances stay visible.
         x = frequency * 1.05 ** (i - (len(sources) - 1) / 2)
         style = {"color": "black", "linestyle": "none", **marker_style(i)}
-        words = f", {name}" if name else ""
-        axes.loglog(x, np.abs(source.impedance), label=f"source{words}", **style)
-        axes.loglog(x, source.limit(), fillstyle="none", label=f"limit of 1 dB{words}", **style)
+        suffix = f", {name}" if name else ""
+        axes.loglog(x, np.abs(source.impedance), label=f"source{suffix}", **style)
+        axes.loglog(x, source.limit(), fillstyle="none", label=f"limit of 1 dB{suffix}", **style)
     axes.xaxis.set_major_locator(FixedLocator(frequency.tolist()))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xticklabels([f"{f:g}" for f in frequency])

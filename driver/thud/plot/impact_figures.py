@@ -41,9 +41,9 @@ if TYPE_CHECKING:
     from thud.impact.impact import Impact
     from thud.plot.style import Curve
 
-# Fraction of the maximum force that a contact exceeds.
-NOISE = 0.01
-# Time that is drawn before and after the contact, as fraction of it.
+# A contact ends below this fraction of the maximum force.
+CONTACT_THRESHOLD = 0.01
+# Drawn time before and after the contact, as a fraction of the contact time.
 MARGIN = 0.04
 TIME_LABEL = "Time since first touch, ms"
 
@@ -75,7 +75,7 @@ def draw_forces(axes: Axes, impacts: Mapping[str, Curve], force: LevelsForce | N
     for i, (name, impact, kind) in enumerate(iterate_curves(impacts, force)):
         axes.plot(*contact_force(impact, kind), label=escape_label(name), **line_style(i))
     axes.margins(x=0)
-    # A number of ticks that depends on the layout would change it in turn.
+    # A number of ticks that depends on the layout would change the layout in turn.
     axes.locator_params(axis="y", nbins=8)
     axes.set_xlabel(TIME_LABEL)
     axes.set_ylabel(force_label(impacts, force))
@@ -86,11 +86,11 @@ def contact_force(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return time since first touch, ms, and low-passed force, kN, during contact.
 
-    Force plates record no more (paper, section 3); above it, meshes and modes ring.
+    Force plates record no higher frequencies (paper, section 3), at which meshes and modes ring.
     """
     time = impact.time - impact.touch_time
     recorded = low_pass(impact.force(kind), impact.sample_rate)
-    end = time[recorded > NOISE * recorded.max()][-1]
+    end = time[recorded > CONTACT_THRESHOLD * recorded.max()][-1]
     shown = (time >= -MARGIN * end) & (time <= (1 + MARGIN) * end)
     return 1e3 * time[shown], 1e-3 * recorded[shown]
 
@@ -107,7 +107,7 @@ def levels(
     source: LimitsSource | None = None,
     method: LevelsMethod | None = None,
 ) -> Figure:
-    """Draw octave levels over the tolerance band of the standards (paper, figure 3).
+    """Draw octave levels with the tolerance band of the standards (paper, figure 3).
 
     One-third-octave bands, which have no limits, are drawn below if a case asks for them.
 
@@ -118,7 +118,7 @@ def levels(
     force
         ``"floor"`` or ``"elastic"`` (the paper's ball force); by default that of each case.
     source
-        ``"rubber_ball"`` or ``"tyre"``: of the tolerance band; by default that of the cases.
+        ``"rubber_ball"`` or ``"tyre"``: source of the limits; by default that of the cases.
     method
         ``"exact"`` or ``"fft"``; by default that of each case.
 
@@ -146,7 +146,7 @@ def draw_levels(
     source: LimitsSource,
     method: LevelsMethod | None = None,
 ) -> None:
-    """Draw levels in the axes of their bands; those of the octaves have the tolerance band."""
+    """Draw levels in the axes of their bands; octaves also show the tolerances."""
     draw_tolerance(panels["octave"], *octave_limits(source), source.replace("_", " "))
     # Markers side by side: equal levels stay distinguishable.
     step = min(0.1, 0.6 / len(impacts))
@@ -161,7 +161,7 @@ def draw_levels(
 def common_source(impacts: Mapping[str, Curve], source: LimitsSource | None = None) -> LimitsSource:
     """Return a source of limits, by default that of the cases and recordings.
 
-    A recording without a stated source follows the others. Raises InputError if the sources differ.
+    A recording without a stated source takes that of the others. Raises InputError if they differ.
     """
     if source is not None:
         return source
@@ -178,7 +178,7 @@ def common_source(impacts: Mapping[str, Curve], source: LimitsSource | None = No
 def draw_tolerance(
     axes: Axes, lower: NDArray[np.float64], upper: NDArray[np.float64], name: str
 ) -> None:
-    """Draw the tolerance of each octave as a grey box with its nominal value."""
+    """Draw the tolerance of each octave as a gray box with its nominal value."""
     octave_boxes(axes, lower, upper, f"Tolerance, {name}")
     i = np.arange(len(lower))
     axes.hlines((lower + upper) / 2, i - 0.4, i + 0.4, color="0.45", linewidth=0.8, label="Nominal")
@@ -188,7 +188,7 @@ def draw_tolerance(
 def level_changes(
     reference: Impact, impacts: Mapping[str, Impact], force: LevelsForce | None = None
 ) -> Figure:
-    """Draw how octave levels change against a reference.
+    """Draw the change of octave levels relative to a reference.
 
     Parameters
     ----------

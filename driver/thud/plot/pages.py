@@ -58,8 +58,8 @@ if TYPE_CHECKING:
 # Line styles and markers of `thud.plot.style` by the names of plotly.
 _DASHES = ("solid", "dash", "dashdot", "dot", "longdashdot", "2px,2px", "longdash")
 _SYMBOLS = ("circle", "square", "triangle-up", "diamond", "triangle-down", "cross", "x")
-# Maximum number of letters of a line of a legend.
-_LINE = 30
+# Maximum number of characters in a line of a legend.
+_MAX_CHARACTERS = 30
 
 
 def html_page(
@@ -85,19 +85,19 @@ def html_page(
 def curve_style(i: int, label: str) -> dict[str, Any]:
     """Return name, line and marker of a curve by its index."""
     return {
-        "name": "<br>".join(html.escape(line) for line in wrap(label, _LINE)),
+        "name": "<br>".join(html.escape(line) for line in wrap(label, _MAX_CHARACTERS)),
         "line": {"color": COLORS[i % len(COLORS)], "dash": styled(i, _DASHES)},
         "marker": {"symbol": styled(i, _SYMBOLS), "size": 8},
     }
 
 
 def curve_points(x: Iterable[Any], y: Iterable[float]) -> dict[str, list[Any]]:
-    """Return a curve, its values with six digits."""
+    """Return the points of a curve, with values of six digits."""
     return {"x": list(x), "y": [float(f"{value:.6g}") + 0.0 for value in y]}
 
 
 def plot_layout(x: str, y: str, kind: str = "linear", scale: str = "linear") -> dict[str, Any]:
-    """Return the layout of a plot, without colors, which are those of the page."""
+    """Return the layout of a plot, without colors, which the page sets."""
     return {
         "xaxis": {"title": {"text": x}, "type": kind, "zeroline": False, "automargin": True},
         "yaxis": {
@@ -115,7 +115,6 @@ def plot_layout(x: str, y: str, kind: str = "linear", scale: str = "linear") -> 
 
 
 def _row(cells: Sequence[str], tag: str) -> str:
-    """Return a row of the table."""
     return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
 
 
@@ -183,10 +182,10 @@ document.getElementById("plot0").on("plotly_restyle", ([change, curves]) => {
 
 
 # Maximum number of characters of a name in one line of a table.
-_COLUMN = 20
-# Space around the text of a cell, and left of all axes, inch.
+_MAX_NAME_LENGTH = 20
+# Space around the text of a cell, and to the left of all axes, inch.
 _CELL_MARGIN = (0.12, 0.08)
-_AXIS = 0.8
+_LEFT_MARGIN = 0.8
 
 
 @own_style()
@@ -210,7 +209,7 @@ def comparison_page(
     octaves.set_ylabel(level_label(impacts, force))
     legend_above(octaves)
     head, *body = table
-    _add_table(figure, grid, [[fill(name, _COLUMN) for name in head], *body])
+    _add_table(figure, grid, [[fill(name, _MAX_NAME_LENGTH) for name in head], *body])
     return figure
 
 
@@ -229,10 +228,10 @@ def _add_table(figure: Figure, grid: GridSpec, rows: Sequence[Sequence[str]]) ->
     for (row, column), cell in table.get_celld().items():
         cell.set(width=widths[column], height=heights[row], linewidth=0.5)
         cell.set_text_props(ha="right" if column else "left")
-    above, others = figure.get_figheight(), grid.nrows - 1
-    grid.set_height_ratios([*([above / others] * others), heights.sum()])
-    width = widths.sum() + _AXIS
-    figure.set_size_inches(max(figure.get_figwidth(), width), above + heights.sum())
+    upper_height, upper_rows = figure.get_figheight(), grid.nrows - 1
+    grid.set_height_ratios([*([upper_height / upper_rows] * upper_rows), heights.sum()])
+    width = widths.sum() + _LEFT_MARGIN
+    figure.set_size_inches(max(figure.get_figwidth(), width), upper_height + heights.sum())
 
 
 def comparison_html(
@@ -262,7 +261,7 @@ def comparison_html(
     ]
     return html_page(
         "Comparison of models and recordings",
-        "Forces as force plates record them, low-passed at 1.25 kHz, and their levels; grey boxes "
+        "Forces as force plates record them, low-passed at 1.25 kHz, and their levels; gray boxes "
         "are the tolerances of the standards, which one-third-octave bands do not have.",
         table,
         plots,
@@ -274,7 +273,7 @@ def _names(bands: BandSet) -> list[str]:
 
 
 def _tolerance(source: LimitsSource) -> dict[str, Any]:
-    """Return the tolerance of each octave as a grey box."""
+    """Return the tolerance of each octave as a gray box."""
     lower, upper = octave_limits(source)
     return {
         "type": "bar",
@@ -289,7 +288,7 @@ def _tolerance(source: LimitsSource) -> dict[str, Any]:
     }
 
 
-# Labels of the steps of the chain, and whether their axes are logarithmic.
+# Labels of the steps from force to room, and whether their axes are logarithmic.
 _STEPS = {
     LEVEL: False,
     "Energy into the floor, J": True,
@@ -300,12 +299,12 @@ _STEPS = {
 
 @own_style()
 def draw_floors(comparison: FloorComparison) -> Figure:
-    """Draw the chain of each floor as spectra, its levels beside the classes, and the table."""
+    """Draw spectra of the steps from force to room, ratings with class limits, and the table."""
     figure = new_figure(7.2, 2 * WIDTH)
     grid = figure.add_gridspec(4, 2)
     panels = [figure.add_subplot(grid[i, j]) for i in range(2) for j in range(2)]
     for i, (name, prediction) in enumerate(comparison.predictions.items()):
-        for axes, values in zip(panels, _chain(prediction), strict=True):
+        for axes, values in zip(panels, _step_values(prediction), strict=True):
             axes.plot(
                 np.arange(len(values)), values, label=escape_label(name), **line_style(i),
                 **marker_style(i, 3.5),
@@ -328,7 +327,7 @@ def floors_html(comparison: FloorComparison) -> str:
     for i, (name, prediction) in enumerate(comparison.predictions.items()):
         style = curve_style(i, name)
         names = [f"{frequency:g}" for frequency in prediction.frequency]
-        for step, values in zip(traces, _chain(prediction), strict=True):
+        for step, values in zip(traces, _step_values(prediction), strict=True):
             points = curve_points(names, values)
             step.append(
                 {**style, "mode": "lines+markers", **points, "showlegend": step is traces[-1]}
@@ -347,21 +346,21 @@ def floors_html(comparison: FloorComparison) -> str:
         "They are statistical means over positions, floors and rooms; see the warnings of each "
         "prediction."
     )
-    # The level in the room, of full width, comes first.
+    # The first plot has the full width: the level in the room.
     return html_page("Comparison of floors", text, comparison.rows(), [plots[-1], *plots[:-1]])
 
 
-def _chain(prediction: RoomPrediction) -> tuple[NDArray[np.float64], ...]:
+def _step_values(prediction: RoomPrediction) -> tuple[NDArray[np.float64], ...]:
     """Return the values of each step of a prediction."""
     force = 10 * np.log10(prediction.energy / prediction.conductance)
     return force, prediction.energy, 100 * prediction.radiated_share, prediction.level
 
 
 def _draw_classes(axes: Axes, comparison: FloorComparison) -> None:
-    """Draw the single numbers beside the maximum levels of the Korean classes."""
+    """Draw the ratings of floors, and the limits of the Korean classes."""
     x = np.arange(len(comparison.predictions))
     room = [prediction.octave_rating.a_weighted for prediction in comparison.predictions.values()]
-    after = [
+    standardized = [
         prediction.standardized_rating.a_weighted for prediction in comparison.predictions.values()
     ]
     axes.bar(
@@ -369,7 +368,7 @@ def _draw_classes(axes: Axes, comparison: FloorComparison) -> None:
         label="in the room, of octaves",
     )  # fmt: skip
     axes.bar(
-        x + 0.2, after, 0.36, color="white", edgecolor="black", linewidth=0.5,
+        x + 0.2, standardized, 0.36, color="white", edgecolor="black", linewidth=0.5,
         hatch="//////", label="standardized, of one-third-octave bands",
     )  # fmt: skip
     for number, limit in enumerate(CLASS_LIMITS, 1):
@@ -380,5 +379,5 @@ def _draw_classes(axes: Axes, comparison: FloorComparison) -> None:
         )  # fmt: skip
     axes.set_xticks(x, [escape_label(name) for name in comparison.predictions], rotation=20)
     axes.set_ylabel("L_iA,Fmax, dB")
-    axes.set_ylim(bottom=min([CLASS_LIMITS[0], *room, *after]) - 5)
+    axes.set_ylim(bottom=min([CLASS_LIMITS[0], *room, *standardized]) - 5)
     axes.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))

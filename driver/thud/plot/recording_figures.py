@@ -9,7 +9,7 @@ import numpy as np
 from thud.base.checks import require_choice
 from thud.level.levels import BANDWIDTHS, low_pass
 from thud.plot.impact_figures import MARGIN, TIME_LABEL, draw_tolerance
-from thud.plot.style import COLORS, GREY, empty_axes, legend_above, octave_axis, own_style
+from thud.plot.style import COLORS, GRAY, empty_axes, legend_above, octave_axis, own_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
     from thud.recordings.recording import Recording
 
 
-# Height without the legend, inch: two of them stand side by side on a report.
+# Height without the legend, inch: a report has two figures side by side.
 HEIGHT = 2.15
-# Maximum number of drops drawn as lines; of more, the range is filled.
+# Maximum number of drops drawn as lines; the range of more drops is filled.
 MAX_LINES = 40
-# Margin of the filtered force beyond the drawn times, s: longer than the filter's response.
-ROOM = 2e-2
+# Margin of the filtered force around the drawn times, s: longer than the filter's response.
+FILTER_MARGIN = 2e-2
 # Points of a force.
 POINTS = 400
-# Backgrounds further below the lowest level, dB, are not drawn: they do not matter.
-DEEPEST = 20.0
+# Backgrounds further below the lowest level than this, dB, are not drawn.
+MAX_DISTANCE = 20.0
 THIN: dict[str, Any] = {"color": "0.55", "linewidth": 0.5}
 DEVIANT: dict[str, Any] = {"color": COLORS[1], "linewidth": 0.7, "linestyle": (0, (3, 1))}
 AVERAGE: dict[str, Any] = {"color": COLORS[0], "linewidth": 1.4}
@@ -43,7 +43,7 @@ BARS: dict[str, Any] = {
 def recording_forces(recording: Recording) -> Figure:
     """Draw the force of every drop, low-passed at 1.25 kHz, and their average, against time.
 
-    The contact time has its limits and the bar of its expanded uncertainty (95 %).
+    The contact time is drawn with its limits and its expanded uncertainty (95 %).
     """
     figure, axes = empty_axes(HEIGHT)
     limits = next(d for d in recording.assess().criteria if d.name == "contact_time")
@@ -52,7 +52,7 @@ def recording_forces(recording: Recording) -> Figure:
     time = longest * np.linspace(-MARGIN, 1 + MARGIN, POINTS)
     forces = 1e-3 * np.array([_recorded(drop, time) for drop in recording.drops])
     allowed = f"permitted contact time, {1e3 * limits.lower:g} to {1e3 * limits.upper:g} ms"
-    axes.axvspan(1e3 * limits.lower, 1e3 * limits.upper, color=GREY, linewidth=0, label=allowed)
+    axes.axvspan(1e3 * limits.lower, 1e3 * limits.upper, color=GRAY, linewidth=0, label=allowed)
     _draw_drops(axes, 1e3 * time, forces, recording)
     if len(forces) > 1:
         axes.plot(1e3 * time, forces.mean(axis=0), label="average", **AVERAGE)
@@ -69,10 +69,11 @@ def recording_forces(recording: Recording) -> Figure:
 
 def _recorded(drop: Drop, time: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the force of a drop, low-passed at 1.25 kHz, N, at times since first touch, s."""
-    ends = ((np.array([time[0] - ROOM, time[-1] + ROOM]) - drop.begin) * drop.sample_rate).astype(
-        int
-    )
-    first, stop = np.clip(ends, 0, len(drop.force))
+    indices = (
+        (np.array([time[0] - FILTER_MARGIN, time[-1] + FILTER_MARGIN]) - drop.begin)
+        * drop.sample_rate
+    ).astype(int)
+    first, stop = np.clip(indices, 0, len(drop.force))
     force = low_pass(drop.force[first:stop], drop.sample_rate)
     return np.interp(time, drop.time[first:stop], force)
 
@@ -88,7 +89,7 @@ def recording_figure(recording: Recording, quantity: str = "levels") -> Figure:
 def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
     """Draw the levels of every drop, their average with its expanded uncertainty, the background.
 
-    Octaves have the tolerances of the verdict.
+    Levels of octaves are drawn with the tolerances of the verdict.
 
     Parameters
     ----------
@@ -112,9 +113,9 @@ def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
     x = np.arange(len(average.level), dtype=float)
     _draw_drops(axes, x, average.drops, recording)
     expanded = np.array([estimate.expanded for estimate in recording.level_estimates(bands)])
-    mark = "average, 95 %" if len(average.drops) > 1 else "drop, 95 %"
+    label = "average, 95 %" if len(average.drops) > 1 else "drop, 95 %"
     axes.errorbar(
-        x, average.level, yerr=_bar(expanded), label=mark, marker="o", markersize=3, **BARS,
+        x, average.level, yerr=_bar(expanded), label=label, marker="o", markersize=3, **BARS,
     )  # fmt: skip
     bounds = average.flag == "background"
     if bounds.any():
@@ -123,9 +124,9 @@ def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
             markersize=6, markerfacecolor="white", color=COLORS[0], zorder=3,
         )  # fmt: skip
     lowest = np.nanmin(average.level) if np.isfinite(average.level).any() else 0.0
-    near = np.where(average.background > lowest - DEEPEST, average.background, np.nan)
+    visible = np.where(average.background > lowest - MAX_DISTANCE, average.background, np.nan)
     axes.plot(
-        x, near, label=_background_label(average.background, near), color="black",
+        x, visible, label=_background_label(average.background, visible), color="black",
         linewidth=0.8, linestyle=":", marker="_", markersize=7,
     )  # fmt: skip
     octave_axis(axes, bands)
@@ -165,5 +166,5 @@ def _draw_drops(
 
 
 def _bar(expanded: NDArray[np.float64] | float, unit: float = 1.0) -> NDArray[np.float64]:
-    """Return the length of an error bar; none where the uncertainty is not known."""
+    """Return the half length of an error bar; 0 if the uncertainty is unknown."""
     return np.nan_to_num(unit * np.asarray(expanded, dtype=np.float64))

@@ -9,7 +9,7 @@ import numpy as np
 from thud.base._schema import Plate
 from thud.plot.style import (
     COLORS,
-    GREY,
+    GRAY,
     WIDTH,
     band_axis,
     empty_axes,
@@ -65,7 +65,7 @@ def room_levels(room: RoomLevels) -> Figure:
 def draw_prediction(prediction: RoomPrediction, measured: RoomLevels | None = None) -> Figure:
     """Draw the components of the level in the room below, and measured levels beside it.
 
-    Hollow marks are bands of few modes, where the statistical level may be wrong.
+    Hollow markers are bands with few modes, for which the statistical level may be wrong.
     """
     figure = new_figure(4.2, WIDTH)
     above, middle, below = figure.subplots(3, 1, sharex=True, height_ratios=(1, 1, 1.6))
@@ -84,7 +84,7 @@ def draw_prediction(prediction: RoomPrediction, measured: RoomLevels | None = No
     middle.set_ylim(bottom=0)
     middle.set_ylabel("Floor")
     low, high = prediction.level - prediction.spread, prediction.level + prediction.spread
-    below.fill_between(x, low, high, color=GREY, linewidth=0, label="± expected spread")
+    below.fill_between(x, low, high, color=GRAY, linewidth=0, label="± expected spread")
     below.plot(x, prediction.level, color=COLORS[0])
     for marks, face in ((few, "white"), (~few, COLORS[0])):
         below.plot(
@@ -145,7 +145,7 @@ def draw_modal_room(room: ModalRoom) -> Figure:
         label="energy mean of the positions",
     )  # fmt: skip
     mean, spread = room.statistical
-    axes.fill_between(x, mean - spread, mean + spread, color=GREY, linewidth=0, zorder=0)
+    axes.fill_between(x, mean - spread, mean + spread, color=GRAY, linewidth=0, zorder=0)
     axes.plot(
         x, mean, color=COLORS[1], marker="s", markersize=3.5, linestyle="--",
         label="statistical, ± expected spread",
@@ -159,7 +159,7 @@ def draw_modal_room(room: ModalRoom) -> Figure:
 @own_style()
 def draw_positions(prediction: RoomPrediction) -> Figure | None:
     """Draw the levels of positions below a plate; None if its modes cannot be counted."""
-    # SciPy takes its time.
+    # SciPy is slow to import.
     from thud.floors.modal_room import ModeCountError, positions_below
 
     if not isinstance(prediction.floor, Plate):

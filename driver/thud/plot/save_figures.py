@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-# The first, the default, is the smallest and the fastest to write.
+# The first is the default: the smallest, and the fastest to write.
 FORMATS = ("svg", "png", "pdf")
 
 
 def save(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Save a figure atomically, in the format of the ending of its path.
+    """Save a figure atomically, in the format that the ending of the path names.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def save_all(
     kind
         Format: ``"svg"``, ``"png"`` or ``"pdf"``.
     replace
-        Replace also files that thud has not written.
+        Also replace files not written by thud.
 
     Raises
     ------

@@ -51,24 +51,24 @@ if TYPE_CHECKING:
     Columns = dict[str, NDArray[Any]]
 
 
-Which = Literal["x", "y"]
+AxisName = Literal["x", "y"]
 # Hatches of bars, which distinguish colors in print.
 HATCHES = (None, "//////", "......", "\\\\\\\\\\\\", "xxxxxx", "------", "||||||", "++++++")
 # Range of numbers that are shown in the unit of the key; others have a display unit.
-_PLAIN = (1e-2, 1e4)
-# Maximum over minimum from which logarithmic ticks are 1, 2, 5, and powers of ten.
-_HALF_DECADE, _DECADES = 5.0, 200.0
+_PLAIN_RANGE = (1e-2, 1e4)
+# Ratios of maximum to minimum from which logarithmic ticks are 1, 2, 5, or powers of ten only.
+_MIN_STEP_RATIO, _MIN_DECADE_RATIO = 5.0, 200.0
 
 
-def show_parameter(axes: Axes, which: Which, parameter: xr.DataArray) -> float:
+def show_parameter(axes: Axes, which: AxisName, parameter: xr.DataArray) -> float:
     """Give an axis the name, unit and scale of a numeric parameter.
 
-    The parameter has the attributes of the dataset. Return the factor of its values on the axis.
+    Return the factor that converts its values to the unit of the axis.
     """
-    unit, factor = parameter.attrs["shown_unit"], 10.0 ** int(parameter.attrs["shown_power"])
+    unit, factor = parameter.attrs["shown_unit"], 10.0 ** int(parameter.attrs["shown_exponent"])
     values = parameter.values
     maximum = float(np.abs(values).max())
-    if unit == parameter.attrs["units"] and not _PLAIN[0] <= maximum < _PLAIN[1]:
+    if unit == parameter.attrs["units"] and not _PLAIN_RANGE[0] <= maximum < _PLAIN_RANGE[1]:
         unit, size = display_unit(unit, maximum)
         factor = 1 / size
     shown = unit.replace("degC", "°C")
@@ -86,11 +86,11 @@ def show_parameter(axes: Axes, which: Which, parameter: xr.DataArray) -> float:
 def _mark_decades(axis: Axis, values: NDArray[np.float64]) -> None:
     """Give a logarithmic axis ticks with plain numbers."""
     ratio = values.max() / values.min()
-    if ratio < _HALF_DECADE:
+    if ratio < _MIN_STEP_RATIO:
         axis.set_major_locator(MaxNLocator(5))
     else:
         axis.set_major_locator(
-            LogLocator(subs=(1, 2, 5) if ratio < _DECADES else (1,), numticks=12)
+            LogLocator(subs=(1, 2, 5) if ratio < _MIN_DECADE_RATIO else (1,), numticks=12)
         )
     axis.set_major_formatter(FormatStrFormatter("%g"))
     axis.set_minor_formatter(NullFormatter())
@@ -101,18 +101,18 @@ def parameter_label(parameter: xr.DataArray) -> str:
     return humanize(str(parameter.name)).capitalize()
 
 
-# Maximum number of values of a parameter that are not grouped in classes.
+# Maximum number of ungrouped values of a parameter, and number of groups.
 _MAX_VALUES = 32
-_CLASSES = 16
-# Maximum number of markers of a line; half of it in half the width.
-_MAX_MARKS = 16
+_GROUP_COUNT = 16
+# Maximum number of markers of a line; half as many in half the width.
+_MAX_MARKERS = 16
 # Maximum number of values of a text parameter that have a panel each.
 _MAX_PANELS = 6
-# Smallest range that is drawn, dB.
-_TINY = 0.05
+# Smallest range of levels that is drawn, dB.
+_MIN_RANGE = 0.05
 
 
-class _Excess(NamedTuple):
+class _RelativeLevels(NamedTuple):
     """Levels minus nominal levels of each sample, minimum and maximum tolerance, dB."""
 
     level: NDArray[np.float64]
@@ -123,9 +123,9 @@ class _Excess(NamedTuple):
 def draw_sweep(result: Sweep) -> Figure:
     """Draw octave levels against the first numeric parameter that has several values.
 
-    Levels are those of the assessed force relative to the nominal ones, dB. Each value of the first
-    text parameter, up to six of them, has its panel. Lines are medians over the other parameters,
-    shades extend from the minimum to the maximum.
+    Levels are those of the assessed force relative to the nominal ones, dB. The first text
+    parameter with up to six values has a panel for each. Lines are medians over the other
+    parameters; shades extend from the minimum to the maximum.
     """
     dataset = result.dataset
     columns = _columns(dataset)
@@ -133,29 +133,34 @@ def draw_sweep(result: Sweep) -> Figure:
     numeric = [name for name in varied if columns[name].dtype.kind in "iuf"]
     name = (numeric or varied or list(columns))[0]
     texts = [n for n in varied if n not in numeric and n != name]
-    split = next((n for n in texts if len(np.unique(columns[n])) <= _MAX_PANELS), None)
-    excess = _excess(dataset, columns)
-    parts = {"": np.ones(len(columns[name]), dtype=bool)}
-    if split:
-        parts = {str(value): columns[split] == value for value in np.unique(columns[split])}
-    across = 1 if len(parts) == 1 else 2
-    down = -(-len(parts) // across)
-    figure = new_figure(1.1 + (1.9 if across == 1 else 1.6) * down)
-    panels = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False).ravel()
-    for i, (axes, (title, panel)) in enumerate(zip(panels, parts.items(), strict=False)):
-        _draw_tolerance(axes, excess.tolerance)
-        levels = np.where(panel[:, np.newaxis], excess.level, np.nan)
-        _draw_octaves(axes, dataset[name], columns[name], levels, _MAX_MARKS // across)
+    panel_parameter = next((n for n in texts if len(np.unique(columns[n])) <= _MAX_PANELS), None)
+    relative = _get_relative_levels(dataset, columns)
+    masks = {"": np.ones(len(columns[name]), dtype=bool)}
+    if panel_parameter:
+        masks = {
+            str(value): columns[panel_parameter] == value
+            for value in np.unique(columns[panel_parameter])
+        }
+    column_count = 1 if len(masks) == 1 else 2
+    row_count = -(-len(masks) // column_count)
+    figure = new_figure(1.1 + (1.9 if column_count == 1 else 1.6) * row_count)
+    panels = figure.subplots(
+        row_count, column_count, sharex=True, sharey=True, squeeze=False
+    ).ravel()
+    for i, (axes, (title, mask)) in enumerate(zip(panels, masks.items(), strict=False)):
+        _draw_tolerance(axes, relative.tolerance)
+        levels = np.where(mask[:, np.newaxis], relative.level, np.nan)
+        _draw_octaves(axes, dataset[name], columns[name], levels, _MAX_MARKERS // column_count)
         axes.set_title(title.replace("_", " "))
-        lowest = i + across >= len(parts)
+        lowest = i + column_count >= len(masks)
         axes.tick_params(axis="x", labelbottom=lowest)
         axes.xaxis.label.set_visible(lowest)
-    for axes in panels[len(parts) :]:
+    for axes in panels[len(masks) :]:
         axes.remove()
     force = "assessed force" if "force" in columns else FORCE_NAMES[dataset.attrs["assessed_force"]]
     figure.supylabel(f"Level − nominal, dB\n({force})")
-    others = [n for n in varied if n not in {name, split}]
-    legend_above(panels[0], title=_meaning(excess, split, others))
+    others = [n for n in varied if n not in {name, panel_parameter}]
+    legend_above(panels[0], title=_get_explanation(relative, panel_parameter, others))
     return figure
 
 
@@ -166,7 +171,7 @@ def _columns(dataset: xr.Dataset) -> Columns:
     return {name: dataset[name].broadcast_like(whole).values.ravel() for name in names}
 
 
-def _excess(dataset: xr.Dataset, columns: Columns) -> _Excess:
+def _get_relative_levels(dataset: xr.Dataset, columns: Columns) -> _RelativeLevels:
     """Return the levels of the assessed force relative to the nominal levels of the source."""
     levels = {
         force: dataset[f"{force}_level"].values.reshape(-1, len(dataset["octave"]))
@@ -181,11 +186,11 @@ def _excess(dataset: xr.Dataset, columns: Columns) -> _Excess:
         lower, upper = octave_limits(source)
         level[sources == source] -= (lower + upper) / 2
         tolerances.extend((upper - lower) / 2)
-    return _Excess(level, (min(tolerances), max(tolerances)))
+    return _RelativeLevels(level, (min(tolerances), max(tolerances)))
 
 
 def _draw_tolerance(axes: Axes, tolerance: tuple[float, float]) -> None:
-    """Draw the maximum tolerance of an octave, and the minimum on it, around the nominal level."""
+    """Draw the maximum tolerance of all octaves around the nominal level, the minimum on top."""
     for width, color in zip(reversed(tolerance), ("0.92", "0.84"), strict=True):
         axes.axhspan(-width, width, color=color, linewidth=0, zorder=0)
     axes.axhline(0, color="0.45", linewidth=0.8)
@@ -196,10 +201,10 @@ def _draw_octaves(
     parameter: xr.DataArray,
     values: NDArray[Any],
     levels: NDArray[np.float64],
-    max_marks: int,
+    max_markers: int,
 ) -> None:
-    """Draw the octave levels of samples, those that are not NaN, against a parameter."""
-    positions, members, names = _classes(values)
+    """Draw the octave levels of samples against a parameter, without levels that are NaN."""
+    positions, members, names = _group_values(values)
     if names is None:
         positions = positions * show_parameter(axes, "x", parameter)
     else:
@@ -212,43 +217,45 @@ def _draw_octaves(
             np.array([_of_finite(group, f) for group in groups])
             for f in (np.median, np.min, np.max)
         )
-        marks = marker_style(i, 3) if len(positions) <= max_marks else {}
+        marks = marker_style(i, 3) if len(positions) <= max_markers else {}
         axes.plot(positions, middle, label=f"{band:g} Hz", **line_style(i), **marks)
-        if np.nanmax(upper - lower, initial=0) > _TINY:
+        if np.nanmax(upper - lower, initial=0) > _MIN_RANGE:
             axes.fill_between(positions, lower, upper, color=COLORS[i], alpha=0.15, linewidth=0)
 
 
-def _classes(
+def _group_values(
     values: NDArray[Any],
 ) -> tuple[NDArray[np.float64], list[NDArray[np.bool_]], list[str] | None]:
-    """Return positions on an axis, the samples of each, and the names of texts."""
+    """Return positions on an axis, the samples at each, and labels if the values are texts."""
     distinct = np.unique(values)
     if values.dtype.kind not in "iuf":
         members = [values == value for value in distinct]
         return np.arange(len(distinct), dtype=float), members, [str(value) for value in distinct]
     if len(distinct) <= _MAX_VALUES:
         return distinct.astype(float), [values == value for value in distinct], None
-    edges = np.quantile(values, np.linspace(0, 1, _CLASSES + 1))
-    position = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _CLASSES - 1)
-    members = [position == i for i in range(_CLASSES) if (position == i).any()]
+    edges = np.quantile(values, np.linspace(0, 1, _GROUP_COUNT + 1))
+    position = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _GROUP_COUNT - 1)
+    members = [position == i for i in range(_GROUP_COUNT) if (position == i).any()]
     return np.array([np.median(values[chosen]) for chosen in members]), members, None
 
 
-def _of_finite(part: NDArray[np.float64], function: Any) -> float:  # noqa: ANN401 - of NumPy
+def _of_finite(values: NDArray[np.float64], function: Any) -> float:  # noqa: ANN401 - of NumPy
     """Return a function of the finite numbers; NaN if there are none."""
-    known = part[np.isfinite(part)]
-    return float(function(known)) if known.size else np.nan
+    finite = values[np.isfinite(values)]
+    return float(function(finite)) if finite.size else np.nan
 
 
-def _meaning(excess: _Excess, split: str | None, others: list[str]) -> str:
-    """Return the explanation of panels, lines, shades and grey."""
-    minimum, maximum = excess.tolerance
-    lines = [f"Grey: tolerances of the octaves, ±{minimum:g} to ±{maximum:g} dB"]
+def _get_explanation(
+    relative: _RelativeLevels, panel_parameter: str | None, others: list[str]
+) -> str:
+    """Return the explanation of panels, lines, shades and gray areas."""
+    minimum, maximum = relative.tolerance
+    lines = [f"Gray: tolerances of the octaves, ±{minimum:g} to ±{maximum:g} dB"]
     if others:
         over = humanize(others[0]) if len(others) == 1 else f"{len(others)} other parameters"
         lines.insert(0, f"Lines: median over {over}; shades: range")
-    if split:
-        lines.insert(0, f"Panels: {humanize(split)}")
+    if panel_parameter:
+        lines.insert(0, f"Panels: {humanize(panel_parameter)}")
     return "\n".join(lines)
 
 
@@ -256,14 +263,15 @@ def _meaning(excess: _Excess, split: str | None, others: list[str]) -> str:
 def draw_design(result: Design) -> Figure:
     """Draw the margin of a design map, dB, its zero as a line, and the samples that conform.
 
-    The margin is positive where all octave levels lie within their limits. For a case with a room
-    draw the rating of its standardized levels instead.
+    The margin is positive if all octave levels lie within their limits. For a case with a room the
+    figure shows the rating of its standardized levels instead.
     """
     dataset = result.dataset
     figure, axes = empty_axes(2.9)
-    which: tuple[Which, Which] = ("x", "y")
+    names: tuple[AxisName, AxisName] = ("x", "y")
     scales = [
-        show_parameter(axes, w, dataset[name]) for w, name in zip(which, result.axes, strict=True)
+        show_parameter(axes, which, dataset[name])
+        for which, name in zip(names, result.axes, strict=True)
     ]
     x, y = (dataset[name].values * scale for name, scale in zip(result.axes, scales, strict=True))
     if RATING in dataset:
@@ -324,8 +332,8 @@ def _draw_margin(
     """Draw the margin as colors, white at 0, with lines at 0 and at round values."""
     lower, upper = min(float(margin.min()), 0.0), max(float(margin.max()), 0.0)
     # On the smaller side, usually that of conforming samples, colors change up to 4 times faster.
-    norm = TwoSlopeNorm(0, min(lower, -upper / 4, -_TINY), max(upper, -lower / 4, _TINY))
-    steps = np.asarray(MaxNLocator(7).tick_values(lower, max(upper, lower + _TINY)))
+    norm = TwoSlopeNorm(0, min(lower, -upper / 4, -_MIN_RANGE), max(upper, -lower / 4, _MIN_RANGE))
+    steps = np.asarray(MaxNLocator(7).tick_values(lower, max(upper, lower + _MIN_RANGE)))
     # Five colors from one line to the next.
     fine = np.linspace(steps[0], steps[-1], 5 * (len(steps) - 1) + 1)
     filled = axes.contourf(*position, margin, levels=fine, cmap="PuOr", norm=norm)
@@ -352,19 +360,19 @@ def draw_sensitivity(result: Sensitivity) -> Figure:
     position = np.arange(len(outputs), dtype=float)
     for i, name in enumerate(parameters):
         row = indices.sel(parameter=name)
-        at = position + (i - (len(parameters) - 1) / 2) * thickness
+        y = position + (i - (len(parameters) - 1) / 2) * thickness
         axes.barh(
-            at, row["total"], 0.9 * thickness, color=COLORS[i % len(COLORS)],
+            y, row["total"], 0.9 * thickness, color=COLORS[i % len(COLORS)],
             hatch=HATCHES[i % len(HATCHES)], edgecolor="white", linewidth=0,
             label=humanize(name),
         )  # fmt: skip
         style: dict[str, Any] = {"color": "black", "linestyle": "none", "elinewidth": 0.6}
         axes.errorbar(
-            row["total"], at - thickness / 5, xerr=row["total_interval"], marker="|", markersize=3,
+            row["total"], y - thickness / 5, xerr=row["total_interval"], marker="|", markersize=3,
             label="total index" if i == len(parameters) - 1 else None, **style,
         )  # fmt: skip
         axes.errorbar(
-            row["first_order"], at + thickness / 5, xerr=row["first_order_interval"], marker="D",
+            row["first_order"], y + thickness / 5, xerr=row["first_order_interval"], marker="D",
             markersize=2, markerfacecolor="white", markeredgewidth=0.5,
             label="first order" if i == len(parameters) - 1 else None, **style,
         )  # fmt: skip
@@ -381,7 +389,7 @@ def draw_sensitivity(result: Sensitivity) -> Figure:
 def draw_surrogate(result: Surrogate) -> Figure:
     """Draw the error of each assessed quantity in held-out drops, dB, and the bound.
 
-    Quantities that are not levels have errors in 20 lg of their ratio.
+    The error of a quantity that is not a level is 20 lg of the ratio to the result of the model.
     """
     labels = [
         name for name, assessed in zip(result.labels, result.assessed, strict=True) if assessed
@@ -410,7 +418,7 @@ def draw_surrogate(result: Surrogate) -> Figure:
 
 @own_style()
 def draw_uncertainty(result: Uncertainty) -> Figure:
-    """Draw the distribution of octave levels over the tolerances of the standards.
+    """Draw the distribution of octave levels, and the tolerances of the standards.
 
     Levels are relative to the nominal ones, dB; bars cover 95 % of the samples.
     """
@@ -439,6 +447,6 @@ def draw_uncertainty(result: Uncertainty) -> Figure:
     title = f"All criteria met: {share}"
     if result.surrogate_range:
         low, high = result.surrogate_range
-        title += f"\nby errors of the surrogate {100 * low:.1f} to {100 * high:.1f} %"
+        title += f"\nwith errors of the surrogate {100 * low:.1f} to {100 * high:.1f} %"
     legend_above(axes, title=title)
     return figure

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
-# Areas behind curves.
-GREY = "0.85"
+# Color of areas behind curves.
+GRAY = "0.85"
 # Width of a column, inch.
 WIDTH = 3.5
 FORCE_NAMES = {"elastic": "elastic force", "floor": "force on the floor"}
@@ -87,7 +87,7 @@ def empty_axes(height: float) -> tuple[Figure, Axes]:
 
 @own_style()
 def legend_above(axes: Axes, *others: Axes, title: str = "") -> Legend:
-    """Put one legend of axes above their figure, which grows by it, in as few rows as fit."""
+    """Put one legend of all axes above their figure, which grows, in as few rows as possible."""
     figure = axes.get_figure(root=True)
     if figure is None:
         message = "the axes are removed from their figure; allowed: axes of a figure"
@@ -119,7 +119,7 @@ def escape_label(label: str) -> str:
 
 
 def styled(i: int, styles: Sequence[Any]) -> Any:  # noqa: ANN401 - of matplotlib
-    """Return the style of a curve by its index; each round of colors has it shifted by one."""
+    """Return the style of a curve by its index; styles shift by one after each round of colors."""
     return styles[(i + i // len(COLORS)) % len(styles)]
 
 
@@ -151,7 +151,7 @@ def iterate_curves(
 ) -> Iterator[tuple[str, Curve, LevelsForce]]:
     """Yield label, impact and kind of force of each curve.
 
-    Without `force` each case has its assessed force, which labels name if they differ. Raises
+    By default the force is that assessed in each case; labels name forces that differ. Raises
     InputError if `impacts` is not a mapping of names to impacts, or empty.
     """
     require_mapping("impacts", impacts, "impacts")
@@ -159,8 +159,8 @@ def iterate_curves(
         require_kind(name, impact, ImpactResult)
     kinds = [impact.assessed_force(force) for impact in impacts.values()]
     for (name, impact), kind in zip(impacts.items(), kinds, strict=True):
-        which = f", {FORCE_NAMES[kind]}" if len(set(kinds)) > 1 else ""
-        yield f"{name}{which}", impact, kind
+        suffix = f", {FORCE_NAMES[kind]}" if len(set(kinds)) > 1 else ""
+        yield f"{name}{suffix}", impact, kind
 
 
 def force_name(impacts: Mapping[str, Curve], force: LevelsForce | None) -> str:
@@ -176,14 +176,14 @@ def level_label(impacts: Mapping[str, Curve], force: LevelsForce | None, label: 
 
 
 def octave_axis(axes: Axes, bands: BandSet = "octave") -> None:
-    """Label the axis with the bands."""
+    """Label the x axis with all bands of a set."""
     nominal = get_bands(bands).nominal
     band_axis(axes, nominal, bands)
     axes.set_xlim(-0.6, len(nominal) - 0.4)
 
 
 def band_axis(axes: Axes, nominal: NDArray[np.float64], bands: BandSet) -> None:
-    """Label the axis with some of the bands of a set, by their nominal mid-band frequencies, Hz."""
+    """Label the x axis with bands of a set, by their nominal mid-band frequencies, Hz."""
     axes.set_xticks(np.arange(len(nominal)), [f"{frequency:g}" for frequency in nominal])
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xlabel(f"{BAND_NAMES[bands]}, Hz")
@@ -194,7 +194,7 @@ def band_axis(axes: Axes, nominal: NDArray[np.float64], bands: BandSet) -> None:
 def octave_boxes(
     axes: Axes, lower: NDArray[np.float64], upper: NDArray[np.float64], label: str
 ) -> None:
-    """Draw the range of each octave as a grey box; the label is that of all of them."""
+    """Draw the range of each octave as a gray box, with one label for all."""
     for i, limits in enumerate(zip(lower, upper, strict=True)):
         name = None if i else label
         axes.fill_between([i - 0.4, i + 0.4], *limits, color="0.82", linewidth=0, label=name)

@@ -15,17 +15,17 @@ if TYPE_CHECKING:
     from thud.level.levels import Bands
     from thud.recordings.measured_drop import Drop
 
-# Energy of a functional over the largest one below which it is negligible.
+# Energy of a functional, as a fraction of the largest, below which it is negligible.
 NEGLIGIBLE = 1e-14
-# Maximum number of drops whose covariances are in memory.
+# Maximum number of drops whose covariances are in memory at the same time.
 MAX_DROPS = 64
 
 
 def band_functionals(count: int, rate: float, lower: float, upper: float) -> NDArray[np.float64]:
     """Return functionals of samples whose squares add up to the energy in a band, [n, count].
 
-    They are the eigenvectors of the energy times the root of their eigenvalues, of which all but
-    about two times duration times band width vanish.
+    They are the eigenvectors of the energy times the square roots of their eigenvalues. About two
+    times duration times bandwidth eigenvalues are not negligible.
     """
     time = (np.arange(count) - (count - 1) / 2) / rate
     nodes, weights = leggauss(12 + int(2 * (upper - lower) * count / rate))
@@ -39,25 +39,25 @@ def band_functionals(count: int, rate: float, lower: float, upper: float) -> NDA
 
 
 def band_noise(drops: Sequence[Drop], bands: Bands) -> NDArray[np.float64]:
-    """Return energies of the noise of the gates in bands, N2 s, [n_drop, n_band, 2].
+    """Return energies of the noise within the gates in bands, N2 s, [n_drop, n_band, 2].
 
-    The last axis has the expected energy, and the standard deviation of the energy of the force
-    after its subtraction. Drops of one rate share the functionals of the longest gate, and those
-    with gates of one length their products.
+    The last axis holds the expected energy of the noise, and the standard deviation of the force's
+    energy after its subtraction. Drops with equal rates share the functionals of the longest gate;
+    drops with equal gate lengths also share the products of functionals.
     """
-    alike: dict[float, dict[int, list[int]]] = {}
+    groups: dict[float, dict[int, list[int]]] = {}
     for i, drop in enumerate(drops):
         count = drop.gate[1] - drop.gate[0]
-        alike.setdefault(drop.sample_rate, {}).setdefault(count, []).append(i)
+        groups.setdefault(drop.sample_rate, {}).setdefault(count, []).append(i)
     edges = list(zip(bands.lower, bands.upper, strict=True))
     energies = np.empty((len(drops), len(edges), 2))
-    for rate, gates in alike.items():
+    for rate, gates in groups.items():
         functionals = [band_functionals(max(gates), rate, *edge) for edge in edges]
         for count, indices in gates.items():
             for k in range(0, len(indices), MAX_DROPS):
-                some = indices[k : k + MAX_DROPS]
+                block = indices[k : k + MAX_DROPS]
                 rows = [functional[:, :count] for functional in functionals]
-                energies[some] = _energies([drops[i] for i in some], rows, edges)
+                energies[block] = _energies([drops[i] for i in block], rows, edges)
     return energies
 
 
@@ -69,17 +69,18 @@ def _energies(
     """Return the energies of drops with gates of one length, [n_drop, n_band, 2]."""
     contacts = [drop.contact for drop in drops]
     forces = np.array([drop.force[slice(*drop.gate)] for drop in drops])
-    slow = np.array([contact.covariance for contact in contacts])
-    white = np.array(
+    slow_covariance = np.array([contact.covariance for contact in contacts])
+    white_variance = np.array(
         [contact.background.variances[0] * contact.sample_rate / 2 for contact in contacts]
     )
     energies = np.empty((len(drops), len(edges), 2))
     for band, (rows, edge) in enumerate(zip(functionals, edges, strict=True)):
         values, summed = forces @ rows.T, contacts[0].summed(rows)
-        covariance = white[:, None, None] * (rows @ rows.T) + summed @ slow @ summed.T
+        covariance = white_variance[:, None, None] * (rows @ rows.T)
+        covariance += summed @ slow_covariance @ summed.T
         noise = np.trace(covariance, axis1=1, axis2=2)
         squares = (covariance**2).sum(axis=(1, 2))
-        # On average the first term is too large by twice the second.
+        # The noise in `values` makes the first term too large by twice the second, on average.
         variance = 4 * np.einsum("di,dij,dj->d", values, covariance, values) - 2 * squares
         middle = sum(edge) / 2
         density, spread = np.array([contact.background.density(middle) for contact in contacts]).T

@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from thud.recordings.outliers import Outlier
     from thud.recordings.recorded_levels import AverageLevels
 
-# dB per relative change of a force.
+# Change of a level per relative change of a force, dB.
 AMPLITUDE_DECIBEL = 20 / math.log(10)
-# Prominence of a counted peak over the peak force, and its minimum in standard deviations of the
-# noise.
+# Prominence of a counted peak as a fraction of the peak force, and the minimum of this prominence
+# in standard deviations of the noise.
 PROMINENCE = 0.1
 MIN_PROMINENCE = 6.0
-# Quantities of drops, besides levels, that are searched for outliers: attribute, title and unit.
+# Quantities besides levels that are searched for outliers: attribute, title, size of the unit.
 SEARCHED = (
     ("contact_time", "contact time, ms,", 1e-3),
     ("restitution", "restitution", 1.0),
@@ -41,8 +41,8 @@ def average_estimates(estimates: Sequence[Estimate], *systematic: Contribution) 
     """Return the mean of one quantity over drops, without unknown values.
 
     The uncertainty of each estimate is its noise, which the repeatability of two or more drops
-    includes; systematic contributions are shared by all drops, so that the average does not reduce
-    them (calibration, height).
+    includes. Systematic contributions (calibration, drop height) are shared by all drops; the
+    average does not reduce them.
     """
     known = [estimate for estimate in estimates if math.isfinite(estimate.value)]
     if not known:
@@ -64,8 +64,8 @@ def level_estimates(
 ) -> tuple[Estimate, ...]:
     """Return average levels with their budgets, dB, shape (n_band,).
 
-    The calibration is the relative standard uncertainty of the force, None if unknown; that of the
-    correction of the force plate is in dB, shape (n_band,), zero if not stated.
+    `calibration` is the relative standard uncertainty of the force, None if unknown; `plate` is the
+    standard uncertainty of the force plate's correction, dB, shape (n_band,), zero if not stated.
     """
     count = len(levels.names)
     contributions = dict(levels.contributions)
@@ -94,13 +94,13 @@ def level_estimates(
 def drop_estimates(
     drops: Sequence[Drop], config: Config, calibration: float | None
 ) -> dict[str, Estimate]:
-    """Return contact time, restitution, peaks, mass and drop height, as `assess` names them.
+    """Return contact time, restitution, peak count, mass and drop height, as `assess` needs them.
 
-    An unstated mass is the effective mass; `calibration` is the relative standard uncertainty of
-    the force.
+    If no mass is stated, it is the effective mass; `calibration` is the relative standard
+    uncertainty of the force.
     """
     times = [drop.contact_time for drop in drops]
-    # The flanks of all drops have one shape: its error does not average.
+    # The flanks of all drops have the same shape: its error does not average out.
     common = min(time.uncertainty for time in times)
     edges = [Contribution("edges of the pulse", common)] if len(times) > 1 else []
     conditions = config.conditions(calibration)
@@ -131,20 +131,20 @@ def check_restitution(drops: Sequence[Drop], conditions: DropConditions) -> tupl
 def average_restitution(
     drops: Sequence[Drop], conditions: DropConditions
 ) -> tuple[Estimate, Estimate]:
-    """Return the restitution, and impulse minus bounces, with their budgets; NaN if unknown.
+    """Return the restitution, and that by impulse minus that by bounces; NaN if unknown.
 
     If the methods differ by more than the expanded uncertainty of the difference, either may be
-    wrong: a rectangle with the difference as half width enters the budget of their mean, so that
-    its interval includes both.
+    wrong: a rectangular distribution with the difference as half width enters the budget of the
+    mean, whose interval then includes both.
     """
     known = [drop for drop in drops if drop.restitutions]
-    causes = dict.fromkeys(cause for drop in known for cause in drop.restitution_shared)
+    causes = dict.fromkeys(cause for drop in known for cause in drop.shared_effects)
     systematic = [
-        _mean_effect(cause, [drop.restitution_shared.get(cause, 0.0) for drop in known])
+        _mean_effect(cause, [drop.shared_effects.get(cause, 0.0) for drop in known])
         for cause in causes
     ]
-    both = [drop for drop in known if {IMPULSE, BOUNCES} <= set(drop.restitutions)]
-    difference = _difference(both, conditions)
+    comparable = [drop for drop in known if {IMPULSE, BOUNCES} <= set(drop.restitutions)]
+    difference = _difference(comparable, conditions)
     if abs(difference.value) > difference.expanded:
         half_width = abs(difference.value)
         systematic.append(Contribution("impulse against bounces", half_width / math.sqrt(3)))
@@ -152,14 +152,13 @@ def average_restitution(
 
 
 def _difference(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
-    """Return restitution by impulse minus that by bounces."""
     differences = []
     effects: dict[str, list[float]] = {}
     for drop in drops:
         impulse, bounces = (drop.restitutions[name] for name in (IMPULSE, BOUNCES))
         combined = math.hypot(impulse.uncertainty, bounces.uncertainty)
         differences.append(Estimate(impulse.value - bounces.value, combined))
-        shared = conditions.shared(drop.restitutions, drop.impulse)
+        shared = conditions.shared_effects(drop.restitutions, drop.impulse)
         for cause, effect in shared[IMPULSE].items():
             effects.setdefault(cause, []).append(effect - shared[BOUNCES].get(cause, 0.0))
     systematic = [_mean_effect(cause, values) for cause, values in effects.items()]
@@ -176,11 +175,14 @@ def average_mass(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
     if not known or not conditions.height:
         return Estimate.unknown()
     value = float(np.mean([drop.effective_mass.value for drop in known]))
-    # From m = J/(v0 + g (t_f/2 + t_c)): the height changes v0 only.
-    change = float(np.mean([drop.impulse.value for drop in known])) / value
-    height = value * conditions.speed / change * conditions.height_uncertainty
-    height /= 2 * conditions.height
-    systematic = {"calibration": value * conditions.calibration, "drop height": height}
+    # m = J / (v0 + g (t_f/2 + t_c)): the height changes v0 only.
+    velocity_change = float(np.mean([drop.impulse.value for drop in known])) / value
+    height_effect = value * conditions.speed / velocity_change * conditions.height_uncertainty
+    height_effect /= 2 * conditions.height
+    systematic = {
+        "calibration": value * conditions.calibration_uncertainty,
+        "drop height": height_effect,
+    }
     return average_estimates(
         [drop.effective_mass for drop in known],
         *(Contribution(cause, value) for cause, value in systematic.items() if value),
@@ -188,7 +190,7 @@ def average_mass(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
 
 
 def find_deviant(drops: Sequence[Drop]) -> tuple[Outlier, ...]:
-    """Return the outliers in contact time, restitution or peak, at 5 % for all three together."""
+    """Return outliers in contact time, restitution or peak force, at 5 % for all three together."""
     names = [drop.name for drop in drops]
     outliers: list[Outlier] = []
     for attribute, title, unit in SEARCHED:
@@ -204,7 +206,7 @@ def find_deviant(drops: Sequence[Drop]) -> tuple[Outlier, ...]:
 
 
 def _stated(value: float | None, uncertainty: float | None) -> Estimate:
-    """Return a value that the laboratory states."""
+    """Return a value stated by the laboratory, with its standard uncertainty if stated."""
     if value is None:
         return Estimate.unknown()
     stated = () if uncertainty is None else (Contribution("stated", uncertainty),)
@@ -215,7 +217,7 @@ def _count_peaks(drop: Drop) -> float:
     """Return the number of peaks of the force; NaN if some may be noise."""
     force = drop.force[slice(*drop.gate)]
     count = peak_count(force, drop.sample_rate)
-    # Noise slower than the contact tilts the pulse without adding peaks.
+    # Noise that is slower than the contact adds no peaks.
     noise = drop.noise.deviation_between(1 / drop.contact_time.value, RECORDED_BAND)
     clear = PROMINENCE * drop.peak_force.value >= MIN_PROMINENCE * noise
     return float(count) if clear or count == 1 else math.nan

@@ -1,4 +1,4 @@
-"""N per unit from a record of a known force."""
+"""Calibration, N per unit, from a record of a known force."""
 
 from __future__ import annotations
 
@@ -21,13 +21,14 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Number of means of a record, and minimum number of a plateau.
+# A record is reduced to about this many means, at least MIN_PLATEAU of them in a plateau.
 MEANS = 4096
 MIN_PLATEAU = 8
-# Samples that are read at once.
+# Number of samples per read.
 BLOCK = 2**20
-# Fractions of the step that mark its rise and fall, and fraction of a plateau ignored at its ends.
+# Fractions of the range of the level at which a step up, and a step down, is detected.
 UP, DOWN = 0.6, 0.4
+# Fraction of a plateau that is ignored at either end.
 SETTLING = 0.1
 # Maximum relative uncertainty of the step.
 MAX_UNCERTAINTY = 0.1
@@ -45,14 +46,14 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
 ) -> Calibration:
     """Return N per unit from a record of a known force put on or taken off the plate.
 
-    Lines are fitted to the levels on both sides of each step, against offset and drift.
+    A line is fitted to the level on either side of each step, which removes offset and drift.
 
     Parameters
     ----------
     record
         File, or a signal in the unit to be calibrated.
     force, mass
-        Either the known force, N, or the known mass, kg.
+        Known force, N, or known mass, kg: one of them.
     channel
         Number or name of the channel of a file.
     unit
@@ -65,21 +66,21 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
     Returns
     -------
     Calibration
-        Its uncertainty includes that of the step, by the residuals of the lines or the scatter of
-        several steps, whichever is larger.
+        The uncertainty includes that of the step: from the residuals of the lines or from the
+        scatter of several steps, whichever is larger.
 
     Raises
     ------
     InputError
-        Where force and mass are both given or missing, or the record has no clear step.
+        If force and mass are both stated or both missing, or the record has no clear step.
     """
     if (force is None) == (mass is None):
-        refuse("calibrate(): give one of force and mass", "force in N or mass in kg")
+        refuse("calibrate(): state either force or mass", "force in N or mass in kg")
     newtons = force if force is not None else (mass or 0.0) * gravity
     require_number("calibrate(): force", newtons)
     if not newtons > 0 or not 0 <= uncertainty < 1:
         refuse(
-            f"calibrate(): {newtons:g} N with a relative uncertainty of {uncertainty:g}",
+            f"calibrate(): force = {newtons:g} N, uncertainty = {uncertainty:g}",
             "a positive force, 0 <= uncertainty < 1",
         )
     name, symbol, samples, count = _source(record, channel, unit)
@@ -102,15 +103,14 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
 def _source(
     record: Signal | str | os.PathLike[str], channel: int | str | None, unit: str | None
 ) -> tuple[str, str, Callable[[int, int], NDArray[np.float64]], int]:
-    """Return name, unit, samples and number of samples of a record."""
     if isinstance(record, Signal):
         if unit is None:
-            refuse(f"{record.name}: the unit is not given", f"unit = one of {ALLOWED}")
+            refuse(f"{record.name}: the unit is not stated", f"unit = one of {ALLOWED}")
         return record.name, require_unit(unit, record.name), record.read, record.n_sample
     path = regular_file(record)
     channels = choose_channels(read_channels(path), channel, shown_path(path))
     if len(channels) != 1:
-        refuse(f"{shown_path(path)}: {len(channels)} channels fit", "channel = one of them")
+        refuse(f"{shown_path(path)}: {len(channels)} channels match", "channel = one of them")
     selected = channels[0]
     symbol = find_unit(selected.unit) if unit is None else require_unit(unit, path.name)
     if not symbol:
@@ -119,9 +119,8 @@ def _source(
 
 
 def _means(samples: Callable[[int, int], NDArray[np.float64]], count: int) -> NDArray[np.float64]:
-    """Return the means of equal sections of a record."""
     width = max(1, count // MEANS)
-    # Complete sections in each block: each read opens the file.
+    # Blocks of complete sections, few because each read opens the file.
     step = width * max(1, BLOCK // width)
     stop = count - count % width
     blocks = (samples(start, min(start + step, stop)) for start in range(0, stop, step))
@@ -133,7 +132,7 @@ def _steps(level: NDArray[np.float64], name: str) -> list[tuple[float, float]]:
     """Return size and standard uncertainty of the steps of a level."""
     if not np.isfinite(level).all():
         refuse(f"{name}: a value is not finite", "real numbers")
-    # Extremes of a running median, against knocks.
+    # The extremes of a running median ignore knocks on the plate.
     smooth = (
         np.median(np.lib.stride_tricks.sliding_window_view(level, 5), axis=1)
         if len(level) > MIN_PLATEAU
@@ -160,7 +159,7 @@ def _steps(level: NDArray[np.float64], name: str) -> list[tuple[float, float]]:
 
 
 def _level_at(level: NDArray[np.float64], begin: int, end: int, edge: int) -> tuple[float, float]:
-    """Return the level at an edge of a plateau and its standard uncertainty, by a line."""
+    """Return the level at an edge of a plateau, by a fitted line, and its standard uncertainty."""
     settling = max(1, int(SETTLING * (end - begin)))
     plateau = level[begin + settling : end - settling]
     index = np.arange(begin + settling, end - settling) - edge
@@ -173,7 +172,6 @@ def _level_at(level: NDArray[np.float64], begin: int, end: int, edge: int) -> tu
 
 
 def _mean(steps: list[tuple[float, float]]) -> tuple[float, float]:
-    """Return the mean of steps and its standard uncertainty."""
     sizes, deviations = np.array(steps).T
     count = len(sizes)
     within = math.sqrt(float(deviations @ deviations)) / count

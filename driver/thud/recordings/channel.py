@@ -1,4 +1,4 @@
-"""One channel of a file in its own unit, before the conversion to a force."""
+"""One channel of a file in the unit of the file, before the conversion to a force."""
 
 from __future__ import annotations
 
@@ -36,23 +36,23 @@ class Channel:
     Attributes
     ----------
     name : str
-        Name in the file; empty where it has none.
+        Name in the file; empty if it has none.
     number : int
         Number of the channel, or of the column, from 1.
     n_sample : int
         Number of samples.
     samples : callable
-        Returns the values of the file from start to before stop, shape (stop - start,).
+        Returns the values in the file from index start to before stop, shape (stop - start,).
     unit : str
         Unit of the values; ``"FS"`` for fractions of full scale, empty if unknown.
     sample_rate : float or None
         Samples per second, Hz; None if unknown.
     counts : float or None
-        Counts of full scale if the values are integers, else None.
+        Counts at full scale if the values are integers, else None.
     date : str
         Date of the measurement, or empty.
     steps : tuple of str
-        Processing by the reader, a sentence each.
+        Processing when the file was read, a sentence each.
     """
 
     name: str
@@ -67,7 +67,7 @@ class Channel:
 
 
 def shown_text(text: object) -> str:
-    """Return a text of a file or a library for a message: short, printable, one line."""
+    """Return text from a file or a library for a message: short, printable, in one line."""
     line = " ".join(str(text).encode("utf-8", "replace").decode("utf-8").split())
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in line[:MAX_SHOWN])
 
@@ -79,7 +79,7 @@ def shown_path(path: Path) -> str:
 
 @contextmanager
 def guarded(path: Path, kind: str) -> Iterator[None]:
-    """Turn any error of a library into InputError, and hide its warnings."""
+    """Convert any error of a library to InputError, and hide its warnings."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -87,7 +87,7 @@ def guarded(path: Path, kind: str) -> Iterator[None]:
     except InputError:
         raise
     except MemoryError as error:
-        refuse(f"{shown_path(path)}: asks for too much memory", f"an undamaged {kind} file", error)
+        refuse(f"{shown_path(path)}: needs too much memory", f"an undamaged {kind} file", error)
     except Exception as error:  # noqa: BLE001 - libraries raise anything on damaged files
         # soundfile repeats the path.
         reason = shown_text(str(error).rpartition("': ")[2]) or type(error).__name__
@@ -99,7 +99,7 @@ def guarded(path: Path, kind: str) -> Iterator[None]:
 
 
 def library(name: str, kind: str) -> Any:  # noqa: ANN401 - a module
-    """Import a library that one format needs; raise InputError where it is missing."""
+    """Import a library that one format needs; raise InputError if it is missing."""
     try:
         return importlib.import_module(name)
     except (ImportError, OSError) as error:  # soundfile raises OSError without its library
@@ -111,7 +111,7 @@ def library(name: str, kind: str) -> Any:  # noqa: ANN401 - a module
 
 
 def require_small(path: Path, kind: str, limit: int = MAX_IN_MEMORY) -> None:
-    """Raise InputError where a file that is read as a whole is too large."""
+    """Raise InputError if a file that is read as a whole is too large."""
     size = path.stat().st_size
     if size > limit:
         refuse(
@@ -121,5 +121,5 @@ def require_small(path: Path, kind: str, limit: int = MAX_IN_MEMORY) -> None:
 
 
 def channel_of(text: str | None) -> int | str | None:
-    """Return the number or the name of a channel."""
+    """Return the number or the name of a channel from a command line."""
     return int(text) if text is not None and text.isdecimal() else text

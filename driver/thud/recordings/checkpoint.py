@@ -25,19 +25,19 @@ if TYPE_CHECKING:
     from thud.recordings.config import Config
     from thud.recordings.signal import Signal
 
-# Maximum time of measurement that a crash loses, s.
+# Measured drops are written at intervals of this, s: a crash loses no more.
 INTERVAL = 5.0
 PREFIX, SUFFIX = ".measured-", ".part"
-# Names of NumPy in the pickle of an array.
+# Names from NumPy that the pickle of an array refers to.
 NUMPY = {"_reconstruct", "_frombuffer", "scalar", "ndarray", "dtype"}
 
 
 class Checkpoint:
-    """Drops of signals in a directory while others are measured; a context manager.
+    """Measured drops, stored in a directory while others are measured; a context manager.
 
-    Each file holds drops of one signal and one configuration, named by their digest. The exit
+    Each file holds drops of one signal and one configuration, whose digest is in its name. The exit
     removes the opened files, and the directory if it is empty, unless the process is interrupted,
-    killed, or fails for another reason than its input.
+    killed, or fails for a reason other than its input.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class Checkpoint:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Remove the files, or write the last drops if the same call may succeed."""
+        """Remove the files, or write the last drops if a repeated call may continue from them."""
         if self.folder is None:
             return
         if kind is not None and not issubclass(kind, InputError):
@@ -70,7 +70,7 @@ class Checkpoint:
                 self._write()
             except OSError as failure:
                 message = (
-                    f"{self.folder}: the last drops are not stored ({failure.strerror}); the same "
+                    f"{self.folder}: the last drops are not stored ({failure.strerror}); the next "
                     "call measures them again"
                 )
                 warnings.warn(message, ReportWarning, stacklevel=2)
@@ -85,7 +85,7 @@ class Checkpoint:
                 self.folder.rmdir()
 
     def open(self, signal: Signal, config: Config) -> dict[int, Drop]:
-        """Return the drops of a signal that were measured before, by their first samples."""
+        """Return the drops of a signal that were measured before, by their first sample."""
         if self.folder is None:
             return {}
         self._write()
@@ -98,7 +98,6 @@ class Checkpoint:
         return drops
 
     def _files(self, digest: str) -> list[Path]:
-        """Return the files of a signal and a configuration."""
         files = self.folder.glob(f"{PREFIX}{digest}-*{SUFFIX}") if self.folder else ()
         return sorted(filter(is_regular, files))
 
@@ -111,7 +110,6 @@ class Checkpoint:
             self._write()
 
     def _write(self) -> None:
-        """Write the new drops to a file of their own."""
         self._written = time.monotonic()
         if self.folder is None or not self._new:
             return
@@ -132,13 +130,13 @@ def _read(path: Path) -> dict[int, Drop]:
 
 
 class _DataOnly(pickle.Unpickler):
-    """Reads dataclasses of thud and arrays, and calls nothing else."""
+    """Unpickler that creates only dataclasses of thud and arrays."""
 
     def find_class(self, module: str, name: str) -> Any:  # noqa: ANN401 - a class
-        """Return a class; raise UnpicklingError for any other than those of data."""
+        """Return a class; raise UnpicklingError if its instances are not data."""
         result = super().find_class(module, name) if module in sys.modules else None
-        ours = module.startswith("thud.") and dataclasses.is_dataclass(result)
-        if not ours and not (module.partition(".")[0] == "numpy" and name in NUMPY):
+        is_dataclass = module.startswith("thud.") and dataclasses.is_dataclass(result)
+        if not is_dataclass and not (module.partition(".")[0] == "numpy" and name in NUMPY):
             message = f"{module}.{name} is no data"
             raise pickle.UnpicklingError(message)
         return result

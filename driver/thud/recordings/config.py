@@ -1,4 +1,4 @@
-"""Configuration of a laboratory: a small TOML file beside its recordings."""
+"""Configuration of a laboratory: a small TOML file next to its recordings."""
 
 from __future__ import annotations
 
@@ -30,7 +30,6 @@ MAX_TEXT = 500
 
 
 def _number(low: float, high: float, value: object, key: str) -> float:
-    """Return a number within a range."""
     require_number(key, value)
     number = float(value)  # type: ignore[arg-type]
     if not low <= number <= high:
@@ -39,40 +38,34 @@ def _number(low: float, high: float, value: object, key: str) -> float:
 
 
 def _text(value: object, key: str) -> str:
-    """Return a text of one line."""
     if not isinstance(value, str) or len(value) > MAX_TEXT or not value.isprintable():
         refuse(f"{key} = {shown(value)} is not allowed", f"a line of up to {MAX_TEXT} characters")
     return value
 
 
 def _texts(value: object, key: str) -> tuple[str, ...]:
-    """Return one text or more."""
     return tuple(
         _text(text, key) for text in (value if isinstance(value, list | tuple) else [value])
     )
 
 
 def _choice(choices: Mapping[str, object] | tuple[str, ...], value: object, key: str) -> str:
-    """Return one of several words."""
     require_choice(key, value, choices)
     return str(value)
 
 
 def _flag(value: object, key: str) -> bool:
-    """Return true or false."""
     if not isinstance(value, bool):
         refuse(f"{key} = {shown(value)} is not allowed", "true or false")
     return value
 
 
 def _channel(value: object, key: str) -> int | str:
-    """Return the number or the name of a channel."""
     is_number = isinstance(value, int) and not isinstance(value, bool)
     return int(_number(1, 1e6, value, key)) if is_number else _text(value, key)
 
 
 def _calibration(value: object, key: str) -> Calibration | str | float:
-    """Return a chain of factors or N per unit."""
     if isinstance(value, Calibration):
         return value
     if not isinstance(value, str):
@@ -86,21 +79,18 @@ def _calibration(value: object, key: str) -> Calibration | str | float:
 
 
 def _table(value: object, key: str) -> Mapping[str, object]:
-    """Return a table."""
     if not isinstance(value, Mapping):
         refuse(f"{key} = {shown(value)} is not allowed", "a table")
     return value
 
 
 def _pair(value: object, key: str, ends: str, low: float, high: float) -> tuple[float, float]:
-    """Return two numbers within a range."""
     if not isinstance(value, list | tuple) or len(value) != 2:  # noqa: PLR2004
         refuse(f"{key} = {shown(value)} is not allowed", f"[{ends}]")
     return _number(low, high, value[0], key), _number(low, high, value[1], key)
 
 
 def _linearity(value: object, key: str) -> tuple[tuple[float, float], ...]:
-    """Return pairs of forces."""
     pairs = value if isinstance(value, list | tuple) else []
     if len(pairs) < 2:  # noqa: PLR2004
         refuse(f"{key} = {shown(value)} is not allowed", "[[applied, indicated], ...], N")
@@ -108,7 +98,6 @@ def _linearity(value: object, key: str) -> tuple[tuple[float, float], ...]:
 
 
 def _limits(value: object, key: str) -> dict[str, tuple[float, float]]:
-    """Return limits by criterion."""
     table = _table(value, key)
     require_words(key, table, [criterion.name for criterion in get_criteria(SOURCES[0])])
     limits = {}
@@ -121,7 +110,7 @@ def _limits(value: object, key: str) -> dict[str, tuple[float, float]]:
 
 
 def _key(check: Callable[[object, str], object], default: object = None) -> Any:  # noqa: ANN401
-    """Declare a key by its check, which returns the value or raises InputError."""
+    """Declare a key with its check, which returns the value or raises InputError."""
     return field(default=default, metadata={"check": check})
 
 
@@ -132,13 +121,13 @@ class PlateConfig:
     Attributes
     ----------
     f0, Q : float or None
-        Frequency, Hz, and quality factor of the first resonance, which is corrected.
+        Frequency, Hz, and quality factor of the first resonance, which will be corrected.
     f0_uncertainty : float or None
         Relative standard uncertainty of the frequency.
     time_constant : float or None
         Time constant of the amplifier, s.
     full_scale : float or None
-        Largest force that plate and recorder can read, N.
+        Largest force that plate and recorder can measure, N.
     linearity : tuple of tuple
         Pairs of a force applied and the force indicated, N.
     """
@@ -152,7 +141,6 @@ class PlateConfig:
 
 
 def _plate(value: object, key: str) -> PlateConfig:
-    """Return a force plate."""
     if isinstance(value, PlateConfig):
         return value
     table = _checked(_table(value, key), PlateConfig, f"{key}: ")
@@ -165,7 +153,7 @@ def _plate(value: object, key: str) -> PlateConfig:
 
 @dataclass(frozen=True)
 class Config:
-    """Statements of a laboratory about its ball, instruments and files; None if unknown.
+    """What a laboratory states about its ball, instruments and files; None if unknown.
 
     Attributes
     ----------
@@ -192,7 +180,7 @@ class Config:
     low_pass : bool
         Whether levels are those of the force below 1.25 kHz.
     limits : mapping
-        Minimum and maximum by criterion that replace those of the standards.
+        Minimum and maximum by criterion, which replace those of the standards.
     """
 
     laboratory: str = _key(_text, "")
@@ -238,7 +226,7 @@ class Config:
 
     @property
     def plate_checks(self) -> tuple[PlateCheck, ...]:
-        """Demands of the standard on the plate; none without ``[plate]``."""
+        """Checks of the plate by the standard; none without ``[plate]``."""
         plate = self.plate
         if plate is None:
             return ()
@@ -253,23 +241,25 @@ class Config:
 def read_config(path: str | os.PathLike[str]) -> Config:
     """Read a configuration.
 
-    Raise InputError with the file and the key that is unknown, of another kind or out of range.
+    Raise InputError if a key is unknown, or its value of the wrong type or out of range.
     """
     file = regular_file(path)
     name = shown_path(file)
     if file.stat().st_size > MIB:
-        refuse(f"{name}: is larger than 1 MiB", "a TOML file of some lines")
+        refuse(f"{name}: is larger than 1 MiB", "a TOML file of a few lines")
     try:
         table = tomllib.loads(file.read_text(encoding="utf-8"))
     except UnicodeDecodeError as error:
         refuse(f"{name}: byte {error.start + 1} is not UTF-8", "TOML, which is UTF-8", error)
     except (OSError, ValueError, RecursionError) as error:
-        refuse(f"{name}: is no TOML ({shown_text(error)})", 'lines such as unit = "V"', error)
+        refuse(
+            f"{name}: is not valid TOML ({shown_text(error)})", 'lines such as unit = "V"', error
+        )
     return Config(**_checked(table, Config, f"{name}: "))
 
 
 def checked_config(config: Config) -> Config:
-    """Return a configuration; raise InputError where a value is not allowed."""
+    """Return a configuration; raise InputError if a value is not allowed."""
     _checked({key: value for key, value in vars(config).items() if value is not None}, Config, "")
     return config
 

@@ -24,31 +24,35 @@ if TYPE_CHECKING:
     from thud.recordings.noise import Cells
     from thud.recordings.plate import Plate
 
-# Length of background used on either side of the contact, s, and its cells: width up to a distance
-# from the contact, s. More background lowers the noise of the offset by less than 5 %.
+# Length of background used on either side of the contact, s. More of it lowers the noise of the
+# offset by less than 5 %.
 MAX_BACKGROUND = 0.1
+# The background is averaged over cells. Pairs: width of a cell, and distance from the contact up to
+# which this width is used, s.
 BACKGROUND_CELLS = ((5e-4, 5e-3), (2e-3, 25e-3), (3e-3, MAX_BACKGROUND))
-# Length of a flank in the search for the touch, s, margin before it, and the latest touch after the
-# start of the pulse as found by the search for drops.
+# Length of a flank in the search for the touch, s.
 FLANK = 3e-3
+# Margin between background and pulse, s.
 MARGIN = 2e-3
+# Maximum time from the start of the pulse, by the search for drops, to the touch, s.
 MAX_DELAY = 1e-3
-# Cells of the flank, s: minimum, maximum around the touch, and elsewhere as fraction of the
-# distance to the touch.
+# Width of the cells of a flank, s: at least MIN_CELL, at most MAX_CELL near the touch, and GROWTH
+# times the distance from it farther away.
 MIN_CELL = 2e-5
 MAX_CELL = 1e-4
 GROWTH = 0.15
-# Cells of the contact, s.
+# Width of the cells of the contact, s.
 CONTACT_CELL = 2e-4
-# The gate of the levels extends this many samples beyond the contact, and (GATE_RATE/rate)2 more at
-# low rates, whose anti-aliasing filter is close to the octave of 500 Hz.
+# The gate of the levels extends this many samples beyond the contact, and (GATE_RATE / rate)**2
+# more at low rates, whose anti-aliasing filter is close to the octave of 500 Hz.
 GATE_SAMPLES = 8
 GATE_RATE = 10_000.0
-# Periods of the resonance within which the correction of a plate responds to a sample; content
-# above its maximum frequency moves an edge by up to this fraction of a period.
+# Duration of the impulse response of a force plate's correction on either side, in periods of the
+# resonance.
 PLATE_PERIODS = 2.0
+# Error of touch and release due to content above the corrected frequencies, in periods.
 PLATE_ERROR = 0.03
-# Errors of samples other than noise, as fraction of the peak: quantization, filter of the recorder.
+# Errors of samples due to quantization and the filter of the recorder, as a fraction of the peak.
 SAMPLE_ERROR = 2e-4
 
 
@@ -61,13 +65,14 @@ class Contact(Immutable):
     touch, release : Estimate
         First touch and release.
     begin, end : Estimate
-        Limits of the contact time (`thud.impact.contact_time`).
+        Times at which the force exceeds, and falls below, 1 % of its peak
+        (`thud.impact.contact_time`).
     peak : float
-        Maximum of the force below 1.25 kHz without the offset, N: a scale.
+        Approximate maximum of the force below 1.25 kHz without the offset, N.
     span : tuple of int
-        First and stop index of the force without background.
+        First and stop index of `force`: the gate and up to MAX_BACKGROUND on either side.
     force, removed : ndarray, shape (span[1] - span[0],)
-        Force, N, and the background that was removed from it, N.
+        Force without background, N, and the removed background, N.
     gate : tuple of int
         First and stop index of the contact with its margins.
     covariance : ndarray, shape (n_cell, n_cell)
@@ -96,47 +101,46 @@ class Contact(Immutable):
 
     @property
     def gated(self) -> NDArray[np.float64]:
-        """Force of the gate, N."""
+        """Force within the gate, N."""
         first = self.span[0]
         return self.force[self.gate[0] - first : self.gate[1] - first]
 
     def summed(self, functionals: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Sum linear functionals of the samples of the gate over its cells: [k, n_cell]."""
-        edges = np.rint(np.linspace(0, functionals.shape[1], len(self.covariance) + 1))
-        return np.add.reduceat(functionals, edges[:-1].astype(int), axis=1)
+        """Return functionals, [k, n] over samples of the gate, summed within cells: [k, n_cell]."""
+        bounds = np.rint(np.linspace(0, functionals.shape[1], len(self.covariance) + 1))
+        return np.add.reduceat(functionals, bounds[:-1].astype(int), axis=1)
 
     def covariance_of(self, functionals: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the covariance of linear functionals of the samples of the gate, shape (k, n)."""
-        white = self.background.variances[0] * self.sample_rate / 2
+        """Return the covariance, [k, k], of functionals, [k, n], of the samples of the gate."""
+        white_variance = self.background.variances[0] * self.sample_rate / 2
         summed = self.summed(functionals)
-        result: NDArray[np.float64] = white * functionals @ functionals.T
+        result: NDArray[np.float64] = white_variance * functionals @ functionals.T
         return result + summed @ self.covariance @ summed.T
 
 
-def cells_between(edges: NDArray[np.intp], rate: float, middle: float) -> Cells:
-    """Return begins and ends of cells between samples, s from the middle of the contact."""
-    time = np.asarray((edges - 0.5) / rate - middle, dtype=np.float64)
+def cells_between(bounds: NDArray[np.intp], rate: float, middle: float) -> Cells:
+    """Return begins and ends of cells from bounds in samples, s from the middle of the contact."""
+    time = np.asarray((bounds - 0.5) / rate - middle, dtype=np.float64)
     return time[:-1], time[1:]
 
 
-def _means(force: NDArray[np.float64], edges: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Return the means over the samples between edges."""
-    total: NDArray[np.float64] = np.add.reduceat(force[: edges[-1]], edges[:-1])
-    return total / np.diff(edges)
+def _means(force: NDArray[np.float64], bounds: NDArray[np.intp]) -> NDArray[np.float64]:
+    total: NDArray[np.float64] = np.add.reduceat(force[: bounds[-1]], bounds[:-1])
+    return total / np.diff(bounds)
 
 
-def _background_edges(length: int, rate: float) -> NDArray[np.intp]:
-    """Return edges of background cells, in samples from the contact, up to a length."""
-    edges = [0.0]
-    for width, reach in BACKGROUND_CELLS:
-        count = int((reach - edges[-1]) / width + 1e-9)
-        edges += list(edges[-1] + width * np.arange(1, count + 1))
-    indices = np.unique(np.rint(np.array(edges) * rate).astype(int))
+def _background_bounds(length: int, rate: float) -> NDArray[np.intp]:
+    """Return bounds of background cells, in samples from the contact, up to a length."""
+    bounds = [0.0]
+    for width, max_distance in BACKGROUND_CELLS:
+        count = int((max_distance - bounds[-1]) / width + 1e-9)
+        bounds += list(bounds[-1] + width * np.arange(1, count + 1))
+    indices = np.unique(np.rint(np.array(bounds) * rate).astype(int))
     return indices[indices <= length]
 
 
 def _spread(rate: float, plate: Plate | None) -> int:
-    """Return the number of samples over which filters spread an edge."""
+    """Return the number of samples by which filters spread a flank."""
     periods = int(PLATE_PERIODS * rate / plate.frequency / 2) if plate else 0
     return int((GATE_RATE / rate) ** 2) + periods
 
@@ -145,30 +149,30 @@ def _spread(rate: float, plate: Plate | None) -> int:
 class Edges:
     """Posteriors of first touch, and of release in reversed time, s from the first sample.
 
-    `limits` are the stop index of the background before, and the first index of that after the
-    contact; the offset, N, is the median of both, which was removed before.
+    `background_limits` are the stop index of the background before the contact and the first index
+    of that after it. `offset` is the median of this background, N, subtracted before the fit.
     """
 
     touch: Posterior
     release: Posterior
     background: Background
     offset: float
-    limits: tuple[int, int]
+    background_limits: tuple[int, int]
 
 
-def find_edges(window: Window, noise: Background | None = None) -> tuple[Estimate, Estimate]:
-    """Return begin and end of a contact within about 0.1 ms, s from the first sample."""
-    edges = find_posteriors(window, window.force, noise, passes=1)
+def estimate_limits(window: Window, noise: Background | None = None) -> tuple[Estimate, Estimate]:
+    """Return begin and end of a contact, s from the first sample, accurate to about 0.1 ms."""
+    edges = find_edges(window, window.force, noise, passes=1)
     (t0, s0), (t1, s1) = edges.touch.edge()[1], edges.release.edge()[1]
     return Estimate(t0, s0), Estimate(-t1, s1)
 
 
 def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
-    """Return the contact in a window from its force, N, which may have been repaired."""
+    """Return the contact in a window; its force, N, may have been repaired."""
     rate, contact = window.sample_rate, window.contact
     middle = (contact[0] + contact[1]) / 2 / rate
-    edges = find_posteriors(window, force, None, passes=2)
-    background, (before_stop, after_start) = edges.background, edges.limits
+    edges = find_edges(window, force, None, passes=2)
+    background, (before_stop, after_start) = edges.background, edges.background_limits
     (t0, s0), begin = edges.touch.edge()
     (t1, s1), end = edges.release.edge()
     t1 = -t1
@@ -178,11 +182,12 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
         max(int((t0 - 3 * s0) * rate) - margin, 0),
         min(int((t1 + 3 * s1) * rate) + margin + 1, len(force)),
     )
-    inner = uniform_edges(*gate, rate)
+    inner = uniform_bounds(*gate, rate)
     _, covariance = background.predict(cells_between(inner, rate, middle))
-    reach = int(MAX_BACKGROUND * rate)
-    span = (max(0, gate[0] - reach), min(len(force), gate[1] + reach))
-    sides = [uniform_edges(*side, 5 * rate) for side in ((span[0], gate[0]), (gate[1], span[1]))]
+    length = int(MAX_BACKGROUND * rate)
+    span = (max(0, gate[0] - length), min(len(force), gate[1] + length))
+    # Five times the rate makes the cells five times as wide.
+    sides = [uniform_bounds(*side, 5 * rate) for side in ((span[0], gate[0]), (gate[1], span[1]))]
     cells = cells_between(np.unique(np.concatenate([*sides, inner])), rate, middle)
     time = np.arange(*span) / rate - middle
     removed = np.interp(time, (cells[0] + cells[1]) / 2, background.predict_mean(cells))
@@ -204,16 +209,16 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
     )
 
 
-def find_posteriors(
+def find_edges(
     window: Window, force: NDArray[np.float64], noise: Background | None, passes: int
 ) -> Edges:
-    """Return the edges of a contact; the second pass starts from the background found by the first.
+    """Return the edges of a contact; a second pass starts from the limits found by the first.
 
-    Noise that is known from another part of the signal is not fitted again.
+    Noise fitted to another part of the signal is used as it is; None fits the noise.
     """
     rate, (first, stop) = window.sample_rate, window.contact
     middle = (first + stop) / 2 / rate
-    # Half of a short background is kept.
+    # At most half of a short background is cut off.
     before_stop = int(max(first - MARGIN * rate, first / 2))
     after_start = int(min(stop + MARGIN * rate, (stop + len(force)) / 2))
     touch = (before_stop / rate, first / rate + MARGIN)
@@ -231,36 +236,40 @@ def find_posteriors(
         background = Background(cells, mean, noise.draws, peak)
         fixed = Background(cells, mean, noise.variances[None], peak)
         posteriors = []
-        for sign, near, at, bounds in (
+        for sign, background_end, pulse_end, interval in (
             (1, before_stop, first, touch),
             (-1, after_start, stop, release),
         ):
-            ahead = bounds if sign > 0 else (-bounds[1], -bounds[0])
-            end = min(ahead[1], sign * at / rate + MAX_DELAY) + FLANK
-            edges = sign * flank_edges(sign * near, ahead, end, rate, fine=pass_index > 0)
+            search = interval if sign > 0 else (-interval[1], -interval[0])
+            end = min(search[1], sign * pulse_end / rate + MAX_DELAY) + FLANK
+            bounds = sign * flank_bounds(
+                sign * background_end, search, end, rate, fine=pass_index > 0
+            )
             posteriors.append(
-                find_edge(force, edges, ahead, fixed, rate, middle, searches, window.plate)
+                find_posterior(force, bounds, search, fixed, rate, middle, searches, window.plate)
             )
         if pass_index + 1 < passes:
-            touch, back = (_reach(posterior.edge(), 3 / rate + 1e-4) for posterior in posteriors)
-            release = (-back[1], -back[0])
+            touch, reverse = (
+                _interval(posterior.edge(), 3 / rate + 1e-4) for posterior in posteriors
+            )
+            release = (-reverse[1], -reverse[0])
             # Samples that a filter affects are no background.
-            beyond = _spread(rate, window.plate)
-            before_stop = max(int(touch[0] * rate) - beyond, first // 2)
-            after_start = min(int(release[1] * rate) + 1 + beyond, (stop + len(force) + 1) // 2)
+            spread = _spread(rate, window.plate)
+            before_stop = max(int(touch[0] * rate) - spread, first // 2)
+            after_start = min(int(release[1] * rate) + 1 + spread, (stop + len(force) + 1) // 2)
     return Edges(posteriors[0], posteriors[1], background, offset, (before_stop, after_start))
 
 
-def _reach(
+def _interval(
     edge: tuple[tuple[float, float], tuple[float, float]], margin: float
 ) -> tuple[float, float]:
-    """Return limits of first touch and begin, with a margin, s."""
+    """Return an interval that includes first touch and begin, with a margin, s."""
     ends = np.array([(mean - 5 * spread, mean + 5 * spread) for mean, spread in edge])
     return float(ends.min()) - margin, float(ends.max()) + margin
 
 
-def uniform_edges(start: int, stop: int, rate: float) -> NDArray[np.intp]:
-    """Return edges of cells of about CONTACT_CELL at a rate, in samples."""
+def uniform_bounds(start: int, stop: int, rate: float) -> NDArray[np.intp]:
+    """Return bounds of cells of about CONTACT_CELL, in samples at a rate, Hz."""
     count = max(1, round((stop - start) / rate / CONTACT_CELL))
     return np.unique(np.rint(np.linspace(start, stop, 1 + count)).astype(int))
 
@@ -269,43 +278,43 @@ def background_means(
     force: NDArray[np.float64], before_stop: int, after_start: int, rate: float, middle: float
 ) -> tuple[Cells, NDArray[np.float64]]:
     """Return the background cells on both sides of a contact, and their mean forces, N."""
-    both = (
-        before_stop - _background_edges(before_stop, rate)[::-1],
-        after_start + _background_edges(len(force) - after_start, rate),
+    sides = (
+        before_stop - _background_bounds(before_stop, rate)[::-1],
+        after_start + _background_bounds(len(force) - after_start, rate),
     )
-    begins, ends = zip(*(cells_between(edges, rate, middle) for edges in both), strict=True)
-    mean = [_means(force, edges) for edges in both if len(edges) > 1]
+    begins, ends = zip(*(cells_between(side, rate, middle) for side in sides), strict=True)
+    mean = [_means(force, side) for side in sides if len(side) > 1]
     return (np.concatenate(begins), np.concatenate(ends)), np.concatenate(mean)
 
 
-def find_edge(  # noqa: PLR0913, PLR0917 - what a flank is
+def find_posterior(  # noqa: PLR0913, PLR0917 - all of them describe one flank
     force: NDArray[np.float64],
-    edges: NDArray[np.intp],
-    bounds: tuple[float, float],
+    bounds: NDArray[np.intp],
+    interval: tuple[float, float],
     background: Background,
     rate: float,
     middle: float,
     searches: int,
     plate: Plate | None = None,
 ) -> Posterior:
-    """Return the posterior of the touch between bounds, s; of the release if the edges fall.
+    """Return the posterior of the touch within an interval, s, from cells with bounds in samples.
 
-    The time of a release is reversed, also in its bounds.
+    If the bounds decrease, it is that of the release, in reversed time as is the interval.
     """
-    reversed_ = edges[0] > edges[-1]
-    edges = edges[::-1] if reversed_ else edges
-    edges = edges[(edges >= 0) & (edges <= len(force))]
-    cells = cells_between(edges, rate, middle)
+    reversed_ = bounds[0] > bounds[-1]
+    bounds = bounds[::-1] if reversed_ else bounds
+    bounds = bounds[(bounds >= 0) & (bounds <= len(force))]
+    cells = cells_between(bounds, rate, middle)
     mean, covariance = background.predict(cells)
-    low, high = max(edges[0] - 1, 0), min(edges[-1] + 1, len(force))
-    smooth = np.convolve(force[low:high], SMOOTHING, mode="same")[edges[0] - low :]
-    value = _means(smooth, edges - edges[0]) - mean
+    low, high = max(bounds[0] - 1, 0), min(bounds[-1] + 1, len(force))
+    smooth = np.convolve(force[low:high], SMOOTHING, mode="same")[bounds[0] - low :]
+    value = _means(smooth, bounds - bounds[0]) - mean
     # Weights of the samples in the smoothed means.
-    count = np.diff(edges)
+    count = np.diff(bounds)
     kernel = SMOOTHING if plate is None else np.convolve(SMOOTHING, _response(plate, rate))
-    reach = len(kernel) // 2
-    weights = np.zeros((len(count), edges[-1] - edges[0] + 2 * reach))
-    weights[np.repeat(np.arange(len(count)), count), reach + np.arange(count.sum())] = 1
+    margin = len(kernel) // 2
+    weights = np.zeros((len(count), bounds[-1] - bounds[0] + 2 * margin))
+    weights[np.repeat(np.arange(len(count)), count), margin + np.arange(count.sum())] = 1
     weights = convolve1d(weights / count[:, None], kernel, mode="constant")
     covariance += background.variances[0] * rate / 2 * weights @ weights.T
     covariance += (SAMPLE_ERROR * background.peak) ** 2 * np.eye(len(value))
@@ -315,28 +324,32 @@ def find_edge(  # noqa: PLR0913, PLR0917 - what a flank is
     flank = Flank(
         time, value, covariance, background.peak, 1 / rate, release=bool(reversed_), plate=plate
     )
-    return find_touch(flank, *bounds, searches)
+    return find_touch(flank, *interval, searches)
 
 
 @lru_cache(maxsize=4)
 def _response(plate: Plate, rate: float) -> NDArray[np.float64]:
-    """Return the response of the correction of a plate to one sample, in its middle."""
-    reach = int(PLATE_PERIODS * rate / plate.frequency)
-    unit = np.zeros(2 * reach + 1)
-    unit[reach] = 1
-    return correct_plate(unit, rate, plate)
+    """Return the impulse response of a force plate's correction, the impulse in the middle."""
+    length = int(PLATE_PERIODS * rate / plate.frequency)
+    impulse = np.zeros(2 * length + 1)
+    impulse[length] = 1
+    return correct_plate(impulse, rate, plate)
 
 
-def flank_edges(
-    first: int, bounds: tuple[float, float], end: float, rate: float, *, fine: bool
+def flank_bounds(
+    first: int, interval: tuple[float, float], end: float, rate: float, *, fine: bool
 ) -> NDArray[np.intp]:
-    """Return edges of flank cells in samples, from the end of the background to a time, s."""
-    touch, half = (bounds[0] + bounds[1]) / 2 * rate, (bounds[1] - bounds[0]) / 2 * rate
-    edges = [first]
-    while edges[-1] < end * rate:
-        away = max(abs(edges[-1] - touch) - half, 0)
+    """Return bounds of flank cells in samples, from the end of the background to a time, s.
+
+    The interval, s, includes the touch; cells that are not fine have the maximum width.
+    """
+    touch = (interval[0] + interval[1]) / 2 * rate
+    half_width = (interval[1] - interval[0]) / 2 * rate
+    bounds = [first]
+    while bounds[-1] < end * rate:
+        distance = max(abs(bounds[-1] - touch) - half_width, 0)
         width = MAX_CELL * rate
         if fine:
-            width = max(MIN_CELL * rate, GROWTH * away, min(half / 10, width))
-        edges.append(edges[-1] + max(1, int(width)))
-    return np.array(edges)
+            width = max(MIN_CELL * rate, GROWTH * distance, min(half_width / 10, width))
+        bounds.append(bounds[-1] + max(1, int(width)))
+    return np.array(bounds)

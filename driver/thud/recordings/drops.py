@@ -19,39 +19,39 @@ if TYPE_CHECKING:
     from thud.recordings.plate import Plate
     from thud.recordings.signal import Signal
 
-# Pulses are searched in means over cells of this length, s, in pieces of PIECE cells that overlap
-# by OVERLAP cells, more than a pulse with its background.
+# Pulses are searched in means over cells of CELL s, in pieces of PIECE cells. Pieces overlap by
+# OVERLAP cells, more than a pulse with its background.
 CELL = 1e-3
 PIECE = 30_000
 OVERLAP = 2_000
-# Cells per value of the running baseline.
+# Number of cells in a segment, whose median is one value of the baseline.
 SEGMENT = 1_000
-# Pulses rise above this many deviations of the cells or above this fraction of the maximum,
-# whichever is less, and at least above MIN_DEVIATIONS. Their edges are searched within two cells of
-# MARGIN cells outside of FOOT of their peak: flanks of the models rise to it in 4 ms.
+# A pulse rises above this many deviations of the cells or this fraction of the maximum, whichever
+# is less. The maximum exceeds MIN_DEVIATIONS deviations.
 RISE = 6.0
 RISE_FRACTION = 0.4
 MIN_DEVIATIONS = 4.0
+# A pulse ends MARGIN cells outside the level FOOT times its peak.
 FOOT = 0.2
 MARGIN = 2
-# Background next to a pulse: distance from half its height, and length, in cells.
+# Background next to a pulse, in cells: distance from the points at half its height, and length.
 DISTANCE = 6
 LENGTH = 20
-# Maximum number of cells between two components of one pulse.
+# Maximum gap within one pulse, in cells.
 MAX_GAP = 4
-# Minimum height of a pulse over the highest one of a signal.
+# Minimum height of a pulse as a fraction of the highest one of a signal.
 MIN_HEIGHT = 0.03
 # Duration of a pulse above half its peak, s: contacts of balls and tyres last 12 to 40 ms.
 DURATIONS = (0.003, 0.06)
-# A valley between two peaks below this fraction of the lower one makes two impacts.
+# Two peaks are two impacts if the valley between them is below this fraction of the lower one.
 VALLEY = 0.3
-# A pulse whose peak reaches this fraction of the one before is a drop of its own. The limits of the
+# A pulse whose peak reaches this fraction of the previous peak is a new drop. The limits of the
 # standards let a ball return with 0.9 of its velocity, and the force follows the velocity.
 NEW_DROP = 0.93
-# Flights of a bounce, s: maximum 2 e v0/g of a drop from 2 m with e = 1, minimum from 0.5 mm.
+# Duration of a flight, s: 2 v0/g for a drop height of 2 m, and of 0.5 mm.
 MAX_FLIGHT = 1.3
 MIN_FLIGHT = 0.02
-# Length of a window before and after a drop, s.
+# Length of a window before and after a pulse, s.
 BEFORE = 0.25
 AFTER = 0.5
 # Minimum rate, Hz: twice the upper edge of the octave of 500 Hz, with a margin for a filter.
@@ -62,10 +62,22 @@ MIN_RATE = 2_000.0
 class Window:
     """Section of a signal around one drop.
 
-    The name is that of the drop, as ``"file.wav, drop 3"``; the signal is read when the force is
-    requested. First and stop index of the section are those in the signal, of the contact, to about
-    1 ms, those in the section. The bounces are the windows of later bounces, the warnings those of
-    the pulse as a whole, and the plate is the one whose resonance was corrected in the signal.
+    Attributes
+    ----------
+    name : str
+        Name of the drop, as ``"file.wav, drop 3"``.
+    signal : Signal
+        Signal, read when the force is requested.
+    start, stop : int
+        First and stop index of the section in the signal.
+    contact : tuple of int
+        First and stop index of the contact in the section, accurate to about 1 ms.
+    bounces : tuple of Window
+        Windows of the bounces after the drop.
+    warnings : tuple of str
+        Possible faults of the pulse as a whole.
+    plate : Plate or None
+        Force plate whose resonance was corrected in the signal.
     """
 
     name: str
@@ -102,8 +114,8 @@ class _Pulse:
 def find_windows(signal: Signal, *, progress: bool = False) -> list[Window]:
     """Return the windows of the drops in a signal, in order.
 
-    The signal is read twice: in blocks for the search, then around each drop. Raise InputError
-    where there is no impact, or the rate is too low.
+    The signal is read twice: in blocks for the search, then around each drop. Raise InputError if
+    there is no impact, or the rate is too low.
     """
     rate, name = signal.sample_rate, signal.name
     if not rate >= MIN_RATE:
@@ -125,7 +137,7 @@ def find_windows(signal: Signal, *, progress: bool = False) -> list[Window]:
 
 
 def _pieces(signal: Signal, *, progress: bool) -> Iterator[tuple[int, NDArray[np.float64]]]:
-    """Yield the first sample and the cell means of the pieces of a signal."""
+    """Yield the index of the first sample and the cell means of each piece of a signal."""
     width = max(1, round(signal.sample_rate * CELL))
     cells = np.empty(0)
     first = 0
@@ -154,10 +166,10 @@ def _pieces(signal: Signal, *, progress: bool) -> Iterator[tuple[int, NDArray[np
 
 
 def _baseline(cells: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the force between the pulses: medians of segments, or a low quantile if short."""
+    """Return the force between the pulses, N: medians of segments; if short, a low quantile."""
     n = len(cells)
     if n < 2 * SEGMENT:
-        # A contact of up to 25 cells is not counted as background.
+        # The quantile excludes a contact of up to 25 cells.
         fraction = np.clip(0.5 * (n - 25) / n, 0.08, 0.5)
         return np.full(n, np.quantile(cells, fraction))
     count = n // SEGMENT
@@ -173,42 +185,42 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]
     below = -level[level < 0]
     deviation = 1.4826 * float(np.median(below)) if below.size else 0.0
     highest = float(level.max(initial=0.0))
-    rise = min(RISE * deviation, RISE_FRACTION * highest)
+    threshold = min(RISE * deviation, RISE_FRACTION * highest)
     if highest <= max(MIN_DEVIATIONS * deviation, 1e-9):
         return []
-    above = np.flatnonzero(level > max(rise, 0.01 * highest))
+    above = np.flatnonzero(level > max(threshold, 0.01 * highest))
     groups = np.split(above, np.flatnonzero(np.diff(above) > MAX_GAP) + 1)
     pulses: list[_Pulse] = []
     for group in groups:
         top = int(group[0] + np.argmax(level[group[0] : group[-1] + 1]))
-        free = -(-(pulses[-1].stop - first) // width) if pulses else 0
-        if top < free:
+        earliest = -(-(pulses[-1].stop - first) // width) if pulses else 0
+        if top < earliest:
             continue
         low, high = (_find_edge(level, top, step, level[top] / 2) for step in (-1, 1))
-        # Noise that merges with a pulse is no pulse.
+        # Noise on the flank of a higher pulse is no pulse.
         if level[low : high + 1].max() > level[top]:
             continue
         if not DURATIONS[0] <= (high - low + 1) * width / rate <= DURATIONS[1]:
             continue
-        # Background next to the pulse: slow noise moves it away from the median of its segment.
-        ahead, after = (
-            level[max(free, low - LENGTH) : low - DISTANCE],
+        # Slow noise moves the background next to the pulse away from the baseline.
+        left, right = (
+            level[max(earliest, low - LENGTH) : low - DISTANCE],
             level[high + DISTANCE :][:LENGTH],
         )
-        beside = [np.quantile(side, 0.4) if side.size else 0.0 for side in (ahead, after)]
+        backgrounds = [np.quantile(side, 0.4) if side.size else 0.0 for side in (left, right)]
         fraction = np.clip((np.arange(len(level)) - low) / max(high - low, 1), 0, 1)
-        local = level - (beside[0] + fraction * (beside[1] - beside[0]))
-        peak = float(local[top])
-        start = max(_find_edge(local, low, -1, FOOT * peak) - MARGIN, free)
-        stop = _find_edge(local, high, 1, FOOT * peak) + 1 + MARGIN
-        warning = _double_peak_warning(local[max(group[0], free) : group[-1] + 1])
+        corrected = level - (backgrounds[0] + fraction * (backgrounds[1] - backgrounds[0]))
+        peak = float(corrected[top])
+        start = max(_find_edge(corrected, low, -1, FOOT * peak) - MARGIN, earliest)
+        stop = _find_edge(corrected, high, 1, FOOT * peak) + 1 + MARGIN
+        warning = _double_peak_warning(corrected[max(group[0], earliest) : group[-1] + 1])
         span = first + start * width, first + stop * width
         pulses.append(_Pulse(*span, peak, warnings=[warning] if warning else []))
     return pulses
 
 
 def _find_edge(envelope: NDArray[np.float64], start: int, direction: int, threshold: float) -> int:
-    """Return the last cell above the threshold; two cells below it in a row end the pulse."""
+    """Return the last cell above the threshold; two successive cells below it end the pulse."""
     edge = start
     while 0 <= edge + direction < len(envelope) and (
         envelope[edge + direction] > threshold
@@ -221,7 +233,7 @@ def _find_edge(envelope: NDArray[np.float64], start: int, direction: int, thresh
 
 
 def _double_peak_warning(envelope: NDArray[np.float64]) -> str:
-    """Return a warning if a deep valley separates two peaks of one pulse, else an empty string."""
+    """Return a warning if a deep valley separates two peaks of a pulse, else an empty string."""
     top = int(np.argmax(envelope))
     for side in (envelope[top:], envelope[: top + 1][::-1]):
         lowest = np.minimum.accumulate(side)
@@ -235,7 +247,6 @@ def _double_peak_warning(envelope: NDArray[np.float64]) -> str:
 
 
 def _windows(signal: Signal, pulses: list[_Pulse]) -> Iterator[Window]:
-    """Yield the windows of drops with their bounces."""
     drops: list[_Pulse] = []
     flight = MAX_FLIGHT
     before: _Pulse | None = None
@@ -254,10 +265,10 @@ def _windows(signal: Signal, pulses: list[_Pulse]) -> Iterator[Window]:
             drops.append(pulse)
             flight = MAX_FLIGHT
         before = pulse
-    edges = {id(p): k for k, p in enumerate(pulses)}
+    indices = {id(p): k for k, p in enumerate(pulses)}
 
     def cut(pulse: _Pulse, name: str) -> Window:
-        k = edges[id(pulse)]
+        k = indices[id(pulse)]
         guard = round(2 * CELL * signal.sample_rate)
         low = pulses[k - 1].stop + guard if k else 0
         high = pulses[k + 1].start - guard if k + 1 < len(pulses) else signal.n_sample

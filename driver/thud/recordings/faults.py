@@ -1,4 +1,4 @@
-"""Faults of a pulse: clipped, cut, doubled, with dropouts; short dropouts are repaired."""
+"""Faults of a pulse: clipped, cut off, doubled, or dropouts, of which short ones are repaired."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ if TYPE_CHECKING:
 
     from thud.recordings.drops import Window
 
-# Minimum background on each side, s and samples.
+# Minimum length of the background on either side, s and samples.
 MIN_BACKGROUND = 1e-3
 MIN_SAMPLES = 4
-# Equal samples at the top are clipped if they are this many and the force beside them falls by more
-# than MIN_FALL quantization steps: a smooth top of this length falls by 4.
+# The top is clipped if this many samples are equal, and the force half as many samples farther out
+# is lower by more than MIN_FALL quantization steps. At a smooth top it is lower by 4.
 MIN_CLIPPED = 4
 MIN_FALL = 12.0
-# Fraction of the full scale from which a sample is clipped.
+# Fraction of full scale from which a sample is clipped.
 CLIPPED_FRACTION = 0.999
-# Minimum jump into or out of equal samples of a dropout, over the peak force: no flank rises by
-# this much between two samples of 20 kHz.
+# Minimum jump into or out of the equal samples of a dropout, as a fraction of the peak force: no
+# flank rises as much between two samples at 20 kHz.
 MIN_JUMP = 0.04
 # Minimum number of equal samples of a dropout.
 MIN_FROZEN = 3
@@ -35,7 +35,7 @@ MAX_REPAIRED = 1e-3
 def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
     """Return the force with its dropouts filled, notes, and warnings.
 
-    Raise InputError where the pulse is cut, clipped, doubled or has long dropouts.
+    Raise InputError if the pulse is cut off, clipped or doubled, or has long dropouts.
     """
     rate, (first, stop), name = window.sample_rate, window.contact, window.name
     minimum = min_background(rate)
@@ -60,13 +60,12 @@ def min_background(rate: float) -> int:
 
 
 def _runs(force: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the first indices and the lengths of the runs of equal values."""
+    """Return first index and length of each run of equal values."""
     starts = np.flatnonzero(np.diff(force, prepend=np.nan) != 0)
     return starts, np.diff(np.append(starts, len(force)))
 
 
 def _refuse_clipped(window: Window, record: NDArray[np.float64]) -> None:
-    """Raise InputError where the top of the pulse is flat."""
     first, stop = window.contact
     force = record[first:stop]
     starts, lengths = _runs(force)
@@ -76,9 +75,12 @@ def _refuse_clipped(window: Window, record: NDArray[np.float64]) -> None:
     start, length = int(starts[k]), int(lengths[k])
     changes = np.abs(np.diff(force))
     step = changes[changes > 0].min(initial=np.inf)
-    half = max(length // 2, 1)
-    beside = [force[max(start - half, 0)], force[min(start + length - 1 + half, len(force) - 1)]]
-    clipped = length >= MIN_CLIPPED and top - max(beside) > MIN_FALL * step
+    distance = max(length // 2, 1)
+    neighbors = [
+        force[max(start - distance, 0)],
+        force[min(start + length - 1 + distance, len(force) - 1)],
+    ]
+    clipped = length >= MIN_CLIPPED and top - max(neighbors) > MIN_FALL * step
     if window.signal.full_scale is not None:
         at_scale = np.count_nonzero(force >= CLIPPED_FRACTION * window.signal.full_scale)
         clipped, length = clipped or at_scale > 1, max(length, int(at_scale))
@@ -86,18 +88,18 @@ def _refuse_clipped(window: Window, record: NDArray[np.float64]) -> None:
         refuse(
             f"{window.name}: the force is clipped at {top:.4g} N for "
             f"{1e3 * length / window.sample_rate:.3g} ms",
-            "a range that holds the peak",
+            "a measuring range that includes the peak",
         )
 
 
 def _fill(
     window: Window, force: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
-    """Return the force with dropouts filled from both sides, notes, and warnings."""
+    """Return the force with dropouts interpolated, notes, and warnings."""
     first, stop = window.contact
     rate = window.sample_rate
-    guard = int(MIN_BACKGROUND * rate)
-    first, stop = first + guard, stop - guard
+    margin = int(MIN_BACKGROUND * rate)
+    first, stop = first + margin, stop - margin
     level = force - np.median(
         np.concatenate([force[: window.contact[0]], force[window.contact[1] :]])
     )
@@ -124,4 +126,8 @@ def _fill(
     filled = force.copy()
     index = np.arange(len(force))
     filled[~good] = np.interp(index[~good], index[good], force[good])
-    return filled, (f"{summary} were filled by lines",), (f"the contact has {summary}",)
+    return (
+        filled,
+        (f"{summary} were filled by linear interpolation",),
+        (f"the contact has {summary}",),
+    )

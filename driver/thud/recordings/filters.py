@@ -1,4 +1,4 @@
-"""Filters of class 1 (IEC 61260-1) with levels, and the low-pass at 1.25 kHz of the paper."""
+"""Band filters of class 1 (IEC 61260-1), levels by them, and the paper's low-pass at 1.25 kHz."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ if TYPE_CHECKING:
 
     from thud.base._schema import BandSet
 
-# Order of the Butterworth low-pass of which each filter is the band-pass: six poles. Order 2 misses
+# Order of the low-pass prototype of each Butterworth band-pass, which has six poles. Order 2 misses
 # the mask of class 1 by 18 dB.
 ORDER = 3
 # Minimum ratio of sample rate and upper band edge. Below it the bilinear transform flattens the
-# lower skirt, which then misses the mask: by 0.8 dB at 3.5, by 4 dB at 2.5.
+# lower skirt, which then misses the mask: by 0.8 dB at a ratio of 3.5, by 4 dB at 2.5.
 MIN_RATIO = 4.0
-# Maximum fraction of the energy of a filter that the padding cuts off: 4e-7 dB if the band holds as
-# much energy as the transient of the filter.
+# Maximum fraction of the energy of a filter's decay that the padding cuts off: 4e-7 dB if the band
+# holds as much energy as the decay.
 MAX_CUT = 1e-7
-# Order of the Butterworth low-pass, which runs forwards and backwards.
+# Order of the Butterworth low-pass, which is applied forwards and backwards.
 LOW_PASS_ORDER = 6
-# Energy that each run removes at the band edge over what it leaves: together they leave a half.
+# Ratio of removed to remaining energy at the band edge in each run; both runs leave one half.
 RUN_LOSS = math.sqrt(2) - 1
 
 
 def band_filters(bands: BandSet, sample_rate: float) -> NDArray[np.float64]:
     """Return the filters of bands as second-order sections, shape (n_band, 3, 6).
 
-    They are Butterworth band-passes with six poles, 3.01 dB down at the exact band edges. Bands
-    whose upper edge lies above a quarter of the sample rate, Hz, where the filter would miss the
-    mask of class 1, are NaN. `filter_levels` interpolates the record for them.
+    They are Butterworth band-passes with six poles, 3.01 dB down at the exact band edges. A band
+    whose upper edge exceeds a quarter of the sample rate, Hz, is NaN: its filter would miss the
+    mask of class 1. For such bands `filter_levels` interpolates the record.
 
-    Second-order sections need no decimation: the lowest band at 1 MHz still keeps its attenuation
-    to 1e-6 dB.
+    Second-order sections need no decimation: even at 1 MHz the attenuation of the lowest band is
+    accurate to 1e-6 dB.
     """
     _require_rate(sample_rate)
     return _filters(bands, float(sample_rate))[0].copy()
@@ -52,8 +52,8 @@ def filter_levels(
     """Return the levels of a force by filters of class 1, dB re 1 N and 1 s, shape (n_band,).
 
     The force, N, shape (n_sample,), is zero before its first and after its last sample: the filters
-    start at rest and ring out. Levels are NaN where the upper band edge is not below half the
-    sample rate, Hz. Raise InputError where the record is empty, zero throughout or not finite, or
+    start at rest and decay completely. Levels are NaN if the upper band edge is not below half the
+    sample rate, Hz. Raise InputError if the record is empty, zero throughout or not finite, or
     the rate or the bands are invalid.
     """
     record = require_real("force", require_array("force", force, dimensions=(1,)))
@@ -69,8 +69,8 @@ def filter_levels(
     rate = float(sample_rate) * factor
     sections, ringing = _filters(bands, rate)
     if factor > 1:
-        # Interpolated by its Fourier transform: the spectrum below half the rate is unchanged. The
-        # interpolation rings before and after the record.
+        # Fourier interpolation keeps the spectrum below half the rate. It rings beyond both ends of
+        # the record, hence the padding.
         record = np.pad(record, int(ringing.max()))
         record = resample(record, factor * len(record))
     for band in np.flatnonzero(inside):
@@ -81,7 +81,6 @@ def filter_levels(
 
 
 def _require_rate(sample_rate: float) -> None:
-    """Raise InputError where a sample rate is not a positive number."""
     require_number("sample_rate", sample_rate)
     if sample_rate <= 0:
         refuse(f"sample_rate = {sample_rate} is not allowed", "sample_rate > 0")
@@ -89,7 +88,7 @@ def _require_rate(sample_rate: float) -> None:
 
 @lru_cache(maxsize=8)
 def _filters(bands: BandSet, sample_rate: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return the sections of each filter, and the number of samples in which it rings out."""
+    """Return the sections of each filter, and the number of samples in which it decays."""
     edges = get_bands(bands)
     sections = np.full((len(edges.nominal), ORDER, 6), np.nan)
     ringing = np.zeros(len(edges.nominal), dtype=np.int64)
@@ -99,7 +98,7 @@ def _filters(bands: BandSet, sample_rate: float) -> tuple[NDArray[np.float64], N
         zeros, poles, gain = butter(ORDER, (lower, upper), "bandpass", fs=sample_rate, output="zpk")
         sections[band] = zpk2sos(zeros, poles, gain)
         radius = np.abs(poles).max()
-        # The energy of the ringing decays at least as radius**(2 n).
+        # After n samples the energy of the decay is at most radius**(2 n).
         ringing[band] = math.ceil(math.log(MAX_CUT) / (2 * math.log(radius)))
     return sections, ringing
 
@@ -109,12 +108,12 @@ def low_pass_force(
 ) -> tuple[NDArray[np.float64], str]:
     """Return a force low-passed at 1.25 kHz, N, shape (n_sample,), without delay, and a note.
 
-    A Butterworth filter of order 6 runs forwards and backwards; together they are 3.01 dB down at
-    1.25 kHz. If the sample rate, Hz, is too low for such frequencies, the force is unchanged.
+    A Butterworth filter of order 6 is applied forwards and backwards; both runs together are
+    3.01 dB down at 1.25 kHz. If the sample rate, Hz, is at most 2.5 kHz, the force is unchanged.
     """
     if sample_rate <= 2 * RECORDED_BAND:
         return force, describe_low_pass(sample_rate)
-    # Both runs attenuate by (1 + (t/t_corner)**12)**2 in energy, t = tan(pi f / rate): 2 at the
+    # Both runs divide the energy by (1 + (t / t_corner)**12)**2, t = tan(pi f / rate): by 2 at the
     # band edge.
     edge = math.tan(math.pi * RECORDED_BAND / sample_rate)
     corner = sample_rate / math.pi * math.atan(edge / RUN_LOSS ** (1 / (2 * LOW_PASS_ORDER)))
@@ -125,7 +124,7 @@ def low_pass_force(
 
 
 def describe_low_pass(sample_rate: float) -> str:
-    """Return what `low_pass_force` does at a sample rate, Hz."""
+    """Describe the filter of `low_pass_force` at a sample rate, Hz."""
     if sample_rate <= 2 * RECORDED_BAND:
         return f"no low-pass at 1.25 kHz: the sample rate, {sample_rate:g} Hz, is one"
     return (

@@ -18,34 +18,35 @@ if TYPE_CHECKING:
 
     from thud.recordings.plate import Plate
 
-# Shapes of a flank, t in ms since the touch: a jump, a filtered jump, t**n, a steep rise
-# 1 - exp(-t / STEEP), a parabola, and a random walk between knots.
+# A flank is a sum of shapes, t in ms since the touch: a jump, a filtered jump, powers t**n, a steep
+# rise 1 - exp(-t / STEEP), a parabola, and a random walk between knots.
 POWERS = np.array([1.0, 1.5, 1.75])
 STEEP = 0.6
 KNOTS = np.array([
     0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5, 4.0, 6.0,
     9.0,
 ])  # fmt: skip
+# Number of jumps, and of the shapes after them whose mean may not be zero.
 N_JUMP = 2
 N_MEAN = len(POWERS) + 1
 
 
 class _Kind(NamedTuple):
-    """A kind of flank: prior distribution of its shapes, over the peak force.
+    """A kind of flank: prior distribution of its shapes, as fractions of the peak force.
 
     Attributes
     ----------
     mean, spread : tuple of float
         Means and standard deviations of powers and steep rise.
     walk : float
-        Standard deviation of the steps of the walk: of smooth kinds as a fraction of the steps of
-        the mean flank, of rough ones after 1 ms.
-    likely : tuple of float
-        Probability at touch and at release: a body strikes with a jump and releases softly.
+        Standard deviation of the walk: for smooth kinds of a step, as a fraction of the mean
+        flank's step; for rough kinds after 1 ms.
+    probability : tuple of float
+        Prior probability at touch and at release: only a strike is likely to have a jump.
     error : tuple of float
-        Error of the shapes in first touch, release, and begin and end of the contact, s.
+        Standard uncertainty due to the shapes, s: of first touch, release, and begin or end.
     rough : bool
-        Whether the force may fall.
+        Whether the force may fall during the flank.
     jump, filtered, parabola : float
         Standard deviations of the other shapes.
     """
@@ -53,7 +54,7 @@ class _Kind(NamedTuple):
     mean: tuple[float, float, float, float]
     spread: tuple[float, float, float, float]
     walk: float
-    likely: tuple[float, float]
+    probability: tuple[float, float]
     error: tuple[float, float, float]
     rough: bool = False
     jump: float = 0.0
@@ -61,8 +62,8 @@ class _Kind(NamedTuple):
     parabola: float = 0.0
 
 
-# Lines, soft feet of bodies that touch in a point (Hertz: 3/2 of a sphere) and roll off, rippling
-# flanks, and those of bodies of which a fraction stops at once. Smooth kinds come first.
+# Lines; soft feet of bodies that touch at a point (Hertz: power 3/2 for a sphere) and roll off;
+# rippling flanks; flanks of bodies of which a fraction stops instantly. Smooth kinds come first.
 _LINE = (0.16, 0.0, 0.0, 0.0), (0.08, 0.0, 0.0, 0.0)
 _SMOOTH, _FOOT, _ROUGH = (5e-6, 60e-6, 5e-6), (30e-6, 60e-6, 20e-6), (40e-6, 140e-6, 20e-6)
 KINDS = (
@@ -77,28 +78,28 @@ KINDS = (
 )
 N_SMOOTH = sum(not kind.rough for kind in KINDS)
 with np.errstate(divide="ignore"):
-    PRIOR = np.log([kind.likely for kind in KINDS])
+    PRIOR = np.log([kind.probability for kind in KINDS])
 ERRORS = np.array([kind.error for kind in KINDS])
-# Relative error of the force by the shapes, of smooth and of rough kinds.
+# Relative error of the force due to the shapes: smooth kinds, rough kinds.
 MISFIT = (0.005, 0.1)
-# The force is never negative, and that of smooth kinds never falls, by more than this fraction of
-# the peak; it reaches the threshold within FOOT_TIME ms, and exceeds FOOT as long after that.
+# Fraction of the peak by which the force may be negative, or fall in smooth kinds. The force
+# reaches the threshold within FOOT_TIME ms after the touch, and FOOT within FOOT_TIME ms more.
 MAX_FALL = 0.002
 FOOT = 0.03
 FOOT_TIME = 1.0
-# Times of one search, which covers REACH standard deviations of the previous one.
+# Number of times in a search, which covers the previous result ± SEARCH_DEVIATIONS deviations.
 N_TIME = 33
-REACH = 6.0
-# Draws of each kind of flank, and minimum probability of a kind.
+SEARCH_DEVIATIONS = 6.0
+# Number of draws of each kind of flank, and minimum posterior probability of a kind.
 N_DRAW = 128
 MIN_PROBABILITY = 1e-6
 # Weights that smooth samples, to reduce the ringing of an anti-aliasing filter.
 SMOOTHING = np.array([0.25, 0.5, 0.25])
-# Times at which the shapes are tabulated, ms: step, and range before and after the touch.
+# The shapes are tabulated at ticks: step, and range before and after the touch, ms.
 TICK = 1e-3
 BEFORE = 2.0
 AFTER = 13.0
-# Margin on both sides, which the filter of the shapes wraps around, ms.
+# Margin of the table on either side, ms: the response of the plate wraps around the ends.
 GUARD = 4.0
 # Times after the touch at which draws are evaluated, ms.
 DELAY = np.concatenate([np.linspace(0, 0.5, 51), np.linspace(0.55, 4, 70)])
@@ -108,9 +109,9 @@ DELAY = np.concatenate([np.linspace(0, 0.5, 51), np.linspace(0.55, 4, 70)])
 class Flank:
     """The start of a pulse, or with `release` its end in reversed time.
 
-    Times are the middles of cells, s; force and covariance are those of their means without the
-    background, N and N2; the peak force is in N and the sampling interval in s. The resonance of
-    the plate, if any, was corrected.
+    Times are the middles of cells, s. The force is the mean over each cell without the background,
+    N, with its covariance, N2. The peak force is in N, the sampling interval in s. The plate is the
+    one whose resonance was corrected, if any.
     """
 
     time: NDArray[np.float64]
@@ -126,9 +127,8 @@ class Flank:
 class Posterior:
     """Posterior of the first touch of a flank, or with `release` of the end of a pulse.
 
-    `kinds` are indices of `KINDS`, and times are uniform, s. By kind and time it has probabilities,
-    [n_kind, n_time], and factors of the information on the shapes, whose last row is the data,
-    [n_kind, n_time, n_column, n_column].
+    Attributes are uniform times, s; indices of `KINDS`; probabilities by kind and time, [n_kind,
+    n_time]; and the factors that `_evidence` returns, [n_kind, n_time, n_column, n_column].
     """
 
     time: NDArray[np.float64]
@@ -140,30 +140,32 @@ class Posterior:
     def edge(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return first touch and begin of the contact, s, with their standard deviations.
 
-        From draws of kind, time and shape, without flanks that no force has.
+        Draws of kind, time and shape with an implausible flank are excluded.
         """
         kind = np.repeat(self.kinds, N_DRAW)
-        total = np.repeat(self.weight.sum(axis=1), N_DRAW)
+        kind_probability = np.repeat(self.weight.sum(axis=1), N_DRAW)
         quantiles = (np.arange(N_DRAW) + 0.5) / N_DRAW
-        at = np.ravel([np.searchsorted(w.cumsum(), quantiles * w.sum()) for w in self.weight])
-        at = np.minimum(at, len(self.time) - 1)
-        touch = self.time[at]
-        path = self._paths(kind, at)
+        index = np.ravel([np.searchsorted(w.cumsum(), quantiles * w.sum()) for w in self.weight])
+        index = np.minimum(index, len(self.time) - 1)
+        touch = self.time[index]
+        path = self._paths(kind, index)
         highest = np.where(kind[:, None] < N_SMOOTH, np.maximum.accumulate(path, axis=1), 0.0)
         delay = _crossing(path, THRESHOLD)
-        fast = (delay <= FOOT_TIME) & (_crossing(path, FOOT) <= delay + FOOT_TIME)
-        chance = total * ((highest - path).max(axis=1) <= MAX_FALL) * fast
-        if not chance.any():
-            chance = total
-        chance /= chance.sum()
-        jumps = chance @ (delay == 0)
+        plausible = (delay <= FOOT_TIME) & (_crossing(path, FOOT) <= delay + FOOT_TIME)
+        probability = kind_probability * ((highest - path).max(axis=1) <= MAX_FALL) * plausible
+        if not probability.any():
+            probability = kind_probability
+        probability /= probability.sum()
+        jump_probability = probability @ (delay == 0)
         results = []
         for value, cell, error in (
             (touch, self._cell, ERRORS[kind, int(self.release)]),
-            (touch + 1e-3 * delay, self._cell * jumps, ERRORS[kind, 2]),
+            (touch + 1e-3 * delay, self._cell * jump_probability, ERRORS[kind, 2]),
         ):
-            mean = float(chance @ value)
-            results.append((mean, float(np.sqrt(chance @ ((value - mean) ** 2 + error**2) + cell))))
+            mean = float(probability @ value)
+            results.append(
+                (mean, float(np.sqrt(probability @ ((value - mean) ** 2 + error**2) + cell)))
+            )
         return results[0], results[1]
 
     @property
@@ -171,10 +173,10 @@ class Posterior:
         """Variance of a time within its cell, s2."""
         return float((self.time[1] - self.time[0]) ** 2 / 12)
 
-    def _paths(self, kind: NDArray[np.intp], at: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Return draws of the averaged force over the peak: [n, n_delay]."""
+    def _paths(self, kind: NDArray[np.intp], index: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Return draws of the averaged force as a fraction of the peak: [n, n_delay]."""
         row = np.repeat(np.arange(len(self.kinds)), N_DRAW)
-        cells, cell = np.unique(row * len(self.time) + at, return_inverse=True)
+        cells, cell = np.unique(row * len(self.time) + index, return_inverse=True)
         lower = self.factors.reshape(-1, *self.factors.shape[2:])[cells]
         inverse = np.linalg.inv(lower[:, :-1, :-1])
         normal = np.tile(_normal_draws(lower.shape[-1] - 1), (len(self.kinds), 1))
@@ -185,19 +187,21 @@ class Posterior:
 
 
 def find_touch(flank: Flank, low: float, high: float, searches: int) -> Posterior:
-    """Return the posterior of the first touch of a flank between two times, s."""
-    level = flank.force / flank.peak
+    """Return the posterior of the first touch of a flank between two times, s, by searches."""
+    relative_force = flank.force / flank.peak
     whitening = []
     for misfit in MISFIT:
-        covariance = flank.covariance / flank.peak**2 + np.diag((misfit * level) ** 2)
+        covariance = flank.covariance / flank.peak**2 + np.diag((misfit * relative_force) ** 2)
         factor = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
-        inverse = solve_triangular(factor, np.eye(len(level)), lower=True, check_finite=False)
+        inverse = solve_triangular(
+            factor, np.eye(len(relative_force)), lower=True, check_finite=False
+        )
         whitening.append(inverse)
     table = _table(1e3 * flank.interval, flank.plate)
     kinds = np.arange(len(KINDS))
     for search in range(searches):
         time = np.linspace(low, high, N_TIME)
-        columns = _columns(table, 1e3 * (flank.time - time[:, None]), level)
+        columns = _columns(table, 1e3 * (flank.time - time[:, None]), relative_force)
         evidence = [
             _evidence(columns, inverse, members)
             for inverse, members in zip(
@@ -214,15 +218,14 @@ def find_touch(flank: Flank, low: float, high: float, searches: int) -> Posterio
         factors = np.concatenate([factor for _, factor in evidence])[likely]
         posterior = Posterior(time, kinds, weight, factors, flank.release)
         mean, deviation = _moments(time, weight.sum(axis=0))
-        reach = REACH * deviation
-        if search + 1 == searches or (mean - reach <= low and mean + reach >= high):
+        half_width = SEARCH_DEVIATIONS * deviation
+        if search + 1 == searches or (mean - half_width <= low and mean + half_width >= high):
             break
-        low, high = max(low, mean - reach), min(high, mean + reach)
+        low, high = max(low, mean - half_width), min(high, mean + half_width)
     return posterior
 
 
 def _moments(time: NDArray[np.float64], weight: NDArray[np.float64]) -> tuple[float, float]:
-    """Return mean and standard deviation of uniform times with weights."""
     mean = float(weight @ time)
     return mean, float(np.sqrt(weight @ (time - mean) ** 2 + (time[1] - time[0]) ** 2 / 12))
 
@@ -232,10 +235,11 @@ def _evidence(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return logarithms of the likelihood by kind and time, and factors of the information.
 
-    Columns: [n_time, n_cell, n_column], the last the force; the inverse of the factor of the
-    covariance of the noise whitens them. The information on shapes X of unit deviation and the
-    force y minus its mean is [X y]'[X y] + diag(1, ..., 1, 0), and the last diagonal element of its
-    factor the root of the residual sum of squares.
+    The columns, [n_time, n_cell, n_column], are the shapes and, last, the force. `inverse`, of the
+    Cholesky factor of the noise covariance, whitens them. With the shapes scaled to unit prior
+    deviation, X, and the force minus its prior mean, y, the information is
+    [X y]'[X y] + diag(1, ..., 1, 0); the last diagonal element of its Cholesky factor is the square
+    root of the residual sum of squares.
     """
     n_time, n_cell, n_column = columns.shape
     flat = np.moveaxis(columns, 1, 0).reshape(n_cell, -1)
@@ -246,12 +250,12 @@ def _evidence(
     information[..., shapes, shapes] += 1
     factors = np.asarray(np.linalg.cholesky(information), dtype=np.float64)
     diagonal = np.diagonal(factors, axis1=2, axis2=3)
-    size = np.log(np.diagonal(inverse)).sum()
-    return size - 0.5 * diagonal[..., -1] ** 2 - np.log(diagonal[..., :-1]).sum(axis=-1), factors
+    likelihood = np.log(np.diagonal(inverse)).sum() - 0.5 * diagonal[..., -1] ** 2
+    return likelihood - np.log(diagonal[..., :-1]).sum(axis=-1), factors
 
 
 def _crossing(path: NDArray[np.float64], level: float) -> NDArray[np.float64]:
-    """Return the delays at which paths first reach a level, ms; the last where one does not."""
+    """Return the delays at which paths first reach a level, ms; the last delay if never."""
     above = path >= level
     rows = np.arange(len(path))
     first = np.where(above.any(axis=1), np.argmax(above, axis=1), len(DELAY) - 1)
@@ -266,7 +270,7 @@ def _crossing(path: NDArray[np.float64], level: float) -> NDArray[np.float64]:
 def _normal_draws(count: int) -> NDArray[np.float64]:
     """Return normal draws: [N_DRAW, count]."""
     points = qmc.Sobol(count, seed=0).random(N_DRAW)
-    # Independent of the order of the times.
+    # Shuffled: the draws must not correlate with the times, which are sorted.
     return np.asarray(np.random.default_rng(0).permutation(ndtri(points)))
 
 
@@ -283,14 +287,14 @@ def _table(interval: float, plate: Plate | None) -> NDArray[np.float64]:
         spectrum = np.fft.rfft(total, axis=0) * plate.passed(frequency)[:, None]
         total = np.fft.irfft(spectrum, len(tau), axis=0)
     guard = round(GUARD / TICK)
-    # A view would keep the guard.
+    # A view would keep the guard in memory.
     return total[guard:-guard].copy()
 
 
 def _columns(
     table: NDArray[np.float64], tau: NDArray[np.float64], level: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the shapes at times since the touch, ms, and the force: [n_time, n_cell, n_column]."""
+    """Return shapes at times since the touch, ms, then the force: [n_time, n_cell, n_column]."""
     index = np.rint(tau / TICK).astype(int) + round(BEFORE / TICK)
     result = np.empty((*tau.shape, table.shape[1] + 1))
     result[..., :-1] = table[np.clip(index, 0, len(table) - 1)]
@@ -315,7 +319,7 @@ def _spread(kind: _Kind) -> NDArray[np.float64]:
 
 
 def _paths() -> NDArray[np.float64]:
-    """Return the averaged shapes at the delays: [n_delay, n_column]."""
+    """Return the shapes averaged over AVERAGED, at the delays: [n_delay, n_column]."""
     time = np.arange(0, DELAY[-1] + 1, 2 * TICK)
     return average_within(_shapes(time, 0), time, DELAY, 1e3 * AVERAGING_WIDTH)
 
@@ -323,7 +327,8 @@ def _paths() -> NDArray[np.float64]:
 SPREADS = np.array([_spread(kind) for kind in KINDS])
 MEANS = np.zeros_like(SPREADS)
 MEANS[:, N_JUMP : N_JUMP + N_MEAN] = [kind.mean for kind in KINDS]
-# From shapes and force to shapes of unit deviation and the force minus its mean, by kind.
+# By kind, [n_kind, n_column, n_column]: scale the shapes to unit deviation, and subtract the mean
+# from the force.
 TRANSFORMS = np.zeros((len(KINDS), SPREADS.shape[1] + 1, SPREADS.shape[1] + 1))
 TRANSFORMS[:, np.arange(SPREADS.shape[1]), np.arange(SPREADS.shape[1])] = SPREADS
 TRANSFORMS[:, :-1, -1] = -MEANS

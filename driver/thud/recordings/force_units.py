@@ -1,4 +1,4 @@
-"""Units of recorded values, and their calibration in newtons."""
+"""Units of recorded values, and their calibration to newtons."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from thud.base.checks import refuse, refuse_value, shown
 
-# By unit: its base unit, and the factor.
+# By unit: base unit, and base units per unit.
 UNITS: dict[str, tuple[str, float]] = {
     "N": ("N", 1.0), "kN": ("N", 1e3), "MN": ("N", 1e6), "mN": ("N", 1e-3), "daN": ("N", 10.0),
     "kgf": ("N", 9.80665), "kp": ("N", 9.80665), "lbf": ("N", 4.4482216152605),
@@ -19,7 +19,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "pC": ("pC", 1.0), "nC": ("pC", 1e3),
     "counts": ("counts", 1.0), "FS": ("FS", 1.0),
 }  # fmt: skip
-# Assumed unit of values without a unit.
+# Unit of values that are assumed to be in N, because none is stated.
 ASSUMED = "N?"
 # Other spellings, in lower case.
 SPELLINGS = {
@@ -34,13 +34,13 @@ EXAMPLES = "such as 250 (N per unit), '250 N/V', '4.1 pC/N, 10 mV/pC', '10 V/FS,
 FACTOR = re.compile(
     r"(?P<value>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<top>[^\s/]+)\s*/\s*(?P<bottom>.+)"
 )
-# Maximum number of factors of a chain, and range of N per unit.
+# Maximum number of factors in a chain, and range of N per unit.
 MAX_FACTORS = 8
 SIZES = (1e-30, 1e30)
 
 
 class Factor(NamedTuple):
-    """A number of one base unit per another."""
+    """A ratio of two base units: value, numerator and denominator."""
 
     value: float
     top: str
@@ -49,7 +49,7 @@ class Factor(NamedTuple):
 
 @dataclass(frozen=True)
 class Calibration:
-    """How recorded values become newtons.
+    """Conversion of recorded values to newtons.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Calibration:
     uncertainty : float or None
         Relative standard uncertainty; None if unknown.
     origin : str
-        Description of its source.
+        Where the calibration comes from, for reports.
     """
 
     chain: str
@@ -67,7 +67,7 @@ class Calibration:
     origin: str = ""
 
     def __post_init__(self) -> None:
-        """Raise InputError where the chain or the uncertainty are not allowed."""
+        """Raise InputError if the chain or the uncertainty are not allowed."""
         read_chain(self.chain)
         value = self.uncertainty
         if value is not None and not (isinstance(value, int | float) and 0 <= value < 1):
@@ -85,7 +85,7 @@ def find_unit(text: str) -> str:
 
 
 def require_unit(text: object, label: str) -> str:
-    """Return the unit that a text names; raise InputError where it names none."""
+    """Return the unit that a text names; raise InputError if it names none."""
     unit = find_unit(text) if isinstance(text, str) else ""
     if not unit:
         refuse(f"{label}: unit = {shown(text)} is not known", ALLOWED)
@@ -93,7 +93,7 @@ def require_unit(text: object, label: str) -> str:
 
 
 def read_chain(text: object) -> list[Factor]:
-    """Return the factors of a chain; raise InputError where it is none.
+    """Return the factors of a chain; raise InputError if the text is not a chain.
 
     >>> read_chain("10 mV/pC")
     [Factor(value=0.01, top='V', bottom='pC')]
@@ -107,11 +107,11 @@ def read_chain(text: object) -> list[Factor]:
         value = float(match["value"]) if match else 0.0
         if not match or not SIZES[0] < abs(value) < SIZES[1]:
             refuse(f"calibration: {term[:60]!r} is not a number with units", EXAMPLES)
-        (top, over), (bottom, under) = (
+        (top, top_factor), (bottom, bottom_factor) = (
             UNITS[require_unit(match[side], f"calibration {term[:60]!r}")]
             for side in ("top", "bottom")
         )
-        factors.append(Factor(value * over / under, top, bottom))
+        factors.append(Factor(value * top_factor / bottom_factor, top, bottom))
     if not 1 <= len(factors) <= MAX_FACTORS:
         refuse(f"calibration: {len(factors)} factors", f"1 to {MAX_FACTORS}, {EXAMPLES}")
     return factors
@@ -122,9 +122,9 @@ def newtons_per_unit(
 ) -> tuple[float, str, float | None]:
     """Return N per unit of the values, its description, and its relative uncertainty or None.
 
-    The unit is that of the values, `ASSUMED`, or empty if the calibration is a number of N per
-    value; the calibration is None if the values are forces. `counts` are those of full scale if the
-    values are integers, and `label` is the file and channel for messages.
+    `unit` is the unit of the values, or `ASSUMED`; it may be empty if the calibration is a number,
+    N per value. The calibration is None if the values are forces. `counts` are the counts at full
+    scale if the values are integers, and `label` names file and channel in messages.
     """
     if unit == ASSUMED:
         return 1.0, "values assumed to be in N", None
@@ -144,8 +144,8 @@ def newtons_per_unit(
     size = _follow(base, factors, scale)
     if size is None:
         refuse(
-            f"{label}: calibration {stated.chain!r} does not lead from {unit} to N by all its "
-            "factors",
+            f"{label}: calibration {stated.chain!r} does not convert {unit} to N with all of "
+            "its factors",
             EXAMPLES,
         )
     value = size * multiple
@@ -156,12 +156,12 @@ def newtons_per_unit(
 
 
 def _follow(unit: str, factors: list[Factor], scale: Factor | None) -> float | None:
-    """Return N per unit by a path that uses each factor once, and full scale if necessary."""
+    """Return N per unit from all factors, each used once, and from full scale if necessary."""
     if unit == "N" and not factors:
         return 1.0
     for i, (value, top, bottom) in enumerate(factors):
         others = factors[:i] + factors[i + 1 :]
-        # An amplifier, 10 V/V, is inverted.
+        # This direction first: a gain, such as 10 V/V, divides.
         for start, end, step in ((top, bottom, 1 / value), (bottom, top, value)):
             if start == unit and (remainder := _follow(end, others, scale)) is not None:
                 return step * remainder

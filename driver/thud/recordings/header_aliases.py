@@ -1,4 +1,4 @@
-"""Aliases in headers for sample rate, sampling interval, date, unit and time."""
+"""Names of sample rate, sampling interval, date, unit and time in headers of files."""
 
 from __future__ import annotations
 
@@ -16,11 +16,10 @@ if TYPE_CHECKING:
 
 
 def _words(text: str) -> frozenset[str]:
-    """Return the words of a text."""
     return frozenset(text.split())
 
 
-# Names in lower case, letters and digits only.
+# Aliases in lower case, letters and digits only.
 RATE = _words(
     "samplerate samplingrate samplefrequency samplingfrequency fs sr sfreq fsample srate "
     "samplerateperchannel samplespersecond samplespersec scanrate matsamplerate abtastrate "
@@ -86,8 +85,8 @@ def split_title(title: str) -> tuple[str, str]:
 def read_number(text: object, decimal: str = "") -> tuple[float, str] | None:
     """Return a number and the unit after it; None if there is no number.
 
-    If both decimal marks fit, `decimal` decides; without it, the point does, and an ambiguous
-    number such as 51,200 is none.
+    If the text is a number with either decimal mark, `decimal` is the mark. Without it the mark is
+    the point, and None is returned for an ambiguous number such as 51,200.
 
     >>> read_number("51,2 kHz")
     (51.2, 'kHz')
@@ -108,7 +107,7 @@ def read_number(text: object, decimal: str = "") -> tuple[float, str] | None:
 def find_rate(items: Iterable[tuple[str, object]], decimal: str = "") -> float | None:
     """Return the sample rate, Hz, from names and values of a header; None if there is none.
 
-    The decimal mark is as for `read_number`.
+    `decimal` is that of `read_number`.
     """
     for title, value in items:
         name, unit = split_title(title)
@@ -126,7 +125,7 @@ def find_rate(items: Iterable[tuple[str, object]], decimal: str = "") -> float |
 
 
 def find_word(items: Iterable[tuple[str, object]], words: frozenset[str]) -> str:
-    """Return the first value of a header whose name is among aliases, or an empty string."""
+    """Return the first value of a header whose name is one of some words, or an empty string."""
     for title, value in items:
         if plain(split_title(title)[0]) in words and str(value).strip():
             return str(value).strip().strip("\"'")[:MAX_LENGTH]

@@ -31,14 +31,14 @@ if TYPE_CHECKING:
     from thud.recordings.measured_drop import Drop
     from thud.recordings.signal import Signal
 
-# Minimum drops, and minimum duration of a signal, s, for processes, which take a second to start.
+# Minimum number of drops, or duration of a signal, s, for processes, which take a second to start.
 MIN_FOR_POOL = 40
 MIN_DURATION = 600.0
 
 
 @dataclass(frozen=True)
 class Origin:
-    """Signal that a number of drops come from; its attributes are those of `Signal`."""
+    """Signal from which drops were measured: attributes of `Signal`, and the number of drops."""
 
     name: str
     path: str
@@ -67,14 +67,14 @@ def measure_signals(
 ) -> tuple[tuple[Drop, ...], tuple[Origin, ...], float | None]:
     """Return the drops of signals, their origins, and the relative uncertainty of the force.
 
-    The uncertainty is the largest of all signals, None if it is unknown for one. The arguments are
-    those of `read_recording`. Raise InputError where there are no signals, or a drop cannot be
-    measured.
+    The uncertainty is the largest of all signals, None if it is unknown for any of them. The
+    arguments are those of `read_recording`. Raise InputError if there are no signals, or a drop
+    cannot be measured.
     """
     drops: list[Drop] = []
     origins: list[Origin] = []
     uncertainties: list[float | None] = []
-    # Threads slow down the many small products.
+    # BLAS threads slow down the many small matrix products.
     if isinstance(checkpoint, Checkpoint):
         opened: AbstractContextManager[Checkpoint] = nullcontext(checkpoint)
     else:
@@ -83,7 +83,7 @@ def measure_signals(
         for signal in signals:
             if config.calibration_uncertainty is not None:
                 signal = replace(signal, calibration_uncertainty=config.calibration_uncertainty)  # noqa: PLW2901
-            # Processes start while the signal is searched.
+            # The processes start during the search for drops.
             if signal.path and signal.n_sample > MIN_DURATION * signal.sample_rate:
                 processes.start()
             windows = find_windows(signal, progress=progress)
@@ -145,14 +145,14 @@ class _Processes(ExitStack):
                 self._pool.submit(int)
 
     def map(self, call: Callable[[Window], Drop], windows: Sequence[Window]) -> Iterator[Drop]:
-        """Yield the results of calls in order, from this process if there is no pool."""
+        """Yield the results of calls in order; without a pool, this process makes the calls."""
         if not self._pool:
             yield from map(call, windows)
             return
         calls = deque(self._pool.submit(call, window) for window in windows)
         try:
             while calls:
-                # A yielded result is not kept in the queue as well.
+                # The queue must not keep a yielded result in memory.
                 yield calls.popleft().result()
         except BrokenExecutor as error:
             message = (
@@ -166,13 +166,13 @@ class _Processes(ExitStack):
 
 
 def measure_window(window: Window, config: Config) -> Drop:
-    """Return the drop in a window, after correction of the resonance of the plate."""
+    """Return the drop in a window, after correction of the resonance of the force plate."""
     steps, warnings = tuple[str, ...](), tuple[str, ...]()
     plate = config.resonance
     if plate is not None:
         window, steps, warnings = correct_window(window, plate)
     drop = measure_drop(window, config.conditions(window.signal.calibration_uncertainty))
-    # A copy without the cached factors of the background, which only the fit needs.
+    # A copy without the cached factors of the background, which are no longer needed.
     contact = replace(drop.contact, background=replace(drop.contact.background))
     return replace(
         drop,

@@ -15,7 +15,7 @@ from thud.base.checks import refuse
 from thud.base.immutable import Immutable
 from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
-from thud.recordings.contact import Contact, find_contact, find_edges
+from thud.recordings.contact import Contact, estimate_limits, find_contact
 from thud.recordings.faults import min_background, repair
 from thud.recordings.noise import Noise
 from thud.recordings.recorded_levels import measure_levels
@@ -27,23 +27,24 @@ if TYPE_CHECKING:
     from thud.base._schema import BandSet
     from thud.recordings.drops import Window
 
-# Draws of noise for its effect on the maximum.
+# Number of draws of noise for its effect on the maximum.
 PEAK_DRAWS = 32
-# Length of the background that raises a warning, s.
+# Length of the background below which a warning is raised, s.
 SHORT_BACKGROUND = 0.005
-# Edges of the octave of 500 Hz, Hz; the fraction of the rate above which content folds back, and
-# the error that raises a warning, dB.
+# Edges of the octave of 500 Hz, Hz.
 OCTAVE_500 = (354.8, 707.9)
+# Fraction of the rate above which content indicates aliasing, and error above which a warning is
+# raised, dB.
 ALIASED_FRACTION = 0.4
 MAX_ALIASING_ERROR = 0.1
-# Minimum contact time over its uncertainty.
+# Minimum ratio of contact time and its uncertainty.
 MIN_CONTACT_RATIO = 4.0
-# Ratio of flight and peak, each over that of the drop, beyond which a pulse is no bounce: the force
-# follows the velocity.
+# Maximum factor between the restitution by flight and the ratio of the peaks. Beyond it a pulse is
+# no bounce, because the force follows the velocity.
 MAX_BOUNCE_RATIO = 3.0
-# Standard deviations of a difference that is noted.
+# Minimum drift and hum that are noted, in standard deviations.
 MIN_DEVIATIONS = 3.0
-# Quantities of the table that are estimated for each drop.
+# Quantities of `QUANTITIES` that are estimated for each drop.
 ESTIMATES = ("contact_time", "restitution", "peak_force", "impulse", "effective_mass")
 
 
@@ -56,7 +57,7 @@ class Drop(Immutable):
     name : str
         Name of the drop, as ``"file.wav, drop 3"``.
     begin : float
-        Time of the first sample since first touch, s.
+        Time of the first sample, s; zero is the first touch.
     force : ndarray, shape (n,)
         Force without offset, drift, hum and slow noise, N.
     sample_rate : float
@@ -64,21 +65,21 @@ class Drop(Immutable):
     onset : float
         Time of first touch in the file, s.
     gate : tuple of int
-        First and stop index of the contact with its margins, over which levels are measured.
+        First and stop index of the contact with its margins: the samples whose levels are measured.
     contact_time, restitution, peak_force, impulse, effective_mass : Estimate
-        In s (`thud.impact.contact_time`), 1, N (below 1.25 kHz), N s and kg; NaN if unknown.
-    restitution_shared : dict of str to float
-        Signed effects of calibration, mass and drop height on the restitution of all drops, which
-        its uncertainty excludes.
+        Units: s (`thud.impact.contact_time`), 1, N (below 1.25 kHz), N s and kg. NaN if unknown.
+    shared_effects : dict of str to float
+        Change of the restitution by one standard uncertainty of calibration, mass and drop height,
+        which all drops share and the uncertainty of the restitution excludes.
     restitution_method : str
         ``"impulse"``, ``"bounces"``, ``"impulse and bounces"`` or ``""``.
     restitutions : dict of str to Estimate
         Restitution by each method.
     noise : Noise
-        Noise of the background.
+        Noise estimated from the background.
     bounces : tuple of float
-        Times since the onset at which the measured bounces begin, s: one if the drop height is
-        known, else up to two.
+        Times at which the measured bounces begin, s since first touch: one bounce if the drop
+        height is known, else up to two.
     steps, warnings : tuple of str
         Processing of the signal, and possible faults, a sentence each.
     contact : Contact
@@ -93,7 +94,7 @@ class Drop(Immutable):
     gate: tuple[int, int]
     contact_time: Estimate
     restitution: Estimate
-    restitution_shared: dict[str, float]
+    shared_effects: dict[str, float]
     restitution_method: str
     restitutions: dict[str, Estimate]
     peak_force: Estimate
@@ -124,13 +125,17 @@ class Drop(Immutable):
 def measure_drop(window: Window, conditions: DropConditions) -> Drop:
     """Measure one drop in the window around it.
 
-    Raise InputError where the pulse is clipped, cut, doubled or full of dropouts.
+    Raise InputError if the pulse is clipped, cut off or doubled, or has long dropouts.
     """
     force, steps, warnings = repair(window)
     try:
         contact = find_contact(window, force)
     except np.linalg.LinAlgError as error:
-        refuse(f"{window.name}: the background is not noise", "noise, drift and hum", error)
+        refuse(
+            f"{window.name}: the background is not noise",
+            "a background of noise, drift and hum",
+            error,
+        )
     for side, length in zip(("before", "after"), contact.background_lengths, strict=True):
         if length < SHORT_BACKGROUND:
             warnings += (f"there are {1e3 * length:.1f} ms of background {side} the contact",)
@@ -143,7 +148,7 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
             f"an uncertainty up to 1/{MIN_CONTACT_RATIO:g} of it",
         )
     impulse = _impulse(contact)
-    # The flight after the drop gives the restitution; without the height two flights are compared.
+    # The first flight gives the restitution; without the height two flights are compared.
     landings = _landings(window, contact, 1 if conditions.height else 2)
     if conditions.height and landings:
         flight = _between(contact.end, landings[0][0]).value
@@ -152,8 +157,8 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
         if not peak / MAX_BOUNCE_RATIO < expected < peak * MAX_BOUNCE_RATIO:
             landings = []
             no_bounce = (
-                f"the pulse {1e3 * flight:.0f} ms after the contact has {peak:.2g} of its peak: "
-                f"it is no bounce from {conditions.height:g} m"
+                f"the pulse {1e3 * flight:.0f} ms after the contact has {peak:.2g} times its peak: "
+                f"it is no bounce after a drop from {conditions.height:g} m"
             )
             warnings += (no_bounce,)
     ends = [contact.end, *(end for _, end in landings)]
@@ -170,7 +175,7 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
         gate=(contact.gate[0] - first, contact.gate[1] - first),
         contact_time=contact_time,
         restitution=restitution,
-        restitution_shared=shared,
+        shared_effects=shared,
         restitution_method=" and ".join(methods),
         restitutions=methods,
         peak_force=_peak(contact),
@@ -184,13 +189,12 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
     )
 
 
-def _between(first: Estimate, last: Estimate) -> Estimate:
-    """Return the time between two times, s."""
-    return Estimate(last.value - first.value, math.hypot(last.uncertainty, first.uncertainty))
+def _between(start: Estimate, end: Estimate) -> Estimate:
+    return Estimate(end.value - start.value, math.hypot(end.uncertainty, start.uncertainty))
 
 
 def _landings(window: Window, drop: Contact, count: int) -> list[tuple[Estimate, Estimate]]:
-    """Return begin and end of the first bounces, s from the start of the window."""
+    """Return begin and end of each of the first bounces, s from the start of the window."""
     landings = []
     for bounce in window.bounces[:count]:
         first, stop = bounce.contact
@@ -200,14 +204,13 @@ def _landings(window: Window, drop: Contact, count: int) -> list[tuple[Estimate,
         delay = (bounce.start - window.start) / window.sample_rate
         begin, end = (
             Estimate(delay + edge.value, edge.uncertainty)
-            for edge in find_edges(bounce, drop.background)
+            for edge in estimate_limits(bounce, drop.background)
         )
         landings.append((begin, end))
     return landings
 
 
 def _peak_above_background(window: Window) -> float:
-    """Return the maximum of a pulse above its background, N."""
     first, stop = window.contact
     force = window.force
     background = np.concatenate([force[:first], force[stop:]])
@@ -215,17 +218,17 @@ def _peak_above_background(window: Window) -> float:
 
 
 def _impulse(contact: Contact) -> Estimate:
-    """Return the time integral of the force, N s: the sum over the gate."""
+    """Return the time integral of the force over the gate, N s."""
     ones = np.full((1, len(contact.gated)), 1 / contact.sample_rate)
     variance = contact.covariance_of(ones)[0, 0]
     return Estimate(float((ones @ contact.gated)[0]), math.sqrt(variance))
 
 
 def _peak(contact: Contact) -> Estimate:
-    """Return the maximum of the force below 1.25 kHz without the bias due to noise, N.
+    """Return the maximum of the force below 1.25 kHz, N, corrected for the bias due to noise.
 
-    The bias is what further noise of the same density adds (bootstrap), which underestimates it for
-    strong noise; it also counts as standard uncertainty.
+    The bias is estimated as the increase of the maximum by additional noise of the same density
+    (bootstrap). The estimate is too low for strong noise, so it is also a standard uncertainty.
     """
     force = np.pad(contact.gated, 2)
     low = low_pass(force, contact.sample_rate)
@@ -241,7 +244,6 @@ def _peak(contact: Contact) -> Estimate:
 
 
 def _noise(contact: Contact) -> Noise:
-    """Return the noise of the background."""
     first, stop = (index - contact.span[0] for index in contact.gate)
     force = np.concatenate([contact.force[:first], contact.force[stop:]])
     deviation = 1.4826 * float(np.median(np.abs(force - np.median(force))))
@@ -250,7 +252,6 @@ def _noise(contact: Contact) -> Noise:
 
 
 def _removed(contact: Contact) -> tuple[str, ...]:
-    """Return which background was removed, a sentence each."""
     first, stop = (index - contact.span[0] for index in contact.gate)
     offset = float(contact.removed[first:stop].mean())
     steps = [f"an offset of {offset:.3g} N was removed"]
@@ -264,13 +265,13 @@ def _removed(contact: Contact) -> tuple[str, ...]:
 
 
 def _check_aliasing(contact: Contact) -> tuple[str, ...]:
-    """Return a warning if content at half the rate folds back into the octave of 500 Hz.
+    """Return a warning if content above half the rate may alias into the octave of 500 Hz.
 
-    Beyond half the rate the amplitude of a pulse with kinks falls as 1/f2.
+    The amplitude of a pulse with kinks is assumed to fall as 1/f**2 above half the rate.
     """
     rate = contact.sample_rate
     lower, upper = OCTAVE_500
-    # Long enough for several frequencies in the octave.
+    # Padded to a length with several frequencies in the octave.
     force = np.pad(contact.gated, (0, int(rate / 20) + 3 * len(contact.gated)))
     frequency = np.fft.rfftfreq(len(force), 1 / rate)
     power = np.abs(np.fft.rfft(force)) ** 2

@@ -18,28 +18,28 @@ if TYPE_CHECKING:
 
     Cells = tuple[NDArray[np.float64], NDArray[np.float64]]  # begins and ends, s
 
-# Mains frequencies, Hz; their standard deviation (EN 50160: +- 0.5 Hz, most of the time 0.1).
+# Mains frequencies and their standard deviation, Hz (EN 50160: ±0.5 Hz, usually ±0.1 Hz).
 MAINS = (50.0, 60.0)
 MAINS_DEVIATION = 0.1
-# Harmonics of hum; the prior standard deviation of the k-th falls as 1/k.
+# Number of harmonics of hum; the prior standard deviation of harmonic k is proportional to 1/k.
 N_HARMONIC = 5
-# Prior standard deviations of offset, and of drift per second, over the peak force: wide.
+# Wide prior standard deviations of offset, and of drift per second, as fractions of the peak force.
 OFFSET = 1.0
 DRIFT = 0.1
-# Squared lag over mean squared length of two cells below which their covariance is exact.
+# The exact covariance of two cells is used below this ratio of squared lag and mean squared length.
 EXACT_LAG = 8.0
-# Priors of the logarithms of the variances: these powers of the variance, up to a deviation of a
-# cell of this fraction of the peak force; falling beyond.
+# The priors of the logarithms of the variances are proportional to these powers of the variance,
+# and fall beyond a standard deviation of a cell of PRIOR_DEVIATION times the peak force.
 SLOPE = np.array([0.5, 0.25, 1.0, 0.25, 0.25])
 PRIOR_DEVIATION = 0.03
-# Standard deviation of each cell due to quantization, over the peak force.
+# Standard deviation of each cell due to quantization, as a fraction of the peak force.
 QUANTIZATION = 1e-6
-# Number of draws of the variances from their posterior, and number that is kept.
+# Number of draws of the variances, and number of them resampled by their posterior.
 N_DRAW = 64
 N_RESAMPLED = 16
-# Degrees of freedom of the distribution of the draws.
+# Degrees of freedom of the Student distribution of the draws.
 DEGREES_OF_FREEDOM = 5
-# Maximum iterations for the maximum of the posterior, and the tolerance of its logarithm.
+# Maximum iterations in the search for the maximum of the posterior, and tolerance of its logarithm.
 MAX_ITERATIONS = 25
 TOLERANCE = 0.02
 
@@ -48,9 +48,9 @@ TOLERANCE = 0.02
 class Noise:
     """Noise of a recording: white, pink and brown.
 
-    The deviation is that of one sample, N. Densities at 1 Hz are one-sided, N2/Hz: constant,
-    proportional to 1/f and to 1/f2. The source is the background that shows them: ``"before and
-    after"``, ``"before"`` or ``"after"``.
+    `deviation` is the standard deviation of one sample, N. `white`, `pink` and `brown` are the
+    one-sided densities at 1 Hz, N2/Hz, of spectra that are constant, proportional to 1/f and to
+    1/f**2. `source` is the background from which they were estimated: ``"before and after"``.
     """
 
     deviation: float
@@ -77,9 +77,10 @@ class Noise:
 def noise_covariances(cells: Cells, other: Cells) -> NDArray[np.float64]:
     """Return covariances of means over cells that are equal or disjoint: [4, n_cell, n_other].
 
-    Of pink and brown noise of density 1 at 1 Hz and of hum of 50 and 60 Hz of variance 1. The
-    covariances at a lag are -ln|lag| and -pi2 |lag|, up to a constant that the unknown offset
-    absorbs; the mean of the first over two cells is taken to second order in their lengths.
+    The first axis is pink and brown noise of density 1 at 1 Hz, and hum of 50 and 60 Hz of
+    variance 1. Pink and brown noise have the covariances -ln|lag| and -pi**2 |lag|, up to a
+    constant that the unknown offset absorbs; the mean of -ln|lag| over two distant cells is exact
+    to second order in their lengths.
     """
     (a, b), (c, d) = cells, other
     lag = np.abs(((a + b) / 2)[:, None] - (c + d) / 2)
@@ -100,14 +101,14 @@ def noise_covariances(cells: Cells, other: Cells) -> NDArray[np.float64]:
 
 
 def _waves(cells: Cells) -> NDArray[np.float64]:
-    """Return means of the waves of each hum over cells; two frequencies each.
+    """Return means over cells of the waves of each hum, [n_mains, n_cell, n_wave].
 
-    Shape (n_mains, n_cell, n_wave).
+    Each harmonic has waves at two frequencies, MAINS_DEVIATION on either side.
     """
     middle, width = (cells[0] + cells[1]) / 2, cells[1] - cells[0]
     order = np.arange(1, N_HARMONIC + 1)
-    near = np.add.outer(MAINS, [-MAINS_DEVIATION, MAINS_DEVIATION])
-    frequency = (near[:, None] * order[:, None]).reshape(len(MAINS), 1, -1)
+    fundamentals = np.add.outer(MAINS, [-MAINS_DEVIATION, MAINS_DEVIATION])
+    frequency = (fundamentals[:, None] * order[:, None]).reshape(len(MAINS), 1, -1)
     weight = np.repeat(np.sqrt(0.5) / order, 2) * np.sinc(frequency * width[:, None])
     phase = 2 * np.pi * frequency * middle[:, None]
     return np.concatenate([weight * np.cos(phase), weight * np.sin(phase)], axis=-1)
@@ -115,12 +116,11 @@ def _waves(cells: Cells) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class Background(Immutable):
-    """Background under the force, predicted linearly from cells next to the contact.
+    """Background during the contact, predicted linearly from cells next to the contact.
 
-    Begins and ends of the cells are in s, their mean forces in N, [n_cell]. The draws of the
-    variances, [n_draw, 5], are densities of white, pink and brown noise, N2/Hz, and variances of
-    hum of 50 and of 60 Hz, N2; a single draw if they are known. The peak force, N, scales the
-    priors of offset and drift.
+    `cells` has their begins and ends, s, `mean` their mean forces, N, [n_cell], and `draws`,
+    [n_draw, 5], densities of white, pink and brown noise, N2/Hz, and variances of hum of 50 and of
+    60 Hz, N2; known ones are a single draw. The peak force, N, scales the priors.
     """
 
     cells: Cells
@@ -140,7 +140,7 @@ class Background(Immutable):
 
     @cached_property
     def _factors(self) -> list[NDArray[np.float64]]:
-        """Return the factor of the covariance of the cells for each draw."""
+        """Cholesky factor of the covariance of the cells for each draw."""
         unit, fixed = covariances(self.cells), _fixed(self.cells, self.peak)
         return [
             np.asarray(np.linalg.cholesky(np.tensordot(draw, unit, 1) + fixed), dtype=np.float64)
@@ -149,35 +149,35 @@ class Background(Immutable):
 
     @cached_property
     def _weights(self) -> list[NDArray[np.float64]]:
-        """Return the inverse covariance of the cells times their means for each draw."""
+        """Inverse covariance of the cells times their means for each draw."""
         return [cho_solve((f, True), self.mean, check_finite=False) for f in self._factors]
 
     def predict(self, cells: Cells) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the background of cells, N, and the covariance of its error, N2.
+        """Return the expected background in cells, N, and the covariance of its error, N2.
 
-        Both are of the mixture of all draws. The covariance lacks the white noise of the
-        cells themselves.
+        Both are those of the mixture of all draws. The covariance excludes the white noise of the
+        predicted cells.
         """
-        across = noise_covariances(self.cells, cells)
+        cross_covariances = noise_covariances(self.cells, cells)
         trend = _trend(self.cells, cells, self.peak)
         total = np.tensordot(self.variances[1:], noise_covariances(cells, cells), 1)
         total += _trend(cells, cells, self.peak)
         means = np.empty((len(self.draws), len(cells[0])))
         for k, (draw, factor) in enumerate(zip(self.draws, self._factors, strict=True)):
-            shared = np.tensordot(draw[1:], across, 1) + trend
-            half = _solve_lower(factor, shared)
-            means[k] = self._weights[k] @ shared
-            total -= half.T @ half / len(self.draws)
+            covariance = np.tensordot(draw[1:], cross_covariances, 1) + trend
+            whitened = _solve_lower(factor, covariance)
+            means[k] = self._weights[k] @ covariance
+            total -= whitened.T @ whitened / len(self.draws)
         mean = means.mean(axis=0)
         means -= mean
         return mean, total + means.T @ means / len(self.draws)
 
     def predict_mean(self, cells: Cells) -> NDArray[np.float64]:
-        """Return the background of cells, N."""
-        across = noise_covariances(self.cells, cells)
+        """Return the expected background in cells, N."""
+        cross_covariances = noise_covariances(self.cells, cells)
         mean = np.mean(self._weights, axis=0) @ _trend(self.cells, cells, self.peak)
         for draw, weights in zip(self.draws, self._weights, strict=True):
-            mean += np.tensordot(draw[1:], weights @ across, 1) / len(self.draws)
+            mean += np.tensordot(draw[1:], weights @ cross_covariances, 1) / len(self.draws)
         return np.asarray(mean, dtype=np.float64)
 
     @property
@@ -192,7 +192,7 @@ class Background(Immutable):
 
     @property
     def hum(self) -> tuple[float, float, float]:
-        """Frequency of the stronger hum, Hz, its amplitude and the deviation of that, N."""
+        """Frequency of the stronger hum, Hz, its amplitude, N, and the deviation of this, N."""
         k = int(np.argmax(self.variances[3:]))
         waves = _waves(self.cells)[k]
         scaled = [draw[3 + k] * w for draw, w in zip(self.draws, self._weights, strict=True)]
@@ -202,12 +202,12 @@ class Background(Immutable):
 
 
 def _solve_lower(factor: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the solution for a lower factor, without the slow checks of SciPy."""
+    """Solve a lower triangular system without the slow checks of SciPy."""
     return np.asarray(lapack.dtrtrs(factor, right, lower=True)[0])
 
 
 def _trend(cells: Cells, other: Cells, peak: float) -> NDArray[np.float64]:
-    """Return the prior covariance of offset and drift."""
+    """Return the covariance of cells due to the priors of offset and drift."""
     time = np.multiply.outer((cells[0] + cells[1]) / 2, (other[0] + other[1]) / 2)
     return np.asarray(peak**2 * (OFFSET**2 + DRIFT**2 * time), dtype=np.float64)
 
@@ -226,27 +226,28 @@ def covariances(cells: Cells) -> NDArray[np.float64]:
 def fit_background(cells: Cells, mean: NDArray[np.float64], peak: float) -> Background:
     """Return the background with variances drawn from their posterior.
 
-    Cells are given by begins and ends, s from about the middle of the contact, and their mean
-    forces, N, shape (n_cell,); the peak force is in N.
+    Arguments as in `Background`; the times are from about the middle of the contact.
     """
     unit = covariances(cells)
     scale = np.array([np.mean(np.diagonal(unit[0])), 1.0, np.pi**2 * 0.02, 1.0, 1.0])
     posterior = _Posterior(unit, _fixed(cells, peak), mean, (PRIOR_DEVIATION * peak) ** 2 / scale)
-    # Half the variance of fast changes.
+    # First guess of the variance: half the mean square difference of adjoining cells.
     adjoining = cells[0][1:] - cells[1][:-1] < 1e-3 * (cells[1] - cells[0])[1:]
-    changes = np.diff(mean)[adjoining]
-    rough = (np.mean(changes**2) / 2 if changes.size else 0.0) + (QUANTIZATION * peak) ** 2
-    first = np.log(rough * np.array([1, 0.1, 0.1, 0.05, 0.05]) / scale)
-    likely, curvature = posterior.maximum(first)
-    return Background(cells, mean, np.exp(posterior.draw(likely, curvature)), peak)
+    differences = np.diff(mean)[adjoining]
+    variance = np.mean(differences**2) / 2 if differences.size else 0.0
+    variance += (QUANTIZATION * peak) ** 2
+    guess = np.log(variance * np.array([1, 0.1, 0.1, 0.05, 0.05]) / scale)
+    maximum, curvature = posterior.maximum(guess)
+    return Background(cells, mean, np.exp(posterior.draw(maximum, curvature)), peak)
 
 
 @dataclass(frozen=True, eq=False)
 class _Posterior:
     """Posterior of the logarithms of the variances.
 
-    The covariance of the cells is linear in the variances; `unit` holds those of unit variance. The
-    priors rise with the variances up to `large`: absent noise comes out small, not zero.
+    The covariance of the cells is linear in the variances: `unit` has the covariances for unit
+    variances, `fixed` the rest. The priors rise with the variances up to `large`, so that the
+    estimate of absent noise is small and not zero.
     """
 
     unit: NDArray[np.float64]
@@ -267,20 +268,20 @@ class _Posterior:
     def _derivatives(
         self, phi: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the gradient, and the average information with that of the priors."""
+        """Return the gradient, and the average information including that of the priors."""
         theta = np.exp(phi)
         factor, _ = lapack.dpotrf(np.tensordot(theta, self.unit, 1) + self.fixed, lower=True)
         inverse = lapack.dpotri(factor, lower=True)[0]
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
         weighted = inverse @ self.mean
-        turned = (self.unit @ weighted) * theta[:, None]
+        products = (self.unit @ weighted) * theta[:, None]
         trace = theta * np.einsum("kij,ij->k", self.unit, inverse)
-        score = 0.5 * (turned @ weighted - trace) + SLOPE - theta / (theta + self.large)
-        # At the maximum, where the score is zero, that of the likelihood is the prior's slope.
-        return score, 0.5 * turned @ inverse @ turned.T + np.diag(SLOPE)
+        score = 0.5 * (products @ weighted - trace) + SLOPE - theta / (theta + self.large)
+        # At the maximum the score of the likelihood is minus that of the prior, about SLOPE.
+        return score, 0.5 * products @ inverse @ products.T + np.diag(SLOPE)
 
     def maximum(self, phi: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the most likely logarithms and the curvature there, from a first guess."""
+        """Return the most probable logarithms, from a first guess, and the curvature there."""
         value = self.logarithm(phi)
         score, curvature = self._derivatives(phi)
         for _ in range(MAX_ITERATIONS):
@@ -298,13 +299,13 @@ class _Posterior:
         return phi, curvature
 
     def draw(
-        self, likely: NDArray[np.float64], curvature: NDArray[np.float64]
+        self, maximum: NDArray[np.float64], curvature: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Return draws from the posterior, [N_RESAMPLED, 5], by importance resampling."""
-        steps, logarithm = _student(len(likely))
+        steps, logarithm = _student(len(maximum))
         # Rows x with covariance inverse(curvature) = inverse(L)' inverse(L).
         lower = np.linalg.cholesky(curvature)
-        phi = likely + solve_triangular(lower, steps.T, lower=True, trans="T").T
+        phi = maximum + solve_triangular(lower, steps.T, lower=True, trans="T").T
         weight = np.array([self.logarithm(draw) for draw in phi]) - logarithm
         weight = np.exp(weight - weight.max())
         quantiles = (np.arange(N_RESAMPLED) + 0.5) / N_RESAMPLED * weight.sum()

@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Probability that a drop that differs by chance is marked.
+# Probability that any drop is marked if all differ by chance only.
 SIGNIFICANCE = 0.05
-# Expanded uncertainty (95 %) over the standard uncertainty.
+# Ratio of expanded (95 %) and standard uncertainty.
 EXPANDED = 1.96
-# Deviation due to rounding, in the unit of the values, which marks no drop.
+# Maximum deviation due to rounding, in the unit of the values.
 ROUNDING = 1e-9
 
 
@@ -26,8 +26,8 @@ ROUNDING = 1e-9
 class Outlier:
     """A drop that differs from the others by more than chance: marked, never excluded.
 
-    Name of the drop, quantity and value, deviation from the mean in standard deviations, and the
-    largest one that chance explains.
+    Attributes are the name of the drop, quantity and value, the deviation from the mean in standard
+    deviations, and its critical value.
     """
 
     name: str
@@ -51,13 +51,13 @@ def find_outliers(
     uncertainty: Sequence[float] | NDArray[np.float64] | None = None,
     significance: float = SIGNIFICANCE,
 ) -> tuple[Outlier, ...]:
-    """Return the drops whose value differs from that of the others.
+    """Return the drops whose value differs from those of the other drops.
 
-    Grubbs' two-sided test, exact for three and more normal values; with ten or more values,
-    Rosner's generalization searches one outlier in five. The significance is the probability that a
-    drop is marked if all differ by chance. Values that are not finite are excluded, and a deviation
-    within the expanded uncertainty (1.96 times the standard one) of the value itself marks no drop.
-    Values and their standard uncertainties have the shape (n_drop,).
+    The test is Grubbs' two-sided one, exact for three and more normal values; from ten values on,
+    Rosner's generalization allows one outlier in five values. The significance is the probability
+    that any drop is marked if all differ by chance. Values that are not finite are ignored. A drop
+    is not marked if it deviates by less than the expanded uncertainty of its value. Values and
+    their standard uncertainties have the shape (n_drop,).
     """
     data = np.asarray(values, dtype=np.float64)
     uncertainties = np.zeros(data.shape) if uncertainty is None else np.nan_to_num(uncertainty)
@@ -66,7 +66,7 @@ def find_outliers(
     last = 0
     for step in range(max(1, len(remaining) // 5)):
         count = len(remaining)
-        if count < 3:  # noqa: PLR2004 - two values have the same distance from their mean
+        if count < 3:  # noqa: PLR2004 - two values are equally far from their mean
             break
         mean, deviation = data[remaining].mean(), data[remaining].std(ddof=1)
         worst = int(remaining[np.argmax(np.abs(data[remaining] - mean))])
@@ -78,7 +78,7 @@ def find_outliers(
         score = distance / deviation
         removed.append(Outlier(names[worst], quantity, float(data[worst]), score, critical))
         remaining = remaining[remaining != worst]
-        # Rosner: all up to the last that exceeds its critical value are outliers.
+        # Rosner: outliers are all values up to the last one that exceeds its critical value.
         if score > critical and distance > EXPANDED * uncertainties[worst]:
             last = step + 1
     return tuple(removed[:last])

@@ -23,17 +23,17 @@ if TYPE_CHECKING:
     from thud.recordings.drops import Window
     from thud.recordings.signal import Signal
 
-# Requirements of the standard on a force plate: flat between these frequencies, Hz, up to this
-# force, N, and linear within this relative tolerance, which is used for "flat" too.
+# Requirements of the standard on a force plate: a flat response between these frequencies, Hz, and
+# up to this force, N, and linearity within this relative tolerance, which is used for flatness too.
 FLAT = (0.2, 1000.0)
 RANGE = 5000.0
 TOLERANCE = 0.02
-# Minimum resonance over the highest band edge: there an error of 1 % of the resonance makes an
-# error of 2 r**2 / (1 - r**2) = 2 % of the force at that edge, the tolerance of the standard.
+# Minimum ratio 1/r of resonance and highest band edge: an error of 1 % of the resonance causes an
+# error of 2 r**2 / (1 - r**2) = 2 % of the force at this edge, the tolerance of the standard.
 MIN_RATIO = math.sqrt(2)
-# Maximum corrected frequency over the resonance: there the correction multiplies the noise by 3.
+# Ratio of maximum corrected frequency and resonance: there the correction amplifies the noise by 3.
 MAX_CORRECTED = 2.0
-# Length of the ringing that a piece of a signal includes, periods times quality.
+# Length of the margin for ringing on either side of a section: periods per quality factor.
 RINGING = 2.0
 
 
@@ -41,7 +41,8 @@ RINGING = 2.0
 class Plate:
     """A force plate as a mass on a spring, whose deformation is measured.
 
-    First resonance, Hz, its quality factor, and the relative standard uncertainty of the resonance.
+    Attributes are the frequency of the first resonance, Hz, its quality factor, and the relative
+    standard uncertainty of the frequency.
     """
 
     frequency: float
@@ -60,17 +61,17 @@ class Plate:
             refuse_value("plate: frequency_uncertainty", self.frequency_uncertainty, "0 to 1")
 
     def response(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """Return the force measured over the force applied, at frequencies in Hz."""
+        """Return the ratio of measured and applied force, at frequencies in Hz."""
         ratio = frequency / self.frequency
         return np.asarray(1 / (1 - ratio**2 + 1j * ratio / self.quality))
 
     def passed(self, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the fraction of the force that its correction keeps, at frequencies in Hz."""
+        """Return the fraction of the force after the correction, at frequencies in Hz."""
         octaves = np.log2(np.maximum(frequency, 1e-9) / (MAX_CORRECTED * self.frequency))
         return np.asarray(np.cos(np.pi / 2 * np.clip(octaves, 0, 1)) ** 2)
 
     def correction(self, sample_rate: float) -> str:
-        """Return a sentence on what `correct_plate` does at a rate, Hz."""
+        """Describe the correction by `correct_plate` at a sample rate, Hz."""
         highest = min(MAX_CORRECTED * self.frequency, sample_rate / 2)
         gain = 1 / abs(self.response(np.array([highest]))[0])
         return (
@@ -81,7 +82,8 @@ class Plate:
     def level_uncertainty(self, bands: BandSet = "octave") -> NDArray[np.float64]:
         """Return the standard uncertainty of corrected levels due to that of the resonance, dB.
 
-        At the upper edge of each band: 20 lg of 1 + 2 r**2 / (1 - r**2) times the relative one.
+        At the upper edge of each band, r times the resonance, a relative error of the resonance
+        changes the force by 2 r**2 / (1 - r**2) times as much.
         """
         square = (get_bands(bands).upper / self.frequency) ** 2
         return np.asarray(
@@ -91,9 +93,9 @@ class Plate:
 
 @dataclass(frozen=True)
 class PlateCheck:
-    """A requirement on the force plate, whether it is met, None if unknown, and the reason.
+    """A requirement on the force plate, whether it is met (None if unknown), and the reason.
 
-    They are ``"flat above"`` (0.2 Hz), ``"flat below"`` (1000 Hz), ``"range"`` and ``"linear"``.
+    Requirements: ``"flat above"`` (0.2 Hz), ``"flat below"`` (1000 Hz), ``"range"``, ``"linear"``.
     """
 
     requirement: str
@@ -106,10 +108,10 @@ def correct_plate(
 ) -> NDArray[np.float64]:
     """Return the force that was applied to a plate, N, shape (n_sample,), from the measured one.
 
-    F = F_m + F_m' / (w0 Q) + F_m'' / w0**2, by the Fourier transform. Up to twice the resonance it
-    is exact; above, where it would only amplify noise, it falls to zero within an octave. The
-    measured force, N, has background at both ends; the rate is in Hz. Raise InputError where the
-    resonance is below 1.41 times the highest edge of the bands of its levels.
+    F = F_m + F_m' / (w0 Q) + F_m'' / w0**2, by the Fourier transform. This is exact up to twice the
+    resonance; above, it would only amplify noise, and is reduced to zero within an octave. The
+    measured force, N, has background at both ends; the rate is in Hz. Raise InputError if the
+    resonance is below 1.41 times the highest edge of the bands.
     """
     edge = get_bands(bands).upper[-1]
     if plate.frequency < MIN_RATIO * edge:
@@ -118,17 +120,17 @@ def correct_plate(
             f"reach up to {edge:.4g} Hz, for a correction",
             f"{MIN_RATIO * edge:.4g} Hz or more",
         )
-    # The response to one sample decays within some periods of the highest corrected frequency.
-    room = math.ceil(20 * sample_rate / (MAX_CORRECTED * plate.frequency))
-    padded = np.pad(force, room, mode="edge")
-    length = next_fast_len(len(padded) + room, real=True)
+    # The impulse response decays within some periods of the highest corrected frequency.
+    margin = math.ceil(20 * sample_rate / (MAX_CORRECTED * plate.frequency))
+    padded = np.pad(force, margin, mode="edge")
+    length = next_fast_len(len(padded) + margin, real=True)
     frequency = np.asarray(np.fft.rfftfreq(length, 1 / sample_rate), dtype=np.float64)
-    # Relative to the first value: the end that wraps around makes no step.
+    # The transform is periodic: without the first value, its ends meet without a step.
     origin = padded[0]
     spectrum = np.fft.rfft(padded - origin, length) / plate.response(frequency)
     spectrum *= plate.passed(frequency)
     corrected: NDArray[np.float64] = (
-        np.fft.irfft(spectrum, length)[room : room + len(force)] + origin
+        np.fft.irfft(spectrum, length)[margin : margin + len(force)] + origin
     )
     return corrected
 
@@ -136,9 +138,9 @@ def correct_plate(
 def correct_window(window: Window, plate: Plate) -> tuple[Window, tuple[str, ...], tuple[str, ...]]:
     """Return a window of the force that was applied to a plate, the processing, and warnings.
 
-    Raise InputError where the pulse is cut, clipped, doubled or has long dropouts.
+    Raise InputError if the pulse is cut off, clipped or doubled, or has long dropouts.
     """
-    # Clipping and dropouts are faults of the recorded force; corrected, a dropout would ring.
+    # Faults must be found in the recorded force; the correction would make a dropout ring.
     force, steps, warnings = repair(window)
     repaired = replace(
         window.signal, samples=partial(_read_repaired, window.signal, window.start, force)
@@ -152,7 +154,6 @@ def correct_window(window: Window, plate: Plate) -> tuple[Window, tuple[str, ...
 
 
 def _read_corrected(signal: Signal, plate: Plate, start: int, stop: int) -> NDArray[np.float64]:
-    """Return the force that was applied to a plate, N, from start to before stop."""
     rate = signal.sample_rate
     margin = math.ceil(RINGING * plate.quality * rate / plate.frequency)
     first, last = max(start - margin, 0), min(stop + margin, signal.n_sample)
@@ -180,9 +181,9 @@ def check_plate(
 ) -> tuple[PlateCheck, ...]:
     """Check a plate by the standard: flat from 0.2 to 1000 Hz, 0 to 5000 N, linear within 2 %.
 
-    The resonance of the plate is corrected; the time constant, s, is that of the amplifier (a
-    high-pass), infinite if static; full scale of plate and recorder is in N, and the linearity has
-    pairs of a force applied and the force indicated, N.
+    The resonance of the plate is corrected. The time constant, s, is that of the amplifier (a
+    high-pass), infinite if static. The full scale, N, is that of plate and recorder. The linearity
+    is pairs of the force applied and the force indicated, N.
     """
     return (
         _check_low(time_constant),
@@ -212,7 +213,7 @@ def _check_low(time_constant: float | None) -> PlateCheck:
 
 
 def _check_high(plate: Plate | None) -> PlateCheck:
-    """Check the highest frequency by what the correction of the resonance leaves."""
+    """Check the highest frequency by the deviation that remains after the correction."""
     requirement, high = "flat below", FLAT[1]
     if plate is None or not plate.frequency_uncertainty:
         missing = "resonance" if plate is None else "uncertainty of the resonance"
@@ -221,7 +222,7 @@ def _check_high(plate: Plate | None) -> PlateCheck:
         )
     frequency = np.linspace(0.0, high, 1001, dtype=np.float64)
     response = np.abs(plate.response(frequency))
-    # Expanded uncertainty of the resonance, both ways.
+    # Expanded uncertainty of the resonance, in both directions.
     shift = 1.96 * plate.frequency_uncertainty
     ratios = [np.abs(plate.response(frequency / (1 + sign * shift))) / response for sign in (-1, 1)]
     deviation = max(float(np.abs(ratio - 1).max()) for ratio in ratios)
@@ -235,7 +236,6 @@ def _check_high(plate: Plate | None) -> PlateCheck:
 
 
 def _check_range(full_scale: float | None) -> PlateCheck:
-    """Check the largest force."""
     if full_scale is None:
         return PlateCheck("range", None, f"whether the plate reads up to {RANGE:g} N is not known")
     require_number("plate: full_scale", full_scale)
@@ -247,23 +247,23 @@ def _check_range(full_scale: float | None) -> PlateCheck:
 
 
 def _check_linearity(linearity: Sequence[tuple[float, float]] | None) -> PlateCheck:
-    """Check the linearity: deviation from the best line through zero, over the value itself."""
+    """Check the linearity by the relative deviation from the best line through zero."""
     requirement = "linear"
     if linearity is None:
         return PlateCheck(requirement, None, "the linearity is not known (pairs of forces)")
     table = np.asarray(linearity, dtype=np.float64)
     if table.ndim != 2 or table.shape[1] != 2 or len(table) < 2 or not (table > 0).all():  # noqa: PLR2004
-        refuse("plate: linearity is no list of pairs", "two or more pairs of forces, N, above 0")
+        refuse("plate: linearity is not a list of pairs", "two or more pairs of forces, N, above 0")
     applied, indicated = table.T
-    # Relative deviations: small forces count as much as large ones.
+    # Relative deviations give small forces as much weight as large ones.
     slope = float(np.mean(indicated / applied))
     relative = indicated / (slope * applied) - 1
     worst = int(np.argmax(np.abs(relative)))
-    reach = "" if applied.max() >= RANGE else f"; above {applied.max():.4g} N it is not known"
+    restriction = "" if applied.max() >= RANGE else f"; above {applied.max():.4g} N it is not known"
     met = bool(abs(relative[worst]) <= TOLERANCE)
     return PlateCheck(
         requirement,
-        None if met and reach else met,
+        None if met and restriction else met,
         f"from {applied.min():.4g} to {applied.max():.4g} N the plate is linear within "
-        f"{100 * abs(relative[worst]):.2g} % (worst at {applied[worst]:.4g} N){reach}",
+        f"{100 * abs(relative[worst]):.2g} % (worst at {applied[worst]:.4g} N){restriction}",
     )

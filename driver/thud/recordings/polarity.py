@@ -16,16 +16,16 @@ if TYPE_CHECKING:
 
 # Peak forces of heavy/soft sources, N: from drops of some centimeters to the tyre on stiff floors.
 PEAKS = (300.0, 15000.0)
-# Factor outside of these that no drop height explains.
+# Maximum factor beyond this range that a drop height can explain.
 MAX_FACTOR = 20.0
 THOUSAND = 1000.0
 POLARITIES = {"positive": 1.0, "negative": -1.0}
-# Minimum ratio of the two peaks that shows the sign.
+# Minimum ratio of the peaks of both signs from which the sign is determined.
 MIN_PEAK_RATIO = 1.5
-# Samples that are read at once, and that show the background level.
+# Number of samples per read, and approximate number from which the background level is estimated.
 BLOCK = 2**18
 SAMPLED = 2**16
-# Fraction of a file at each end that shows the background level.
+# Fraction of a file at either end from which the background level is estimated.
 EDGE = 0.01
 
 
@@ -38,13 +38,13 @@ class Extremes:
     background: float
 
     def peak(self, scale: float) -> float:
-        """Return the positive peak above the background, N."""
+        """Return the positive peak above the background, N, if `scale` is N per value."""
         high, low = self.high - self.background, self.low - self.background
         return max(high * scale, low * scale) + 0.0  # never -0
 
 
 def scan(samples: Callable[[int, int], NDArray[np.float64]], count: int, name: str) -> Extremes:
-    """Read a channel once; raise InputError where a value is not finite or all are equal."""
+    """Return the extremes of a channel; raise InputError if values are not finite or all equal."""
     low, high = np.inf, -np.inf
     stride = max(1, count // SAMPLED)
     thinned = []
@@ -63,25 +63,25 @@ def scan(samples: Callable[[int, int], NDArray[np.float64]], count: int, name: s
         refuse(f"{name}: all samples are {low:g}", "a recording of drops")
     thin = np.concatenate(thinned)
     edge = max(1, int(EDGE * thin.size))
-    # A record filled by the pulse shows the background at one end only, one of many drops overall.
+    # If the pulse fills the record, the background is at one end only; with many drops, overall.
     levels = [float(np.median(section)) for section in (thin[:edge], thin[-edge:], thin)]
     middle = low + (high - low) / 2
     return Extremes(low, high, max(levels, key=lambda level: abs(level - middle)))
 
 
 def find_sign(
-    seen: Extremes, scale: float, polarity: str | None, name: str
+    extremes: Extremes, scale: float, polarity: str | None, name: str
 ) -> tuple[float, tuple[str, ...]]:
     """Return the sign that makes a compression positive, and notes."""
-    # The polarity is that of the recorded values, before the calibration.
+    # `polarity` refers to the recorded values, before the calibration.
     if polarity is not None:
         sign = POLARITIES[polarity] * float(np.sign(scale))
         changed = f"The sign was changed: polarity = {polarity!r}."
         return sign, (changed,) if sign * scale < 0 else ()
-    up, down = seen.peak(scale), seen.peak(-scale)
+    up, down = extremes.peak(scale), extremes.peak(-scale)
     if max(up, down) < MIN_PEAK_RATIO * min(up, down):
         refuse(
-            f"{name}: the sign is not clear, the force goes {up:.4g} N up and {down:.4g} N down",
+            f"{name}: the sign is not clear, the peaks are {up:.4g} N and {-down:.4g} N",
             "polarity = 'positive' or 'negative', the sign of a compression",
         )
     if up > down:
@@ -89,28 +89,28 @@ def find_sign(
     return -1.0, (f"The sign was changed: the largest peak, {-down:.4g} N, is negative.",)
 
 
-def check_peak(seen: Extremes, scale: float, name: str, *, assumed: bool) -> tuple[str, ...]:
+def check_peak(extremes: Extremes, scale: float, name: str, *, assumed: bool) -> tuple[str, ...]:
     """Return warnings about a peak force; `scale` is N per value, with its sign.
 
-    Raise InputError where the unit must be wrong, also where it is only assumed.
+    Raise InputError if the unit must be wrong, or an assumed unit may be.
     """
     low, high = PEAKS
-    peak, other = seen.peak(scale), seen.peak(-scale)
+    peak, opposite_peak = extremes.peak(scale), extremes.peak(-scale)
     allowed = f"{low:g} to {high:g} N for heavy/soft sources"
     if assumed and not low <= peak <= high:
         refuse(f"{name}: the values are without a unit and reach {peak:.4g}", f"{allowed}, or unit")
-    for ratio, likely in ((THOUSAND, "kN instead of N"), (1 / THOUSAND, "mN instead of N")):
+    for ratio, cause in ((THOUSAND, "kN instead of N"), (1 / THOUSAND, "mN instead of N")):
         if low <= peak * ratio <= high:
             refuse(
-                f"{name}: the peak is {peak:.4g} N; the unit is probably wrong, {likely}", allowed
+                f"{name}: the peak is {peak:.4g} N; the unit is probably wrong, {cause}", allowed
             )
     if not low / MAX_FACTOR <= peak <= high * MAX_FACTOR:
-        refuse(f"{name}: the peak is {peak:.4g} N; unit or calibration are wrong", allowed)
+        refuse(f"{name}: the peak is {peak:.4g} N; unit or calibration is wrong", allowed)
     warnings: tuple[str, ...] = ()
     if not low <= peak <= high:
-        warnings += (f"The peak is {peak:.4g} N; usual are {allowed}.",)
-    if other > MIN_PEAK_RATIO * peak:
+        warnings += (f"The peak is {peak:.4g} N; usual is {allowed}.",)
+    if opposite_peak > MIN_PEAK_RATIO * peak:
         warnings += (
-            f"The force goes {other:.4g} N down and {peak:.4g} N up; the polarity may be wrong.",
+            f"The peaks are {-opposite_peak:.4g} N and {peak:.4g} N; the polarity may be wrong.",
         )
     return warnings

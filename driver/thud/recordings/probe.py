@@ -1,4 +1,4 @@
-"""Probe of a file in a subprocess, where a library may hang, crash or fill memory."""
+"""Probe of a file in a subprocess, because a library may hang, crash or fill memory."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from thud.recordings.channel import guarded, shown_path
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-# Maximum time, s, and memory, bytes.
+# Maximum time, s, and additional memory, bytes, of the subprocess.
 TIMEOUT = 10.0
 MEMORY = 2**29
 
@@ -26,7 +26,7 @@ MEMORY = 2**29
 def probe_in_subprocess(action: Callable[[Path], object], path: Path, kind: str) -> None:
     """Run an action on a file in a forked process.
 
-    Raise InputError as the action, or where the process hangs, crashes or runs out of memory.
+    Raise InputError if the action does, or if the process hangs, crashes or runs out of memory.
     """
     reader, writer = os.pipe()
     with guarded(path, kind):  # Python warns of a fork with threads; the child starts none
@@ -45,14 +45,14 @@ def probe_in_subprocess(action: Callable[[Path], object], path: Path, kind: str)
     if message:
         raise InputError(message.decode("utf-8", "replace"))
     if status:
-        reason = "makes its library fail" if ended else f"is not read within {TIMEOUT:g} s"
+        reason = "makes its library crash" if ended else f"cannot be read within {TIMEOUT:g} s"
         refuse(f"{shown_path(path)}: {reason}", f"an undamaged {kind} file")
 
 
 def _report(action: Callable[[Path], object], path: Path, kind: str, writer: int) -> None:
     """Run an action, write its error to a pipe, and end the process."""
     code = 1
-    # Ends a process whose parent was killed meanwhile.
+    # The alarm ends this process if its parent is killed.
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.alarm(2 * int(TIMEOUT))
     try:

@@ -48,28 +48,28 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     height
         Drop height, m.
     mass
-        Mass of the source, kg. With both, restitution follows from the impulse.
+        Mass of the source, kg. Mass and height give the restitution by the impulse.
     height_uncertainty, mass_uncertainty
         Their standard uncertainties, m and kg.
     source
         Source whose limits apply, ``"rubber_ball"`` or ``"tyre"``.
     channel, unit, calibration, polarity, sample_rate
-        As `open_signals` takes them.
+        As for `open_signals`.
     calibration_uncertainty
         Relative standard uncertainty of the force.
     low_pass
         Whether levels are those of the force below 1.25 kHz, as in the paper.
     config
-        Configuration of the laboratory, or its file; the other arguments have precedence.
+        Configuration of the laboratory, or its file; other arguments override it.
     progress
         Show progress bars.
     workers
-        Processes that measure the drops of one file. Scripts with more than one need
+        Number of processes that measure drops. Scripts with more than one need
         ``if __name__ == "__main__":``.
     checkpoint
-        Directory of measured drops while others are measured, or a `Checkpoint`. After an interrupt
-        the same call measures the remaining drops, if neither files nor configuration have changed.
-        They are removed at the end, those of a `Checkpoint` when it is closed.
+        Directory, or `Checkpoint`, that stores measured drops while others are measured. After an
+        interrupt the same call measures the remaining drops only, if neither files nor
+        configuration have changed. The end, or that of the `Checkpoint`, removes them.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     Raises
     ------
     InputError
-        Where a file cannot be read or a drop cannot be measured.
+        If a file cannot be read or a drop cannot be measured.
     """
     settings = config if isinstance(config, Config) else read_config(config) if config else Config()
     stated: dict[str, Any] = {

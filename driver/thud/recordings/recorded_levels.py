@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from thud.recordings.measured_drop import Drop
 
 METHODS = ("exact", "fft", "filter")
-# Levels above the background, dB: below the first a level is an upper bound, below the second the
+# Levels above background, dB: below the first value a level is an upper bound, below the second the
 # standards require the correction (ISO 10140-4, ISO 16283-2).
 BACKGROUND = (6.0, 15.0)
-# Zeros on both sides of the gate for the response of the low-pass, s: the rest changes an octave by
-# at most 2e-4 dB at 8 kHz and above, 3e-3 dB below.
+# Length of zeros on either side of the gate for the response of the low-pass, s. The truncation of
+# the response changes an octave by up to 2e-4 dB at sample rates of 8 kHz or more, else 3e-3 dB.
 MARGIN = 3e-3
-# dB per relative change of an energy.
+# Change of a level per relative change of an energy, dB.
 ENERGY_DECIBEL = 10 / math.log(10)
-# Contributions that differ from drop to drop, which the scatter of drops includes.
+# Contributions that are independent between drops: the repeatability includes them.
 WITHIN_REPEATABILITY = ("noise",)
 
 
@@ -43,13 +43,13 @@ class DropLevels(Immutable):
     Attributes
     ----------
     name, bands, method : str
-        Name of the drop, ``"octave"`` or ``"third"``, and method of the levels.
+        Name of the drop, ``"octave"`` or ``"third"``, and method of measurement.
     level : ndarray, shape (n_band,)
         Force exposure levels, dB, corrected for the background.
     uncertainty : ndarray, shape (n_band,)
-        Combined standard uncertainty of `contributions`, dB.
+        Combined standard uncertainty by `contributions`, dB.
     measured, background : ndarray, shape (n_band,)
-        Levels before the correction, and the level of the noise over the same gate, dB.
+        Levels before the correction, and levels of the noise within the same gate, dB.
     flag : ndarray of str, shape (n_band,)
         ``""``: more than 15 dB above the background; ``"corrected"``: 6 to 15 dB above it;
         ``"background"``: less than 6 dB above it, the level is an upper bound; ``"rate"``: NaN,
@@ -79,22 +79,22 @@ class AverageLevels(Immutable):
     Attributes
     ----------
     bands, method : str
-        As those of the drops.
+        As in `DropLevels`.
     names : tuple of str, shape (n_drop,)
-        Drops.
+        Names of the drops.
     drops : ndarray, shape (n_drop, n_band)
         Level of each drop, dB.
     level, background : ndarray, shape (n_band,)
-        Level of the mean energy, corrected for the mean background, and the latter, dB.
+        Level of the mean energy, corrected for the background, and the mean background, dB.
     uncertainty : ndarray, shape (n_band,)
         Combined standard uncertainty, dB.
     flag : ndarray of str, shape (n_band,)
-        As for a drop, from the mean energies.
+        As in `DropLevels`, from the mean energies.
     spread : ndarray, shape (n_band,)
         Standard deviation of the drops' levels, dB; NaN for a single drop.
     contributions : dict of ndarray, shape (n_band,)
-        Standard uncertainties of the average, dB. The repeatability, of ``n_drop - 1`` degrees of
-        freedom, includes the noise, which differs from drop to drop.
+        Standard uncertainties of the average, dB. The repeatability, with ``n_drop - 1`` degrees of
+        freedom, includes the noise, which is independent between drops.
     outliers : tuple of Outlier
         Drops that differ from the others.
     """
@@ -121,10 +121,10 @@ def measure_levels(
 ) -> list[DropLevels]:
     """Return the levels of drops, corrected for the background, with their uncertainty.
 
-    The force is zero outside the gate of each drop. ``"exact"`` is its band energy, ``"fft"`` the
-    sum of the 1 Hz bins of a window of 1 s, ``"filter"`` the energy after filters of class 1, each
-    after a low-pass at 1.25 kHz with `low_pass`, as in the paper. The expected energy of the noise
-    is subtracted. Raise InputError where the method or the bands are unknown.
+    The force is set to zero outside the gate of each drop. ``"exact"`` is its band energy,
+    ``"fft"`` the sum over the 1 Hz bins of a window of 1 s, ``"filter"`` the energy after filters
+    of class 1. With `low_pass` the force is low-passed at 1.25 kHz first, as in the paper. The
+    expected energy of the noise is subtracted. Raise InputError if method or bands are unknown.
     """
     require_choice("method", method, METHODS)
     noise = band_noise(drops, get_bands(bands))
@@ -169,10 +169,13 @@ def compare_methods(
 def average_levels(estimates: Sequence[DropLevels]) -> AverageLevels:
     """Return the energy average of the levels of drops, their spread and their outliers.
 
-    Raise InputError where there are no drops, or their bands or methods differ.
+    Raise InputError if there are no drops, or their bands or methods differ.
     """
     if len({(e.bands, e.method) for e in estimates}) != 1:
-        refuse("the drops differ in bands or method, or there are none", "levels of one kind")
+        refuse(
+            "the drops differ in bands or method, or there are none",
+            "levels in the same bands by the same method",
+        )
     first, count = estimates[0], len(estimates)
     drops = np.array([e.level for e in estimates])
     energies = np.array([10 ** (e.measured / 10) for e in estimates])
@@ -207,12 +210,12 @@ _DESCRIPTIONS = {
     "exact": "band energy of the force within the gate (exact)",
     "fft": "1 Hz bins of a rectangular window of 1 s, zero outside the gate (fft)",
     "filter": "Butterworth filters of class 1 of IEC 61260-1, the gated force padded until they "
-    "have rung out (filter)",
+    "have decayed (filter)",
 }
 
 
 def _gated(drop: Drop, *, low_pass: bool) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    """Return the force of the gate, padded with zeros if low-passed, and the steps."""
+    """Return the force within the gate, padded with zeros if low-passed, and notes."""
     first, stop = drop.gate
     force = drop.force[first:stop]
     begin, end = 1e3 * drop.time[[first, stop - 1]]
@@ -227,7 +230,7 @@ def _gated(drop: Drop, *, low_pass: bool) -> tuple[NDArray[np.float64], tuple[st
 def _levels(
     force: NDArray[np.float64], rate: float, bands: BandSet, method: str
 ) -> NDArray[np.float64]:
-    """Return levels by a method, dB; NaN where the rate is too low for the band."""
+    """Return levels by a method, dB; NaN if the rate is too low for the band."""
     if method == "filter":
         return filter_levels(force, rate, bands)
     return force_exposure_levels(force, rate, bands, "fft" if method == "fft" else "exact")
@@ -238,8 +241,8 @@ def _corrected(
 ) -> tuple[NDArray[np.float64], NDArray[np.str_]]:
     """Return levels corrected for the background, and flags.
 
-    Below 6 dB the correction is that at 6 dB. Above 15 dB, where the standards require none, it is
-    applied too, up to 0.14 dB.
+    Less than 6 dB above the background the correction is that at 6 dB. More than 15 dB above it the
+    standards require none, but it is applied, up to 0.14 dB.
     """
     low, high = BACKGROUND
     above = measured - background
@@ -249,12 +252,10 @@ def _corrected(
 
 
 def _root_sum(contributions: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Return the combined standard uncertainty."""
     return np.asarray(np.sqrt(np.sum([value**2 for value in contributions.values()], axis=0)))
 
 
 def _background_steps(nominal: NDArray[np.float64], flag: NDArray[np.str_]) -> tuple[str, ...]:
-    """Return notes on the correction for the background."""
     texts = {
         "corrected": "corrected for the background, 6 to 15 dB below",
         "background": "less than 6 dB above the background, an upper bound",

@@ -48,19 +48,19 @@ if TYPE_CHECKING:
 class Recording(Displayed):
     """Recorded drops of one source.
 
-    `time` and `force`, also in comparisons and fits, are those of the first drop; levels and other
-    numbers are averages over all drops.
+    `time` and `force` are those of the first drop, also in comparisons and fits. Levels and other
+    quantities are averages over all drops.
 
     Attributes
     ----------
     name : str
-        Name of the recording, also of its results.
+        Name of the recording and of its results.
     drops : tuple of Drop
         The drops in order.
     origins : tuple of Origin
-        The files.
+        The files of the drops.
     config : Config
-        Statements of the laboratory; mass, kg, and height, m, may be None.
+        What the laboratory states; mass, kg, and height, m, may be None.
     calibration_uncertainty : float or None
         Relative standard uncertainty of the force; None if unknown.
     """
@@ -80,7 +80,7 @@ class Recording(Displayed):
         )
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text: the criteria."""
+        """Return the criteria as rows of text with a header."""
         return self.assess().rows()
 
     @classmethod
@@ -110,7 +110,7 @@ class Recording(Displayed):
         Raises
         ------
         InputError
-            Where a drop cannot be measured.
+            If a drop cannot be measured.
         """
         config = Config(
             height=height,
@@ -133,9 +133,9 @@ class Recording(Displayed):
         workers: int = 1,
         checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     ) -> Recording:
-        """Measure the drops of signals; other arguments as for `read_recording`.
+        """Measure the drops of signals; the other arguments are those of `read_recording`.
 
-        Raise InputError where a drop cannot be measured.
+        Raise InputError if a drop cannot be measured.
         """
         drops, origins, uncertainty = measure_signals(
             signals,
@@ -186,7 +186,7 @@ class Recording(Displayed):
 
     @property
     def limits_source(self) -> LimitsSource | None:
-        """Source of the configuration; None if it is the default."""
+        """Source whose limits apply, by the configuration; None if it is the default."""
         return None if self.config.source == Config.source else self.config.source
 
     @property
@@ -196,12 +196,12 @@ class Recording(Displayed):
 
     @property
     def impact_velocity(self) -> float:
-        """Velocity at first touch by the stated drop height, m/s; NaN without it."""
+        """Velocity at first touch from the stated drop height, m/s; NaN if none is stated."""
         return self.config.conditions(None).speed
 
     @property
     def velocity_tolerance(self) -> float:
-        """Relative tolerance of the velocity: that of a drop height of 0.85 m or more ± 1 cm."""
+        """Relative tolerance of the velocity, for a drop height of at least 0.85 m ± 1 cm."""
         return 0.015
 
     @property
@@ -240,7 +240,7 @@ class Recording(Displayed):
             warnings.append("the number of peaks is unknown: some may be noise")
         known = sum(math.isfinite(drop.restitution.value) for drop in self.drops)
         if 0 < known < len(self.drops):
-            warnings.append(f"the restitution of {known} of {len(self.drops)} drops is known")
+            warnings.append(f"the restitution is known of {known} of {len(self.drops)} drops only")
         warnings += check_restitution(self.drops, config.conditions(self.calibration_uncertainty))
         if config.mass is None and math.isfinite(self.estimates["mass"].value):
             warnings.append("the mass is not stated: the effective mass is assessed")
@@ -282,7 +282,7 @@ class Recording(Displayed):
         return float(getattr(self, name, math.nan))
 
     def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - of the protocol
-        """Return the force of the first drop, corrected, N, shape (n_sample,), for any `kind`."""
+        """Return the corrected force of the first drop, N, shape (n_sample,), for any `kind`."""
         return self.drops[0].force
 
     def peak(self, force: LevelsForce | None = None) -> float:  # noqa: ARG002 - of the protocol
@@ -320,14 +320,14 @@ class Recording(Displayed):
 
     @cached_property
     def estimates(self) -> dict[str, Estimate]:
-        """Contact time, restitution, peaks, mass and drop height with their budgets."""
+        """Contact time, restitution, peak count, mass and drop height with their budgets."""
         return drop_estimates(self.drops, self.config, self.calibration_uncertainty)
 
     @cached_property
     def outliers(self) -> tuple[Outlier, ...]:
-        """Drops that differ in a level, the contact time, the restitution or the peak.
+        """Drops that differ in a level, the contact time, the restitution or the peak force.
 
-        They are not excluded. Levels share a significance of 5 %, and so do the others.
+        They are not excluded. The significance is 5 % for all levels, and 5 % for all others.
         """
         return (*self.average().outliers, *find_deviant(self.drops))
 
@@ -345,7 +345,7 @@ class Recording(Displayed):
         source: LimitsSource | None = None,
         force: LevelsForce | None = None,  # noqa: ARG002 - of the protocol
     ) -> Verdict:
-        """Assess a source, by default that of the configuration, at 95 % by its limits."""
+        """Assess the recording by the limits of a source, by default that of the configuration."""
         return assess(
             self.level_estimates(),
             source=source or self.config.source,
@@ -362,7 +362,7 @@ class Recording(Displayed):
     def to_xarray(self) -> xr.Dataset:
         """Return the force of the first drop, the average levels and the means over the drops.
 
-        Raise InputError where xarray is not installed.
+        Raise InputError if xarray is not installed.
         """
         with require_extra("studies"):
             from thud.impact.datasets import recording_dataset
@@ -372,12 +372,12 @@ class Recording(Displayed):
     def to_dataframe(self) -> pd.DataFrame:
         """Return the force of the first drop over time.
 
-        Raise InputError where pandas is not installed.
+        Raise InputError if pandas is not installed.
         """
         return data_frame({"floor_force_N": self.force()}, self.time)
 
     def drop_force(self, drop: int = 1) -> DropForce:
-        """Return the force of a contact by its number, from 1; it is zero before and after."""
+        """Return the force of one contact, zero before and after; `drop` is its number from 1."""
         require_whole("drop", drop, 1, len(self.drops))
         origin = [origin for origin in self.origins for _ in range(origin.drops)][drop - 1]
         measured = self.drops[drop - 1]

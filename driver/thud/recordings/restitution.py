@@ -19,19 +19,19 @@ IMPULSE, BOUNCES = "impulse", "bounces"
 
 @dataclass(frozen=True)
 class DropConditions:
-    """Height, mass and calibration of drops, with the standard uncertainties that all drops share.
+    """Drop height and mass, with the standard uncertainties that all drops share.
 
     Attributes
     ----------
     height, mass : float or None
         Drop height of the lowest point, m, and mass, kg; None if unknown.
-    calibration, mass_uncertainty, height_uncertainty : float
-        Standard uncertainties: of the force, relative, and in kg and m.
+    calibration_uncertainty, mass_uncertainty, height_uncertainty : float
+        Standard uncertainties of force (relative), mass, kg, and drop height, m.
     """
 
     height: float | None = None
     mass: float | None = None
-    calibration: float = 0.0
+    calibration_uncertainty: float = 0.0
     mass_uncertainty: float = 0.0
     height_uncertainty: float = 0.0
 
@@ -49,48 +49,51 @@ class DropConditions:
         if self.height and self.mass:
             momentum = self.mass * speed
             value = impulse.value / momentum - 1 - GRAVITY * contact_time.value / speed
-            parts = (impulse.uncertainty / momentum, GRAVITY * contact_time.uncertainty / speed)
-            methods[IMPULSE] = Estimate(value, math.hypot(*parts))
+            uncertainties = (
+                impulse.uncertainty / momentum,
+                GRAVITY * contact_time.uncertainty / speed,
+            )
+            methods[IMPULSE] = Estimate(value, math.hypot(*uncertainties))
         if self.height and flights:
             scale = GRAVITY / (2 * speed)
             methods[BOUNCES] = Estimate(scale * flights[0].value, scale * flights[0].uncertainty)
         elif len(flights) > 1:
             first, second = flights[:2]
             warning = (
-                f"the restitution of the first bounce is {second.value / first.value:.3f}; that of "
-                "the drop itself is unknown without the drop height"
+                f"the restitution at the second impact is {second.value / first.value:.3f}; that "
+                "at the first impact is unknown without the drop height"
             )
             return methods, (warning,)
         return methods, ()
 
-    def shared(
+    def shared_effects(
         self, methods: dict[str, Estimate], impulse: Estimate
     ) -> dict[str, dict[str, float]]:
-        """Return the signed effect of calibration, mass and drop height on each method."""
+        """Return the change of each restitution by one standard uncertainty of each cause."""
         effects: dict[str, dict[str, float]] = {}
-        height = self.height_uncertainty / (2 * self.height) if self.height else 0.0
+        speed_uncertainty = self.height_uncertainty / (2 * self.height) if self.height else 0.0
         if IMPULSE in methods:
             ratio = impulse.value / ((self.mass or math.nan) * self.speed)
             effects[IMPULSE] = {
-                "calibration": ratio * self.calibration,
+                "calibration": ratio * self.calibration_uncertainty,
                 "mass": -ratio * self.mass_uncertainty / (self.mass or math.nan),
-                "drop height": -(1 + methods[IMPULSE].value) * height,
+                "drop height": -(1 + methods[IMPULSE].value) * speed_uncertainty,
             }
         if BOUNCES in methods:
-            effects[BOUNCES] = {"drop height": -methods[BOUNCES].value * height}
+            effects[BOUNCES] = {"drop height": -methods[BOUNCES].value * speed_uncertainty}
         return effects
 
     def mean(
         self, methods: dict[str, Estimate], impulse: Estimate
     ) -> tuple[Estimate, dict[str, float]]:
-        """Return the weighted mean of the methods, and the shared effects on it.
+        """Return the weighted mean over the methods, and the shared effects on this mean.
 
-        The weights are the inverse variances, shared effects included; the uncertainty of the mean
-        excludes these.
+        The weights are the inverse variances including shared effects, which the uncertainty of the
+        mean excludes.
         """
         if not methods:
             return Estimate.unknown(), {}
-        effects = self.shared(methods, impulse)
+        effects = self.shared_effects(methods, impulse)
         deviations = {name: max(estimate.uncertainty, 1e-12) for name, estimate in methods.items()}
         weights = {
             name: 1 / (deviations[name] ** 2 + sum(effect**2 for effect in effects[name].values()))
@@ -109,15 +112,15 @@ class DropConditions:
     def effective_mass(
         self, impulse: Estimate, contact_time: Estimate, restitution: Estimate | None
     ) -> Estimate:
-        """Return impulse over (v0 (1 + e) + g t_c), kg, e from bounces."""
+        """Return J / (v0 (1 + e) + g t_c), kg, from impulse J and restitution e by bounces."""
         if restitution is None or not self.height:
             return Estimate.unknown()
         speed = self.speed
-        change = speed * (1 + restitution.value) + GRAVITY * contact_time.value
-        value = impulse.value / change
-        parts = (
-            impulse.uncertainty / change,
-            value * speed * restitution.uncertainty / change,
-            value * GRAVITY * contact_time.uncertainty / change,
+        velocity_change = speed * (1 + restitution.value) + GRAVITY * contact_time.value
+        value = impulse.value / velocity_change
+        uncertainties = (
+            impulse.uncertainty / velocity_change,
+            value * speed * restitution.uncertainty / velocity_change,
+            value * GRAVITY * contact_time.uncertainty / velocity_change,
         )
-        return Estimate(value, math.hypot(*parts))
+        return Estimate(value, math.hypot(*uncertainties))

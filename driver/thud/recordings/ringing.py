@@ -1,4 +1,4 @@
-"""Ringing of a plate after a contact, if its resonance is not corrected."""
+"""Ringing of the force plate after a contact, if its resonance is not corrected."""
 
 from __future__ import annotations
 
@@ -13,30 +13,31 @@ if TYPE_CHECKING:
     from thud.recordings.contact import Contact
     from thud.recordings.plate import Plate
 
-# Decay times of a ringing to 1/e, s.
+# Trial decay times of a ringing to 1/e, s.
 DECAYS = np.array([0.002, 0.004, 0.008, 0.016, 0.032])
-# Pause after the gate, in which soft releases end, and minimum length after it, s.
+# Pause after the gate, in which soft releases end, and minimum length of the signal after it, s.
 PAUSE = 1e-3
 MIN_LENGTH = 4e-3
-# Minimum frequency, Hz, and maximum one over the rate: filters ring near half of it.
+# Minimum frequency, Hz, and maximum frequency as a fraction of the sample rate: filters ring near
+# half the rate.
 MIN_FREQUENCY = 200.0
 MAX_FREQUENCY = 0.3
-# Minimum energy over that of the noise: one of about 6000 points exceeds it by noise once in 1e7.
+# Minimum ratio to the energy of noise: noise exceeds it at one of about 6000 points once in 1e7.
 MIN_ENERGY = 25.0
-# Minimum energy over that before the contact, where tones are no ringing.
+# Minimum ratio to the energy before the contact: a tone that is there already is no ringing.
 MIN_INCREASE = 4.0
-# Minimum amplitude of a warning over the peak, of an unstated plate and after the correction; and
-# minimum number of oscillations.
+# Minimum amplitude for a warning, as a fraction of the peak: without and with a stated plate.
 MIN_AMPLITUDE = (3e-4, 1e-3)
-MIN_OSCILLATIONS = 3.0
+# Minimum quality factor, pi times the number of oscillations within the decay time.
+MIN_QUALITY = 3.0
 
 
 def check_ringing(contact: Contact, plate: Plate | None = None) -> tuple[str, ...]:
     """Return a warning if the plate keeps ringing after the contact.
 
     A matched filter searches a free oscillation A exp(-t/d) cos(2 pi f t + p) after the gate, for
-    some d and all f. The density of the noise is that of the background, times the gain of the
-    correction of a plate.
+    the decay times d and all frequencies f. The density of the noise is that of the background,
+    times the gain of the plate's correction.
     """
     rate, first = contact.sample_rate, contact.span[0]
     pause = int(PAUSE * rate)
@@ -50,7 +51,7 @@ def check_ringing(contact: Contact, plate: Plate | None = None) -> tuple[str, ..
     quality = np.pi * resonance * decay
     if not (MIN_FREQUENCY <= resonance <= MAX_FREQUENCY * rate and energy[k, index] > MIN_ENERGY):
         return ()
-    if quality < MIN_OSCILLATIONS:
+    if quality < MIN_QUALITY:
         return ()
     if len(before) >= MIN_LENGTH * rate:
         frequency_before, energy_before = _matched(before, contact, plate)
@@ -64,26 +65,26 @@ def check_ringing(contact: Contact, plate: Plate | None = None) -> tuple[str, ..
     amplitude = 2 * np.sqrt(energy[k, index] * density * rate / 2 / window)
     if amplitude < MIN_AMPLITUDE[plate is not None] * contact.peak:
         return ()
-    # Between the frequencies of the transform: the vertex of a parabola.
+    # Interpolation between the frequencies of the transform: the vertex of a parabola.
     low, top, high = np.log(energy[k, index - 1 : index + 2])
     resonance += (frequency[1] - frequency[0]) * (low - high) / (2 * (low - 2 * top + high))
-    effect = "is not the one of [plate]" if plate else "is in levels, peaks and contact time"
+    effect = "differs from that in [plate]" if plate else "affects levels, peaks and contact time"
     warning = (
         f"the plate keeps ringing after the contact, at {resonance:.0f} Hz with {amplitude:.2g} N: "
-        f"a resonance of the plate that {effect}; state it in [plate]"
+        f"its resonance {effect}; state it in [plate]"
     )
     return (warning,)
 
 
 def _gain(plate: Plate, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the gain of the density of noise by the correction of a plate, at least 1."""
+    """Return the gain of the noise density by a plate's correction, at least 1."""
     return np.asarray(np.maximum(1 / np.abs(plate.response(frequency)) ** 2, 1.0))
 
 
 def _matched(
     force: NDArray[np.float64], contact: Contact, plate: Plate | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return frequencies, Hz, and the energy of each decay there over that of the noise."""
+    """Return frequencies, Hz, and the ratio of energy and noise by decay time and frequency."""
     rate = contact.sample_rate
     windows = np.exp(-np.arange(len(force)) / rate / DECAYS[:, None])
     length = next_fast_len(2 * len(force), real=True)

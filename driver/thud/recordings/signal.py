@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-# Bytes of a file that are hashed at once.
-HASHED = 2**20
+# Number of bytes of a file per read for the checksum.
+BLOCK = 2**20
 
 
 @dataclass(frozen=True, eq=False)
 class Signal(Immutable):
-    """One channel of one file, in newtons; only requested samples are read.
+    """Force of one channel of a file, N; only requested samples are read.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Signal(Immutable):
     n_sample : int
         Number of samples.
     full_scale : float or None
-        Largest force that the format of the file can hold, N; None if unknown.
+        Largest force that the sample format can hold, N; None if unknown.
     date : str
         Date of the measurement; empty if unknown.
     calibration : str
@@ -45,7 +45,7 @@ class Signal(Immutable):
     calibration_uncertainty : float or None
         Relative standard uncertainty of the calibration; None if unknown.
     steps : tuple of str
-        Processing by the reader, a sentence each.
+        Processing when the file was read, a sentence each.
     warnings : tuple of str
         Possible faults, a sentence each.
     samples : callable
@@ -84,7 +84,7 @@ class Signal(Immutable):
             return digest.hexdigest()
         try:
             with Path(self.path).open("rb") as file:
-                while block := file.read(HASHED):
+                while block := file.read(BLOCK):
                     digest.update(block)
         except OSError as error:
             refuse(f"{self.name}: cannot be read ({error.strerror})", "a readable file", error)
@@ -93,14 +93,14 @@ class Signal(Immutable):
     def read(self, start: int, stop: int) -> NDArray[np.float64]:
         """Return the force of the samples from start to before stop, N, positive in compression.
 
-        Raise InputError where the file has changed, is damaged, or holds non-finite values.
+        Raise InputError if the file has changed, is damaged, or holds non-finite values.
         """
         if not 0 <= start <= stop <= self.n_sample:
             refuse(f"{self.name}: samples {start} to {stop}", f"samples 0 to {self.n_sample}")
         force = self.samples(start, stop)
         if force.shape != (stop - start,):
             refuse(
-                f"{self.name}: {force.size} samples from sample {start} on, {stop - start} are due",
+                f"{self.name}: {force.size} samples from sample {start}, {stop - start} expected",
                 "a file that is complete and does not change",
             )
         if not np.isfinite(force).all():

@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-# Minimum and maximum sample rate, Hz: the octave of 500 Hz needs 1.42 kHz and a filter.
+# Minimum and maximum sample rate, Hz: the octave of 500 Hz needs 1.42 kHz and room for a filter.
 RATES = (2500.0, 1e8)
-# Minimum stored fraction of a file, which else is sparse, and maximum number of inspected pieces.
+# Minimum stored fraction of a file, below which it is sparse, and maximum number of pieces counted.
 MIN_STORED = 0.01
 MAX_PIECES = 1000
 
@@ -52,19 +52,19 @@ def open_signals(  # noqa: PLR0913 - the keys of the configuration
     Parameters
     ----------
     path
-        File; its format is found by content.
+        File; its content determines the format.
     channel
-        Number, from 1 (of a table: of the column), or name; without it the channels in units of
-        force, or the only one.
+        Number, from 1 (in tables that of the column), or name; by default all channels in units of
+        force, or the only channel.
     unit
-        Unit of the recorded values, where the file does not say it or is wrong.
+        Unit of the recorded values, if the file does not state it or is wrong.
     calibration
         N per unit, a chain of factors such as ``"4.1 pC/N, 10 mV/pC"``, or a `Calibration`.
     polarity
-        Sign of a compression in the file, ``"positive"`` or ``"negative"``; without it that of
+        Sign of a compression in the file, ``"positive"`` or ``"negative"``; by default that of
         the larger peak.
     sample_rate
-        Samples per second, Hz, where the file does not say it or is wrong.
+        Samples per second, Hz, if the file does not state it or is wrong.
 
     Returns
     -------
@@ -73,8 +73,8 @@ def open_signals(  # noqa: PLR0913 - the keys of the configuration
     Raises
     ------
     InputError
-        Where the file is missing, damaged, too large or of unknown format; channel, unit, rate,
-        calibration or sign are unknown; or the force is implausible.
+        If the file is missing, damaged, too large or of unknown format, if channel, unit, rate,
+        calibration or sign are unknown, or if the force is implausible.
     """
     if polarity is not None:
         require_choice("polarity", polarity, POLARITIES)
@@ -91,9 +91,9 @@ def open_signals(  # noqa: PLR0913 - the keys of the configuration
 
 
 def regular_file(path: str | os.PathLike[str]) -> Path:
-    """Return a path; raise InputError where it is no readable, completely stored, regular file.
+    """Return a path; raise InputError if it is not a readable, completely stored regular file.
 
-    Opening a pipe could block; reading a sparse file of gigabytes takes minutes.
+    Opening a pipe could block, and reading a sparse file of gigabytes would take minutes.
     """
     require_kind("recording", path, str | os.PathLike)
     file = Path(path)
@@ -120,14 +120,14 @@ def regular_file(path: str | os.PathLike[str]) -> Path:
 
 
 def _stored(descriptor: int, size: int) -> int:
-    """Return the number of stored bytes of a file, at least of its first pieces."""
+    """Return the number of stored bytes of a file; its size if it has too many pieces."""
     position = stored = 0
     for _ in range(MAX_PIECES):
         try:
             begin = os.lseek(descriptor, position, os.SEEK_DATA)
             position = os.lseek(descriptor, begin, os.SEEK_HOLE)
         except OSError as error:
-            # No more data, or a file system without this information.
+            # ENXIO: no more data; else the file system does not know.
             return stored if error.errno == errno.ENXIO else size
         stored += position - begin
         if position >= size:
@@ -136,8 +136,8 @@ def _stored(descriptor: int, size: int) -> int:
 
 
 def choose_channels(channels: list[Channel], channel: int | str | None, name: str) -> list[Channel]:
-    """Return the selected channels; raise InputError where the selection is ambiguous."""
-    listed = ", ".join(
+    """Return the selected channels; raise InputError if the selection is ambiguous."""
+    choices = ", ".join(
         f"{entry.number}" + (f" {shown_text(entry.name)!r}" if entry.name else "")
         for entry in channels[:20]
     )
@@ -146,7 +146,7 @@ def choose_channels(channels: list[Channel], channel: int | str | None, name: st
         if not forces and len(channels) > 1:
             refuse(
                 f"{name}: has {len(channels)} channels, none of them in a unit of force",
-                f"channel = one of {listed}",
+                f"channel = one of {choices}",
             )
         return forces or channels
     matching = [entry for entry in channels if channel in {entry.number, entry.name}]
@@ -160,14 +160,15 @@ def choose_channels(channels: list[Channel], channel: int | str | None, name: st
         ]
     if len(matching) != 1:
         refuse(
-            f"{name}: channel = {shown(channel)} fits {len(matching)} channels", f"one of {listed}"
+            f"{name}: channel = {shown(channel)} matches {len(matching)} channels",
+            f"one of {choices}",
         )
     return matching
 
 
 @dataclass(frozen=True)
 class _Stated:
-    """Statements of the user on the values of a file."""
+    """What the user states about the values in a file."""
 
     unit: str | None
     calibration: float | str | Calibration | None
@@ -176,7 +177,7 @@ class _Stated:
 
 
 def _signal(path: Path, channel: Channel, stated: _Stated, *, several: bool) -> Signal:
-    """Return the signal of a channel; raise InputError where its rate or unit is unknown."""
+    """Return the signal of a channel; raise InputError if its rate or unit is unknown."""
     name = shown_path(Path(path.name))
     if several:
         name += f", {shown_text(channel.name) or f'channel {channel.number}'}"
@@ -207,7 +208,6 @@ def _signal(path: Path, channel: Channel, stated: _Stated, *, several: bool) -> 
 
 
 def _rate(channel: Channel, stated: _Stated, name: str) -> tuple[float, tuple[str, ...]]:
-    """Return the sample rate of a channel, Hz, and notes."""
     rate = channel.sample_rate if stated.sample_rate is None else float(stated.sample_rate)
     if rate is None:
         refuse(f"{name}: the sample rate is not known", "sample_rate in Hz, or a column of times")
@@ -215,12 +215,11 @@ def _rate(channel: Channel, stated: _Stated, name: str) -> tuple[float, tuple[st
         refuse(f"{name}: the sample rate is {rate:.6g} Hz", f"{RATES[0]:g} to {RATES[1]:g} Hz")
     if channel.sample_rate in {None, rate}:
         return rate, ()
-    was = f"{channel.sample_rate:.7g} Hz"
-    return rate, (f"The rate of the file, {was}, was replaced by {rate:.7g} Hz as stated.",)
+    file_rate = f"{channel.sample_rate:.7g} Hz"
+    return rate, (f"The rate of the file, {file_rate}, was replaced by {rate:.7g} Hz as stated.",)
 
 
 def _unit(channel: Channel, stated: _Stated, name: str) -> tuple[str, tuple[str, ...]]:
-    """Return the unit of the values of a channel, and notes."""
     file_unit = find_unit(channel.unit)
     if stated.unit is not None:
         if file_unit == "FS" and stated.unit not in {"FS", "counts"}:
@@ -238,14 +237,13 @@ def _unit(channel: Channel, stated: _Stated, name: str) -> tuple[str, tuple[str,
     if not channel.unit and stated.calibration is None:
         return ASSUMED, ("The file states no unit; the values are assumed to be in N.",)
     if channel.unit or isinstance(stated.calibration, str | Calibration):
-        state = f"in {shown_text(channel.unit)!r}" if channel.unit else "without a unit"
-        refuse(f"{name}: the values are {state}", f"unit = one of {ALLOWED}")
+        description = f"in {shown_text(channel.unit)!r}" if channel.unit else "without a unit"
+        refuse(f"{name}: the values are {description}", f"unit = one of {ALLOWED}")
     return "", ()
 
 
 def _read_scaled(
     samples: Callable[[int, int], NDArray[np.float64]], factor: float, start: int, stop: int
 ) -> NDArray[np.float64]:
-    """Return samples times a factor, from start to before stop."""
     values = samples(start, stop)
     return values if factor == 1.0 else values * factor

@@ -17,7 +17,7 @@ STEPS = (1e-9, 1e3)
 # Tolerances of any times, and of rounded times, as fractions of the sampling interval.
 TOLERANCE = 1e-3
 ROUNDED_TOLERANCE = 0.25
-# Approximate number of times whose digits are counted.
+# Approximate number of times from which the last digit is determined.
 MAX_COUNTED = 2**16
 # Significant decimal digits of a float.
 FLOAT_DIGITS = 17
@@ -26,7 +26,7 @@ MAX_FORCE = 1e12
 
 
 class Record(NamedTuple):
-    """A force, N, over uniformly spaced times, s, both of shape (n_sample,), and its rate, Hz."""
+    """Uniformly spaced times, s, and force, N, both of shape (n_sample,), and sample rate, Hz."""
 
     time: NDArray[np.float64]
     force: NDArray[np.float64]
@@ -36,9 +36,9 @@ class Record(NamedTuple):
 def uniform_grid(time: NDArray[np.float64], name: str) -> tuple[float, float, tuple[str, ...]]:
     """Return start and step, s, of the uniform grid that fits times best, and notes.
 
-    Times, s, shape (n_sample,), may miss it by their rounding to the last written digit: at
-    44.1 kHz, the sixth decimal is a twentieth of a step. Raise InputError with the time off the
-    grid, or the step that is not allowed.
+    Times, s, shape (n_sample,), may deviate by their rounding to the last written digit: at
+    44.1 kHz, the sixth decimal is a twentieth of a step. Raise InputError if a time is off the
+    grid, or the step is not allowed.
     """
     if not np.isfinite(time).all():
         refuse(f"{name}: a time is not finite", "real numbers, s")
@@ -51,19 +51,19 @@ def uniform_grid(time: NDArray[np.float64], name: str) -> tuple[float, float, tu
             f"{name}: the times rise by {step:.4g} s from row to row",
             f"{minimum:g} to {maximum:g} s",
         )
-    miss = np.abs(time - time.mean() - index * step) / step
-    # An odd stride covers all last digits.
+    deviation = np.abs(time - time.mean() - index * step) / step
+    # An odd stride samples all last digits.
     rounding = last_digit(time[:: len(time) // MAX_COUNTED | 1])
     allowed = max(TOLERANCE, min(ROUNDED_TOLERANCE, rounding / step))
-    worst = int(np.argmax(miss))
-    if miss[worst] > allowed:
+    worst = int(np.argmax(deviation))
+    if deviation[worst] > allowed:
         refuse(
             f"{name}: the times are not uniformly spaced: row {worst + 1}, {time[worst]:.9g} s, is "
-            f"{miss[worst]:.2g} steps of {step:.4g} s off a uniform grid",
-            f"one sampling rate, to {allowed:.2g} steps",
+            f"{deviation[worst]:.2g} steps of {step:.4g} s off a uniform grid",
+            f"a constant step, within {allowed:.2g} steps",
         )
     begin = float(time.mean() + index[0] * step)
-    if miss[worst] <= TOLERANCE:
+    if deviation[worst] <= TOLERANCE:
         return begin, step, ()
     note = f"The times, rounded to {rounding:.1g} s, were replaced by a grid of {1 / step:.7g} Hz."
     return begin, step, (note,)
@@ -88,7 +88,7 @@ def last_digit(time: NDArray[np.float64]) -> float:
 def read_record(table: NDArray[np.float64], name: str = "record") -> Record:
     """Return the record of a table with the columns time, s, and force, N.
 
-    Raise InputError where it has fewer than eight samples, times that are not uniformly spaced, or
+    Raise InputError if it has fewer than eight samples, times that are not uniformly spaced, or
     a force that is not mainly positive.
     """
     rows, columns = table.shape

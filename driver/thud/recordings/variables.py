@@ -1,4 +1,4 @@
-"""Named vectors and scalars in memory as channels."""
+"""Channels from named arrays in memory."""
 
 from __future__ import annotations
 
@@ -32,8 +32,9 @@ MAX_COLUMNS = 256
 def channels_of_variables(values: dict[str, NDArray[np.generic]], name: str) -> list[Channel]:
     """Return the channels among variables: vectors, and the columns of slender matrices.
 
-    Scalars and texts are the header; a vector of times gives the rate of vectors of its length.
-    Both apply to the variables of their group, the name up to a slash, and of groups in it.
+    Scalars and texts are the header; a vector of times gives the rate of vectors of its length. A
+    group is the name up to the last slash. A header applies to its group and the groups within it,
+    times to their group.
     """
     columns = [
         (key, f"[{i + 1}]" * (matrix.shape[1] > 1), matrix[:, i].astype(np.float64))
@@ -56,7 +57,7 @@ def channels_of_variables(values: dict[str, NDArray[np.generic]], name: str) -> 
             (t for t in times if len(times[t]) == len(column) and _split(t)[0] == group), None
         )
         siblings = [(_split(k)[1], text_of(v)) for k, v in values.items() if _split(k)[0] == group]
-        # Times in the same group have precedence over a rate above it.
+        # Times override a rate in the header of an outer group.
         rate, steps = find_rate(header if time is None else siblings), tuple[str, ...]()
         if rate is None and time is not None:
             scale = TIME_UNITS.get(split_title(_split(time)[1])[1].casefold(), 1.0)

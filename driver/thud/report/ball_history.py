@@ -1,4 +1,4 @@
-"""History of one ball: the criteria of its calibration reports against their dates."""
+"""History of one ball: criteria of its calibration reports by date, and their trends."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 YEAR = timedelta(days=365.25)
-# Probability of a reported trend in any criterion of a ball that does not change.
+# Probability that a trend is reported in any criterion of a ball that does not change.
 SIGNIFICANCE = 0.05
 # Minimum number of reports for a trend: a line fits any two.
 MIN_REPORTS = 3
-# Maximum time between the last report and a date that is reported, years.
+# Maximum time between the last report and the reported date of a limit, years.
 MAX_YEARS = 100.0
-# Maximum number of reports in the table: the first, and the last ones.
+# Maximum number of reports in the table: the first and the most recent ones.
 MAX_COLUMNS = 8
-# Marks of values in the table.
-WORDS = {RESULTS[0]: "", RESULTS[1]: " no", RESULTS[2]: " ?"}
+# Marks of values in the table by verdict.
+MARKS = {RESULTS[0]: "", RESULTS[1]: " no", RESULTS[2]: " ?"}
 # Maximum size of a report, bytes.
 MAX_SIZE = 2**28
-# Entries of a report, and of its criteria, that a chart needs.
+# Entries of a report, and of each of its criteria, that a history needs.
 KEYS = ("ball", "serial", "source", "date", "verdict", "criteria")
 CRITERION_KEYS = (
     "name", "unit", "band", "value", "uncertainty", "expanded_uncertainty", "upper_bound", "lower",
@@ -55,9 +55,9 @@ class Trend(Immutable):
     slope, expanded : float
         Change per year and its expanded uncertainty (95 %).
     significant : bool
-        Whether it is significant, at 5 % for all criteria together.
+        Whether the slope is significant, at 5 % for all criteria together.
     time, value : ndarray, shape (2,)
-        Times of the first and the last report, years since the first, and the line there.
+        Times of the first and the last value, years since the first report, and the line there.
     reached, earliest, latest : float
         Time at which the line reaches a limit, and its interval (95 %), years since the first
         report; NaN if there is no such time or the trend is not significant.
@@ -96,22 +96,24 @@ class History:
         """Time since the first report, years, shape (n_report,)."""
         return np.array([(date - self.dates[0]) / YEAR for date in self.dates])
 
-    def day(self, years: float) -> datetime:
-        """Return the day of a time since the first report, years."""
+    def date(self, years: float) -> datetime:
+        """Return the date of a time since the first report, years."""
         return self.dates[0] + years * YEAR
 
     def criteria(self) -> list[list[dict[str, Any]]]:
-        """Return the entries of each criterion, in the order of the dates."""
+        """Return the entries of each criterion in the reports, in the order of the dates."""
         reports = (report["criteria"] for report in self.reports)
         return [list(entries) for entries in zip(*reports, strict=True)]
 
     def trends(self) -> list[Trend | None]:
         """Return the trend of each criterion; None with fewer than three dates, or equal values."""
         series = [(entries, self._known(entries)) for entries in self.criteria()]
-        able = [len(set(years)) >= MIN_REPORTS and np.ptp(v) > 0 for _, (years, v, _) in series]
+        fitted = [len(set(years)) >= MIN_REPORTS and np.ptp(v) > 0 for _, (years, v, _) in series]
         return [
-            _trend(*columns, limits_of(entries[-1]), SIGNIFICANCE / sum(able)) if is_able else None
-            for (entries, columns), is_able in zip(series, able, strict=True)
+            _trend(*columns, limits_of(entries[-1]), SIGNIFICANCE / sum(fitted))
+            if is_fitted
+            else None
+            for (entries, columns), is_fitted in zip(series, fitted, strict=True)
         ]
 
     def _known(
@@ -127,7 +129,7 @@ class History:
         return columns[:, 0], columns[:, 1], columns[:, 2]
 
     def table(self) -> list[tuple[str, ...]]:
-        """Return rows of text: values of the first and the last reports, drifts and limits."""
+        """Return rows of text: values by date, change per year and date of the limit."""
         criteria, last = self.criteria(), len(self.dates) - 1
         styles = [style_of(entries[0]) for entries in criteria]
         columns = [("", *(style.title for style in styles), "verdict")]
@@ -135,12 +137,12 @@ class History:
             if 0 < i <= last + 1 - MAX_COLUMNS:
                 continue
             column = [entries[i] for entries in criteria]
-            cells = (criterion_row(entry)[1] + WORDS[entry["verdict"]] for entry in column)
+            cells = (criterion_row(entry)[1] + MARKS[entry["verdict"]] for entry in column)
             day = self.dates[i].date().isoformat()
             columns.append((day, *cells, self.reports[i]["verdict"]))
-        together = list(zip(styles, self.trends(), strict=True))
-        columns.append(("per year", *(_slope(style, trend) for style, trend in together), ""))
-        columns.append(("limit on", *(self._limit(trend) for _, trend in together), ""))
+        pairs = list(zip(styles, self.trends(), strict=True))
+        columns.append(("per year", *(_slope(style, trend) for style, trend in pairs), ""))
+        columns.append(("limit on", *(self._limit(trend) for _, trend in pairs), ""))
         return list(zip(*columns, strict=True))
 
     def warnings(self) -> list[str]:
@@ -151,24 +153,24 @@ class History:
                 continue
             style = style_of(entries[0])
             text = f"{style.title}: changes by {_slope(style, trend).rstrip(' *')} per year"
-            date = self._date(trend.reached)
+            date = self._date_text(trend.reached)
             if date:
-                ends = [self._date(end) or "later" for end in (trend.earliest, trend.latest)]
+                ends = [self._date_text(end) or "later" for end in (trend.earliest, trend.latest)]
                 verb = "reached" if trend.reached < self.years[-1] else "reaches"
                 text += f"; {verb} a limit on {date} (95 %: {ends[0]} to {ends[1]})"
             warnings.append(text)
         return warnings
 
     def _limit(self, trend: Trend | None) -> str:
-        return "–" if trend is None else self._date(trend.reached) or "–"
+        return "–" if trend is None else self._date_text(trend.reached) or "–"
 
-    def _date(self, years: float) -> str:
-        """Return the date of a time; empty if unknown or far."""
+    def _date_text(self, years: float) -> str:
+        """Return the date of a time, years, as text; empty if unknown or too far away."""
         last = float(self.years[-1])
         if not -MAX_YEARS < years - last < MAX_YEARS:
             return ""
         try:
-            return self.day(years).date().isoformat()
+            return self.date(years).date().isoformat()
         except OverflowError:
             return ""
 
@@ -212,23 +214,21 @@ def _require_same(
     *,
     different_balls: bool,
 ) -> None:
-    """Raise InputError if a report is not of the source, or the ball, of the first."""
     names, first_names = ([c["name"] for c in r["criteria"]] for r in (report, first))
     if report["source"] != first["source"] or names != first_names:
         refuse(
             f"{file}: its source {report['source']!r} or its criteria are not those of {origin}",
             "reports of one source",
         )
-    for key, words in (("serial", "serial number"), ("ball", "ball")):
+    for key, title in (("serial", "serial number"), ("ball", "ball")):
         if report[key] != first[key] and not different_balls:
             refuse(
-                f"{file}: its {words} {report[key]!r} is not that of {origin}, {first[key]!r}",
+                f"{file}: its {title} {report[key]!r} is not that of {origin}, {first[key]!r}",
                 "reports of one ball, or --different-balls",
             )
 
 
 def _files(path: Path) -> list[Path]:
-    """Return the reports of a path."""
     if not path.is_dir():
         return [path]
     reports = sorted(path.rglob("report.json"))
@@ -238,7 +238,6 @@ def _files(path: Path) -> list[Path]:
 
 
 def _read(path: Path) -> tuple[datetime, dict[str, Any]]:
-    """Return the date and the content of a report."""
     allowed = "report.json of thud-driver measure"
     try:
         if path.stat().st_size > MAX_SIZE:
@@ -252,14 +251,14 @@ def _read(path: Path) -> tuple[datetime, dict[str, Any]]:
     date = read_date(report["date"].split(" to ")[0])
     if date is None:
         refuse(
-            f"{path}: its date {report['date']!r} is not known",
+            f"{path}: its date {report['date']!r} cannot be read",
             'a date of the recording or of the configuration, such as "2024-05-03"',
         )
     return date, report
 
 
 def _is_complete(report: dict[str, Any]) -> bool:
-    """Whether a report has all entries of a chart, each of its type."""
+    """Whether a report has all entries that a history needs, each of its type."""
     entries = report.get("criteria")
     if any(key not in report for key in KEYS) or not isinstance(entries, list) or not entries:
         return False
@@ -293,9 +292,9 @@ def _trend(
     limits: tuple[float, float],
     significance: float,
 ) -> Trend:
-    """Return the line of least squares, weighted by 1/uncertainty2, with its uncertainty.
+    """Return the least-squares line, weighted by 1/uncertainty**2, with its uncertainty.
 
-    Its uncertainty is the larger of the stated one and that of the scatter, with n - 2 degrees of
+    It is the larger of two, by the stated uncertainties and by the scatter with n - 2 degrees of
     freedom: a trend must be significant by both.
     """
     count = len(time)
@@ -308,13 +307,13 @@ def _trend(
     scatter = math.sqrt(float(weight @ residual**2) / (count - 2))
 
     def factor(probability: float) -> float:
-        """Return the half width of an interval over 1/sqrt(sum of weights)."""
+        """Return the half width of an interval relative to 1/sqrt(sum of weights)."""
         quantile = student.ppf(1 - probability / 2, [count - 2, np.inf])
         return float(max(quantile[0] * scatter, quantile[1] if stated else 0.0))
 
     expanded = factor(0.05) / math.sqrt(spread)
     bound = factor(significance) / math.sqrt(spread)
-    # Values that are equal but for rounding have no trend.
+    # Values that are equal except for rounding have no trend.
     rounding = 1e-9 * max(float(np.abs(value).max()), 1e-300)
     significant = abs(slope) > bound and abs(slope) * float(np.ptp(time)) > rounding
     ends = np.array([time[0], time[-1]])
@@ -322,17 +321,17 @@ def _trend(
     times = (math.nan, math.nan, math.nan)
     if significant:
         limit = limits[1] if slope > 0 else limits[0]
-        times = _reach(limit - mean, slope, factor(0.05), weight.sum(), spread)
+        times = _crossing(limit - mean, slope, factor(0.05), weight.sum(), spread)
     return Trend(slope, expanded, significant, ends, line, *(middle + instant for instant in times))
 
 
-def _reach(
+def _crossing(
     distance: float, slope: float, factor: float, weights: float, spread: float
 ) -> tuple[float, float, float]:
-    """Return when a line reaches a limit, and the interval, since the weighted mean time.
+    """Return the time at which a line reaches a limit, and its interval, since the mean time.
 
-    Fieller: the times at which the limit lies on the edge of the interval of the line,
-    (distance - slope t)2 = factor2 (1/weights + t2/spread).
+    The ends of the interval (Fieller) are the times at which the confidence band of the line
+    reaches the limit: (distance - slope t)**2 = factor**2 (1/weights + t**2/spread).
     """
     a = slope**2 - factor**2 / spread
     b = slope * distance
@@ -345,7 +344,7 @@ def _reach(
 
 
 def _slope(style: Style, trend: Trend | None) -> str:
-    """Return a drift with its expanded uncertainty, marked if it is significant."""
+    """Return a slope with its expanded uncertainty as text, marked if it is significant."""
     if trend is None:
         return "–"
     slope, expanded = trend.slope / style.unit, trend.expanded / style.unit

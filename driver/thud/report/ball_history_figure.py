@@ -1,4 +1,4 @@
-"""The control chart of a ball: each criterion against the date, with its limits."""
+"""The control chart of a ball: each criterion by date, with its limits."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.ticker import MultipleLocator
 
-from thud.plot.style import COLORS, GREY, WIDTH, legend_above, new_figure, own_style
+from thud.plot.style import COLORS, GRAY, WIDTH, legend_above, new_figure, own_style
 from thud.report.rows import NOT_KNOWN, limits_of, style_of
 
 if TYPE_CHECKING:
@@ -24,16 +24,16 @@ MARKS = {
     "inconclusive": ("s", "white"),
     "does not conform": ("X", COLORS[1]),
 }
-# Margin before the first and after the last report, as fraction of the time between, and minimum.
-ROOM, MIN_ROOM = 0.06, timedelta(days=15)
+# Margin before the first and after the last report: fraction of the time between them, and minimum.
+MARGIN, MIN_MARGIN = 0.06, timedelta(days=15)
 
 
 @own_style()
 def draw_history(history: History) -> Figure:
-    """Draw each criterion of a ball against the date of its reports.
+    """Draw each criterion of a ball by the date of its reports.
 
-    The range of the limits is grey, bars are expanded uncertainties (95 %), markers show the
-    verdict; significant trends have a line.
+    The allowed range is grey, bars are expanded uncertainties (95 %), markers show the verdict, and
+    lines the significant trends.
     """
     criteria, trends = history.criteria(), history.trends()
     rows = -(-len(criteria) // 2)
@@ -44,9 +44,9 @@ def draw_history(history: History) -> Figure:
     for axes in panels[len(criteria) :]:
         axes.remove()
     figure.align_ylabels()
-    room = max(ROOM * (history.dates[-1] - history.dates[0]), MIN_ROOM)
+    margin = max(MARGIN * (history.dates[-1] - history.dates[0]), MIN_MARGIN)
     first = panels[0]
-    first.set_xlim(history.dates[0] - room, history.dates[-1] + room)
+    first.set_xlim(history.dates[0] - margin, history.dates[-1] + margin)
     locator = AutoDateLocator(minticks=3, maxticks=6)  # type: ignore[no-untyped-call]
     first.xaxis.set_major_locator(locator)
     first.xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]
@@ -57,17 +57,16 @@ def draw_history(history: History) -> Figure:
 def _draw_criterion(
     axes: Axes, history: History, entries: list[dict[str, Any]], trend: Trend | None
 ) -> None:
-    """Draw one criterion."""
     style = style_of(entries[0])
     bounds = np.array([limits_of(entry) for entry in entries]) / style.unit
-    # A count has one allowed value, whose area would have no height.
+    # A count has a single allowed value: its area gets a height.
     is_count = bounds[0, 0] == bounds[0, 1]
     bounds += is_count * np.array([-0.4, 0.4])
-    # Beyond both ends of the axis.
-    span = history.dates[-1] - history.dates[0] + MIN_ROOM
+    # The area extends beyond both ends of the axis.
+    span = history.dates[-1] - history.dates[0] + MIN_MARGIN
     edges = np.array([history.dates[0] - span, *history.dates, history.dates[-1] + span])
     lower, upper = np.pad(bounds, ((1, 1), (0, 0)), "edge").T
-    axes.fill_between(edges, lower, upper, step="mid", color=GREY, linewidth=0)
+    axes.fill_between(edges, lower, upper, step="mid", color=GRAY, linewidth=0)
     for date, entry in zip(history.dates, entries, strict=True):
         if entry["value"] is None:
             continue
@@ -81,7 +80,7 @@ def _draw_criterion(
     if all(entry["value"] is None for entry in entries):
         axes.text(0.5, 0.5, NOT_KNOWN, transform=axes.transAxes, ha="center")
     if trend is not None and trend.significant:
-        dates = np.array([history.day(year) for year in trend.time])
+        dates = np.array([history.date(year) for year in trend.time])
         axes.plot(dates, trend.value / style.unit, color=COLORS[0], linewidth=1, linestyle="--")
     axes.margins(y=0.15)
     if is_count:
@@ -90,8 +89,7 @@ def _draw_criterion(
 
 
 def _add_legend(axes: Axes, trends: list[Trend | None]) -> None:
-    """Put a legend above the panels."""
-    axes.fill_between([], [], color=GREY, linewidth=0, label="allowed")
+    axes.fill_between([], [], color=GRAY, linewidth=0, label="allowed")
     for verdict, (marker, color) in MARKS.items():
         axes.errorbar(
             [], [], yerr=[], label=verdict, marker=marker, markersize=4.5, markerfacecolor=color,

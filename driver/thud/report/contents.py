@@ -1,4 +1,4 @@
-"""Content of ``report.json``: a calibration report for machines."""
+"""Content of ``report.json``: a machine-readable calibration report."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ TIME_FORMATS = ("", " %H:%M:%S", " %H:%M")
 
 
 def report_data(recording: Recording, source: LimitsSource | None = None) -> dict[str, Any]:
-    """Return the report of a recording as JSON; unknown values are None.
+    """Return the report of a recording as a JSON object; unknown values are None.
 
-    Numbers are in SI units, uncertainties are standard ones unless named expanded.
+    Values are in SI units; uncertainties are standard uncertainties unless named expanded.
     """
     config, verdict = recording.config, recording.assess(source)
     data: dict[str, Any] = {
@@ -81,9 +81,9 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
 
 
 def criteria_data(recording: Recording, source: LimitsSource | None = None) -> list[dict[str, Any]]:
-    """Return the criteria of a recording with their budgets, as JSON has them.
+    """Return the criteria of a recording with their budgets, as in ``report.json``.
 
-    An uncertainty that is not stated is None; so is the margin of an upper bound or a count.
+    None: an uncertainty that is not stated, and the margin of an upper bound or a count.
     """
     verdict = recording.assess(source)
     finite: list[dict[str, Any]] = _finite(_criteria(recording, verdict.source, verdict.criteria))
@@ -91,7 +91,7 @@ def criteria_data(recording: Recording, source: LimitsSource | None = None) -> l
 
 
 def read_date(text: str) -> datetime | None:
-    """Return a date in one of the formats of recordings; None if it has none of them.
+    """Return a date written in ISO 8601 or one of the other known formats; None if in none.
 
     >>> read_date("03.05.2024").date().isoformat()
     '2024-05-03'
@@ -103,14 +103,14 @@ def read_date(text: str) -> datetime | None:
         pass
     for form in (date + time for date in DATE_FORMATS for time in TIME_FORMATS):
         try:
-            return datetime.strptime(line, form)  # noqa: DTZ007 - files name no zone
+            return datetime.strptime(line, form)  # noqa: DTZ007 - files state no time zone
         except ValueError:
             continue
     return None
 
 
 def _dates(texts: Iterable[str]) -> str:
-    """Return the date of a measurement, or the first and the last one; empty if not stated."""
+    """Return the day of a measurement, or its first and last day; empty if not stated."""
     stated = [text for text in dict.fromkeys(texts) if text.strip()]
     dates = [read_date(text) for text in stated]
     days = sorted({date.date().isoformat() for date in dates if date})
@@ -122,7 +122,6 @@ def _dates(texts: Iterable[str]) -> str:
 def _criteria(
     recording: Recording, source: LimitsSource, criteria: tuple[Criterion, ...]
 ) -> list[dict[str, Any]]:
-    """Return the criteria with their budgets."""
     average = recording.average()
     count = len(average.level)
     standard = get_criteria(source)
@@ -130,9 +129,9 @@ def _criteria(
     for name in ("contact_time", "restitution"):
         spreads[name] = _spread(getattr(drop, name).value for drop in recording.drops)
     rows = []
-    for i, (criterion, usual) in enumerate(zip(criteria, standard, strict=True)):
+    for i, (criterion, default) in enumerate(zip(criteria, standard, strict=True)):
         is_level, estimate = i < count, criterion.estimate
-        stated = bool(estimate.contributions)
+        has_budget = bool(estimate.contributions)
         limits = criterion.lower, criterion.upper
         is_count = criterion.lower == criterion.upper
         rows.append(
@@ -141,14 +140,14 @@ def _criteria(
                 "unit": criterion.unit,
                 "band": float(get_bands().nominal[i]) if is_level else None,
                 "value": criterion.value,
-                "uncertainty": estimate.uncertainty if stated else None,
+                "uncertainty": estimate.uncertainty if has_budget else None,
                 "freedom": estimate.freedom,
                 "coverage_factor": estimate.coverage_factor,
-                "expanded_uncertainty": estimate.expanded if stated else None,
+                "expanded_uncertainty": estimate.expanded if has_budget else None,
                 "upper_bound": estimate.upper_bound,
                 "lower": criterion.lower,
                 "upper": criterion.upper,
-                "limits_of_standard": limits == (usual.lower, usual.upper),
+                "limits_of_standard": limits == (default.lower, default.upper),
                 "margin": None if estimate.upper_bound or is_count else criterion.margin,
                 "probability": criterion.probability,
                 "verdict": criterion.result,
@@ -162,7 +161,6 @@ def _criteria(
 
 
 def _levels(recording: Recording, bands: BandSet) -> dict[str, Any]:
-    """Return the levels of the average and of the drops."""
     average, budgets = recording.average(bands), recording.level_estimates(bands)
     columns = ("background", "spread", "flag", "drops")
     return {
@@ -176,13 +174,12 @@ def _levels(recording: Recording, bands: BandSet) -> dict[str, Any]:
 
 
 def _drop(drop: Drop) -> dict[str, Any]:
-    """Return the results of a drop."""
     return {
         "name": drop.name,
         "onset": drop.onset,
         **{name: _estimate(getattr(drop, name)) for name in ESTIMATES},
         "restitution_method": drop.restitution_method,
-        "restitutions": {name: _estimate(by) for name, by in drop.restitutions.items()},
+        "restitutions": {method: _estimate(value) for method, value in drop.restitutions.items()},
         "bounces": list(drop.bounces),
         "noise": drop.noise.deviation,
         "steps": list(drop.steps),
@@ -195,13 +192,12 @@ def _estimate(estimate: Estimate) -> dict[str, float]:
 
 
 def _spread(values: Iterable[float]) -> float:
-    """Return the standard deviation of the finite values; NaN of fewer than two."""
     known = [value for value in values if math.isfinite(value)]
     return float(np.std(known, ddof=1)) if len(known) > 1 else math.nan
 
 
 def _finite(value: Any) -> Any:  # noqa: ANN401 - of JSON
-    """Return a value of JSON; numbers that are not finite are None."""
+    """Return a JSON value with None for numbers that are not finite."""
     if isinstance(value, dict):
         return {key: _finite(item) for key, item in value.items()}
     if isinstance(value, list):

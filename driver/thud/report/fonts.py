@@ -17,7 +17,7 @@ FILES = {"normal": "DejaVuSans.ttf", "bold": "DejaVuSans-Bold.ttf"}
 
 
 def font_faces(text: str) -> str:
-    """Return CSS that holds the characters of a text in the font, normal and bold."""
+    """Return CSS that embeds the characters of a text, in the normal and the bold font."""
     return "\n".join(
         f"@font-face {{ font-family: '{FAMILY}'; font-weight: {weight}; "
         f"src: url(data:font/woff;base64,{_subset(weight, text)}) format('woff'); }}"
@@ -38,7 +38,6 @@ def missing_characters(text: str) -> str:
 
 
 def _characters(path: str | Path) -> set[str]:
-    """Return the characters of a font."""
     return set(map(chr, ft2font.FT2Font(path).get_charmap()))
 
 
@@ -47,16 +46,15 @@ def _path(weight: str) -> Path:
 
 
 def _subset(weight: str, text: str) -> str:
-    """Return the font of the characters of a text, in base 64."""
     options = Options(flavor="woff", notdef_outline=True, hinting=False)
-    # Time stamps of FontForge, which cannot be subset.
+    # FontForge's time stamps: fontTools cannot subset this table.
     options.drop_tables.append("FFTM")
     with TTFont(_path(weight)) as font:
         subsetter = Subsetter(options)
         subsetter.populate(text=text)
         subsetter.subset(font)
         font.flavor = "woff"
-        # The same report gives the same bytes.
+        # A report has the same bytes each time it is written.
         font.recalcTimestamp = False
         content = io.BytesIO()
         font.save(content)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import h5netcdf  # noqa: F401 - xarray names a missing one late
+import h5netcdf  # noqa: F401 - without it xarray fails only when it writes
 import numpy as np
 import xarray as xr
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Name and meaning of the levels of the average, by their keys in a report.
+# Variable and meaning of the average levels, by their keys in a report.
 LEVELS = {
     "level": ("level", "force exposure level of the average, re 1 N and 1 s"),
     "uncertainty": ("level_uncertainty", "standard uncertainty of the level"),
     "expanded_uncertainty": ("level_expanded", "expanded uncertainty of the level, 95 %"),
-    "background": ("background", "level of the noise over the same gate"),
+    "background": ("background", "level of the noise within the same gate"),
     "spread": ("spread", "standard deviation of the levels of the drops"),
 }
 FILES = {"name": "name", "sha256": "SHA-256", "date": "date", "calibration": "calibration"}
@@ -38,39 +38,38 @@ def netcdf(data: dict[str, Any]) -> bytes:
 
 
 def recording_dataset(data: dict[str, Any]) -> xr.Dataset:
-    """Return drops, levels and files of the result of `thud.report.contents.report_data`."""
+    """Return drops, levels and files from the result of `thud.report.contents.report_data`."""
     drops, files = data["drops"], data["files"]
     onset = {"units": "s", "long_name": "time of first touch in the file"}
     variables: dict[str, Any] = {"onset": ("drop", _numbers(d["onset"] for d in drops), onset)}
     for name in ESTIMATES:
-        for key, suffix, of in (
+        for key, suffix, prefix in (
             ("value", "", ""),
             ("uncertainty", "_uncertainty", "standard uncertainty of the "),
         ):
             values = _numbers(drop[name][key] for drop in drops)
             quantity = QUANTITIES[name]
-            about = {"units": quantity.unit or "1", "long_name": of + quantity.meaning}
-            variables[name + suffix] = ("drop", values, about)
+            attributes = {"units": quantity.unit or "1", "long_name": prefix + quantity.meaning}
+            variables[name + suffix] = ("drop", values, attributes)
     coordinates: dict[str, Any] = {"drop": ("drop", _texts(drop["name"] for drop in drops))}
     for bands, levels in data["levels"].items():
-        words = {"units": "Hz", "long_name": "nominal frequency"}
-        coordinates[bands] = (bands, np.array(levels["band"]), words)
+        attributes = {"units": "Hz", "long_name": "nominal frequency"}
+        coordinates[bands] = (bands, np.array(levels["band"]), attributes)
         for key, (name, meaning) in LEVELS.items():
-            about = {"units": "dB", "long_name": meaning}
-            variables[f"{bands}_{name}"] = (bands, _numbers(levels[key]), about)
+            attributes = {"units": "dB", "long_name": meaning}
+            variables[f"{bands}_{name}"] = (bands, _numbers(levels[key]), attributes)
         flag = {"long_name": "corrected for the background, upper bound, or no level"}
         variables[f"{bands}_flag"] = (bands, _texts(levels["flag"]), flag)
-        about = {"units": "dB", "long_name": "force exposure level of each drop"}
+        attributes = {"units": "dB", "long_name": "force exposure level of each drop"}
         of_drops = np.array([_numbers(row) for row in levels["drops"]])
-        variables[f"{bands}_drop_level"] = (("drop", bands), of_drops, about)
+        variables[f"{bands}_drop_level"] = (("drop", bands), of_drops, attributes)
     for key, meaning in FILES.items():
-        words = {"long_name": f"{meaning} of the file"}
-        variables[f"file_{key}"] = ("file", _texts(file[key] for file in files), words)
+        attributes = {"long_name": f"{meaning} of the file"}
+        variables[f"file_{key}"] = ("file", _texts(file[key] for file in files), attributes)
     return xr.Dataset(variables, coordinates, _attributes(data))
 
 
 def _attributes(data: dict[str, Any]) -> dict[str, Any]:
-    """Return the provenance."""
     known = {key: data[key] for key in PROVENANCE if data[key] not in (None, "")}
     notes = {
         kind: "\n".join(
@@ -101,5 +100,5 @@ def _texts(values: Iterable[str]) -> NDArray[np.object_]:
 
 
 def _plain(text: str) -> str:
-    """Return a text that HDF5 can hold: no zeros, no lone surrogates."""
+    """Return a text that HDF5 can store: no null characters, no lone surrogates."""
     return text.replace("\0", " ").encode("utf-8", "replace").decode()

@@ -1,4 +1,4 @@
-"""Messages about many drops, similar ones merged."""
+"""Merging of similar messages about many drops."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 def group_messages(messages: Iterable[tuple[str, str]], count: int, kind: str) -> list[str]:
     """Merge messages that differ only in numbers, with the range of each number.
 
-    `messages` are names of drops or files with their messages, `count` is the number of all drops
-    or files, `kind` their plural.
+    `messages` are pairs of the name of a drop or file and a message, `count` is the number of all
+    drops or files, and `kind` is ``"drops"`` or ``"files"``.
 
     >>> group_messages([("a", "an offset of 3 N"), ("b", "an offset of 4.5 N")], 2, "drops")
     ['an offset of 3 to 4.5 N (2 of 2 drops)']
@@ -37,7 +37,7 @@ def group_messages(messages: Iterable[tuple[str, str]], count: int, kind: str) -
 
 
 def group_by_kind(messages: Mapping[str, Sequence[tuple[str, Sequence[str]]]]) -> list[str]:
-    """Return messages by kind, such as ``"drops"``, grouped; each entry is a name with its own."""
+    """Merge messages of each kind, such as ``"drops"``, given as names with their messages."""
     return [
         message
         for kind, entries in messages.items()
@@ -48,13 +48,12 @@ def group_by_kind(messages: Mapping[str, Sequence[tuple[str, Sequence[str]]]]) -
 
 
 def shorten(items: Sequence[str], count: int) -> list[str]:
-    """Return up to a number of items; of more, the first ones and how many follow."""
+    """Return items up to a number; if there are more, the last one says how many follow."""
     if len(items) <= count:
         return list(items)
     return [*items[: count - 1], f"and {len(items) - count + 1} more, in report.json"]
 
 
 def _range(texts: Sequence[str]) -> str:
-    """Return the minimum and the maximum of numbers as they are written."""
     low, high = min(texts, key=float), max(texts, key=float)
     return low if float(low) == float(high) else f"{low} to {high}"

@@ -1,4 +1,4 @@
-"""The page of a calibration report: A4 in one file, from its data and its figures."""
+"""The page of a calibration report: one A4 sheet, in one HTML file with its figures."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-# Maximum number of instruments, of files, and of notes in a list.
+# Maximum length of the lists of instruments, files and notes.
 INSTRUMENTS, FILES, NOTES = 6, 5, 7
 # Number of drops up to which none can be an outlier.
 MIN_DROPS = 2
@@ -32,15 +32,15 @@ STANDARDS = {
     "rubber_ball": "JIS A 1418-2, ISO 10140-5 and ISO 16283-2",
     "tyre": "JIS A 1418-2",
 }
-# Position of the limits in the picture of a criterion, of 100.
+# Positions of the limits in the picture of a criterion, of width 100.
 LOW, HIGH = 25.0, 75.0
 
 
 def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) -> str:
     """Return the page as self-contained HTML.
 
-    `data` is from `thud.report.contents.report_data`, `figures` are up to two of column width,
-    `checksum` is the SHA-256 of ``report.json``.
+    `data` is the result of `thud.report.contents.report_data`, `figures` are up to two figures of
+    column width, and `checksum` is the SHA-256 of ``report.json``.
     """
     source = data["source"].replace("_", " ")
     body = BODY.substitute(
@@ -60,46 +60,44 @@ def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) 
         footer=_text(f"thud {data['thud']} · report.json: SHA-256 {checksum}"),
     )
     title = f"Calibration report: {data['serial'] or data['name']}"
-    used = "".join(sorted(set(html.unescape(re.sub(r"<[^>]*>", "", body)))))
+    characters = "".join(sorted(set(html.unescape(re.sub(r"<[^>]*>", "", body)))))
     return PAGE.substitute(
         title=_text(title),
-        fonts=font_faces(used),
+        fonts=font_faces(characters),
         family=FAMILY,
         body=body,
     )
 
 
 def page_text(data: dict[str, Any]) -> str:
-    """Return the texts of the laboratory, which may hold any characters."""
+    """Return the texts that the laboratory stated, which may have any characters."""
     keys = ("laboratory", "ball", "serial", "date", "name")
     files = [file[key] for file in data["files"] for key in ("name", "calibration")]
     return _plain("".join([*(data[key] for key in keys), *data["instruments"], *files]))
 
 
 def _plain(text: str) -> str:
-    """Return a text in one line of printable characters."""
+    """Return a text as one line of printable characters."""
     line = " ".join(text.split())
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in line)
 
 
 def _text(text: str) -> str:
-    """Return a text as HTML."""
     return html.escape(_plain(text))
 
 
 def _reason(criteria: Sequence[dict[str, Any]]) -> str:
-    """Return which criteria are not met."""
+    """Return the criteria that are inconclusive or not met, as text."""
     parts = []
     for verdict in RESULTS[1:]:
-        missed = [criterion for criterion in criteria if criterion["verdict"] == verdict]
-        names = [style_of(criterion).title.split(",")[0] for criterion in missed]
+        matching = [criterion for criterion in criteria if criterion["verdict"] == verdict]
+        names = [style_of(criterion).title.split(",")[0] for criterion in matching]
         if names:
             parts.append(f"{verdict}: {', '.join(names).lower().replace(' hz', ' Hz')}")
     return "; ".join(parts) or "all criteria are met"
 
 
 def _about(data: dict[str, Any]) -> list[tuple[str, str]]:
-    """Return laboratory, ball and conditions."""
     temperature = data["temperature"]
     return [
         ("Laboratory", data["laboratory"]),
@@ -111,11 +109,10 @@ def _about(data: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _measured(data: dict[str, Any]) -> list[tuple[str, str]]:
-    """Return recordings, calibration and instruments."""
     files, drops = data["files"], len(data["drops"])
     rates = sorted({file["sample_rate"] for file in files})
-    listed = " to ".join(dict.fromkeys(f"{rate / 1e3:.4g}" for rate in (rates[0], rates[-1])))
-    amount = f"{_count(drops, 'drop')} in {_count(len(files), 'file')}, {listed} kHz"
+    range_text = " to ".join(dict.fromkeys(f"{rate / 1e3:.4g}" for rate in (rates[0], rates[-1])))
+    amount = f"{_count(drops, 'drop')} in {_count(len(files), 'file')}, {range_text} kHz"
     calibrations = list(dict.fromkeys(file["calibration"] for file in files if file["calibration"]))
     relative = data["calibration_uncertainty"]
     uncertainty = (
@@ -131,7 +128,6 @@ def _measured(data: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _pairs(pairs: Iterable[tuple[str, str]]) -> str:
-    """Return labels and values as rows."""
     rows = []
     for label, value in pairs:
         shown = "<br>".join(map(_text, value.split("\n"))) if value else NOT_KNOWN
@@ -140,19 +136,17 @@ def _pairs(pairs: Iterable[tuple[str, str]]) -> str:
 
 
 def _columns(row: Sequence[str], picture: str) -> list[str]:
-    """Return a row with a picture before the verdict."""
+    """Insert a picture before the verdict, the last cell of a row."""
     return [*row[:-1], picture, row[-1]]
 
 
 def _row(criterion: dict[str, Any]) -> str:
-    """Return a criterion as a row of the table."""
     cells = _columns([_text(cell) for cell in criterion_row(criterion)], _range(criterion))
     style = criterion["verdict"].replace(" ", "-")
     return f'<tr class="{style}">' + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
 
 
 def _range(criterion: dict[str, Any]) -> str:
-    """Return a picture of the limits, the value and its expanded uncertainty."""
     (lower, upper), value = limits_of(criterion), criterion["value"]
     box = f'<rect x="{LOW}" y="1" width="{HIGH - LOW}" height="8" fill="#ccc"/>'
     if value is None or lower == upper:
@@ -175,19 +169,17 @@ def _range(criterion: dict[str, Any]) -> str:
 
 
 def _rule(data: dict[str, Any]) -> str:
-    """Return the rules of limits and verdicts."""
-    own = any(not criterion["limits_of_standard"] for criterion in data["criteria"])
+    has_own_limits = any(not criterion["limits_of_standard"] for criterion in data["criteria"])
     limits = f"Limits of {STANDARDS.get(data['source'], 'the standards')}"
-    limits += ", those marked * of the laboratory. " if own else ". "
+    limits += ", those marked * of the laboratory. " if has_own_limits else ". "
     return limits + (
-        "U: expanded uncertainty for 95 % (JCGM 100, Student's t). A criterion conforms where "
-        "value ± U lies within its limits, does not conform where it lies outside, and is "
+        "U: expanded uncertainty for 95 % (JCGM 100, Student's t). A criterion conforms if "
+        "value ± U lies within its limits, does not conform if it lies outside, and is "
         "inconclusive otherwise (JCGM 106). Spread: standard deviation of single drops."
     )
 
 
 def _means(drops: Sequence[dict[str, Any]]) -> list[str]:
-    """Return the means over the drops of quantities that are no criteria."""
     means = []
     for name in ESTIMATES:
         known = [drop[name]["value"] for drop in drops if drop[name]["value"] is not None]
@@ -199,12 +191,16 @@ def _means(drops: Sequence[dict[str, Any]]) -> list[str]:
     for drop in drops:
         for method, estimate in drop["restitutions"].items():
             methods.setdefault(method, []).append(estimate["value"])
-    by = [f"by {name} {number(sum(values) / len(values), 3)}" for name, values in methods.items()]
-    return [f"mean: {', '.join(means)}", *([f"mean restitution: {', '.join(by)}"] if by else [])]
+    restitutions = [
+        f"by {name} {number(sum(values) / len(values), 3)}" for name, values in methods.items()
+    ]
+    return [
+        f"mean: {', '.join(means)}",
+        *([f"mean restitution: {', '.join(restitutions)}"] if restitutions else []),
+    ]
 
 
 def _results(data: dict[str, Any]) -> list[str]:
-    """Return the notes on drops, other quantities and methods."""
     drops, low, high = data["drops"], *BACKGROUND
     results = _means(drops)
     averaged = "energy average of the drops" if len(drops) > 1 else "of one drop"
@@ -217,7 +213,7 @@ def _results(data: dict[str, Any]) -> list[str]:
         results.append(f"levels {low:g} to {high:g} dB above the background were corrected for it")
     if "background" in flags:
         results.append(f"levels less than {low:g} dB above the background are upper bounds")
-    met = [entry["sentence"] for entry in data["plate"] if entry["met"]]
+    met = [entry["reason"] for entry in data["plate"] if entry["met"]]
     if met:
         results.append(f"force plate: {'; '.join(met)}")
     bands = [f"{entry['band']:g}" for entry in data["criteria"] if entry["band"] is not None]
@@ -231,18 +227,16 @@ def _results(data: dict[str, Any]) -> list[str]:
 
 
 def _outliers(outliers: Iterable[dict[str, Any]]) -> str:
-    """Return the note on outliers among the drops."""
     names: dict[str, list[str]] = {}
     for outlier in outliers:
         names.setdefault(outlier["name"], []).append(outlier["quantity"].split(",")[0])
     if not names:
         return "no drop differs from the others by more than chance (Grubbs, 5 %)"
     listed = "; ".join(f"{name} ({', '.join(quantities)})" for name, quantities in names.items())
-    return f"{_count(len(names), 'outlier')}, marked and not left out (Grubbs, 5 %): {listed}"
+    return f"{_count(len(names), 'outlier')}, marked but not excluded (Grubbs, 5 %): {listed}"
 
 
 def _messages(data: dict[str, Any], kind: str) -> list[str]:
-    """Return the steps or warnings of the recording, its files and its drops, grouped."""
     messages = {
         key: [(entry["name"], entry[kind]) for entry in data[key]] for key in ("files", "drops")
     }
@@ -250,13 +244,11 @@ def _messages(data: dict[str, Any], kind: str) -> list[str]:
 
 
 def _notes(title: str, messages: Sequence[str]) -> str:
-    """Return messages as a list with a title."""
     items = "".join(f"<li>{_text(message)}</li>" for message in shorten(messages, NOTES))
     return f"<h2>{_text(title)}</h2><ul>{items}</ul>"
 
 
 def _files(files: Sequence[dict[str, Any]]) -> str:
-    """Return the names and checksums of the first files."""
     names = shorten([_plain(file["name"]) for file in files], FILES)
     checksums = [*(file["sha256"] for file in files[: len(names) - (len(files) > FILES)]), ""]
     return "\n".join(
@@ -270,7 +262,6 @@ def _count(number_of: int, noun: str) -> str:
 
 
 def _cells(figures: Sequence[Figure]) -> list[str]:
-    """Return the cells of the figures that can be drawn."""
     cells = []
     for i, figure in enumerate(figures):
         with warn_if_not_drawn("a figure of the report"):

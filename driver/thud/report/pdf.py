@@ -13,14 +13,14 @@ NEEDED = (
 def html_to_pdf(page: str) -> bytes:
     """Return a page as PDF, without access to other files.
 
-    Raises ImportError if WeasyPrint or a library that it needs is missing.
+    Raise ImportError if WeasyPrint or a library that it needs is missing.
     """
     try:
         from weasyprint import HTML
         from weasyprint.urls import URLFetcher
     except OSError as error:
         raise ImportError(str(error)) from error
-    # It logs font tables that it does not use.
+    # fontTools logs each font table that it does not use.
     logging.getLogger("fontTools").setLevel(logging.ERROR)
     fetcher = URLFetcher(allowed_protocols=("data",))
     content: bytes = HTML(string=page, url_fetcher=fetcher).write_pdf()

@@ -1,4 +1,4 @@
-"""Tables and files of a measured recording."""
+"""Tables and result files of a measured recording."""
 
 from __future__ import annotations
 
@@ -28,23 +28,24 @@ if TYPE_CHECKING:
     from thud.base.files import Results
     from thud.recordings.recording import Recording
 
-# Columns of the page that are not printed.
+# Columns of the page that the printed table omits.
 _HIDDEN = ("Spread", "Background")
+# Verdicts of several criteria.
 _PLURALS = {RESULTS[0]: "conform", RESULTS[1]: "do not conform"}
 DATASET = "recording.nc"
 _PAGE = (HTML, PDF, "force.svg", "levels.svg")
 
 
 def drop_table(recording: Recording) -> list[tuple[str, ...]]:
-    """Return rows of text, a drop each: touch, contact, restitutions, peak and levels.
+    """Return a row of text for each drop: first touch, contact, restitutions, peak and levels.
 
-    After ± is the standard uncertainty of that drop due to its noise.
+    The number after ± is the standard uncertainty due to the noise of the drop.
     """
     nominal = get_bands().nominal
     levels = recording.average().drops
     methods = dict.fromkeys(method for drop in recording.drops for method in drop.restitutions)
-    by = [f"restitution by {method} (± u)" for method in methods] or ["restitution"]
-    head = ("drop", "at, s", "contact, ms (± u)", *by, "peak, N")
+    restitutions = [f"restitution by {method} (± u)" for method in methods] or ["restitution"]
+    head = ("drop", "at, s", "contact, ms (± u)", *restitutions, "peak, N")
     rows: list[tuple[str, ...]] = [(*head, *(f"{f:g} Hz, dB" for f in nominal))]
     unknown = Estimate.unknown()
     rows += [
@@ -62,7 +63,7 @@ def drop_table(recording: Recording) -> list[tuple[str, ...]]:
 
 
 def messages(recording: Recording, kind: str) -> list[str]:
-    """Return the ``"steps"`` or ``"warnings"`` of files and drops, grouped."""
+    """Return the ``"steps"`` or ``"warnings"`` of files and drops, with similar ones merged."""
     return group_by_kind(
         {
             "files": [(file.name, getattr(file, kind)) for file in recording.origins],
@@ -93,13 +94,15 @@ def verdict_text(recording: Recording) -> str:
         "does not conform": f"The source does not conform to the limits of the {name}",
         "inconclusive": f"The result is inconclusive by the limits of the {name}",
     }[assessment.result]
-    own = any(not criterion["limits_of_standard"] for criterion in criteria_data(recording))
-    more = " Limits marked * are those of the laboratory." if own else ""
-    return f"{sentence} at 95 %: {count_verdicts(d.result for d in assessment.criteria)}.{more}"
+    has_own_limits = any(
+        not criterion["limits_of_standard"] for criterion in criteria_data(recording)
+    )
+    note = " Limits marked * are those of the laboratory." if has_own_limits else ""
+    return f"{sentence} at 95 %: {count_verdicts(d.result for d in assessment.criteria)}.{note}"
 
 
 def count_verdicts(results: Iterable[str]) -> str:
-    """Return how many criteria have each verdict.
+    """Return a text with the number of criteria for each verdict.
 
     >>> count_verdicts(["conforms", "conforms", "does not conform"])
     '2 criteria conform, 1 does not conform'
@@ -116,7 +119,7 @@ def count_verdicts(results: Iterable[str]) -> str:
 
 
 def levels_csv(data: dict[str, Any]) -> str:
-    """Return the levels of a report in all bands, with uncertainties and background, as text."""
+    """Return the levels of a report in all bands, with uncertainties and background, as CSV."""
     head = (
         "bandwidth nominal_Hz level_dB standard_uncertainty_dB expanded_dB background_dB spread_dB "
         "flag"
@@ -131,7 +134,7 @@ def levels_csv(data: dict[str, Any]) -> str:
 
 
 def criteria_csv(data: dict[str, Any]) -> str:
-    """Return value, uncertainty, limits and verdict of each criterion of a report as text."""
+    """Return value, uncertainty, limits and verdict of each criterion of a report as CSV."""
     keys = ("expanded_uncertainty", "lower", "upper", "margin", "verdict")
     rows = [
         [
@@ -144,12 +147,11 @@ def criteria_csv(data: dict[str, Any]) -> str:
         for criterion in data["criteria"]
     ]
     head = "criterion unit value upper_bound uncertainty lower upper margin verdict"
-    about = f"# thud {version()}; SI units, levels in dB re 1 N; uncertainty expanded, 95 %\n"
-    return about + _csv([head.split(), *rows])
+    comment = f"# thud {version()}; SI units, levels in dB re 1 N; uncertainty expanded, 95 %\n"
+    return comment + _csv([head.split(), *rows])
 
 
 def _csv(rows: Iterable[Iterable[object]]) -> str:
-    """Return rows as text; None is empty."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()
@@ -161,17 +163,17 @@ def file_names(*, figures: bool = True) -> list[str]:
 
 
 def save(recording: Recording, results: Results, *, figures: bool = True) -> None:
-    """Write levels, criteria and data, and, with figures, these and the page to a directory.
+    """Write levels, criteria and data; with `figures` also the figures and the page.
 
-    All contents are made before the first file is written. Files of an earlier recording that this
-    one does not have are removed.
+    All contents are created before the first file is written. Files of an earlier recording that
+    have no new content are removed.
 
     Raises
     ------
     InputError
-        If a file is in the way.
+        If a file or directory that thud did not write is in the way.
     OSError
-        If they cannot be written.
+        If a file cannot be written.
 
     Warns
     -----
@@ -186,17 +188,16 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
         **_dataset(data, results.folder),
     }
     if figures and _has_matplotlib():
-        # Matplotlib takes its time.
+        # Matplotlib is slow to import.
         from thud.plot.save_figures import figure_files
 
-        drawn = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
-        contents |= page_contents(data, list(drawn.values()), results.folder)
-        contents |= figure_files(drawn)
+        drawings = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
+        contents |= page_contents(data, list(drawings.values()), results.folder)
+        contents |= figure_files(drawings)
     write_files(results, data, contents, file_names())
 
 
 def _has_matplotlib() -> bool:
-    """Return whether figures can be drawn; warn if they cannot."""
     with warn_if_not_drawn("the page"):
         import matplotlib as mpl
 
@@ -205,7 +206,6 @@ def _has_matplotlib() -> bool:
 
 
 def _dataset(data: dict[str, Any], folder: Path) -> dict[str, bytes]:
-    """Return the content of the NetCDF file by its name; warn if xarray is missing."""
     try:
         with require_extra("studies"):
             from thud.report.netcdf import netcdf

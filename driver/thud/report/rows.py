@@ -1,4 +1,4 @@
-"""Criteria as rows of text: the table of a report, on paper and on screen."""
+"""Criteria as rows of text, for the report and the terminal."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 NOT_KNOWN = "not known"
 COUNT = "peak_count"
-# Title, size of the unit, decimals of criteria other than levels.
+# Title, size of the unit and decimals of each criterion that is not a level.
 STYLES = {
     "contact_time": ("Contact time, ms", 1e-3, 2),
     "restitution": ("Restitution", 1.0, 3),
@@ -23,19 +23,19 @@ HEAD = (
 
 
 class Style(NamedTuple):
-    """How a criterion is written."""
+    """Format of a criterion: title, size of its unit, and decimals."""
 
     title: str
     unit: float
     decimals: int
 
     def text(self, value: float | None, unknown: str = NOT_KNOWN) -> str:
-        """Return a value in the unit of the criterion, without its name."""
+        """Return a value in the unit of the criterion as text."""
         return unknown if value is None else number(value / self.unit, self.decimals)
 
 
 def style_of(criterion: dict[str, Any]) -> Style:
-    """Return how a criterion of a report is written."""
+    """Return the format of a criterion of a report."""
     if criterion["band"] is not None:
         return Style(f"{criterion['band']:g} Hz, dB", 1.0, 2)
     name = criterion["name"]
@@ -49,12 +49,12 @@ def criterion_row(criterion: dict[str, Any]) -> tuple[str, ...]:
     value, margin = criterion["value"], criterion["margin"]
     bound = "at most " if criterion["upper_bound"] else ""
     ends = [f"{end / style.unit:g}".replace("-", "−") for end in limits_of(criterion)]
-    own = "" if criterion["limits_of_standard"] else " *"
+    mark = "" if criterion["limits_of_standard"] else " *"
     return (
         style.title,
         bound * (value is not None) + style.text(value),
         expanded_text(criterion),
-        " to ".join(dict.fromkeys(ends)) + own,
+        " to ".join(dict.fromkeys(ends)) + mark,
         style.text(margin, "–"),
         _width(style, criterion["spread"], "–"),
         style.text(criterion["background"], "–"),
@@ -63,7 +63,7 @@ def criterion_row(criterion: dict[str, Any]) -> tuple[str, ...]:
 
 
 def criterion_rows(criteria: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
-    """Return the criteria of a report as rows of text under their head."""
+    """Return the criteria of a report as rows of text below `HEAD`."""
     return [HEAD, *map(criterion_row, criteria)]
 
 
@@ -82,7 +82,7 @@ def expanded_text(criterion: dict[str, Any]) -> str:
 
 
 def number(value: float, decimals: int) -> str:
-    """Return a number with a typographic minus sign, and none before zero.
+    """Return a number as text, with a typographic minus sign and no negative zero.
 
     >>> number(-1.004, 1)
     '−1.0'
@@ -91,5 +91,5 @@ def number(value: float, decimals: int) -> str:
 
 
 def _width(style: Style, value: float | None, unknown: str) -> str:
-    """Return the width of an interval, with one decimal more than a value."""
+    """Return the width of an interval as text, with one decimal more than a value."""
     return style._replace(decimals=style.decimals + 1).text(value, unknown)

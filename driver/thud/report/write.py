@@ -1,4 +1,4 @@
-"""Write the calibration report of a recording: a page to be signed, and its data."""
+"""Write the calibration report of a recording: a page to sign, and its data."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ def write_report(
     Parameters
     ----------
     recording
-        The recording.
+        Measured recording.
     directory
-        Directory of the files; created if missing.
+        Directory for the files; it is created if missing.
     replace
-        Replace also files that thud has not written.
+        Whether to replace files that thud did not write.
 
     Raises
     ------
     InputError
-        If a file is in the way.
+        If a file or directory that thud did not write is in the way.
     OSError
         If a file cannot be written.
 
@@ -53,7 +53,7 @@ def write_report(
         If WeasyPrint (needed for the PDF) or a font is missing, or the report of another recording
         is replaced.
     """
-    # SciPy takes its time.
+    # SciPy is slow to import.
     from thud.report.contents import report_data
 
     folder, data = Path(directory), report_data(recording)
@@ -72,7 +72,7 @@ def page_contents(
 ) -> dict[str, bytes]:
     """Return the page as HTML and, if possible, PDF, by file name.
 
-    Warn if there is no PDF, or no font for some characters; the folder is for the message.
+    Warn if there is no PDF, or no font for some characters; `folder` is named in the warning.
     """
     from thud.report.fonts import missing_characters
     from thud.report.page import page_text, report_page
@@ -102,7 +102,7 @@ def write_files(
 ) -> list[Path]:
     """Write the files of a recording; warn if they replace those of another one.
 
-    Earlier files of `names` without new content are removed, as is an earlier PDF.
+    Earlier files of `names` that have no new content are removed, as is an earlier PDF.
     """
     earlier = _earlier(results.folder)
     paths = results.write(contents, stale=[*names, *([PDF] if HTML in contents else [])])
@@ -117,7 +117,6 @@ def _checksums(data: dict[str, Any]) -> list[str]:
 
 
 def _earlier(folder: Path) -> list[str] | None:
-    """Return the checksums of the recording of an earlier report; None without one."""
     from thud.report.contents import FORMAT
 
     try:

@@ -26,8 +26,9 @@ if TYPE_CHECKING:
     Keep = Callable[[Block, dict[str, NDArray[Any]]], None]
 
 BACKENDS = ("threads", "processes", "dask")
-# Time limits, s: for an answer of the scheduler, and without any worker.
+# Maximum time until the scheduler replies, s.
 SCHEDULER_TIMEOUT = 5.0
+# Maximum time without any worker, s.
 WORKER_TIMEOUT = 60.0
 # Time between two checks of the workers, s.
 CHECK_INTERVAL = 5.0
@@ -57,7 +58,7 @@ def run_blocks(
             while running:
                 _collect(running, keep, check)
         except BaseException as error:
-            # Running blocks are completed and kept; after an interrupt the backend ends them.
+            # After an error running blocks are completed and kept; an interrupt ends them.
             interrupted = isinstance(error, KeyboardInterrupt)
             for future in [] if interrupted else list(running):
                 if future.cancel():
@@ -80,7 +81,7 @@ def checked_backend(
         refuse_value(
             f"backend = {backend!r} with scheduler",
             scheduler,
-            "the address of a scheduler for dask, and only there",
+            "the address of a scheduler for dask, none for other backends",
         )
     if workers is not None:
         if scheduler:
@@ -115,7 +116,7 @@ def _collect(
 def _open(
     backend: str, workers: int | None, scheduler: str | None
 ) -> Iterator[tuple[Executor, int, Callable[[], None]]]:
-    """Open a backend; yield its executor, how many blocks run at once, and a check of its workers.
+    """Open a backend; yield its executor, number of parallel blocks, and check of its workers.
 
     An interrupt ends the blocks that are running.
     """
@@ -151,15 +152,15 @@ def _dask(address: str) -> Iterator[tuple[Executor, int, Callable[[], None]]]:
         except (OSError, ValueError, TypeError) as error:
             refuse(
                 f"scheduler = {shown(address)} does not answer within {SCHEDULER_TIMEOUT:g} s",
-                "the address of a running one, such as tcp://host:8786",
+                "the address of a running scheduler, such as tcp://host:8786",
                 error,
             )
         with client:
             width = _wait_for_cores(client)
             if not width:
                 refuse(
-                    f"scheduler = {shown(address)} shows no worker within {SCHEDULER_TIMEOUT:g} s",
-                    "one with workers",
+                    f"scheduler = {shown(address)} has no worker after {SCHEDULER_TIMEOUT:g} s",
+                    "a scheduler with workers",
                 )
             with client.get_executor() as executor:
                 try:
@@ -170,10 +171,10 @@ def _dask(address: str) -> Iterator[tuple[Executor, int, Callable[[], None]]]:
 
 
 def _connected(kind: type, address: str) -> Any:  # noqa: ANN401 - of an optional package
-    """Return a client of a scheduler; raise OSError where it does not answer in time.
+    """Return a client of a scheduler; raise OSError if it does not answer in time.
 
-    The time limit of the client does not cover the time after the connection. Another thread
-    therefore waits for the client, and closes one that comes too late.
+    The client has no time limit after it has connected. Another thread therefore waits for the
+    client, and closes a client that is late.
     """
     connection: Future[Any] = Future()
     late = Event()

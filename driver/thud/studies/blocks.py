@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from thud.studies.samples import Columns, SampleStudy
 
 # Results that need more bytes than this are written as Zarr.
-LARGE = 256 * 2**20
+MAX_NETCDF_SIZE = 256 * 2**20
 # Name of the file with the identity of the blocks.
 IDENTITY = "study"
 # Names of all complete files.
@@ -57,7 +57,7 @@ class Blocks:
         self._identity = {**study.identity, "samples in a block": f"{size}"}
 
     def open(self) -> None:
-        """Begin or continue the study. Raises InputError where the disk is too small."""
+        """Begin or continue the study. Raises InputError if the disk is too small."""
         with _named(self.path):
             self._require_space()
             self._partial.mkdir(exist_ok=True)
@@ -71,7 +71,7 @@ class Blocks:
 
     @property
     def complete(self) -> bool:
-        """The study is done."""
+        """Whether the study is complete."""
         return self.path.exists()
 
     def _require_space(self) -> None:
@@ -111,17 +111,17 @@ class Blocks:
     def _write_zarr(self, paths: list[Path]) -> None:
         """Write a Zarr group, some variables at a time: only these have to fit in memory."""
         part = self.path.with_name(f".{self.path.name}.part")
-        # An interrupted removal may have left one.
+        # An interrupted removal may have left this directory.
         shutil.rmtree(part, ignore_errors=True)
         part = unique_path(part)
         with _open(paths[0]) as first:
             sizes = {str(name): values.nbytes for name, values in first.data_vars.items()}
         names = list(sizes)
-        together = max(1, 2 * LARGE // (max(sizes.values()) * len(paths)))
+        group_size = max(1, 2 * MAX_NETCDF_SIZE // (max(sizes.values()) * len(paths)))
         try:
             with _named(self.path):
-                for i in range(0, len(names), together):
-                    result = _join(paths, names[i : i + together], known_intact=i > 0)
+                for i in range(0, len(names), group_size):
+                    result = _join(paths, names[i : i + group_size], known_intact=i > 0)
                     grid = grid_of(self._study, result)
                     grid.to_zarr(part, mode="a" if i else "w", consolidated=False)
                 part.rename(self.path)
@@ -130,8 +130,8 @@ class Blocks:
 
 
 def result_names(study: SampleStudy) -> list[str]:
-    """Return the possible names of results of a study; the first is that of a finished one."""
-    large = disk_space(study) > LARGE
+    """Return the possible file names of a study's results; the first is of complete results."""
+    large = disk_space(study) > MAX_NETCDF_SIZE
     endings = ["nc", "zarr", "partial"]
     if study.format == "zarr" or (large and study.format == "auto"):
         endings = ["zarr", "nc", "partial"]
@@ -181,7 +181,7 @@ def _join(
 ) -> xr.Dataset:
     """Return blocks as one dataset, or some of its variables with all coordinates.
 
-    Blocks that are known to be intact are not read as a whole.
+    The checksums of blocks that are known to be intact are not verified.
     """
     parts = []
     for path in paths:
@@ -194,7 +194,7 @@ def _join(
 
 
 def _loaded(dataset: xr.Dataset) -> xr.Dataset:
-    """Load a dataset, its texts as objects of any length."""
+    """Load a dataset, with texts as objects of any length."""
     texts: dict[Any, Any] = {
         name: variable.astype(object)
         for name, variable in dataset.variables.items()
@@ -210,7 +210,7 @@ def _open(path: Path, *, known_intact: bool = False) -> Iterator[xr.Dataset]:
             if path.suffix == ".zarr":
                 # Opening a pipe could block.
                 if any(not (entry.is_dir() or is_regular(entry)) for entry in path.rglob("*")):
-                    message = "holds something that is not a file"
+                    message = "contains an entry that is neither a file nor a directory"
                     raise ValueError(message)
                 dataset = _open_zarr(path)
             else:
@@ -259,7 +259,7 @@ def _require_intact(path: Path) -> None:
 
 @contextmanager
 def _named(path: Path) -> Iterator[None]:
-    """Name the requested path in errors of the disk."""
+    """Add the path to errors of the disk that name no file."""
     try:
         yield
     except OSError as error:

@@ -1,4 +1,4 @@
-"""The modulus of a ball from its curve in a press."""
+"""The modulus of a ball from its force and deflection in a press."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-# Points of the curves of the model, between which it is interpolated.
+# Number of points of a curve of the model, which is interpolated.
 _POINTS = 81
 _PARAMETERS = 2
 _MIN_DATA = 5
@@ -40,14 +40,15 @@ class CompressionFit(Estimates):
 
     The ``youngs_modulus``, Pa, is the storage modulus of materials with Maxwell branches (the press
     measures their long-term modulus), and the modulus at about 1 Hz of a fractional damping law.
-    ``touch`` is the deflection at which the plates touch the ball, m. See `Estimates` for the rest.
+    ``touch`` is the deflection at which the plates touch the ball, m. See `Estimates` for the
+    other attributes.
 
     Attributes
     ----------
     deflection, force : ndarray, shape (n,)
         The measured curve, m and N.
     curve : CompressionCurve
-        The curve of the model, its deflection counted from first touch.
+        The curve of the model, with deflections from first touch.
     """
 
     deflection: Array
@@ -83,7 +84,7 @@ class CompressionFit(Estimates):
 
 
 @check_keywords
-def fit_compression(  # noqa: PLR0913 - as of `compress`
+def fit_compression(  # noqa: PLR0913 - as in `compress`
     deflection: ArrayLike,
     force: ArrayLike,
     ball: Ball | None = None,
@@ -94,20 +95,20 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
 ) -> CompressionFit:
     """Estimate the modulus of elasticity of a ball from a compression between two plates.
 
-    Least squares of the force; the deflection at which the plates touch the ball is estimated too.
-    Residuals are taken as independent and of equal variance; a warning says where their signs are
-    not random, so that the model does not explain the curve.
+    Squared residuals of the force are minimized; the deflection at first touch is estimated too.
+    Residuals are assumed to be independent and of equal variance. A warning reports if their signs
+    are not random: the model then does not explain the curve.
 
     Parameters
     ----------
     deflection : array_like, shape (n,)
-        Measured approach of the plates, m, ascending: the branch of loading.
+        Measured approach of the plates, m, ascending: the loading branch.
     force : array_like, shape (n,)
         Measured force, N.
     ball
-        The ball, whose modulus is the start of the search; by default that of the paper.
+        The ball, whose modulus starts the search; by default the ball of the paper.
     model, gas
-        As of `compress`.
+        As in `compress`.
     confidence
         Confidence of the intervals.
 
@@ -121,8 +122,7 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
     InputError
         If the data or the model cannot be used.
     NumericalError
-        If a ball of the search cannot be compressed that far, or the curve does not depend on the
-        modulus.
+        If the model cannot be compressed that far, or its curve does not depend on the modulus.
     """
     start = Ball() if ball is None else ball
     measured, measured_force = _data(deflection, force)
@@ -131,7 +131,7 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
     curves: dict[float, CompressionCurve] = {}
 
     def curve(modulus: float) -> CompressionCurve:
-        """Return the curve of a modulus; each is computed once."""
+        """Return the curve of the model for a modulus, computed once."""
         if modulus not in curves:
             curves[modulus] = compress(
                 replace(start, youngs_modulus=modulus), model, max_deflection=1.05 * span,
@@ -147,12 +147,12 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
 
     # The plates may touch the ball a little before the first point.
     bounds = ([-np.inf, -0.04], [np.inf, 0.9])
-    first = np.array([np.log(_ratio(curve(start.youngs_modulus), measured, measured_force)), 0.0])
+    first = np.array(
+        [np.log(_work_ratio(curve(start.youngs_modulus), measured, measured_force)), 0.0]
+    )
     best = least_squares(residuals, first, bounds=bounds, x_scale=(1.0, 0.1), xtol=1e-10)
     if np.linalg.matrix_rank(best.jac) < _PARAMETERS:
-        message = (
-            "youngs_modulus has no effect on the force of this model; allowed: one that has it"
-        )
+        message = "youngs_modulus has no effect on the force of this model; allowed: another model"
         raise NumericalError(message)
     modulus = float(np.exp(best.x[0])) * start.youngs_modulus
     touch = float(measured[0] + best.x[1] * span)
@@ -179,7 +179,7 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
 
 
 def _data(deflection: ArrayLike, force: ArrayLike) -> tuple[Array, Array]:
-    """Return both columns; raise InputError if they are no curve."""
+    """Return both columns; raise InputError if they are not a curve."""
     measured, measured_force = (
         require_real(name, require_array(name, values, {1}))
         for name, values in (("deflection", deflection), ("force", force))
@@ -193,21 +193,21 @@ def _data(deflection: ArrayLike, force: ArrayLike) -> tuple[Array, Array]:
         refuse("deflection or force is not finite", "finite numbers")
     falling = np.flatnonzero(np.diff(measured) <= 0)
     if falling.size:
-        refuse(f"deflection does not rise at point {falling[0] + 2}", "the branch of loading")
+        refuse(f"deflection does not rise at point {falling[0] + 2}", "the loading branch")
     if not measured_force[-1] > max(0.0, measured_force[0]):
         refuse("force does not rise with the deflection", "forces that are positive in compression")
     return measured, measured_force
 
 
-def _ratio(curve: CompressionCurve, measured: Array, measured_force: Array) -> float:
-    """Return the measured work over that of a curve; raise InputError if that is 0."""
+def _work_ratio(curve: CompressionCurve, measured: Array, measured_force: Array) -> float:
+    """Return the measured work divided by that of a curve; raise InputError if that is 0."""
     work = float(np.trapezoid(measured_force, measured))
     shown = np.interp(measured - measured[0], curve.deflection, curve.force)
     model_work = float(np.trapezoid(shown, measured))
     if not model_work > 0:
         refuse(
             f"deflection spans {np.ptp(measured):g} m, where the model has no force",
-            "a ball that is pressed by millimeters",
+            "a compression by millimeters",
         )
     return max(work, 0.01 * float(measured_force[-1] * np.ptp(measured))) / model_work
 
@@ -215,7 +215,6 @@ def _ratio(curve: CompressionCurve, measured: Array, measured_force: Array) -> f
 def _warnings(
     residuals: Array, relative_touch: float, bounds: tuple[list[float], list[float]]
 ) -> list[str]:
-    """Return the warnings of a fit."""
     result = []
     if min(relative_touch - bounds[0][1], bounds[1][1] - relative_touch) < 1e-6:  # noqa: PLR2004 - of the span
         result.append(

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from thud.studies.parameter import Parameter
     from thud.studies.samples import Columns, SampleStudy
 
-# Bytes of a sample on disk without its levels and parameters, and of an empty file.
+# Bytes on disk of a sample without its levels and parameters, and of an empty file.
 _SAMPLE_BYTES = 95
 _FILE_BYTES = 27_000
 
@@ -37,7 +37,7 @@ def disk_space(study: SampleStudy) -> int:
 def new_dataset(study: SampleStudy, columns: Columns, results: Columns) -> xr.Dataset:
     """Return the results of samples along the dimension ``sample``, levels also along bands.
 
-    `columns` are their parameters by name, `results` those of `evaluate`.
+    `columns` are the parameters of the samples by name, `results` the results of `evaluate`.
     """
     coordinates, variables = sample_variables(results)
     for parameter in study.parameters:
@@ -54,14 +54,14 @@ def _attributes(study: SampleStudy, parameter: Parameter) -> dict[str, Any]:
     shown_unit, power = parameter.shown_unit
     meaning = key.meaning
     if temperature and parameter.name in temperature.keys:
-        meaning += f" at {temperature.reference:g} degC; changed by its temperature"
+        meaning += f" at {temperature.reference:g} degC; the temperature changes it"
     return {
         **attributes(key),
         "long_name": meaning,
         "group": key.group,
         "key": parameter.name,
         "shown_unit": shown_unit,
-        "shown_power": -power,
+        "shown_exponent": -power,
         "scale": parameter.scale,
     }
 
@@ -83,7 +83,7 @@ def provenance(study: SampleStudy) -> dict[str, str]:
 
 
 def in_order(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a dataset with its variables in order, which Zarr does not keep."""
+    """Return a dataset with its variables in the usual order, which Zarr does not keep."""
     results = {
         name: dataset.variables[name] for name in ALL_QUANTITIES if name in dataset.data_vars
     }
@@ -93,7 +93,7 @@ def in_order(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def grid_of(study: SampleStudy, dataset: xr.Dataset) -> xr.Dataset:
-    """Return the dataset of a complete grid with a dimension for each parameter."""
+    """Return a complete dataset; a grid gets a dimension for each parameter."""
     if study.design != "grid":
         return dataset
     coordinates = {name: dataset[name] for name in BANDS if name in dataset.coords}
@@ -110,5 +110,5 @@ def grid_of(study: SampleStudy, dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _objects(values: NDArray[Any]) -> NDArray[Any]:
-    """Return an array, of texts as objects: xarray would fix their length."""
+    """Return an array; texts become objects, because xarray would fix their length."""
     return values.astype(object) if values.dtype.kind == "U" else values

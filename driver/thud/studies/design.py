@@ -1,4 +1,4 @@
-"""Which balls conform to the standards: the margin over two parameters."""
+"""Maps of the balls that conform to the standards, over two parameters."""
 
 from __future__ import annotations
 
@@ -32,18 +32,19 @@ _AXES = 2
 
 @dataclass(frozen=True, eq=False)
 class Design(SampleResult):
-    """Margin and verdict over two parameters.
+    """Margin and verdict as functions of two parameters.
 
     Attributes
     ----------
     dataset : Dataset
-        Every sample, on a grid of the two parameters in ascending order. ``margin`` is the minimum
-        distance of an octave level to its limits, dB; ``conforms`` is the verdict by all criteria.
-        With a room, the figure shows ``standardized_rating``, dB.
+        Every sample, on a grid of the two parameters in ascending order. ``margin`` is the smallest
+        signed distance of the octave levels from their limits, dB, negative outside; ``conforms``
+        is the verdict by all criteria. If the case has a room, the figure shows
+        ``standardized_rating``, dB, instead.
     axes : tuple of str
         The two parameters.
     mark : tuple of float or None
-        Position of the ball of the paper, or else of the case; None if it is outside the map.
+        Position of the ball of `mark_name`; None if it is outside the map.
     mark_name : str
         ``"paper's ball"`` or ``"case"``.
     """
@@ -60,13 +61,15 @@ class Design(SampleResult):
         return f"<Design, {' and '.join(self.axes)}: {count}>"
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text: how many samples conform, and the best one."""
+        """Return header and rows of text: how many samples conform, and the best sample."""
         margin = self.dataset["margin"]
         rows: list[tuple[str, ...]] = [("quantity", "value"), ("samples", f"{margin.size}")]
         rows.append(("octave levels conform", f"{int((margin >= 0).sum())}"))
         rows.append(("all criteria conform", f"{int(self.dataset['conforms'].sum())}"))
         if "undecided" in self.dataset:
-            rows.append(("undecided by the surrogate", f"{int(self.dataset['undecided'].sum())}"))
+            rows.append(
+                ("undecided because of the surrogate", f"{int(self.dataset['undecided'].sum())}")
+            )
         label, sign, quantity = "largest margin, dB", 1, margin
         if RATING in self.dataset:
             label, sign, quantity = "lowest standardized rating, dB", -1, self.dataset[RATING]
@@ -74,20 +77,20 @@ class Design(SampleResult):
             best = quantity.isel((sign * quantity).argmax(...))
             rows.append((label, f"{float(best):z.2f}"))
             for name in self.axes:
-                power = self.dataset[name].attrs["shown_power"]
+                power = self.dataset[name].attrs["shown_exponent"]
                 unit = self.dataset[name].attrs["shown_unit"]
                 rows.append((f"  at {name}, {unit}", f"{float(best[name]) * 10.0**power:.4g}"))
         return rows
 
     def plot(self) -> Figure:
-        """Return the margin over both parameters."""
+        """Return the map as a figure."""
         from thud.plot import draw_design
 
         return draw_design(self)
 
 
 class DesignKind(SampleKind[Design]):
-    """Maps of a design as a kind of study."""
+    """Design maps as a kind of study."""
 
     name = "design"
     designs = ("grid",)
@@ -111,7 +114,7 @@ KIND = DesignKind()
 def design(
     study: Source, output: str | os.PathLike[str] | None = None, **options: Unpack[RunOptions]
 ) -> Design:
-    """Compute which geometry and material conform to the standards.
+    """Compute which geometries and materials conform to the standards.
 
     The study has two numeric parameters with two values or more; arguments and errors are those of
     `sweep`.
@@ -124,12 +127,13 @@ def _is_axis(parameter: Parameter) -> bool:
 
 
 def _mark(study: SampleStudy) -> tuple[tuple[float, float] | None, str]:
-    """Return position and name of the paper's ball if all else is as there, else of the case."""
+    """Return the mark: the paper's ball if all other keys have its values, else the case."""
     names = [parameter.name for parameter in study.parameters]
     paper, ours = _ball_and_drop(Case(), None), _ball_and_drop(study.case, study.density)
-    by_density = study.density is not None or DENSITY.name in names
-    rest = set(paper) - set(names) - {"mass" if by_density else DENSITY.name}
-    of_paper = set(names) <= set(paper) and all(math.isclose(ours[n], paper[n]) for n in rest)
+    mass_follows_density = study.density is not None or DENSITY.name in names
+    ignored = "mass" if mass_follows_density else DENSITY.name
+    compared = set(paper) - set(names) - {ignored}
+    of_paper = set(names) <= set(paper) and all(math.isclose(ours[n], paper[n]) for n in compared)
     values = paper if of_paper else ours
     positions: list[Any] = [values.get(name, value_in(study.case, name)) for name in names]
     ends = [(min(grid), max(grid)) for grid in (p.grid() for p in study.parameters)]
@@ -142,7 +146,7 @@ def _mark(study: SampleStudy) -> tuple[tuple[float, float] | None, str]:
 
 
 def _ball_and_drop(case: Case, density: float | None) -> dict[str, float]:
-    """Return the numbers of ball, drop and density of the wall."""
+    """Return the parameters of ball and drop, and the density of the wall, by name."""
     ball = case.ball
     volume = wall_volume(ball.outer_radius, ball.wall_thickness)
     if density is None:

@@ -1,4 +1,4 @@
-"""Results directories: one run at a time, and results of one version of a study."""
+"""Results directories, each for one run at a time and one version of a study."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ if TYPE_CHECKING:
     from thud.studies.kind import Kind
     from thud.studies.study import Study
 
+# Endings of the figures.
 FORMATS = (".svg",)
-# Further differences are only counted.
+# Maximum number of listed differences; others are counted.
 _MAX_SHOWN = 3
 
 
@@ -84,7 +85,7 @@ def require_version(
         if changes and not results.replace:
             refuse(
                 f"{path} belongs to another version of this study: {changes}",
-                "another directory, or --replace (replace=True) to compute it again",
+                "another directory, or --replace (replace=True) to compute the study again",
             )
         if changes:
             outdated.append(path)
@@ -95,7 +96,7 @@ def require_version(
 
 
 def _changes(path: Path, identity_in: Callable[[Path], dict[str, str] | None], study: Study) -> str:
-    """Return the differences of a study from that of results; raise if these are no results."""
+    """Return how a study differs from saved results; raise if these are not results."""
     if path.is_symlink():
         message = f"{path} is a link"
         raise ValueError(message)
@@ -104,7 +105,7 @@ def _changes(path: Path, identity_in: Callable[[Path], dict[str, str] | None], s
 
 
 def differences(before: Mapping[str, str], now: Mapping[str, str]) -> str:
-    """Return the keys in which two versions of a study differ, or nothing.
+    """Return the differences of two versions of a study as text, empty if they agree.
 
     >>> differences({"[design] size": "500"}, {"[design] size": "1000", "[design] seed": "1"})
     '[design] size = 500 is now 1000, [design] seed = 1 is new'

@@ -62,8 +62,8 @@ def fit(  # noqa: PLR0913 - options of a search
 ) -> Fit:
     """Estimate parameters of a model from a force history or from levels, by least squares.
 
-    Trust-region reflective steps (`scipy.optimize.least_squares`) within the limits, parameters
-    scaled by their starts. Points at which the model cannot be computed are rejected.
+    The search takes trust-region reflective steps (`scipy.optimize.least_squares`) within the
+    limits; parameters are scaled by their starts. Points where the model fails are rejected.
 
     Parameters
     ----------
@@ -71,24 +71,24 @@ def fit(  # noqa: PLR0913 - options of a search
         The data; a recording, an impact or arrays of time, s, and force, N, are the record of a
         `ForceTarget`. A list of targets is fitted jointly, each with its own `fixed` keys.
     parameters
-        Names of keys of ball, drop or model that take real numbers; in a mapping each with its
-        start or a `Parameter`.
+        Names of keys of ball, drop or model with real values; a mapping states the start or a
+        `Parameter` of each.
     case
-        Everything else; by default the ball of the paper in the model of the paper.
+        All other keys; by default the ball of the paper in the model of the paper.
     confidence
         Confidence of the intervals.
     starts
-        Number of starts: the start of the parameters, and others spread over their limits, or
-        within a factor of 2 of it without limits. The best result counts.
+        Number of starting points: the start of the parameters, and others spread over the limits,
+        or within a factor of 2 of the start if there are no limits. The best fit is returned.
     seed
-        Seed of the other starts.
+        Seed of the other starting points.
     max_steps
-        Maximum number of steps from each start.
+        Maximum number of steps from each starting point.
     surrogate
         A surrogate, or the path of its file, that predicts the levels of the search instead of the
         model. Its errors add to the uncertainties of the target; the model computes the result.
     progress
-        Show how many impacts were computed.
+        Show the number of computed impacts.
 
     Returns
     -------
@@ -123,18 +123,16 @@ def fit(  # noqa: PLR0913 - options of a search
 
 
 def _targets(target: Any) -> tuple[Target, ...]:  # noqa: ANN401 - checked here
-    """Return the targets of a call of `fit`."""
     if not isinstance(target, list):
         target = [target if isinstance(target, Target) else ForceTarget(target)]
     elif not target or not all(isinstance(entry, Target) for entry in target):
-        refuse("target is a list of something else", "one or more of ForceTarget and LevelTarget")
+        refuse("target is a list with other entries than targets", "ForceTarget and LevelTarget")
     return tuple(target)
 
 
 def _pairs(
     case: Case, targets: Sequence[Target], names: AbstractSet[str]
 ) -> list[tuple[Case, Misfit]]:
-    """Return the case and the misfit of each target."""
     result: list[tuple[Case, Misfit]] = []
     for number, target in enumerate(targets, start=1):
         label = "target" if len(targets) == 1 else f"target {number}"
@@ -167,7 +165,6 @@ def _search(
     *,
     progress: bool,
 ) -> Fit:
-    """Return the best fit by the model, or by a surrogate if there is one."""
     if surrogate is None:
         return search(pairs, ranges, options, progress=progress)
     pairs = _with_surrogate(pairs, surrogate, ranges)
@@ -200,7 +197,7 @@ class FitStudy(Study):
     surrogate: Surrogate | None = None
 
     def own_identity(self) -> dict[str, str]:
-        """Return target and search."""
+        """Return the settings of targets and search."""
         tables = self.tables["target"]
         tables = tables if isinstance(tables, list) else [tables]
         result: dict[str, str] = {}
@@ -223,17 +220,17 @@ class FitKind(Kind[FitStudy, Fit]):
     """Fits as a kind of study."""
 
     name = "fit"
-    words = ("target", "surrogate", *OPTIONS)
+    own_keys = ("target", "surrogate", *OPTIONS)
 
     def new_parameter(self, name: str, entry: object, case: Case, density: object) -> Parameter:  # noqa: ARG002
         """Return a parameter that is fitted."""
         return fitted_parameter(name, entry, case)
 
     def complete(self, study: Study, content: Mapping[str, Any], folder: Path) -> FitStudy:
-        """Return a study with its target."""
+        """Return a study with its targets."""
         names = {parameter.name for parameter in study.parameters}
         if study.density is not None and names & {"outer_radius", "wall_thickness"}:
-            refuse("[fixed] density is not allowed beside a geometry that is fitted", "mass")
+            refuse("[fixed] density is not allowed if the geometry is fitted", "mass")
         case = study.case
         if study.density is not None:
             case = with_density(case, study.density)
@@ -248,14 +245,14 @@ class FitKind(Kind[FitStudy, Fit]):
         get_ranges(case, study.parameters)
         # JSON knows neither dates nor infinity.
         shown = json.loads(json.dumps(content, default=str), parse_constant=str)
-        head = {**vars(study), "case": case}
-        result = FitStudy(**head, targets=targets, tables=shown, options=options)
+        common = {**vars(study), "case": case}
+        result = FitStudy(**common, targets=targets, tables=shown, options=options)
         result.pairs()
         if "surrogate" not in content:
             return result
         trained = read_plan(table_of(content, "surrogate"), folder)
         if not isinstance(trained, Surrogate):
-            refuse("[surrogate] of a fit has no file", "file, of a surrogate that is trained")
+            refuse("[surrogate] of a fit has no file", "the file of a trained surrogate")
         return self.with_surrogate(result, trained)
 
     def with_surrogate(self, study: FitStudy, trained: Surrogate) -> FitStudy:

@@ -43,9 +43,9 @@ class RunOptions(TypedDict, total=False):
     progress : bool
         Show a progress bar.
     replace : bool
-        Replace results of another version of the study, and files that thud has not written.
+        Replace results of another version of the study, and files not written by thud.
     surrogate : Surrogate or str or None
-        Predicts the samples instead of the model; or the path of its file.
+        Surrogate, or the path of its file, that predicts the samples instead of the model.
     """
 
     backend: Literal["threads", "processes", "dask"] | None
@@ -61,8 +61,8 @@ class Kind(ABC, Generic[S, R]):
     """A kind of study: how its file is read, how it is computed, which files it writes."""
 
     name: ClassVar[str]
-    # Keys and tables of its file beside those of every study.
-    words: ClassVar[tuple[str, ...]]
+    # Keys and tables of its file besides those of every study.
+    own_keys: ClassVar[tuple[str, ...]]
 
     def read_study(self, source: Source) -> S:
         """Return a study of this kind; see `thud.studies.kinds.read_study`."""
@@ -71,7 +71,7 @@ class Kind(ABC, Generic[S, R]):
                 refuse(f"{source.name} is a {source.kind} study", f"a {self.name} study")
             return source  # type: ignore[return-value]
         with read_tables(source) as (content, folder, text):
-            common = read_common(content, folder, self.name, self.words, self.new_parameter)
+            common = read_common(content, folder, self.name, self.own_keys, self.new_parameter)
             own = () if isinstance(source, Mapping) else (source,)
             inputs = (*own, *named_files(content, folder))
             common = dataclasses.replace(common, text=text, inputs=inputs)
@@ -103,7 +103,7 @@ class Kind(ABC, Generic[S, R]):
     def new_parameter(
         self, name: str, entry: object, case: Case, density: float | None
     ) -> Parameter:
-        """Return a parameter from its name and table; `density` is that of the wall if fixed."""
+        """Return a parameter by its name and table; `density` is the fixed one of the wall."""
 
     @abstractmethod
     def complete(self, study: Study, content: Mapping[str, Any], folder: Path) -> S:
@@ -122,7 +122,7 @@ class Kind(ABC, Generic[S, R]):
 
     @abstractmethod
     def compute(self, study: S, results: Results | None, **options: Unpack[RunOptions]) -> R:
-        """Return the result, kept in a directory if given."""
+        """Return the result; finished samples are kept in a directory, if any."""
 
     @abstractmethod
     def identity_files(self, study: S) -> list[str]:
@@ -130,12 +130,12 @@ class Kind(ABC, Generic[S, R]):
 
     @abstractmethod
     def identity_in(self, path: Path) -> dict[str, str] | None:
-        """Return the identity of results; None if there is no result to lose."""
+        """Return the identity of saved results; None if they have no finished sample."""
 
     @abstractmethod
     def listed_files(self, study: S) -> list[str]:
         """Return the names of files that a study may write and list in the manifest."""
 
     def files(self, result: R, study: S) -> dict[str, bytes]:  # noqa: ARG002 - most have none
-        """Return further files by their names."""
+        """Return the contents of additional files by name."""
         return {}

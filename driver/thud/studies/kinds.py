@@ -1,4 +1,4 @@
-"""The list of kinds of studies; the module of a kind is imported when it is used."""
+"""Kinds of studies; the module of a kind is imported when the kind is used."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ class KindInfo(NamedTuple):
     has_samples: bool = True
 
 
-# By the name of the command, of the function, and of the module that holds the `Kind` as ``KIND``.
+# A key names the command, the function, and the module with the `Kind` as ``KIND``.
 KINDS = {
     "sweep": KindInfo("drops over a grid, a list or a random design of parameters"),
-    "sensitivity": KindInfo("Sobol indices: which parameter matters for what"),
-    "design": KindInfo("which geometry and material conform to the standards"),
-    "uncertainty": KindInfo("how tolerances spread levels and conformity"),
+    "sensitivity": KindInfo("Sobol indices: how much each parameter affects each result"),
+    "design": KindInfo("which geometries and materials conform to the standards"),
+    "uncertainty": KindInfo("effect of tolerances on levels and conformity"),
     "surrogate": KindInfo("train a fast approximation of a slow model for other studies"),
     "fit": KindInfo("parameters of a model from a force or from levels", has_samples=False),
 }
@@ -61,7 +61,7 @@ def read_study(source: Source, kind: str = "sweep") -> Study:
     Raises
     ------
     InputError
-        Names file, table, key and what is allowed.
+        If the study is invalid; the message names file, table, key and what is allowed.
     """
     study: Study = get_kind(kind).read_study(source)
     return study

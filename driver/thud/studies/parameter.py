@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Maximum number of values of a parameter, or of base samples: memory.
+# Maximum number of values of a parameter, or of base samples, for memory.
 MAX_VALUES = 2**30
-# Keys of a parameter that varies, by its form, and of one that is fitted; all take `unit` too.
+# Table keys of a varying parameter, by its form, and of a fitted one, besides `unit`.
 FORMS = {"values": ("values",), "low": ("low", "high", "count", "scale"), "std": ("mean", "std")}
 FITTED = ("start", "low", "high")
 NUMBERS = ("real", "whole", "list")
@@ -43,14 +43,14 @@ _SCALES = ("linear", "log")
 
 @dataclass(frozen=True, eq=False)
 class Parameter(Plain):
-    """A parameter of a study, as its table in ``[parameters]``.
+    """A parameter of a study, as stated by its table in ``[parameters]``.
 
     Attributes
     ----------
     start : float or None
-        Where a fit starts; by default the value of the case.
+        Start of a fit; by default the value of the case.
     low, high : float or None
-        Ends of the values, or limits of the search of a fit, by default those of the key.
+        Range of the values, or limits of a fit, by default those of the key.
     values : sequence or None
         The values; a random design draws each with equal probability.
     count : int
@@ -58,12 +58,13 @@ class Parameter(Plain):
     scale : str
         ``"linear"`` or ``"log"``: spacing of the values.
     mean, std : float or None
-        Of a normal distribution; the mean is by default the value of the case.
+        Mean and standard deviation of a normal distribution; the mean is by default the value of
+        the case.
     unit : str or None
-        Unit of all of them; by default that of the key.
+        Unit of these numbers; by default that of the key.
     name : str
-        Name of the key, entries of lists as ``"frequency(2)"``; set by the study, which also
-        converts the numbers to the unit of the key and keeps `unit` for tables and figures.
+        Name of the key, or of an entry of a list, such as ``"frequency(2)"``. The study sets it,
+        converts the numbers to the unit of the key, and keeps `unit` for tables and figures.
     key : Key
         The key; set by the study.
     """
@@ -97,13 +98,13 @@ class Parameter(Plain):
 
     @property
     def table(self) -> dict[str, object]:
-        """Its table, without defaults."""
+        """Its table in a study, without defaults."""
         words = (word for word in vars(self) if word not in {"name", "key"})
         return {w: vars(self)[w] for w in words if vars(self)[w] != getattr(Parameter, w)}
 
     @property
     def shown_unit(self) -> tuple[str, int]:
-        """Unit for tables and figures, and the power of ten that converts it to that of the key."""
+        """Unit for tables and figures, and the exponent of ten that converts it to `key.unit`."""
         unit = self.unit or self.key.unit or "1"
         return unit, power_of(unit, self.key.unit, self.name)
 
@@ -125,7 +126,7 @@ class Parameter(Plain):
         return np.unique(np.rint(values).astype(int)) if self.key.kind == "whole" else values
 
     def quantile(self, fraction: NDArray[np.float64]) -> NDArray[np.generic]:
-        """Return the values below which a fraction of all values lies."""
+        """Return the values below which fractions of all values lie."""
         if self.values is not None:
             return np.take(self.grid(), (fraction * len(self.values)).astype(int))
         if self.std is not None and self.mean is not None:
@@ -152,7 +153,7 @@ class Parameter(Plain):
         return result
 
     def __str__(self) -> str:
-        """Return the parameter as it would stand in a file."""
+        """Return the parameter as it would be written in a file."""
         _, power = self.shown_unit
         entries: dict[str, Any] = self.table
         for word, value in entries.items():
@@ -173,7 +174,7 @@ def varied(
 ) -> Parameter:
     """Return a parameter that varies; `default_mean` is its value in the case."""
     words = [word for form in FORMS.values() for word in form]
-    label, key, table, power = _begin(name, table, owners, words)
+    label, key, table, power = _read_table(name, table, owners, words)
     form = next((form for form in FORMS if form in table), None)
     if form is None:
         refuse(
@@ -192,7 +193,7 @@ def varied(
     if form == "values":
         values = table["values"]
         if not isinstance(values, list | tuple) or not values:
-            refuse(f"{label}: values = {shown(values)} is empty or no list", "[one, or, more]")
+            refuse(f"{label}: values = {shown(values)} is empty or not a list", "[one, or, more]")
         result = {"values": tuple(checked(f"{label}: values", key, v, power) for v in values)}
     elif form == "low":
         result = _between(label, key, table, read)
@@ -209,7 +210,7 @@ def fitted(name: str, entry: object, owners: tuple[str, ...]) -> Parameter:
         entry = {}
     elif not isinstance(entry, Mapping):
         entry = {"start": entry}
-    label, key, table, power = _begin(name, entry, owners, FITTED)
+    label, key, table, power = _read_table(name, entry, owners, FITTED)
     numbers: dict[str, Any] = {}
     for word, value in table.items():
         if word != "unit" and value is not None:
@@ -218,23 +219,23 @@ def fitted(name: str, entry: object, owners: tuple[str, ...]) -> Parameter:
     return Parameter(**numbers, unit=table.get("unit"), name=name, key=key)
 
 
-def _begin(
-    name: str, table: object, owners: tuple[str, ...], words: Sequence[str]
+def _read_table(
+    name: str, table: object, owners: tuple[str, ...], allowed_keys: Sequence[str]
 ) -> tuple[str, Key, Mapping[str, Any], int]:
-    """Return label, key, table and power of ten of the unit of a parameter."""
+    """Return label, key and table of a parameter, and the exponent of ten of its unit."""
     label = f"[parameters] {name}"
     key, entry = find_key(name, owners)
     if key.kind == "list" and entry is None:
-        refuse(f"{label} is a list", f"one entry of it, such as {name + '(1)'!r}")
+        refuse(f"{label} is a list", f"one of its entries, such as {name + '(1)'!r}")
     if not isinstance(table, Mapping):
-        refuse(f"{label} = {shown(table)} is not a table", f"{', '.join(words)}, unit")
-    require_words(label, table, (*words, "unit"))
+        refuse(f"{label} = {shown(table)} is not a table", f"{', '.join(allowed_keys)}, unit")
+    require_words(label, table, (*allowed_keys, "unit"))
     unit = key.unit or "1" if table.get("unit") is None else table["unit"]
     return label, key, table, power_of(unit, key.unit, label)
 
 
 def checked(label: str, key: Key, value: object, power: int) -> Value:
-    """Return a value in the unit of its key; raise InputError if it is of another kind."""
+    """Return a value in the unit of its key; raise InputError if the key has another kind."""
     number = math.nan
     if isinstance(value, int | float) and not isinstance(value, bool):
         number = scaled(value, power) if -MAX_NUMBER < value < MAX_NUMBER else math.inf
@@ -252,10 +253,10 @@ def _between(
     label: str, key: Key, table: Mapping[str, Any], read: Callable[[str], float]
 ) -> dict[str, Any]:
     if "high" not in table:
-        refuse(f"{label} has no high end", "high beside low")
+        refuse(f"{label} has no high end", "both low and high")
     low, high = read("low"), read("high")
     whole = key.kind == "whole"
-    # Limits that are other keys depend on the sample.
+    # Limits that are names of other keys depend on the sample.
     lower = -math.inf if isinstance(key.lower, str) else key.lower
     upper = math.inf if isinstance(key.upper, str) else key.upper
     if whole and not lower <= low <= high <= upper:
@@ -287,12 +288,12 @@ def _normal(
         refuse_value(f"{label}: std", table["std"], "0 < std")
     mean = read("mean") if "mean" in table else default_mean
     if mean is None or not math.isfinite(float(mean)):
-        refuse(f"{label} has no mean", "mean beside std")
+        refuse(f"{label} has no mean", "both mean and std")
     return {"mean": float(mean), "std": std}
 
 
 def quantity(label: str, entry: object, unit: str) -> Any:  # noqa: ANN401 - a value of any kind
-    """Return a value, a list, or a table of ``value`` and ``unit``, in the unit of a key."""
+    """Return a value or a list, converted to a unit if it is a table of ``value`` and ``unit``."""
     if not isinstance(entry, Mapping):
         return entry
     require_words(label, entry, ("value", "unit"))

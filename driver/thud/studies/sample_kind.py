@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 R = TypeVar("R", bound=StudyResult)
 
-# More samples are computed only with `allow_large`.
+# Maximum number of samples without `allow_large`.
 MAX_SAMPLES = 100_000
 _FILE_FORMATS = ("auto", "netcdf", "zarr")
 
@@ -49,10 +49,10 @@ def _require_no_floor(case: Case) -> None:
 
 
 class DropsKind(Kind[SampleStudy, R]):
-    """A kind of study that needs drops around its case."""
+    """A kind of study that computes many variations of its case."""
 
-    words: ClassVar[tuple[str, ...]] = ("format", "design", "temperature", "surrogate")
-    # The designs that it takes, the default first.
+    own_keys: ClassVar[tuple[str, ...]] = ("format", "design", "temperature", "surrogate")
+    # Sampling designs that are allowed, the default first.
     designs: ClassVar[tuple[str, ...]]
 
     def new_parameter(
@@ -67,20 +67,20 @@ class DropsKind(Kind[SampleStudy, R]):
         return varied(name, entry, key_owners(case), mean)
 
     def complete(self, study: Study, content: Mapping[str, Any], folder: Path) -> SampleStudy:
-        """Return a study with its design."""
-        written = content.get("format", _FILE_FORMATS[0])
-        require_choice("format", written, _FILE_FORMATS)
+        """Return a study with its sampling design."""
+        file_format = content.get("format", _FILE_FORMATS[0])
+        require_choice("format", file_format, _FILE_FORMATS)
         table = table_of(content, "temperature") if "temperature" in content else None
         temperature = read_temperature(table, study.case, study.parameters)
         design = read_design(table_of(content, "design"), self.designs, study.parameters)
-        # Samples need neither snapshots nor free modes nor a compression.
+        # Samples need no snapshots, free modes or compression.
         case = replace(study.case, modes=None, compression=None)
-        owned = (key for key in KEYS if key.owner == study.model)
-        files = {key.name: 0.0 for key in owned if key.group == OUTPUT_GROUP}
+        model_keys = (key for key in KEYS if key.owner == study.model)
+        files = {key.name: 0.0 for key in model_keys if key.group == OUTPUT_GROUP}
         if case.model and files:
             case = replace(case, model=replace(case.model, **files))  # type: ignore[arg-type]
-        head = {**vars(study), "case": case}
-        result = SampleStudy(**head, **design, temperature=temperature, format=written)
+        common = {**vars(study), "case": case}
+        result = SampleStudy(**common, **design, temperature=temperature, format=file_format)
         if "surrogate" not in content:
             return result
         _require_no_floor(case)
@@ -105,7 +105,7 @@ class DropsKind(Kind[SampleStudy, R]):
         checked_backend(options.get("backend"), options.get("workers"), options.get("scheduler"))
 
     def listed_files(self, study: SampleStudy) -> list[str]:
-        """Return the names of the figures, and of the surrogate that is trained."""
+        """Return the names of the figures, and of the surrogate if one is trained."""
         trained = [surrogate_name(study)] if study.plan else []
         return [*trained, *(f"{study.name}{ending}" for ending in FORMATS)]
 
@@ -127,7 +127,7 @@ class SampleKind(DropsKind[R]):
     def compute(
         self, study: SampleStudy, results: Results | None, **options: Unpack[RunOptions]
     ) -> R:
-        """Return the result of all samples, computed or continued."""
+        """Compute missing samples; return the result of all samples."""
         try:
             if study.plan:
                 study = replace(study, surrogate=train(study, results, options))

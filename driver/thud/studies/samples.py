@@ -1,4 +1,4 @@
-"""Studies of many samples: designs, and the values of keys in their samples."""
+"""Studies of many samples, and the values of keys in each sample."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 # A block of samples should take about this time, s.
 _BLOCK_TIME = 0.5
-# Samples of a block that a surrogate predicts in about this time.
-_SURROGATE_BLOCK = 2**16
+# Number of samples that a surrogate predicts in about this time.
+_SURROGATE_BLOCK_SIZE = 2**16
 
 
 @dataclass(frozen=True)
@@ -42,15 +42,15 @@ class SampleStudy(Study):
     design : str
         ``"grid"``, ``"list"``, ``"random"``, ``"latin_hypercube"``, ``"sobol"`` or ``"saltelli"``.
     size, seed : int
-        Number of samples that are drawn (of base samples for ``"saltelli"``), and the seed.
+        Number of random samples (of base samples for ``"saltelli"``), and the seed.
     temperature : Temperature or None
-        Effect of a temperature that varies on the material.
+        How the material depends on temperature, if the temperature is a parameter.
     format : str
-        ``"netcdf"``, ``"zarr"``, or ``"auto"``: Zarr for what is large.
+        ``"netcdf"``, ``"zarr"``, or ``"auto"``: Zarr for large results.
     plan : Plan or None
-        How a surrogate is trained for its samples.
+        How to train a surrogate that predicts the samples.
     surrogate : Surrogate or None
-        Predicts its samples instead of the model.
+        Surrogate that predicts the samples instead of the model.
     """
 
     design: str = "grid"
@@ -65,7 +65,7 @@ class SampleStudy(Study):
     counts_peaks: ClassVar[bool] = False
 
     def own_identity(self) -> dict[str, str]:
-        """Return design, temperature law and surrogate."""
+        """Return the settings of design, temperature and surrogate."""
         result = sampler_versions(self.design) | {"[design] kind": self.design}
         if self.size:
             result |= {"[design] size": f"{self.size}", "[design] seed": f"{self.seed}"}
@@ -79,7 +79,7 @@ class SampleStudy(Study):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of values of each parameter of a grid, or the one number of all samples."""
+        """Number of values of each parameter in a grid; for other designs the number of samples."""
         if self.design == "grid":
             return tuple(parameter.size for parameter in self.parameters)
         if self.design == "list":
@@ -97,9 +97,9 @@ class SampleStudy(Study):
     def block_size(self) -> int:
         """Number of samples that are computed together, the same for all backends."""
         if self.plan or self.surrogate:
-            return _SURROGATE_BLOCK
+            return _SURROGATE_BLOCK_SIZE
         if self.design in {"grid", "list"}:
-            # A grid may be larger than the memory; its ends suffice.
+            # A full grid may exceed the memory; its first value is enough here.
             first = {p.name: replace(p, count=min(p.count, 2)).grid()[:1] for p in self.parameters}
         else:
             first = self.parameter_columns(0, 1)
@@ -121,7 +121,7 @@ class SampleStudy(Study):
     def key_columns(self, columns: Columns) -> Columns:
         """Return samples of `parameter_columns` as values of keys, shape (n_sample,).
 
-        The density determines the mass, the temperature modulus and loss factor.
+        The density determines the mass; the temperature determines modulus and loss factor.
         """
         result = dict(columns)
         density = result.pop(DENSITY.name, self.density)
@@ -129,15 +129,15 @@ class SampleStudy(Study):
             ball = vars(self.case.ball) | result
             volume = wall_volume(ball["outer_radius"], ball["wall_thickness"])
             result["mass"] = density * volume * np.ones(len(next(iter(columns.values()))))
-        return self.temperature.act(self.case, result) if self.temperature else result
+        return self.temperature.apply(self.case, result) if self.temperature else result
 
 
 @dataclass(frozen=True)
 class Block:
     """Samples from index `start` on that are computed together.
 
-    They differ from the case in the columns, shape (n_sample,), by names of keys. `version` is the
-    version of thud that has to compute them, `surrogate` what predicts them instead of the model.
+    `columns` are the values, shape (n_sample,), of the keys in which they differ from the case.
+    `version` is the required version of thud; `surrogate` replaces the model if there is one.
     """
 
     start: int
@@ -151,7 +151,7 @@ class Block:
 def evaluate(block: Block) -> Columns:
     """Return the results of a block by their names in `ALL_QUANTITIES`; NaN where a sample fails.
 
-    Raises InputError in another version of thud.
+    Raises InputError if the version of thud differs.
     """
     if block.version != version():
         refuse(

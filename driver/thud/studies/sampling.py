@@ -1,4 +1,4 @@
-"""Designs: which samples a study has, and the points of those that are sampled."""
+"""Sampling designs: which samples a study has, and the points of random designs."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SAMPLED = ("random", "latin_hypercube", "sobol", "saltelli")
-# Fewer base samples than this give no Sobol indices.
+# Minimum number of base samples for Sobol indices.
 MIN_BASE_SAMPLES = 4
-# Maximum of NumPy's integers.
+# Largest integer of NumPy.
 _MAX_SAMPLES = 2**63 - 1
 
 
 def sampler_versions(design: str) -> dict[str, str]:
-    """Return the versions of the packages that sample a design, on which its points depend."""
+    """Return the versions of the packages on which the points of a design depend."""
     names = {"saltelli": ("scipy", "SALib")}.get(design, ("scipy",) if design in SAMPLED else ())
     return {f"{name.lower()}_version": version(name) for name in names}
 

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from thud.studies.study import Source
 
 INDICES = {
-    "first_order": "fraction of the variance by this parameter alone",
+    "first_order": "fraction of the variance due to this parameter alone",
     "first_order_interval": "half width of its confidence interval",
-    "total": "fraction of the variance by this parameter, interactions included",
+    "total": "fraction of the variance due to this parameter, interactions included",
     "total_interval": "half width of its confidence interval",
 }
 CONFIDENCE = 0.95
@@ -48,8 +48,8 @@ class Sensitivity(SampleResult):
         Every sample of the study.
     indices : Dataset
         ``first_order`` and ``total`` index of each ``output`` and ``parameter``, and half widths
-        of their confidence intervals of 95 %; NaN for outputs that do not vary. With a surrogate
-        also ``surrogate``, the variance of its errors over that of each output.
+        of their 95 % confidence intervals; NaN for outputs that do not vary. With a surrogate
+        also ``surrogate``, the variance of its errors divided by that of each output.
     left_out : int
         Number of base samples left out because one of their samples has no result.
     """
@@ -132,8 +132,10 @@ def _indices(study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
     outputs = {f"level {band:g} Hz": levels[:, i] for i, band in enumerate(get_bands().nominal)}
     outputs |= {name.replace("_", " "): dataset[name].to_numpy() for name in ("contact_time", peak)}
     # Quantities of drops on a floor.
-    below = (name for name in FLOOR_QUANTITIES if name in dataset and dataset[name].ndim == 1)
-    outputs |= {name.replace("_", " "): dataset[name].to_numpy() for name in below}
+    floor_quantities = (
+        name for name in FLOOR_QUANTITIES if name in dataset and dataset[name].ndim == 1
+    )
+    outputs |= {name.replace("_", " "): dataset[name].to_numpy() for name in floor_quantities}
     dimension = len(study.parameters)
     usable = (dataset["status"].to_numpy() == 0).reshape(-1, dimension + 2).all(axis=1)
     if usable.sum() < MIN_BASE_SAMPLES:
@@ -149,18 +151,21 @@ def _indices(study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
         for (name, meaning), values in zip(INDICES.items(), zip(*result, strict=True), strict=True)
     }
     if study.surrogate:
-        meaning = {"units": "1", "long_name": "variance of the surrogate's errors over that of all"}
+        meaning = {
+            "units": "1",
+            "long_name": "variance of the surrogate's errors divided by that of the output",
+        }
         errors = np.concatenate(
             [study.surrogate.mean_square(name) for name in (f"{force}_level", "contact_time", peak)]
         )
-        # Levels are in dB; other quantities are compared in dB too.
+        # The errors of all quantities are in dB.
         spread = np.array(
             [
                 np.var(v[rows] if i < levels.shape[1] else 20 * np.log10(v[rows]))
                 for i, v in enumerate(outputs.values())
             ]
         )
-        # NaN for outputs that do not vary, as the indices.
+        # NaN for outputs that do not vary, like the indices.
         spread[spread <= _ROUNDING] = np.nan
         variables["surrogate"] = ("output", errors / spread, meaning)
     names = {
@@ -174,14 +179,14 @@ def _indices(study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
 def sobol_indices(
     values: NDArray[np.float64], dimension: int, seed: int = 0
 ) -> tuple[NDArray[np.float64], ...]:
-    """Return first order and total Sobol indices of a quantity, each with its half interval.
+    """Return first-order and total Sobol indices of a quantity, with half widths of intervals.
 
     `values`, shape (n (dimension + 2),), belong to the points of a ``"saltelli"`` design; `seed` is
-    that of the resampling. Indices have shape (dimension,); NaN if the values do not vary.
+    for the resampling. Indices have shape (dimension,); NaN if the values do not vary.
     """
     from SALib.analyze import sobol
 
-    # Rounding errors are no variance; quantities that a surrogate withholds are NaN.
+    # Rounding errors do not count as variance; quantities that a surrogate withholds are NaN.
     if not np.ptp(values) > 1e-12 * np.abs(values).max():
         return tuple(np.full((4, dimension), np.nan))
     cube = {"num_vars": dimension, "names": list(map(str, range(dimension)))}
@@ -191,6 +196,6 @@ def sobol_indices(
         calc_second_order=False,
         num_resamples=RESAMPLES,
         conf_level=CONFIDENCE,
-        seed=seed + 1,  # SALib takes 0 for none
+        seed=seed + 1,  # SALib reads 0 as no seed
     )
     return tuple(np.asarray(result[name]) for name in ("S1", "S1_conf", "ST", "ST_conf"))

@@ -27,12 +27,12 @@ from thud.studies.parameter import Parameter, checked, quantity
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
-# What studies are read from.
+# Types that a study is read from.
 Source: TypeAlias = "str | os.PathLike[str] | Mapping[str, object] | Study"
 
 # Keys and tables that every study may have.
-WORDS = ("name", "case", "fixed", "parameters")
-# Maximum length of a text before it is shortened to its beginning and a checksum.
+COMMON_KEYS = ("name", "case", "fixed", "parameters")
+# Texts that are longer than this are shortened to their beginning and a checksum.
 _MAX_LENGTH = 300
 # Quantiles of the parameters for trial cases.
 TRIAL_QUANTILES = (0.01, 0.5, 0.99)
@@ -41,12 +41,12 @@ _NAMED_KEY = re.compile(r"&\w+: (\w+)")
 
 @dataclass(frozen=True)
 class Study:
-    """A study, complete and checked; `read_study` makes one.
+    """A study, complete and checked, as returned by `read_study`.
 
     Attributes
     ----------
     name : str
-        Name of the study, also of its files.
+        Name of the study and of its files.
     kind : str
         Kind of study, see `thud.studies.kinds.KINDS`.
     case : Case
@@ -56,9 +56,9 @@ class Study:
     density : float or None
         Density of the wall if it is fixed instead of the mass, kg/m3.
     text : str
-        The text of the study.
+        Text of the study file.
     inputs : tuple of path-like
-        The files that it is read from.
+        Files that the study is read from.
     """
 
     name: str
@@ -88,13 +88,13 @@ class Study:
 
     def trial_case(self, quantile: float) -> Case:
         """Return the case with its parameters at a quantile; raise InputError if it is invalid."""
-        acting = (p for p in self.parameters if p.key not in {DENSITY, TEMPERATURE})
-        result = {p.name: p.trial(quantile) for p in acting}
+        varied = (p for p in self.parameters if p.key not in {DENSITY, TEMPERATURE})
+        result = {p.name: p.trial(quantile) for p in varied}
         case = with_values(self.case, {name: v for name, v in result.items() if v is not None})
         return case if self.density is None else with_density(case, self.density)
 
     def own_identity(self) -> dict[str, str]:
-        """Return what only the results of this kind depend on."""
+        """Return the additional settings on which results of this kind depend."""
         return {}
 
 
@@ -126,7 +126,7 @@ def read_tables(
 
 
 def named_files(value: object, folder: Path) -> Iterator[Path]:
-    """Yield the files whose paths, relative to a folder, are texts of a study."""
+    """Yield the existing files that a study names by paths relative to a folder."""
     if isinstance(value, str):
         with suppress(OSError, ValueError):
             if (folder / value).is_file():
@@ -142,7 +142,7 @@ def _content(path: Path) -> str:
     except OSError as error:
         refuse(f"{error.strerror}", "a file that exists and can be read", error)
     except UnicodeDecodeError as error:
-        refuse(f"byte {error.start + 1} is not of UTF-8", "TOML, which is UTF-8", error)
+        refuse(f"byte {error.start + 1} is not UTF-8", "TOML, which is UTF-8", error)
 
 
 def _text(source: Mapping[str, object]) -> str:
@@ -175,11 +175,11 @@ def read_common(
     content: dict[str, Any],
     folder: Path,
     kind: str,
-    words: Iterable[str],
+    own_keys: Iterable[str],
     new_parameter: Callable[[str, object, Case, float | None], Parameter],
 ) -> Study:
-    """Read the part that all kinds share; `words` are the kind's own keys beside `WORDS`."""
-    require_words("the study", content, (*WORDS, *words))
+    """Read the part that all kinds share; `own_keys` are those besides `COMMON_KEYS`."""
+    require_words("the study", content, (*COMMON_KEYS, *own_keys))
     fixed, parameters = (table_of(content, name) for name in ("fixed", "parameters"))
     name = content["name"]
     is_text = isinstance(name, str) and name.strip() and name.isprintable()
@@ -196,7 +196,7 @@ def read_common(
 
 
 def table_of(content: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """Return a table of a study, empty where it is missing."""
+    """Return a table of a study, empty if it is missing."""
     table = content.get(name, {})
     if not isinstance(table, dict):
         refuse_value(name, table, f"a table [{name}]")
@@ -216,7 +216,7 @@ def _case(path: object, folder: Path, fixed: Mapping[str, Any]) -> Case:
         if case.model is None or model != case.model.name:
             case = replace(case, model=new_model(model, {}))
     if case.model is None:
-        refuse(f"case = {shown(path)} has no source model", "a case with one")
+        refuse(f"case = {shown(path)} has no source model", "a case with a source model")
     return case
 
 
@@ -250,28 +250,28 @@ def _require_use(fixed: Mapping[str, Any], parameters: Mapping[str, Any]) -> Non
         # A fixed value may be the mean of a normal distribution.
         if name in parameters and ("std" not in parameters[name] or "mean" in parameters[name]):
             refuse(
-                f"[fixed] {name} has no effect beside [parameters] {name}",
+                f"[fixed] {name} has no effect because of [parameters] {name}",
                 "one of them, or std without mean in [parameters]",
             )
 
 
 def _require_valid(study: Study, fixed: Mapping[str, Any]) -> None:
-    """Raise InputError if the library refuses a fixed value for all values of the parameters."""
+    """Raise InputError if a fixed value is invalid for all values of the parameters."""
     keys = {name.partition("(")[0] for name in fixed} | ({"mass"} if study.density else set())
-    refusals = []
+    messages = []
     for quantile in TRIAL_QUANTILES:
         try:
             check_case(replace(study.trial_case(quantile), modes=None, compression=None))
         except InputError as error:
-            refusals.append(str(error))
-    named = [_NAMED_KEY.match(refusal) for refusal in refusals]
+            messages.append(str(error))
+    named = [_NAMED_KEY.match(message) for message in messages]
     if len(named) == len(TRIAL_QUANTILES) and all(result and result[1] in keys for result in named):
-        message = f"[fixed]: {refusals[0]}"
+        message = f"[fixed]: {messages[0]}"
         raise InputError(message)
 
 
 def with_density(case: Case, density: float) -> Case:
-    """Return a case whose mass is that of a wall of a density, kg/m3."""
+    """Return a case whose mass follows from the density of the wall, kg/m3."""
     volume = wall_volume(case.ball.outer_radius, case.ball.wall_thickness)
     return replace(case, ball=replace(case.ball, mass=density * volume))
 

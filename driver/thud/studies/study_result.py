@@ -1,4 +1,4 @@
-"""What every kind of study returns."""
+"""Results of studies."""
 
 from __future__ import annotations
 
@@ -61,12 +61,13 @@ class SampleResult(StudyResult):
 
     @property
     def warnings(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Number of samples without results, and a reason."""
+        """Number of samples without results, and the most frequent reason."""
         failed = self.dataset["status"].values != 0
         if not failed.any():
             return ()
         ((reason, _),) = Counter(self.dataset["reason"].values[failed]).most_common(1)
-        return (f"{failed.sum()} of {failed.size} samples have no results, such as: {reason}",)
+        count = f"{failed.sum()} of {failed.size} samples have no results"
+        return (f"{count}; most frequent reason: {reason}",)
 
     @property
     def notes(self) -> tuple[str, ...]:

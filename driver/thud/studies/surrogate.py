@@ -27,7 +27,7 @@ class SurrogateKind(DropsKind[Surrogate]):
     """Surrogates as a kind of study."""
 
     name = "surrogate"
-    words: ClassVar[tuple[str, ...]] = ("surrogate",)
+    own_keys: ClassVar[tuple[str, ...]] = ("surrogate",)
     designs = ("grid",)
 
     def new_parameter(
@@ -44,7 +44,9 @@ class SurrogateKind(DropsKind[Surrogate]):
         """Return a study with the plan of its training."""
         result = super().complete(study, {"surrogate": {}, **content}, folder)
         if result.plan is None:
-            refuse("[surrogate] file is not allowed in its own training", "error, size and seed")
+            refuse(
+                "[surrogate] file is not allowed for training a surrogate", "error, size and seed"
+            )
         return result
 
     def compute(
@@ -74,11 +76,11 @@ KIND = SurrogateKind()
 def surrogate(
     study: Source, output: str | os.PathLike[str] | None = None, **options: Unpack[RunOptions]
 ) -> Surrogate:
-    """Train a surrogate: a fast approximation of the model, which studies take as `surrogate`.
+    """Train a surrogate: a fast approximation of the model for the option `surrogate` of studies.
 
-    Each parameter of the study has low and high. Arguments and errors are those of `sweep`. The
-    drops are kept; an interrupted training is continued. InputError is also raised if a drop has no
-    result or drops differ in their number of peaks, NumericalError if the error exceeds its bound
-    with all drops.
+    Each parameter of the study has `low` and `high`. Arguments and errors are those of `sweep`. The
+    drops are kept, and an interrupted training is continued. InputError is also raised if a drop
+    has no result or drops differ in their number of peaks, NumericalError if the error exceeds its
+    bound with all drops.
     """
     return KIND.run(study, output, **options)

@@ -28,15 +28,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class PredictedLevels:
-    """What a surrogate predicts of one drop, in the units of a target, shape (size,)."""
+    """Quantities of one drop from a surrogate, in the units of a target, shape (size,)."""
 
     values: NDArray[np.float64]
 
 
 class SurrogateLevels(LevelMisfit):
-    """How far the levels that a surrogate predicts are from a target.
+    """Misfit between a target and the levels that a surrogate predicts.
 
-    The mean squares of its held-out errors add to the variances of the target, where known.
+    The mean squares of its held-out errors are added to the variances of the target, if known.
     """
 
     def __init__(self, misfit: LevelMisfit, surrogate: Surrogate, case: Case) -> None:
@@ -47,20 +47,20 @@ class SurrogateLevels(LevelMisfit):
             self.name = self.name.replace("_", f"_{self.bands}_")
         if self.name not in surrogate.outputs:
             refuse(f"the surrogate has no {self.name}", f"{', '.join(surrogate.outputs)}")
-        missed = np.sqrt(surrogate.mean_square(self.name))[self.indices]
+        level_errors = np.sqrt(surrogate.mean_square(self.name))[self.indices]
         ratios = [np.sqrt(surrogate.mean_square(n)[0]) * np.log(10) / 20 for n in self.extra]
-        sizes = self.target[len(missed) :]
-        own = [np.array([r * s]) for r, s in zip(ratios, sizes, strict=True)]
+        other_targets = self.target[len(level_errors) :]
+        other_errors = [np.array([r * s]) for r, s in zip(ratios, other_targets, strict=True)]
         for i, quantity in enumerate(self.extra):
             if quantity == "contact_time":
                 # Many drops have a contact time rounded to the next sample.
-                own[i] = np.hypot(own[i], 1 / case.sampling.sample_rate)
-        self.model_error = freeze(np.concatenate([missed, *own]))
+                other_errors[i] = np.hypot(other_errors[i], 1 / case.sampling.sample_rate)
+        self.model_error = freeze(np.concatenate([level_errors, *other_errors]))
         if self.known_noise:
             self.deviation = freeze(np.hypot(self.deviation, self.model_error))
 
     def solve(self, case: Case) -> Impact:
-        """Return the prediction for a case, which only `values` reads."""
+        """Return the prediction for a case in place of an impact; only `values` reads it."""
         columns: dict[str, Any] = {
             name: np.array([value_in(case, name)]) for name in self.surrogate.keys
         }
@@ -74,7 +74,7 @@ class SurrogateLevels(LevelMisfit):
         return cast("Impact", PredictedLevels(values))
 
     def values(self, impact: Impact) -> NDArray[np.float64]:
-        """Return what is compared, dB, s and 1, of a prediction or an impact, shape (size,)."""
+        """Return the compared quantities, dB, s and 1, shape (size,)."""
         return impact.values if isinstance(impact, PredictedLevels) else super().values(impact)
 
 
@@ -103,29 +103,33 @@ def within_region(entry: Range, surrogate: Surrogate) -> Range:
 
 
 def recompute(fit: Fit) -> Fit:
-    """Return a fit with the impacts of the model, and warnings where the surrogate differs."""
+    """Return a fit with the impacts of the model, and warnings if the surrogate differs."""
     targets = []
-    missed = share = 0.0
+    max_deviation = max_fraction = 0.0
     for target in fit.targets:
         misfit = cast("SurrogateLevels", target.misfit)
         impact = compute(target.case)
-        off = np.abs(misfit.values(impact) - misfit.values(target.impact))
+        deviation = np.abs(misfit.values(impact) - misfit.values(target.impact))
         # Quantities that are equal in all training drops have no error.
-        known = misfit.model_error > 0
-        missed = max(missed, float((off[known] / misfit.model_error[known]).max(initial=0.0)))
+        varies = misfit.model_error > 0
+        max_deviation = max(
+            max_deviation, float((deviation[varies] / misfit.model_error[varies]).max(initial=0.0))
+        )
         if misfit.known_noise:
-            share = max(share, float((misfit.model_error / misfit.deviation).max() ** 2))
+            max_fraction = max(
+                max_fraction, float((misfit.model_error / misfit.deviation).max() ** 2)
+            )
         targets.append(replace(target, impact=impact))
     messages = []
-    if share:
+    if max_fraction:
         messages.append(
-            f"the errors of the surrogate are up to {100 * share:.2g} % of the variances of the "
-            "residuals"
+            f"the errors of the surrogate are up to {100 * max_fraction:.2g} % of the variances of "
+            "the residuals"
         )
     # Exceeded by 1 in 15 000 normal errors; held-out errors have longer tails.
-    if missed > 4:  # noqa: PLR2004
+    if max_deviation > 4:  # noqa: PLR2004
         messages.append(
-            f"at the result the model differs from the surrogate by {missed:.2g} standard "
+            f"at the result the model differs from the surrogate by {max_deviation:.2g} standard "
             "deviations of the surrogate's errors"
         )
     return replace(fit, targets=tuple(targets), warnings=(*fit.warnings, *messages))

@@ -1,4 +1,4 @@
-"""Training of surrogates: drops until the errors of what is assessed are small enough."""
+"""Training of surrogates by drops until assessed quantities have small enough errors."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class TrainingStudy(SampleStudy):
 def train(study: SampleStudy, results: Results | None, options: RunOptions) -> Surrogate:
     """Return the surrogate of all samples of a study, trained or read from its directory.
 
-    Its drops are kept there, as samples of a study of their own. Raises InputError if a key cannot
+    Its drops are saved there as samples of a separate study. Raises InputError if a key cannot
     be learned or a drop has no result, NumericalError if the error exceeds its bound.
     """
     plan = study.plan
@@ -182,7 +182,7 @@ def _learn(
 
 
 def _decibels(name: str, values: Values) -> Values:
-    """Return a quantity in dB, shape (n, count); NaN where it has no logarithm."""
+    """Return a quantity in dB, shape (n, count); NaN if any value has no logarithm."""
     if name in LEVELS:
         return values
     if (values <= 0).any():
@@ -194,9 +194,9 @@ def _decibels(name: str, values: Values) -> Values:
 def regress(points: Values, values: Values, assessed: NDArray[np.bool_]) -> dict[str, Any]:
     """Return a Gaussian process through values at points in the unit cube.
 
-    Correlation lengths and noise (steps of the time integration, contacts node by node) maximize
-    the likelihood of the assessed quantities; all others share them. Returns the fields length,
-    weights, mean, scale and residuals of a `Surrogate`.
+    Correlation lengths and noise (of time steps, and of nodes that touch one by one) maximize the
+    likelihood of the assessed quantities; the other quantities share them. Returns the
+    fields length, weights, mean, scale and residuals of a `Surrogate`.
     """
     with require_extra("surrogate"):
         from sklearn.exceptions import ConvergenceWarning
@@ -206,19 +206,19 @@ def regress(points: Values, values: Values, assessed: NDArray[np.bool_]) -> dict
     # Constant quantities, such as a prescribed contact time.
     scale[scale <= _ROUNDING * np.maximum(np.abs(mean), 1.0)] = 0.0
     varies = scale > 0  # false for NaN
-    normal = np.where(varies, (values - mean) / np.where(varies, scale, 1.0), 0.0)
-    chosen = assessed & varies if (assessed & varies).any() else assessed
+    normalized = np.where(varies, (values - mean) / np.where(varies, scale, 1.0), 0.0)
+    fitted = assessed & varies if (assessed & varies).any() else assessed
     shape = Matern(np.full(points.shape[1], 2.0), (0.05, 50.0), nu=SMOOTHNESS)
     kernel = ConstantKernel(10.0, (1e-2, 1e6)) * shape + WhiteKernel(1e-2, (1e-10, 10.0))
     process = GaussianProcessRegressor(kernel)
     with warnings.catch_warnings(), threadpool_limits(1, "blas"):
-        # A parameter without effect ends at the maximum length.
+        # A parameter without effect gets the maximum length.
         warnings.simplefilter("ignore", ConvergenceWarning)
-        process.fit(points, normal[:, chosen])
+        process.fit(points, normalized[:, fitted])
         inverse = cho_solve((process.L_, True), np.eye(len(points)))
-        weights = inverse @ normal
+        weights = inverse @ normalized
     signal = process.kernel_.k1
-    # Leave one out (Rasmussen and Williams 2006, eq. 5.12).
+    # Leave-one-out residuals (Rasmussen and Williams 2006, eq. 5.12).
     residuals = np.where(varies | ~np.isfinite(mean), -weights / np.diag(inverse)[:, None], 0.0)
     return {
         "length": np.broadcast_to(signal.k2.length_scale, points.shape[1:]).astype(float),

@@ -29,14 +29,14 @@ class Sweep(SampleResult):
     Attributes
     ----------
     dataset : Dataset
-        A grid has one dimension per parameter, other designs the dimension ``sample``; what is
-        stored as Zarr is read on demand.
+        A grid has one dimension per parameter, other designs the dimension ``sample``. A
+        dataset in Zarr is read on demand.
     """
 
     dataset: xr.Dataset
 
     def __post_init__(self) -> None:
-        """Copy a dataset in memory; what is stored as Zarr may be larger."""
+        """Copy a dataset in memory; one in Zarr may be larger than the memory."""
         if "source" not in self.dataset.encoding:
             super().__post_init__()
 
@@ -126,8 +126,8 @@ def read_sweep(path: str | os.PathLike[str]) -> Sweep:
     Parameters
     ----------
     path
-        A file ``.nc``, a Zarr group ``.zarr``, or the directory ``.partial`` of a study that is not
-        done: its finished samples.
+        A file ``.nc``, a Zarr group ``.zarr``, or the directory ``.partial`` with the
+        finished samples of an incomplete study.
 
     Returns
     -------
@@ -139,6 +139,6 @@ def read_sweep(path: str | os.PathLike[str]) -> Sweep:
     InputError
         If there are no results of a study.
     OSError
-        If they cannot be read for now.
+        If they temporarily cannot be read.
     """
     return Sweep(read_dataset(Path(path)))

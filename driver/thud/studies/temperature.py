@@ -1,4 +1,4 @@
-"""Effect of the temperature of the ball on its rubber, with constants of the user."""
+"""Effect of the temperature of the ball on its rubber, with constants from the user."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from thud.studies.parameter import Parameter
 
 _WORDS = ("reference", "coefficient", "c1", "c2")
-# Keys that hold the damping law; its order where the law is not the fractional one.
+# Keys of the damping law, and the orders of laws other than the fractional one.
 _LAW_KEYS = ("viscosity", "damping_law")
 _ORDERS = {"kelvin_voigt": 1.0, "rising": 1.0}
 
@@ -28,8 +28,8 @@ _ORDERS = {"kelvin_voigt": 1.0, "rising": 1.0}
 class Temperature:
     """Modulus of elasticity and shift of the loss factor as functions of the temperature T.
 
-    The modulus E is E (1 + coefficient (T - reference)) at every frequency. With `c1` and `c2` the
-    material behaves at T and a frequency f as at `reference` and a f, log10 a =
+    The modulus E becomes E (1 + coefficient (T - reference)) at every frequency. With `c1` and `c2`
+    the material at T and a frequency f behaves as at `reference` and a f, where log10 a =
     -c1 (T - reference)/(c2 + T - reference) (Williams, Landel and Ferry 1955).
 
     Attributes
@@ -37,9 +37,9 @@ class Temperature:
     reference : float
         Temperature at which the keys of the case hold, degC.
     coefficient : float or None
-        Of the modulus, 1/K.
+        Coefficient of the modulus, 1/K.
     c1, c2 : float or None
-        Of the shift, 1 and K.
+        Constants of the shift, 1 and K.
     """
 
     reference: float
@@ -54,7 +54,7 @@ class Temperature:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Keys that it changes."""
+        """Keys that depend on the temperature."""
         return ("youngs_modulus", "loss_factor") if self.c1 else ("youngs_modulus",)
 
     def shift(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -66,12 +66,12 @@ class Temperature:
             power = np.where(self.c2 + above > 0, -self.c1 * above / (self.c2 + above), np.nan)
             return np.asarray(10.0**power)
 
-    def act(self, case: Case, samples: dict[str, Any]) -> dict[str, Any]:
+    def apply(self, case: Case, samples: dict[str, Any]) -> dict[str, Any]:
         """Return samples with the values of keys at their ``temperature``, shape (n_sample,).
 
         Modulus and loss factor are those at the `loss_frequency` of the case: the complex modulus
-        of the fractional law changes by the factor 1 + p (cos + i sin) (a**order - 1) with the
-        angle pi order/2 and p = loss factor/sin.
+        of the fractional law changes by the factor 1 + p (cos + i sin) (a**order - 1) with cos and
+        sin of pi order/2, and p = loss factor/sin.
         """
         result = dict(samples)
         temperature = result.pop(TEMPERATURE.name)
@@ -89,7 +89,6 @@ class Temperature:
 
 
 def _loss_law(case: Case) -> str:
-    """Return the damping law of a case."""
     options = vars(case.model)
     return next((options[key] for key in _LAW_KEYS if key in options), "none")
 
@@ -128,7 +127,7 @@ def _require_shift(case: Case, parameters: tuple[Parameter, ...]) -> None:
     names = {parameter.name for parameter in parameters}
     varied = next((key for key in _LAW_KEYS if key in names), None)
     if varied:
-        refuse(f"[temperature] c1 is not allowed where {varied} varies", f"{varied} in [fixed]")
+        refuse(f"[temperature] c1 is not allowed if {varied} varies", f"{varied} in [fixed]")
     if law not in {"fractional", *_ORDERS}:
         refuse(
             f"[temperature] c1 cannot shift the loss of {case.model.name} ({law})",  # type: ignore[union-attr]

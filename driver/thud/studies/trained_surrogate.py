@@ -1,4 +1,4 @@
-"""A surrogate: results of a model by interpolation, with their errors."""
+"""Surrogates: interpolation of the results of a model, with its errors."""
 
 from __future__ import annotations
 
@@ -45,32 +45,32 @@ if TYPE_CHECKING:
 # Fraction of held-out drops within the stated error, and the confidence of that statement.
 COVERAGE = 0.95
 # Samples that are computed together: their kernel stays in the cache.
-_CHUNK = 250
-# Values beyond the region by this fraction of its width are rounding.
+_CHUNK_SIZE = 250
+# Values this fraction of the width outside the region are rounding errors.
 _ROUNDING = 1e-9
 # Smoothness of the Matern kernel: functions that are twice differentiable.
 SMOOTHNESS = 2.5
 # Fewer drops have no order statistic that bounds 95 % of all with a confidence of 95 %.
 MIN_DROPS = 64
-# The time of the training grows with the third power of their number.
+# The time of the training grows with the third power of the number of drops.
 MAX_DROPS = 8192
 _ARRAYS = ("region", "points", "length", "weights", "mean", "scale", "residuals")
 
 
 @dataclass(frozen=True, eq=False)
 class Surrogate(StudyResult):
-    """Prediction of drops of a model from training drops of the same region.
+    """Prediction of drops of a model from training drops in the same region.
 
     A Gaussian process interpolates all quantities, in dB: levels, and 20 lg of other quantities.
-    Each has an error: that of 95 % of drops which it was not trained on is smaller, with a
-    confidence of 95 % (order statistic of the leave-one-out residuals).
+    Each quantity has a stated error: with a confidence of 95 %, the errors of 95 % of other drops
+    are smaller (order statistic of the leave-one-out residuals).
 
     Attributes
     ----------
     case : Case
         The case of the drops.
     keys : tuple of str
-        Keys in which they differ.
+        Keys in which the drops differ.
     region : ndarray, shape (n_key, 2)
         Minimum and maximum of each key.
     outputs : dict of str to int
@@ -90,7 +90,7 @@ class Surrogate(StudyResult):
     mean, scale : ndarray, shape (n_number,)
         Mean and standard deviation of each number over the drops, dB.
     residuals : ndarray, shape (n_drop, n_number)
-        Prediction minus result of each drop without itself, dB.
+        Leave-one-out residuals: prediction minus result, dB.
     """
 
     case: Case
@@ -108,7 +108,7 @@ class Surrogate(StudyResult):
     residuals: Values
 
     def __repr__(self) -> str:
-        """Return the keys and the largest error of what is assessed."""
+        """Return the keys and the largest error of an assessed number."""
         error = float(self.errors[self.assessed].max())
         return (
             f"<Surrogate of {len(self.points)} drops by {', '.join(self.keys)}: "
@@ -129,7 +129,7 @@ class Surrogate(StudyResult):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Its accuracy."""
+        """Accuracy of the surrogate."""
         return (self.accuracy,)
 
     def plot(self) -> Figure:
@@ -140,7 +140,7 @@ class Surrogate(StudyResult):
 
     @property
     def labels(self) -> list[str]:
-        """Names of all numbers."""
+        """Labels of all numbers."""
         result = []
         for name, count in self.outputs.items():
             words = name.replace("_", " ")
@@ -156,7 +156,7 @@ class Surrogate(StudyResult):
 
     @property
     def errors(self) -> Values:
-        """Error of each number, dB, shape (n_number,); NaN where the model has no such result."""
+        """Error of each number, dB, shape (n_number,); NaN if the model has no such result."""
         count = len(self.points)
         # There is no such order statistic for 58 drops or fewer.
         rank = int(binom.ppf(COVERAGE, count, COVERAGE))
@@ -226,9 +226,9 @@ class Surrogate(StudyResult):
     def predict(self, case: Case, columns: Columns) -> Columns:
         """Return the results of samples of a case that differ in some keys, shape (n_sample,) each.
 
-        They are those of `thud.studies.samples.evaluate`, and ``undecided``: whether the errors
+        The results are those of `thud.studies.samples.evaluate`, and ``undecided``: whether errors
         could change the verdict. Samples outside the region have a status and a reason instead.
-        Raises InputError as `require`.
+        Raises InputError like `require`.
         """
         self.require(case, columns)
         with require_extra("surrogate"):
@@ -241,13 +241,13 @@ class Surrogate(StudyResult):
         )
         low, high = self.region.T
         width = high - low
-        edge = _ROUNDING * np.maximum(width, np.abs(high))
-        outside = ~((values >= low - edge) & (values <= high + edge))
+        tolerance = _ROUNDING * np.maximum(width, np.abs(high))
+        outside = ~((values >= low - tolerance) & (values <= high + tolerance))
         points = (values - low) / np.where(width > 0, width, 1.0)
         kernel = Matern(self.length, nu=SMOOTHNESS)
         numbers = np.empty((count, len(self.mean)))
-        for start in range(0, count, _CHUNK):
-            chunk = slice(start, start + _CHUNK)
+        for start in range(0, count, _CHUNK_SIZE):
+            chunk = slice(start, start + _CHUNK_SIZE)
             numbers[chunk] = kernel(points[chunk], self.points) @ self.weights
         numbers = numbers * self.scale + self.mean
         numbers[:, ~(self.errors <= self.bound)] = np.nan
@@ -269,21 +269,23 @@ class Surrogate(StudyResult):
     def _results(
         self, case: Case, numbers: Values, samples: Columns, reasons: NDArray[np.object_]
     ) -> Columns:
-        parts = self._split(numbers)
-        levels = {name: columns for name, columns in parts.items() if self.outputs[name] > 1}
-        result: Columns = {n: 10 ** (columns[:, 0] / 20) for n, columns in parts.items()} | levels
+        quantities = self._split(numbers)
+        levels = {name: columns for name, columns in quantities.items() if self.outputs[name] > 1}
+        result: Columns = {
+            n: 10 ** (columns[:, 0] / 20) for n, columns in quantities.items()
+        } | levels
         names = ("contact_time", "restitution")
         level = f"{case.levels.force}_level"
         mass_and_height = [
             samples.get(n, np.asarray(value_in(case, n))) for n in ("mass", "height")
         ]
-        exact = [np.zeros(1)] * 3
+        no_errors = [np.zeros(1)] * 3
         verdicts = assess_many(
             (result[level], *(result[n] for n in names), np.array([self.peaks]), *mass_and_height),
             (
                 self.error_of(level)[np.newaxis],
                 *(result[n] * (10 ** (self.error_of(n) / 20) - 1) for n in names),
-                *exact,
+                *no_errors,
             ),
             case.limits.source,
         )
@@ -303,7 +305,7 @@ class Surrogate(StudyResult):
         if any(getattr(self, name).shape != shape for name, shape in shapes.items()):
             return False
         low, high = self.region.T
-        known = (self.points, self.length, *(
+        finite = (self.points, self.length, *(
             getattr(self, name)[..., self.assessed] for name in ("weights", "mean", "residuals")
         ))  # fmt: skip
         return bool(
@@ -311,7 +313,7 @@ class Surrogate(StudyResult):
             and self.assessed.any()
             and (low <= high).all()
             and (self.length > 0).all()
-            and all(np.isfinite(part).all() for part in known)
+            and all(np.isfinite(part).all() for part in finite)
             and self.bound > 0
             and self.peaks == int(self.peaks)
             and self.case.model
@@ -347,7 +349,7 @@ class Surrogate(StudyResult):
         return file.getvalue()
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write it atomically to a file ``.npz``, which `read_surrogate` reads."""
+        """Write the file ``.npz`` that `read_surrogate` reads, atomically."""
         replace_file(path, self.to_bytes())
 
 
@@ -365,12 +367,12 @@ def assess_many(
     criteria = get_criteria(source)
     lower = np.array([criterion.lower for criterion in criteria])
     upper = np.array([criterion.upper for criterion in criteria])
-    inside = np.minimum(assessed - lower, upper - assessed)
-    surely, perhaps = ((inside >= sign * deviation).all(axis=1) for sign in (1, -1))
+    margins = np.minimum(assessed - lower, upper - assessed)
+    certain, possible = ((margins >= sign * deviation).all(axis=1) for sign in (1, -1))
     return {
-        "margin": inside[:, :bands].min(axis=1),
-        "conforms": (inside >= 0).all(axis=1),
-        "undecided": perhaps & ~surely,
+        "margin": margins[:, :bands].min(axis=1),
+        "conforms": (margins >= 0).all(axis=1),
+        "undecided": possible & ~certain,
     }
 
 
@@ -402,9 +404,9 @@ def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
     Raises
     ------
     InputError
-        If the file is damaged or no surrogate.
+        If the file is damaged or not a surrogate.
     OSError
-        If it cannot be read for now.
+        If the file temporarily cannot be read.
     """
     require_kind("surrogate", path, str | Path)
     try:
@@ -421,8 +423,8 @@ def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
     except Exception as error:
         if is_failure(error):
             raise
-        # Zip, NumPy and JSON raise many kinds.
-        reason = getattr(error, "strerror", None) or "no surrogate"
+        # Zip, NumPy and JSON raise many kinds of errors.
+        reason = getattr(error, "strerror", None) or "not a surrogate"
         refuse(f"{path} cannot be read: {reason}", "a file that Surrogate.save wrote", error)
     if not intact:
         refuse(
@@ -434,7 +436,7 @@ def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
 
 @dataclass(frozen=True)
 class Plan:
-    """How a surrogate is trained: maximum error, dB, and number of drops, seed."""
+    """How a surrogate is trained: maximum error, dB, maximum number of drops, seed."""
 
     error: float = 0.1
     size: int = 1024
@@ -442,7 +444,7 @@ class Plan:
 
     @property
     def identity(self) -> dict[str, str]:
-        """What a surrogate depends on beside its drops, as texts by group and key."""
+        """Everything besides drops that a surrogate depends on, as texts by group and key."""
         with require_extra("surrogate"):
             import sklearn
         return {
@@ -452,7 +454,7 @@ class Plan:
 
     @property
     def stages(self) -> list[tuple[int, int]]:
-        """First drop and stop (exclusive) of each stage; each adds about a half, up to `size`."""
+        """First drop and stop (exclusive) of each stage; stages grow by a half or a third."""
         ends = [min(MIN_DROPS, self.size)]
         while ends[-1] < self.size:
             # 64, 96, 128, 192, ...: balanced parts of Sobol's sequence.

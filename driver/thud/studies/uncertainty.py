@@ -1,4 +1,4 @@
-"""Probability of conformity: Monte Carlo over tolerances of manufacture and temperature."""
+"""Probability of conformity with tolerances of manufacture and temperature (Monte Carlo)."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ class Uncertainty(SampleResult):
         if self.surrogate_range:
             low, high = self.surrogate_range
             share = f"{100 * low:.1f} to {100 * high:.1f} %"
-            rows.append(("  by errors of the surrogate", "", "", share, ""))
+            rows.append(("  with errors of the surrogate", "", "", share, ""))
         return rows
 
     def plot(self) -> Figure:
@@ -132,7 +132,7 @@ class UncertaintyKind(SampleKind[Uncertainty]):
     def new_parameter(
         self, name: str, entry: object, case: Case, density: float | None
     ) -> Parameter:
-        """Return a parameter that varies; the limits are the same for all samples."""
+        """Return a parameter that varies; limits must be the same for all samples."""
         if name in {"source", "force"}:
             refuse(
                 f"[parameters] {name} is not allowed, because all samples have the same limits",
@@ -143,17 +143,19 @@ class UncertaintyKind(SampleKind[Uncertainty]):
     def new_result(self, study: SampleStudy, dataset: xr.Dataset) -> Uncertainty:
         """Return the distribution over all samples."""
         dataset = dataset.load()
-        good = dataset["status"].values == 0
-        if good.sum() < 2:  # noqa: PLR2004 - a spread needs two
+        computed = dataset["status"].values == 0
+        if computed.sum() < 2:  # noqa: PLR2004 - a spread needs two
             reason = next((f" ({text})" for text in dataset["reason"].values if text), "")
-            refuse(f"only {good.sum()} of {study.size} samples have results{reason}", "two or more")
+            refuse(
+                f"only {computed.sum()} of {study.size} samples have results{reason}", "two or more"
+            )
         return Uncertainty(
             dataset,
-            dataset[f"{study.case.levels.force}_level"].values[good],
+            dataset[f"{study.case.levels.force}_level"].values[computed],
             study.case.limits.source,
-            int(dataset["conforms"].values[good].sum()),
-            int(good.sum()),
-            int((~good).sum()),
+            int(dataset["conforms"].values[computed].sum()),
+            int(computed.sum()),
+            int((~computed).sum()),
         )
 
 

@@ -70,8 +70,9 @@ contains
       yes = name == temporary .or. index(name, temporary//'.') == 1
    end function is_temporary
 
-   !> Whether a manifest lists a file, with the checksum of its content.
+   !> Whether a manifest lists a file that has not changed since.
    function is_listed(target, name, entries) result(yes)
+      !> The directory.
       character(len=*), intent(in) :: target
       character(len=*), intent(in) :: name
       !> The manifest: [n_entry].
@@ -87,7 +88,8 @@ contains
       yes = checksum >= 0 .and. any(entries%name == name .and. entries%sum == digits)
    end function is_listed
 
-   !> Finds unchanged old files that stay beside the new set: results of other commands, figures of the same input.
+   !> Finds the listed and unchanged old files that are not in the new set: results of other commands and figures of the
+   !> same input stay, the others go.
    subroutine get_kept(target, names, same, kept, gone)
       !> The directory, under its lock.
       character(len=*), intent(in) :: target
@@ -155,7 +157,8 @@ contains
       end do
       call exchange_directories(workspace, target, done)
       if (.not. done) return
-      ! The user may have replaced files meanwhile; renaming a file to another link to itself does nothing.
+      ! Move files that the user has replaced after they were linked. All others are links to the same file in both
+      ! directories, for which renaming does nothing.
       call list_directory(workspace, names)
       do i = 1, size(names)
          if (is_temporary(names(i)) .or. any(names(i) == [character(len=name_length) :: manifest, replaced])) cycle
@@ -240,7 +243,7 @@ contains
       character(len=*), intent(in) :: path
       !> Entries; none without a manifest: [n_entry].
       type(entry_type), allocatable, intent(out) :: entries(:)
-      !> Whether there is a manifest, or nothing of that name.
+      !> False if the name of the manifest belongs to something else; true if nothing has this name.
       logical, intent(out) :: is_manifest
       character(len=name_length + 64) :: line
       character(len=256) :: message

@@ -11,8 +11,8 @@ module thud_result_directory
    use thud_file_set, only: add_entries, clear_workspace, entry_type, get_kept, is_listed, is_workspace, manifest, &
       new_entries, read_manifest, replace_set
    use thud_interrupt, only: check_interrupt
-   use thud_system, only: add_to_checksum, can_exchange, close_descriptor, create_file, directory_exists, flush_directory, &
-      get_system_message, is_missing, is_same_file, keep_interrupts, list_directory, lock_directory, &
+   use thud_system, only: add_to_checksum, can_exchange, close_descriptor, create_file, defer_interrupts, directory_exists, &
+      flush_directory, get_system_message, is_missing, is_same_file, list_directory, lock_directory, &
       name_length, pass_interrupts, path_length, remove_file, rename_file, resolve_path, write_text
    use thud_text, only: newline
    implicit none (type, external)
@@ -229,7 +229,7 @@ contains
       end if
    end subroutine require_written
 
-   !> Finds the owner of a directory.
+   !> Finds whose results a directory holds.
    subroutine find_owner(path, marker, replace, owner, error)
       character(len=*), intent(in) :: path
       !> The file that will identify the case.
@@ -249,7 +249,7 @@ contains
       owner = no_owner
       if (.not. directory_exists(path)) then
          inquire (file=path, exist=exists)
-         if (exists) error = making_error(path)
+         if (exists) error = unusable_error(path)
          return
       end if
       call list_directory(path, names)
@@ -342,10 +342,10 @@ contains
       !> Set if the workspace cannot be created.
       type(error_type), allocatable, intent(out) :: error
       character(len=name_length), allocatable :: names(:)
-      integer :: slash, made
+      integer :: slash, target_lock
       logical :: done
 
-      call keep_interrupts()
+      call defer_interrupts()
       call resolve_path(directory%path, directory%target, done)
       if (done) then
          slash = index(directory%target, '/', back=.true.)
@@ -360,14 +360,14 @@ contains
          if (allocated(error)) return
          if (directory%workspace_lock < 0) then
             directory%is_new = .not. directory_exists(directory%target)
-            call lock_directory(directory%target, .true., made)
-            call close_descriptor(made)
+            call lock_directory(directory%target, .true., target_lock)
+            call close_descriptor(target_lock)
             directory%workspace = directory%target//'/'//inner_workspace
             call lock_directory(directory%workspace, .true., directory%workspace_lock)
          end if
       end if
       call check_interrupt(error)
-      if (directory%workspace_lock < 0 .and. .not. allocated(error)) error = making_error(directory%path)
+      if (directory%workspace_lock < 0 .and. .not. allocated(error)) error = unusable_error(directory%path)
       if (allocated(error)) return
       call list_directory(directory%workspace, names)
       if (is_workspace(names)) return
@@ -389,7 +389,7 @@ contains
       if (.not. allocated(error)) call check_files(directory, error)
       if (directory%lock < 0) call check_interrupt(error)
       if (allocated(error) .or. directory%lock >= 0) return
-      if (directory_exists(directory%target)) error = making_error(directory%path)
+      if (directory_exists(directory%target)) error = unusable_error(directory%path)
    end subroutine lock_target
 
    !> Replaces the files of the directory by those of the workspace.
@@ -419,7 +419,7 @@ contains
       if (allocated(error)) return
       if (directory%lock < 0) then
          call rename_file(directory%workspace, directory%target, moved)
-         if (.not. moved) error = making_error(directory%path)
+         if (.not. moved) error = unusable_error(directory%path)
       else
          call replace_set(directory%workspace, directory%target, entries, gone, &
             directory%workspace /= directory%target//'/'//inner_workspace, error)
@@ -427,11 +427,11 @@ contains
    end subroutine publish
 
    !> Error for a directory that cannot be created or written.
-   pure function making_error(path) result(error)
+   pure function unusable_error(path) result(error)
       character(len=*), intent(in) :: path
       type(error_type) :: error
 
       error = input_error('--output '//path//' cannot be used; allowed: a directory that you may write to')
-   end function making_error
+   end function unusable_error
 
 end module thud_result_directory

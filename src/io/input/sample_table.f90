@@ -221,7 +221,7 @@ contains
                //'allowed: one decimal mark in a table')
             return
          end if
-         if (table%decimal == ' ' .and. may_be_group(cells(i))) then
+         if (table%decimal == ' ' .and. may_separate_thousands(cells(i))) then
             ambiguous = i
          else
             table%decimal = cells(i)(at:at)
@@ -232,7 +232,7 @@ contains
    end subroutine find_decimal
 
    !> Whether the comma of a number may separate thousands, as in 1,575.
-   pure function may_be_group(cell) result(may)
+   pure function may_separate_thousands(cell) result(may)
       character(len=*), intent(in) :: cell
       logical :: may
       integer :: first, comma
@@ -241,7 +241,7 @@ contains
       comma = index(cell, ',')
       may = comma > first .and. comma - first <= 3 .and. len_trim(cell) - comma == 3 .and. cell(first:first) /= '0' &
          .and. verify(trim(cell(first:)), '0123456789,') == 0
-   end function may_be_group
+   end function may_separate_thousands
 
    !> Removes the quotes around a cell, and blanks next to them.
    subroutine unquote(table, cell, error)

@@ -52,7 +52,7 @@ contains
       character(len=*), intent(in) :: header
       !> The numbers: [n_row, n_column].
       real(wp), intent(in) :: columns(:, :)
-      !> Texts of a column before and after the numbers: [n_row].
+      !> Texts of additional columns before and after the numbers: [n_row].
       character(len=*), intent(in), optional :: labels(:), notes(:)
       character(len=:), allocatable :: text
       type(text_buffer_type) :: buffer

@@ -113,9 +113,9 @@ contains
 
    !> Vectors at all nodes, one after the other.
    pure function get_points(r, z) result(point)
-      !> Components of the vectors: [n_line, n_ring].
+      !> Components of the vectors: [nodes from pole to pole, nodes through the wall].
       real(wp), intent(in) :: r(:, :), z(:, :)
-      !> The vectors, in array order: [2, n_line*n_ring].
+      !> The vectors, in array order: [2, n_node].
       real(wp) :: point(2, size(r))
 
       point(1, :) = reshape(r, [size(r)])

@@ -29,12 +29,12 @@ contains
       character(len=:), allocatable :: text
       character(len=:), allocatable :: header
       real(wp), allocatable :: values(:, :)
-      integer :: n_part, n_own, i
+      integer :: n_component, n_own, i
 
-      n_part = size(history%component_name)
-      n_own = n_part + 4
+      n_component = size(history%component_name)
+      n_own = n_component + 4
       header = 'time_s,deflection_m,velocity_m_per_s'
-      do i = 1, n_part
+      do i = 1, n_component
          header = header//','//trim(history%component_name(i))//'_N'
       end do
       header = header//',elastic_force_N,floor_force_N'
@@ -49,8 +49,8 @@ contains
       end if
       values(:, 1) = history%deflection
       values(:, 2) = history%velocity
-      values(:, 3:n_part + 2) = history%component
-      values(:, n_part + 3) = history%elastic_force
+      values(:, 3:n_component + 2) = history%component
+      values(:, n_component + 3) = history%elastic_force
       values(:, n_own) = history%floor_force
       text = get_history_csv(header, get_times(history), values)
    end function get_force_csv

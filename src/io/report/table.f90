@@ -124,13 +124,14 @@ contains
       end do
    end function get_modes_table
 
-   !> Table of the quasi-static compression for the screen: last point, and secant stiffness at the last and first point.
+   !> Table of the quasi-static compression for the screen: last point, secant stiffness there and at the first deflection
+   !> above 0.
    function get_compression_table(compression) result(text)
       type(compression_type), intent(in) :: compression
       character(len=:), allocatable :: text
 
       associate (deflection => compression%deflection, force => compression%force, n => size(compression%force))
-         text = '  slow compression between plates'//newline &
+         text = '  quasi-static compression between plates'//newline &
             //row('peak deflection', 1.0e3_wp*deflection(n), 2, 'mm') &
             //row('force there', force(n), 1, 'N') &
             //row('secant stiffness', force(n)/deflection(n)/1.0e3_wp, 2, 'kN/m') &

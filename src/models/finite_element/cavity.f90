@@ -61,7 +61,7 @@ contains
       pressure = cavity%pressure*(cavity%volume/volume)**cavity%exponent - cavity%ambient
    end function get_gas_pressure
 
-   !> Work that changes the volume of the gas, including that on the air around the ball, J.
+   !> Work that changes the volume from that at first touch, done on the gas and on the air around the ball, J.
    pure function get_gas_energy(cavity, volume) result(energy)
       type(cavity_type), intent(in) :: cavity
       !> Volume, above 0, m3.

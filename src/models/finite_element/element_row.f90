@@ -2,8 +2,8 @@
 !> Taylor and Pister 1985, Comput. Methods Appl. Mech. Eng. 51, 177-208).
 !>
 !> The elements of one ring of the mesh are processed together, one per lane: nothing is gathered or scattered, since
-!> neighbors lie side by side in memory. Arithmetic is the limit, then the first level of cache. General tensors have the
-!> components 1 = rr, 2 = rz, 3 = zr, 4 = zz, 5 = hoop; symmetric tensors 1 = rr, 2 = zz, 3 = hoop, 4 = rz.
+!> neighbors lie side by side in memory. Arithmetic limits the speed, then the first-level cache. General tensors have
+!> the components 1 = rr, 2 = rz, 3 = zr, 4 = zz, 5 = hoop; symmetric tensors 1 = rr, 2 = zz, 3 = hoop, 4 = rz.
 module thud_element_row
    use thud_constants, only: pi
    use thud_kinds, only: wp
@@ -72,7 +72,7 @@ contains
       end do
    end function new_element_row
 
-   !> Gradients of a vector field at all Gauss points: the deformation gradient F of positions, its rate of velocities.
+   !> Gradients of a vector field at all Gauss points: F if the field holds positions, the rate of F if it holds velocities.
    pure subroutine get_gradients(row, n, r, z, gradient)
       type(element_row_type), intent(in) :: row
       !> Number of elements.
@@ -104,17 +104,17 @@ contains
       end do
    end subroutine get_gradients
 
-   !> Subtracts the nodal forces of first Piola-Kirchhoff stresses from the forces on two rings of nodes.
-   pure subroutine add_nodal_forces(row, n, stress, r, z)
+   !> Adds the forces of first Piola-Kirchhoff stresses on two rings of nodes: minus the derivatives of the strain energy.
+   pure subroutine add_nodal_forces(row, n, stress, force_r, force_z)
       type(element_row_type), intent(in) :: row
       !> Number of elements.
       integer, intent(in) :: n
       !> Stresses, Pa: [n, component, point].
       real(wp), intent(in) :: stress(n, n_component, n_point)
       !> Forces outwards on the nodes of the inner and the outer ring, N: [0:n, 2].
-      real(wp), intent(inout) :: r(0:n, 2)
+      real(wp), intent(inout) :: force_r(0:n, 2)
       !> Forces upwards, N: [0:n, 2].
-      real(wp), intent(inout) :: z(0:n, 2)
+      real(wp), intent(inout) :: force_z(0:n, 2)
       real(wp) :: outwards(n), upwards(n)
       integer :: a, g, j, line, ring
 
@@ -133,8 +133,8 @@ contains
          end do
          ring = merge(2, 1, mod(a, 2) == 0)
          line = merge(1, 0, a > 2)
-         r(line:n - 1 + line, ring) = r(line:n - 1 + line, ring) - outwards
-         z(line:n - 1 + line, ring) = z(line:n - 1 + line, ring) - upwards
+         force_r(line:n - 1 + line, ring) = force_r(line:n - 1 + line, ring) - outwards
+         force_z(line:n - 1 + line, ring) = force_z(line:n - 1 + line, ring) - upwards
       end do
    end subroutine add_nodal_forces
 

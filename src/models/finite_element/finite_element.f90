@@ -215,10 +215,10 @@ contains
    end subroutine solve
 
    !> Integrates in time until the ball has left for good.
-   subroutine march(run, start, contacts, options, sampling, history, error)
+   subroutine march(run, touch_height, contacts, options, sampling, history, error)
       type(impact_run_type), intent(inout) :: run
       !> Height of the center of mass at first touch, m.
-      real(wp), intent(in) :: start
+      real(wp), intent(in) :: touch_height
       type(contacts_type), intent(inout) :: contacts
       !> Number of bounces, times of flight, step.
       class(finite_element_options_type), intent(in) :: options
@@ -249,7 +249,7 @@ contains
             call check_run(run, time, first_energy, history, error)
             if (allocated(error)) return
             if (k == 0) then
-               call record_sample(run, i, start, history)
+               call record_sample(run, i, touch_height, history)
                latest = i
                ! Pressures are means over the sampling interval, as the force is.
                if (mod(i - 1, stride) == 0) call take_snapshot(history%motion, time, run%position, run%velocity, &
@@ -270,7 +270,7 @@ contains
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
             //to_text(contacts%settling_time)//' s after contact '//to_text(options%bounces)//'; allowed: longer than that')
       end if
-      if (.not. allocated(error)) call continue_flight(run, latest, start, history)
+      if (.not. allocated(error)) call continue_flight(run, latest, touch_height, history)
    end subroutine march
 
    !> Chooses the steps of the next sampling intervals; returns an error if the run would take too long.
@@ -278,7 +278,7 @@ contains
       type(impact_run_type), intent(inout) :: run
       !> Time since the record began, s.
       real(wp), intent(in) :: time
-      !> Fraction of the stability limit to use.
+      !> Options; `step_safety` is the fraction of the stability limit to use.
       class(finite_element_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       !> Number of samples of the record.
@@ -300,7 +300,7 @@ contains
       end associate
    end subroutine check_step
 
-   !> Adds the impulse of the floor in one step to the means around two samples.
+   !> Distributes the impulse of the floor in one step between the mean forces of two samples.
    pure subroutine add_impulse(impulse, interval, i, fraction, history)
       !> The impulse, N s; sampling interval, s.
       real(wp), intent(in) :: impulse, interval
@@ -325,6 +325,7 @@ contains
       real(wp), intent(in) :: step
       logical :: touches
 
+      ! `stop` is the displacement of the floor at the next instant, downwards.
       associate (last => ubound(run%position, 2))
          touches = minval(run%position(:, last, 2) + step*(run%velocity(:, last, 2) - step*run%gravity) &
             - run%contact%edge_height) + run%floor%stop + step*run%floor%velocity < 0.0_wp

@@ -10,9 +10,9 @@
 !> pressure p = C sqrt(s) at the distance s inside and the gap 4/3 C/E* s**(3/2) at the distance s outside (Johnson 1985,
 !> Contact Mechanics, section 5.1), with C = 2 E* sqrt(2 a)/(pi R) by Hertz. With the edge at the distance e from the inner
 !> node, a linear shape function of width h gives the outer node the force per area 4/15 C e**(5/2)/h**2 at the
-!> gap 4/3 C/E* (h - e)**(3/2). A parabola replaces this relation, with a in the middle of the element: of the same force at
-!> the floor, 4/15 C sqrt(h), and the same work, 0.1840 times this force times the gap at e = 0. Force and gap vanish as the
-!> mesh is refined.
+!> gap 4/3 C/E* (h - e)**(3/2). A parabola replaces this relation between force and gap. It has the same force at zero gap,
+!> 4/15 C sqrt(h), and the same work, 0.1840 times this force times the gap at e = 0; the radius a is that of the middle of
+!> the element. Force and gap vanish as the mesh is refined.
 module thud_floor_contact
    use thud_ball, only: ball_type
    use thud_constants, only: pi
@@ -84,7 +84,7 @@ contains
             ! The work of a parabola is a third of force times height.
             contact%edge_height(j) = 3*fullness*4*strength*width**1.5_wp/(3*modulus)
             if (.not. options%layer_stiffness > 0.0_wp) cycle
-            ! A layer yields first; the softer it is relative to the element, the lower the force.
+            ! A layer lowers the force, the more the softer it is relative to the element.
             contact%edge_force(j) = contact%edge_force(j)/(1 + modulus/(width*options%layer_stiffness))
          end do
       end associate

@@ -42,8 +42,8 @@ module thud_free_modes
       real(wp), allocatable :: frequency(:)
       !> Order of the Legendre polynomial that dominates at the outer surface: [n_mode].
       integer, allocatable :: harmonic(:)
-      !> Mass of the ball times squared vertical amplitude of the lowest point at unit modal mass, 1 for the rigid motion,
-      !> which states how strongly a contact there drives the mode: [n_mode].
+      !> Mass of the ball times squared vertical amplitude of the lowest point at unit modal mass. It states how strongly a
+      !> contact at the lowest point drives the mode; it would be 1 for the rigid motion: [n_mode].
       real(wp), allocatable :: participation(:)
       !> Displacements in r and z, of maximum length 1, the lowest point moving upwards: [2, 0:n_line, 0:n_ring, n_mode].
       real(wp), allocatable :: shape(:, :, :, :)
@@ -64,7 +64,7 @@ contains
          in_group('mesh', get_mesh_fields(options%mesh))]
    end function get_modes_fields
 
-   !> Returns an error if the mesh does not resolve as many modes.
+   !> Returns an error if the mesh does not resolve the requested number of modes.
    subroutine check_modes(options, error)
       !> Number of modes, and the mesh.
       type(modes_options_type), intent(in) :: options

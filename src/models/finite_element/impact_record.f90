@@ -51,16 +51,16 @@ contains
    end function new_impact_record
 
    !> Writes all quantities of one sample except the force.
-   subroutine record_sample(run, i, start, history)
+   subroutine record_sample(run, i, touch_height, history)
       !> The ball, between updates of velocity and position.
       type(impact_run_type), intent(in) :: run
       !> Index of the sample.
       integer, intent(in) :: i
       !> Height of the center of mass at first touch, m.
-      real(wp), intent(in) :: start
+      real(wp), intent(in) :: touch_height
       type(force_history_type), intent(inout) :: history
 
-      history%deflection(i) = start - get_mean_height(run)
+      history%deflection(i) = touch_height - get_mean_height(run)
       history%velocity(i) = -get_mean_velocity(run)
       associate (r => run%position(:, ubound(run%position, 2), 1))
          history%model_history(i, at_radius) = maxval(r, mask=run%floor_force(:, 2) > 0.0_wp)
@@ -77,31 +77,31 @@ contains
    end subroutine record_sample
 
    !> Continues after the computation as free flight without vibration, up to the next touch.
-   pure subroutine continue_flight(run, last, start, history)
+   pure subroutine continue_flight(run, last, touch_height, history)
       !> The ball at the end of the computation.
       type(impact_run_type), intent(in) :: run
       !> Index of the latest sample.
       integer, intent(in) :: last
       !> Height of the center of mass at first touch, m.
-      real(wp), intent(in) :: start
+      real(wp), intent(in) :: touch_height
       type(force_history_type), intent(inout) :: history
       real(wp) :: mass, speed, rise, time
       integer :: i
 
       mass = sum(run%mass(:, :, 2))
       do i = last + 1, size(history%deflection)
-         associate (first => -history%deflection(last), upwards => -history%velocity(last))
+         associate (initial_rise => -history%deflection(last), upwards => -history%velocity(last))
             ! The flight ends at the height of first touch.
-            time = (upwards + sqrt(upwards**2 + 2*run%gravity*max(first, 0.0_wp)))/run%gravity
+            time = (upwards + sqrt(upwards**2 + 2*run%gravity*max(initial_rise, 0.0_wp)))/run%gravity
             time = min(time, (i - last)/history%sample_rate)
             speed = upwards - run%gravity*time
-            rise = first + (upwards - run%gravity*time/2)*time
+            rise = initial_rise + (upwards - run%gravity*time/2)*time
             history%model_history(i, :) = history%model_history(last, :)
             history%model_history(i, at_kinetic) = history%model_history(last, at_kinetic) + mass/2*(speed**2 - upwards**2)
          end associate
          history%velocity(i) = -speed
          history%deflection(i) = -rise
-         history%model_history(i, at_gravity) = mass*run%gravity*(start + rise)
+         history%model_history(i, at_gravity) = mass*run%gravity*(touch_height + rise)
       end do
       if (run%floor%moves) call continue_freely(run%floor, run%time, history%sample_rate, last + 1, &
          history%floor_displacement, history%floor_velocity)

@@ -124,7 +124,7 @@ contains
          ! If there are no forces, the next step reports the reason.
          if (stability_ratio >= huge(stability_ratio)) exit
          ratio = stability_ratio/(safety*max_stability_ratio)
-         ! The ratio grows with the first to second power of the step: the higher number of steps is taken.
+         ! The ratio grows with a power of the step from 1 to 2: of the numbers of steps by these two, the higher is taken.
          if (ratio <= 1.0_wp) then
             ! Later the number never decreases, since the estimated mode lags behind the deforming ball.
             if (starts) n_step = max(min_steps, 1, ceiling(n_step*sqrt(max(ratio, 0.0_wp))))

@@ -16,7 +16,7 @@ module thud_maxwell_branches
    public :: add_branch_stress
 
    !> Length of a step divided by the relaxation time beyond which a branch has lost its memory.
-   real(wp), parameter :: max_steps_over_time = 100.0_wp
+   real(wp), parameter :: max_step_ratio = 100.0_wp
 
 contains
 
@@ -32,8 +32,8 @@ contains
       real(wp), intent(in) :: modulus(:), time(:)
       !> Length of the step, s.
       real(wp), intent(in) :: interval
-      !> Whether the viscous tensors advance to the end of the step. Otherwise they stay, and the stresses are those of the
-      !> fastest motion, which reverses in each step together with its tensors.
+      !> Whether the viscous tensors advance to the end of the step. Otherwise they stay unchanged, and the
+      !> moduli are raised to those of the fastest mode, in which strains and viscous tensors change sign in each step.
       logical, intent(in) :: commit
       !> Volumes of the points, undeformed, m3: [n, point].
       real(wp), intent(in) :: weight(n, n_point)
@@ -66,16 +66,16 @@ contains
             stored = 0.0_wp
             call take_branch_step(n, effective(b), time(b), ratio(b), mean_weight(b), commit, weight(:, g), c, &
                viscous(:, :, g, b), branch_stress, stored, power)
-            ! Energy at the mean stress: with it work, energy and loss of a linear branch balance over the steps.
+            ! Scaled so that work, energy and loss of a linear branch balance over the steps.
             energy = energy + stored*(1 + mean_weight(b))*(1 + exp(-ratio(b)))/2
          end do
-         call add_branch_stresses(n, isochoric_factor, c, branch_stress, f(:, :, g), cofactor(:, :, g), jacobian(:, g), &
+         call add_stress_at_point(n, isochoric_factor, c, branch_stress, f(:, :, g), cofactor(:, :, g), jacobian(:, g), &
             stress(:, :, g))
       end do
    end subroutine add_branch_stress
 
-   !> Value of exp(t/time) - 1 at the instant t of a step at which a decaying stress equals its mean over the step, which is
-   !> x/(1 - exp(-x)) - 1.
+   !> Weight of the deformation for the mean stress of a step, x/(1 - exp(-x)) - 1: the value of exp(t/time) - 1 at the
+   !> instant t at which a decaying stress equals its mean over the step.
    pure elemental function get_mean_weight(ratio) result(mean_weight)
       !> Length of the step divided by the relaxation time, x.
       real(wp), intent(in) :: ratio
@@ -120,7 +120,7 @@ contains
       integer, intent(in) :: n
       !> Shear modulus, Pa; relaxation time, s; step divided by relaxation time.
       real(wp), intent(in) :: modulus, time, ratio
-      !> Weight of the deformation relative to the viscous tensor, for the tensor within the step.
+      !> Weight of the deformation, relative to the viscous tensor, for the mean stress of the step.
       real(wp), intent(in) :: mean_weight
       !> Whether the viscous tensors advance to the end of the step.
       logical, intent(in) :: commit
@@ -159,7 +159,7 @@ contains
          energy = energy + weight(j)*modulus/2*(trace(j) - 3)
          power = power + weight(j)*modulus/(2*time)*(square - trace(j)**2/3)
       end do
-      if (commit) call update_internal_variables(n, min(ratio, max_steps_over_time), c, trace, viscous)
+      if (commit) call update_internal_variables(n, min(ratio, max_step_ratio), c, trace, viscous)
    end subroutine take_branch_step
 
    !> Advances the viscous tensors of one Maxwell branch at one Gauss point to the end of a step.
@@ -176,7 +176,7 @@ contains
       integer :: j
 
       end_weight = exp(ratio) - 1
-      ! At large strain the rate of the norm, tr(Cbar Cv^-1)/3 - 1, also matters to second order in the step.
+      ! The weight grows at the rate tr(Cbar Cv^-1)/3, 1 at small strain: a correction of second order in the step.
       strain_weight = end_weight + (trace/3 - 1)*ratio**2/2
       call mix(n, end_weight, strain_weight, c, viscous, mixed, determinant)
       call get_inverse_cube_root(n, determinant, root)
@@ -186,10 +186,10 @@ contains
    end subroutine update_internal_variables
 
    !> Mixtures of viscous tensor and deformation at one Gauss point, and their determinants, which are near 1.
-   pure subroutine mix(n, usual_weight, strain_weight, c, viscous, tensor, determinant)
+   pure subroutine mix(n, normalizing_weight, strain_weight, c, viscous, tensor, determinant)
       integer, intent(in) :: n
       !> Weight of the deformation, relative to the viscous tensor, that normalizes the mixture.
-      real(wp), intent(in) :: usual_weight
+      real(wp), intent(in) :: normalizing_weight
       !> Weights of the deformation: [n].
       real(wp), intent(in) :: strain_weight(n)
       real(wp), intent(in) :: c(n, n_symmetric)
@@ -202,7 +202,7 @@ contains
       real(wp) :: scale
       integer :: i, j
 
-      scale = 1/(1 + usual_weight)
+      scale = 1/(1 + normalizing_weight)
       !$omp simd
       do j = 1, n
          do i = 1, n_symmetric
@@ -213,7 +213,7 @@ contains
    end subroutine mix
 
    !> Adds the stresses of all branches at one Gauss point.
-   pure subroutine add_branch_stresses(n, isochoric_factor, c, branch_stress, f, cofactor, jacobian, stress)
+   pure subroutine add_stress_at_point(n, isochoric_factor, c, branch_stress, f, cofactor, jacobian, stress)
       integer, intent(in) :: n
       !> Determinants to the power -2/3: [n].
       real(wp), intent(in) :: isochoric_factor(n)
@@ -241,6 +241,6 @@ contains
             stress(j, 5) = stress(j, 5) + scale*f(j, 5)*p3 + factor*cofactor(j, 5)
          end associate
       end do
-   end subroutine add_branch_stresses
+   end subroutine add_stress_at_point
 
 end module thud_maxwell_branches

@@ -38,7 +38,7 @@ contains
       real(wp), intent(out) :: dilatation(n_dilatation, 2*n_node)
       !> Mass for pairs of nodes, the same for both directions, kg, lower triangle: [9, 9].
       real(wp), intent(out) :: mass(n_node, n_node)
-      real(wp) :: strain(4*n_point, 2*n_node), shape(n_point, n_node), pressure(n_dilatation, n_dilatation)
+      real(wp) :: strain(4*n_point, 2*n_node), shape(n_point, n_node), gram(n_dilatation, n_dilatation)
       real(wp) :: point(n_line), weight(n_line), value(n_node), gradient(n_node, 2), jacobian(2, 2)
       real(wp) :: determinant, radius, volume
       real(wp) :: divergence(2*n_node), hoop(n_node), basis(n_dilatation)
@@ -46,7 +46,7 @@ contains
 
       call get_gauss_points(point, weight)
       dilatation = 0.0_wp
-      pressure = 0.0_wp
+      gram = 0.0_wp
       do j = 1, n_line
          do i = 1, n_line
             k = i + n_line*(j - 1)
@@ -66,14 +66,14 @@ contains
             ! Coordinates relative to the size of the element keep the functions of the pressure well conditioned.
             basis = [1.0_wp, (radius - r(5))/(maxval(r) - minval(r)), &
                (dot_product(value, z) - z(5))/(maxval(z) - minval(z))]
-            pressure = pressure + volume*spread(basis, 1, 3)*spread(basis, 2, 3)
+            gram = gram + volume*spread(basis, 1, 3)*spread(basis, 2, 3)
             dilatation = dilatation + volume*spread(basis, 2, 2*n_node)*spread(divergence, 1, n_dilatation)
          end do
       end do
       call dsyrk('L', 'T', 2*n_node, 4*n_point, 1.0_wp, strain, 4*n_point, 0.0_wp, distortion, 2*n_node)
       call dsyrk('L', 'T', n_node, n_point, 1.0_wp, shape, n_point, 0.0_wp, mass, n_node)
-      call dpotrf('L', n_dilatation, pressure, n_dilatation, info)
-      call dtrsm('L', 'L', 'N', 'N', n_dilatation, 2*n_node, 1.0_wp, pressure, n_dilatation, dilatation, n_dilatation)
+      call dpotrf('L', n_dilatation, gram, n_dilatation, info)
+      call dtrsm('L', 'L', 'N', 'N', n_dilatation, 2*n_node, 1.0_wp, gram, n_dilatation, dilatation, n_dilatation)
    end subroutine get_mixed_element
 
    !> Strains per displacement at one point: three stretches minus their mean, and the shear. Their squares add up to twice

@@ -1,9 +1,9 @@
 !> A mobile floor under the finite elements, in steps of central differences.
 !>
-!> The force of a step is that at its instant, constant from half a step before to half a step after; so the displacement of
-!> the floor is known at the midpoints between instants, as velocities are. Contact forces depend on the displacement at the
-!> instant, stopped nodes on that at the next instant under the same force, and both displacements on the force. Since the
-!> force does not increase when the floor yields, there is one solution.
+!> The force at an instant acts from half a step before to half a step after it; so the displacement of the floor is known at
+!> the midpoints between instants, as velocities are. Contact forces depend on the displacement at the instant, and impulses
+!> that stop nodes on the displacement at the next instant. Both displacements depend on the force. Since the force does not
+!> increase when the floor moves away from the ball, there is exactly one solution.
 module thud_moving_floor
    use thud_floor_contact, only: floor_contact_type, get_contact_forces
    use thud_kinds, only: wp
@@ -30,18 +30,23 @@ module thud_moving_floor
       type(receiver_type) :: receiver
       !> Motion at the midpoint before the instant.
       type(receiver_motion_type) :: motion
-      !> Displacement at the instant, and at the next, where nodes stop, m.
-      real(wp) :: displacement = 0.0_wp, stop = 0.0_wp
-      !> Twice the travel from the midpoint before to the instant, and from the instant to the midpoint after, divided by the
-      !> time between the midpoints, m/s; velocity at the instant without that of the direct mobility, m/s.
-      real(wp) :: velocity_before = 0.0_wp, velocity_after = 0.0_wp, velocity = 0.0_wp
+      !> Displacement at the instant, m.
+      real(wp) :: displacement = 0.0_wp
+      !> Displacement at the next instant, where nodes stop, m.
+      real(wp) :: stop = 0.0_wp
+      !> Twice the travel from the midpoint before to the instant, divided by the time between the midpoints, m/s.
+      real(wp) :: velocity_before = 0.0_wp
+      !> The same from the instant to the midpoint after, m/s.
+      real(wp) :: velocity_after = 0.0_wp
+      !> Velocity at the instant without that of the direct mobility, m/s.
+      real(wp) :: velocity = 0.0_wp
       !> Energy given to the floor up to the instant, and up to the midpoint after it, J.
       real(wp) :: work = 0.0_wp, work_after = 0.0_wp
       !> Lengths of the previous and the present step for which the factors below hold, s; negative: none.
       real(wp) :: last_interval = -1.0_wp, interval = -1.0_wp
       !> Displacements at the instants without force, m; compliances, m/N: [3].
       real(wp) :: free(3) = 0.0_wp, compliance(3) = 0.0_wp
-      !> Displacement up to the instants per amplitude, m/(N s): [n_pole, 3].
+      !> Displacement from the midpoint before up to each instant, per unit amplitude of each pole, m/(N s): [n_pole, 3].
       complex(wp), allocatable :: displacement_factor(:, :)
       !> The step from midpoint to midpoint.
       type(receiver_step_type) :: step
@@ -157,13 +162,13 @@ contains
       !> The reaction, N; its negative derivative with respect to the trial force, N/N.
       real(wp), intent(out) :: reaction, slope
       real(wp), dimension(0:ubound(mass, 1)) :: stiffness
-      real(wp), dimension(0:ubound(mass, 1), 2) :: over, force
+      real(wp), dimension(0:ubound(mass, 1), 2) :: relative_position, force
       real(wp) :: energy, span, needed
       integer :: j
 
-      over(:, 1) = position(:, 1)
-      over(:, 2) = position(:, 2) + floor%displacement
-      call get_contact_forces(contact, over, force, energy, stiffness)
+      relative_position(:, 1) = position(:, 1)
+      relative_position(:, 2) = position(:, 2) + floor%displacement
+      call get_contact_forces(contact, relative_position, force, energy, stiffness)
       reaction = 0.0_wp
       slope = 0.0_wp
       span = (floor%last_interval + floor%interval)/2

@@ -38,7 +38,7 @@ module thud_pressed_ball
 
    !> The ball; arrays over nodes are [0:n_polar, 0:n_radial, 2].
    type :: pressed_ball_type
-      !> The body without gas: the gas couples all nodes of the cavity.
+      !> The body without gas: the gas, which couples all nodes of the cavity, is treated separately.
       type(elastic_body_type) :: body
       type(cavity_type) :: cavity
       !> Positions relative to the lower plate, m.
@@ -52,7 +52,7 @@ module thud_pressed_ball
       !> Diameter of the undeformed ball, m; force on a node that counts as zero, N.
       real(wp) :: diameter = 0.0_wp, tolerance = 0.0_wp
       !> Thickness of the wall and of an element, m.
-      real(wp) :: wall = 0.0_wp, thickness = 0.0_wp
+      real(wp) :: wall = 0.0_wp, element_thickness = 0.0_wp
    end type pressed_ball_type
 
 contains
@@ -65,47 +65,47 @@ contains
       type(material_type), intent(in) :: material
       type(pressed_ball_type) :: pressed
       type(material_type) :: relaxed
-      type(mesh_type) :: even
+      type(mesh_type) :: symmetric
       integer :: n
 
       n = mesh%n_polar
-      even = get_even_mesh(mesh)
+      symmetric = get_symmetric_mesh(mesh)
       relaxed = material
       relaxed%viscosity = 0.0_wp
       relaxed%branch_modulus = material%branch_modulus(:0)
       relaxed%branch_time = material%branch_time(:0)
-      pressed%body = new_elastic_body(ball, even, relaxed)
+      pressed%body = new_elastic_body(ball, symmetric, relaxed)
       pressed%cavity = pressed%body%cavity
       pressed%body%cavity%pressure = 0.0_wp
       pressed%body%cavity%ambient = 0.0_wp
       pressed%diameter = 2*ball%outer_radius
       pressed%tolerance = balanced*material%shear_modulus*ball%wall_thickness**2
       pressed%wall = ball%wall_thickness
-      pressed%thickness = ball%wall_thickness/mesh%n_radial
+      pressed%element_thickness = ball%wall_thickness/mesh%n_radial
       allocate (pressed%position(0:n, 0:mesh%n_radial, 2))
-      pressed%position(:, :, 1) = even%r
-      pressed%position(:, :, 2) = even%z + ball%outer_radius
+      pressed%position(:, :, 1) = symmetric%r
+      pressed%position(:, :, 2) = symmetric%z + ball%outer_radius
       allocate (pressed%touches(0:n, 2), source=.false.)
       pressed%touches(0, 1) = .true.
       pressed%touches(n, 2) = .true.
    end function new_pressed_ball
 
    !> The mesh with nodes as dense around the highest point as around the lowest.
-   pure function get_even_mesh(mesh) result(even)
+   pure function get_symmetric_mesh(mesh) result(symmetric)
       type(mesh_type), intent(in) :: mesh
-      type(mesh_type) :: even
+      type(mesh_type) :: symmetric
       real(wp) :: angle
       integer :: j
 
-      even = mesh
+      symmetric = mesh
       do j = 0, mesh%n_polar
          angle = pi*real(j, wp)/real(mesh%n_polar, wp)
          angle = angle - grading*sin(2*angle)/2
-         even%r(j, :) = hypot(mesh%r(j, :), mesh%z(j, :))*sin(angle)
-         even%z(j, :) = -hypot(mesh%r(j, :), mesh%z(j, :))*cos(angle)
+         symmetric%r(j, :) = hypot(mesh%r(j, :), mesh%z(j, :))*sin(angle)
+         symmetric%z(j, :) = -hypot(mesh%r(j, :), mesh%z(j, :))*cos(angle)
       end do
-      even%r([0, mesh%n_polar], :) = 0.0_wp
-   end function get_even_mesh
+      symmetric%r([0, mesh%n_polar], :) = 0.0_wp
+   end function get_symmetric_mesh
 
    !> Moves the plates to an approach.
    subroutine press(pressed, deflection, error)
@@ -152,13 +152,13 @@ contains
       logical :: met
 
       associate (middle => (pressed%diameter - pressed%deflection)/2)
-         met = any(pressed%body%mesh%z(:, 0) < -pressed%thickness .and. pressed%position(:, 0, 2) >= middle)
+         met = any(pressed%body%mesh%z(:, 0) < -pressed%element_thickness .and. pressed%position(:, 0, 2) >= middle)
       end associate
    end function has_met
 
    !> Newton's method at one approach of the plates.
    subroutine find_rest(pressed, converged, error)
-      !> The ball, at the positions of another approach.
+      !> The ball; its positions, those of the previous approach, are the first estimate.
       type(pressed_ball_type), intent(inout) :: pressed
       !> Whether the ball is at rest.
       logical, intent(out) :: converged
@@ -321,7 +321,7 @@ contains
       integer :: i, j, k, first, second
 
       band = 0.0_wp
-      step = trial*pressed%thickness
+      step = trial*pressed%element_thickness
       held = pressed
       ! A gas whose pressure does not depend on its volume.
       held%cavity = cavity_type(volume=1.0_wp, exponent=0.0_wp, pressure=get_gas_pressure(pressed%cavity, &

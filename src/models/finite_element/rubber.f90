@@ -12,8 +12,10 @@ module thud_rubber
 
    public :: add_viscous_stress, get_elastic_stress, get_inverse_cube_root, get_volume_ratios
 
-   !> Half-widths of the ranges around 1 and `middle` in which one and two iterations give all digits of the cube root.
-   real(wp), parameter :: near = 0.2_wp, middle = 1.45_wp, far = 1.05_wp
+   !> Half-width of the range around 1 in which one iteration gives all digits of the cube root.
+   real(wp), parameter :: near = 0.2_wp
+   !> Middle and half-width of the range in which two iterations do.
+   real(wp), parameter :: middle = 1.45_wp, far = 1.05_wp
 
 contains
 
@@ -105,23 +107,24 @@ contains
       !> Sum to which the strain energy is added, J.
       real(wp), intent(inout) :: energy
       real(wp) :: modulus, invariant, factor, total
-      real(wp) :: pressure(n), root(n)
+      real(wp) :: mean_stress(n), root(n)
       integer :: c, g, j
 
-      pressure = -volume
+      ! Holds the mean dilatations of the elements until it is multiplied by the bulk modulus.
+      mean_stress = -volume
       do g = 1, n_point
-         pressure = pressure + weight(:, g)*jacobian(:, g)
+         mean_stress = mean_stress + weight(:, g)*jacobian(:, g)
       end do
-      pressure = pressure/volume
-      total = bulk_modulus/2*sum(volume*pressure**2)
-      pressure = bulk_modulus*pressure
+      mean_stress = mean_stress/volume
+      total = bulk_modulus/2*sum(volume*mean_stress**2)
+      mean_stress = bulk_modulus*mean_stress
       modulus = shear_modulus*(1 - mooney_share)
       do g = 1, n_point
          call get_inverse_cube_root(n, jacobian(:, g), root)
          !$omp simd private(invariant, factor) reduction(+:total)
          do j = 1, n
             invariant = root(j)**2*(f(j, 1, g)**2 + f(j, 2, g)**2 + f(j, 3, g)**2 + f(j, 4, g)**2 + f(j, 5, g)**2)
-            factor = pressure(j) - modulus*invariant/(3*jacobian(j, g))
+            factor = mean_stress(j) - modulus*invariant/(3*jacobian(j, g))
             do c = 1, n_component
                stress(j, c, g) = modulus*root(j)**2*f(j, c, g) + factor*cofactor(j, c, g)
             end do

@@ -22,7 +22,7 @@ module thud_stable_step
 
 contains
 
-   !> First estimate of the fastest mode, which contains every mode, the fastest ones most: [0:n_polar, 0:n_radial, 2].
+   !> First estimate of the fastest mode: a mixture of all modes, mainly of the fastest ones: [0:n_polar, 0:n_radial, 2].
    pure function get_first_direction(body) result(direction)
       type(elastic_body_type), intent(in) :: body
       real(wp), allocatable :: direction(:, :, :)

@@ -1,4 +1,4 @@
-"""Formats of recordings: a module each, and a table that identifies them."""
+"""Formats of recordings: one module for each, and a table that identifies them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-# Bytes that identify the format, and number of channels that the probe reads.
+# Number of bytes from which the format is identified, and of channels that the probe reads.
 HEAD = 4096
 MAX_PROBED = 8
 HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -22,8 +22,8 @@ HDF5 = b"\x89HDF\r\n\x1a\n"
 class Format(NamedTuple):
     """A format: name, module that reads it, suffixes, and whether the first bytes match it.
 
-    It is probed in a subprocess first if its library may hang, crash or fill memory on damaged
-    files.
+    With `is_probed` a subprocess reads the file first, because its library may hang, crash or fill
+    memory if the file is damaged.
     """
 
     name: str
@@ -34,13 +34,13 @@ class Format(NamedTuple):
 
 
 def _is_uff(head: bytes) -> bool:
-    """Whether a file begins with the mark of a universal file and the number of a data set."""
+    """Whether a file begins with the mark -1 of a universal file and the number of a data set."""
     lines = head.lstrip(b"\r\n").splitlines()[:2]
     return len(lines) > 1 and lines[0].strip() == b"-1" and lines[1][:6].strip().isdigit()
 
 
 def _is_text(head: bytes) -> bool:
-    """Whether a file is text: UTF-16 with its mark, or without zero bytes."""
+    """Whether a file is text: UTF-16 with a byte order mark, or without zero bytes."""
     return bool(head) and (head[:2] in {b"\xff\xfe", b"\xfe\xff"} or b"\0" not in head)
 
 
@@ -57,9 +57,9 @@ FORMATS = (
     Format("universal", "universal", (".uff", ".unv", ".uf"), _is_uff),
     Format("text", "text", (".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm", ".prn"), _is_text),
 )  # fmt: skip
-# First bytes of other files, and the advice for each.
-OTHERS = {
-    b"CDF": "NetCDF 4, which `nccopy -k nc4` makes of this older NetCDF",
+# First bytes of files that are not supported, and what is needed instead.
+UNSUPPORTED = {
+    b"CDF": "NetCDF 4, to which `nccopy -k nc4` converts this older NetCDF",
     b"PK\x03\x04": "the file that is in this archive, or the table saved as CSV",
     b"\x1f\x8b": "the file that is in this archive",
     b"\xd0\xcf\x11\xe0": "the table saved as CSV",
@@ -67,9 +67,9 @@ OTHERS = {
 
 
 def read_channels(path: Path) -> list[Channel]:
-    """Return the channels of a file; its content shows the format.
+    """Return the channels of a file; its content determines the format.
 
-    Raise InputError where the format is unknown or the file is damaged.
+    Raise InputError if the format is unknown or the file is damaged.
     """
     with guarded(path, "a file"), path.open("rb") as file:
         head = file.read(HEAD)
@@ -78,13 +78,13 @@ def read_channels(path: Path) -> list[Channel]:
         refuse(f"{name}: is empty", "a recording")
     actual = next((entry for entry in FORMATS if entry.matches(head)), None)
     expected = next((entry for entry in FORMATS if path.suffix.lower() in entry.suffixes), None)
-    advice = next((text for start, text in OTHERS.items() if head.startswith(start)), None)
+    advice = next((text for start, text in UNSUPPORTED.items() if head.startswith(start)), None)
     if advice:
         refuse(f"{name}: is of a format that is not supported", advice)
     if actual is None or (actual.module == "text" and expected not in {None, actual}):
         kinds = ", ".join(entry.name for entry in FORMATS)
         reason = f"is no {expected.name} file" if expected else "is of no known format"
-        refuse(f"{name}: {reason} by its first bytes", f"{kinds} files")
+        refuse(f"{name}: {reason} according to its first bytes", f"{kinds} files")
     module = importlib.import_module(f"{__name__}.{actual.module}")
     if actual.is_probed:
         probe_in_subprocess(lambda file: _read_ends(module.read_channels(file)), path, actual.name)
@@ -94,7 +94,6 @@ def read_channels(path: Path) -> list[Channel]:
 
 
 def _read_ends(channels: list[Channel]) -> None:
-    """Read the first and the last sample of some channels."""
     for channel in channels[:MAX_PROBED]:
         channel.samples(0, 1)
         channel.samples(channel.n_sample - 1, channel.n_sample)

@@ -18,25 +18,24 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Counts of full scale by subtype, None for floats.
+# Counts at full scale by subtype, None for floats.
 SUBTYPES = {
     "PCM_S8": 2.0**7, "PCM_U8": 2.0**7, "PCM_16": 2.0**15, "PCM_24": 2.0**23, "PCM_32": 2.0**31,
     "FLOAT": None, "DOUBLE": None,
 }  # fmt: skip
-# Length of a chunk whose true length is in the 64 bit table of a RF64 file, or unknown.
+# Length of a chunk whose true length is in the 64-bit table of an RF64 file, or unknown.
 UNKNOWN = 0xFFFFFFFF
 # Maximum number of channels, and of chunks of a file.
 MAX_CHANNELS = 1024
 MAX_CHUNKS = 10000
-# Maximum number of samples in the header of FLAC.
+# Maximum number of samples in a FLAC header; larger values mean that it is unknown.
 MAX_FLAC = 2**36
-# Positions of the date and the time in a broadcast chunk.
+# Bytes of date and time in a broadcast chunk.
 DATE = slice(320, 330)
 CLOCK = slice(330, 338)
 
 
 def _read(path: Path, column: int, start: int, stop: int) -> NDArray[np.float64]:
-    """Return the samples of a channel from start to before stop."""
     soundfile = library("soundfile", "WAV and FLAC")
     with guarded(path, "an audio file"), soundfile.SoundFile(os.fsencode(path)) as file:
         file.seek(start)
@@ -55,14 +54,14 @@ def read_channels(path: Path) -> list[Channel]:
         kind, count, columns = file.subtype, file.frames, file.channels
         rate = float(file.samplerate)
     if kind not in SUBTYPES:
-        refuse(f"{name}: samples of the kind {kind}", ", ".join(SUBTYPES))
+        refuse(f"{name}: samples of the format {kind}", ", ".join(SUBTYPES))
     if columns > MAX_CHANNELS:
         refuse(f"{name}: {columns} channels", f"up to {MAX_CHANNELS}")
-    # The library cannot seek in such a file, and a cut is not detectable.
+    # Without a length the library cannot seek, and a file that is cut off is not detectable.
     if is_flac and count >= MAX_FLAC:
         refuse(
-            f"{name}: its header has no number of samples, as of a streaming encoder",
-            "FLAC files with their length: encode it again, as by `ffmpeg -i OLD.flac NEW.flac`",
+            f"{name}: its header has no number of samples (written by a streaming encoder)",
+            "FLAC files with their length; encode it again, as by `ffmpeg -i OLD.flac NEW.flac`",
         )
     # A FLAC file that is cut off lacks its last sample.
     if count < 1 or (is_flac and _read(path, 0, count - 1, count).size != 1):
@@ -84,9 +83,9 @@ def read_channels(path: Path) -> list[Channel]:
 
 
 def _read_chunks(file: BinaryIO, name: str) -> str:
-    """Return the date of a WAV file; raise InputError where it is cut off.
+    """Return the date of a WAV file; raise InputError if it is cut off.
 
-    The library reads a file that is cut off without an error.
+    The library does not detect this.
     """
     size = os.fstat(file.fileno()).st_size
     lengths: dict[bytes, int] = {}
@@ -100,8 +99,10 @@ def _read_chunks(file: BinaryIO, name: str) -> str:
         if kind == b"bext":
             file.seek(begin)
             text = file.read(CLOCK.stop)
-            words = (text[at].strip(b"\0 ").decode("ascii", "replace") for at in (DATE, CLOCK))
-            date = " ".join(word for word in words if word.isprintable() and word)
+            texts = (
+                text[section].strip(b"\0 ").decode("ascii", "replace") for section in (DATE, CLOCK)
+            )
+            date = " ".join(word for word in texts if word.isprintable() and word)
     if missing is None:
         refuse(f"{name}: has no chunk of samples", "an undamaged WAV file")
     if missing > 0:
@@ -117,7 +118,7 @@ def _chunks(
     for _ in range(MAX_CHUNKS):
         file.seek(begin)
         head = file.read(8)
-        if len(head) < 8 or begin >= size:  # noqa: PLR2004 - of a chunk
+        if len(head) < 8 or begin >= size:  # noqa: PLR2004 - size of a chunk header
             return
         kind, length = struct.unpack("<4sI", head)
         if length == UNKNOWN:

@@ -50,9 +50,9 @@ MAX_DEPTH = 32
 MAX_VALUE = 4096
 MAX_CHUNK = 2**26
 MAX_RATIO = 1100
-# Maximum number of times.
+# Maximum length of a vector of times.
 MAX_TIMES = 2**22
-# Attribute of the MATLAB class, and classes stored as vectors of numbers that are no recording.
+# Attribute with the MATLAB class, and classes that are stored as numbers but are no recordings.
 MATLAB_CLASS = frozenset({"matlabclass"})
 MATLAB_OTHERS = {"char", "cell", "struct", "function_handle", "canonical empty"}
 
@@ -60,7 +60,7 @@ MATLAB_OTHERS = {"char", "cell", "struct", "function_handle", "canonical empty"}
 SCALING = {"scalefactor": 1.0, "addoffset": 0.0}
 
 
-def _read(  # noqa: PLR0913, PLR0917 - identify a channel and a section of it
+def _read(  # noqa: PLR0913, PLR0917 - they identify a section of a channel
     path: Path,
     dataset: str,
     scale: float,
@@ -69,7 +69,6 @@ def _read(  # noqa: PLR0913, PLR0917 - identify a channel and a section of it
     start: int,
     stop: int,
 ) -> NDArray[np.float64]:
-    """Return the samples of a scaled row or column of a dataset from start to before stop."""
     h5py = library("h5py", "HDF5")
     with guarded(path, "HDF5"), _open(h5py, path) as file:
         piece: Any = slice(start, stop)
@@ -81,7 +80,7 @@ def _read(  # noqa: PLR0913, PLR0917 - identify a channel and a section of it
 
 @dataclass(frozen=True)
 class _Vectors:
-    """A numeric dataset that may hold channels, with names and values of its header."""
+    """A numeric dataset that may hold channels, with the names and values of its header."""
 
     key: str
     data: Any
@@ -99,7 +98,7 @@ class _Vectors:
 
     @property
     def parent(self) -> str:
-        """Path of the group."""
+        """Path of its group."""
         return self.key.rpartition("/")[0]
 
 
@@ -137,11 +136,11 @@ def _walk(h5py: Any, file: Any, path: Path) -> list[_Vectors]:  # noqa: ANN401 -
     waiting: list[tuple[str, int, list[tuple[str, object]]]] = [("", 0, [])]
     seen = {h5py.h5o.get_info(file.id).addr}
     while waiting:
-        group_path, depth, above = waiting.pop()
+        group_path, depth, outer_header = waiting.pop()
         if depth > MAX_DEPTH:
             refuse(f"{shown_path(path)}: groups more than {MAX_DEPTH} deep", "a recording")
         group = file[group_path or "/"]
-        header = [*_attributes(h5py, group), *above]
+        header = [*_attributes(h5py, group), *outer_header]
         vectors = []
         for key, entry in _entries(h5py, group, seen, shown_path(path)):
             if isinstance(entry, h5py.Group):
@@ -158,7 +157,7 @@ def _walk(h5py: Any, file: Any, path: Path) -> list[_Vectors]:  # noqa: ANN401 -
 
 
 def _entries(h5py: Any, group: Any, seen: set[int], name: str) -> Iterator[tuple[str, Any]]:  # noqa: ANN401
-    """Yield groups and datasets of a group by hard links, each object once."""
+    """Yield name and object of the groups and datasets in a group, each object once."""
     for key in group:
         link = group.get(key, getlink=True)
         if isinstance(link, h5py.ExternalLink):
@@ -178,7 +177,7 @@ def _entries(h5py: Any, group: Any, seen: set[int], name: str) -> Iterator[tuple
 
 
 def _attributes(h5py: Any, entry: Any) -> list[tuple[str, object]]:  # noqa: ANN401 - a library
-    """Return the scalar attributes of an object, and any that scale it."""
+    """Return the scalar attributes of an object, and scaling attributes of any shape."""
     attributes: list[tuple[str, object]] = []
     for key in entry.attrs:
         kind = entry.attrs.get_id(key)
@@ -195,7 +194,7 @@ def _is_scalar(h5py: Any, shape: tuple[int, ...] | None, dtype: Any) -> bool:  #
     """Whether a value is one number or text of limited size."""
     is_text = h5py.check_string_dtype(dtype) is not None
     return (
-        shape is not None  # of an empty attribute
+        shape is not None  # an empty attribute has none
         and math.prod(shape) == 1
         and (dtype.kind in "iufSU" or is_text)
         and dtype.itemsize <= MAX_VALUE
@@ -203,17 +202,20 @@ def _is_scalar(h5py: Any, shape: tuple[int, ...] | None, dtype: Any) -> bool:  #
 
 
 def _is_channel(data: Any, name: str, path: Path) -> bool:  # noqa: ANN401 - of a library
-    """Whether a dataset may hold channels; raise InputError where it is external or too large."""
+    """Whether a dataset may hold channels; raise InputError if it is external or too large."""
     if data.dtype.kind not in "iuf" or len(data.shape) not in {1, 2}:
         return False
     if max(data.shape) < MIN_SAMPLES or math.prod(data.shape) // max(data.shape) > MAX_COLUMNS:
         return False
     if data.is_virtual or data.external:
-        refuse(f"{name}: lies in another file", "the other file")
+        refuse(f"{name}: is stored in another file", "the other file")
     size = math.prod(data.shape) * data.dtype.itemsize
     stored = data.id.get_storage_size() * (MAX_RATIO if data.chunks else 1)
     if size > stored or (not data.chunks and size > path.stat().st_size):
-        refuse(f"{name}: claims {size} bytes and stores {stored} at most", "an undamaged HDF5 file")
+        refuse(
+            f"{name}: {size} bytes according to its shape, {stored} stored at most",
+            "an undamaged HDF5 file",
+        )
     if data.chunks and math.prod(data.chunks) * data.dtype.itemsize > MAX_CHUNK:
         refuse(
             f"{name}: chunks of {math.prod(data.chunks) * data.dtype.itemsize / MIB:.0f} MiB",
@@ -223,7 +225,6 @@ def _is_channel(data: Any, name: str, path: Path) -> bool:  # noqa: ANN401 - of 
 
 
 def _channels(path: Path, entry: _Vectors, times: list[_Vectors], before: int) -> list[Channel]:
-    """Return the channels of a dataset."""
     count = math.prod(entry.data.shape) // entry.n_sample
     rate, date = find_rate(entry.header), find_word(entry.header, DATE)
     steps: tuple[str, ...] = ()
@@ -254,7 +255,7 @@ def _channels(path: Path, entry: _Vectors, times: list[_Vectors], before: int) -
 
 
 def _scaling(path: Path, entry: _Vectors, word: str) -> float:
-    """Return the factor or offset of a dataset; raise InputError where it is no finite number."""
+    """Return the factor or offset of a dataset; raise InputError if it is no finite number."""
     title = next((title for title, _ in entry.header if plain(title) == word), "")
     if not title:
         return SCALING[word]
@@ -269,7 +270,7 @@ def _scaling(path: Path, entry: _Vectors, word: str) -> float:
 
 
 def _rate_of_times(path: Path, times: _Vectors) -> tuple[float, tuple[str, ...], str]:
-    """Return the rate of a dataset of times, Hz, notes, and the date of its origin if stated."""
+    """Return sample rate, Hz, notes, and, if stated, the date of time zero, from times."""
     name = f"{shown_path(path)}: {shown_text(times.key)}"
     if times.n_sample > MAX_TIMES:
         refuse(f"{name}: {times.n_sample} times", f"up to {MAX_TIMES}, or an attribute sample_rate")
@@ -278,7 +279,8 @@ def _rate_of_times(path: Path, times: _Vectors) -> tuple[float, tuple[str, ...],
     values = np.asarray(times.data[()], dtype=np.float64).ravel()
     if unit.casefold() not in TIME_UNITS:
         refuse(
-            f"{name}: unit = {shown_text(unit)!r} is no time", ", ".join(filter(None, TIME_UNITS))
+            f"{name}: unit = {shown_text(unit)!r} is not a unit of time",
+            ", ".join(filter(None, TIME_UNITS)),
         )
     _, step, steps = uniform_grid(values * TIME_UNITS[unit.casefold()], name)
     return 1 / step, steps, since

@@ -43,7 +43,6 @@ def read_channels(path: Path) -> list[Channel]:
 
 
 def _require_size(size: int, name: str) -> None:
-    """Raise InputError where variables are too large."""
     if size > MAX_IN_MEMORY:
         refuse(
             f"{name}: the variables unpack to more than {MAX_IN_MEMORY // MIB} MiB",
@@ -52,7 +51,7 @@ def _require_size(size: int, name: str) -> None:
 
 
 def _arrays(key: str, content: object, name: str) -> Iterator[tuple[str, NDArray[np.generic]]]:
-    """Yield names and values of numbers and texts in a variable."""
+    """Yield the numbers and texts in a variable by their names."""
     if isinstance(content, dict):
         for field, value in content.items():
             yield from _arrays(f"{key}/{field}", value, name)
@@ -61,7 +60,7 @@ def _arrays(key: str, content: object, name: str) -> Iterator[tuple[str, NDArray
     if value.dtype == object and any(isinstance(element, dict) for element in value.ravel()):
         refuse(
             f"{name}: {shown_text(key)} is an array of structures, or damaged",
-            "a structure of one element, or vectors as variables of their own",
+            "a single structure, or vectors as separate variables",
         )
     if value.dtype.kind in "iufU":
         yield key, value

@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 MAX_CHANNELS = 1024
 MAX_SEGMENTS = 200_000
-# Mark, flags, version, and lengths of a segment and of its description.
+# Lead-in of a segment: mark, flags, version, length of the segment, length of its metadata.
 LEAD = struct.Struct("<4sIIQQ")
 
 
 class _OpenFile:
-    """A TDMS file that stays open, as its description may be long; another process reopens it."""
+    """A TDMS file that stays open, as its metadata may be long; other processes open it again."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -37,7 +37,7 @@ class _OpenFile:
 
     @cached_property
     def tdms(self) -> Any:  # noqa: ANN401 - of the library
-        """The file of the library; closed with this object."""
+        """File opened by the library; it is closed with this object."""
         file = self.path.open("rb")
         weakref.finalize(self, file.close)
         return _library().TdmsFile.open(file)
@@ -49,9 +49,9 @@ class _OpenFile:
 
 
 def _library() -> Any:  # noqa: ANN401 - a module
-    """Return the library without its warnings, whose reasons are refused here."""
+    """Return the library without its warnings; files that cause them are rejected here."""
     nptdms = library("nptdms", "TDMS")
-    # Each of its modules has a logger with a level of its own.
+    # Each module of the library has a logger with its own level.
     nptdms.log.log_manager.set_level(logging.ERROR)
     return nptdms
 
@@ -73,9 +73,8 @@ def read_channels(path: Path) -> list[Channel]:
 
 
 def _channel(file: _OpenFile, number: int, group: Any, channel: Any) -> Channel:  # noqa: ANN401
-    """Return a channel of a TDMS file."""
     size = file.path.stat().st_size
-    if len(channel) > size:  # a sample has at least a byte
+    if len(channel) > size:  # a sample has one byte or more
         refuse(
             f"{shown_path(file.path)}: {len(channel)} samples in {size} bytes",
             "an undamaged TDMS file",
@@ -94,7 +93,7 @@ def _channel(file: _OpenFile, number: int, group: Any, channel: Any) -> Channel:
 
 
 def _require_complete(file: BinaryIO, name: str) -> None:
-    """Raise InputError where a segment is cut off, which the library only warns of."""
+    """Raise InputError if a segment is cut off; the library only warns."""
     size = os.fstat(file.fileno()).st_size
     begin = 0
     for _ in range(MAX_SEGMENTS):

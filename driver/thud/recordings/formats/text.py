@@ -1,4 +1,4 @@
-"""Tables of numbers of spreadsheets and data loggers."""
+"""Tables of numbers from spreadsheets and data loggers."""
 
 from __future__ import annotations
 
@@ -54,22 +54,22 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 COMMENTS = "#%!*'/;"
-# Maximum lengths of a header in lines, and of a table in numbers.
+# Maximum number of lines in a header, and of numbers in a table.
 MAX_HEADER = 1000
 MAX_NUMBERS = 2**24
-# Lines that are converted at once.
+# Number of lines per conversion.
 BLOCK = 2**14
-# Content of lines that are converted one by one, by their decimal mark.
+# By decimal mark: characters that np.loadtxt cannot read, so that lines are read one by one.
 UNUSUAL = {
     ".": re.compile(rf'["#{GROUPING.strip(" ")}]'),
     ",": re.compile(rf'["#{GROUPING.strip(" ")}.]|,(?!\d)'),
 }
-# A decimal comma, as in 1,05 and -0,5.
+# A comma that must be a decimal mark, as in 1,05 and -0,5.
 DECIMAL_COMMA = re.compile(r"[-+]?\d+,0\d|[-+]0,")
-# Between names and values of a header; lines of titles and units.
+# Separators of name and value in a header, and maximum number of lines of titles and units.
 PAIR = re.compile(r"[:=\t;,]")
 MAX_TITLES = 3
-# Relative tolerance of two statements of the rate.
+# Relative tolerance between the rate in the header and the rate of the times.
 SAME_RATE = 0.01
 ALLOWED = (
     "columns of numbers, separated by commas, semicolons, tabs or blanks (decimal commas with "
@@ -79,9 +79,10 @@ ALLOWED = (
 
 @dataclass
 class _Table:
-    """Lines of a file, sorted into header, titles and numbers.
+    """Layout of a file: header, titles and columns of numbers.
 
-    With `has_commas` its only column has decimal commas.
+    The numbers begin at line `first`, have `width` columns, and `used` are the numeric ones. With
+    `has_commas` the only column has decimal commas.
     """
 
     name: str
@@ -105,7 +106,7 @@ def read_channels(path: Path) -> list[Channel]:
     with path.open("rb") as file:
         mark = file.read(2)
     encoding = "utf-16" if mark in {b"\xff\xfe", b"\xfe\xff"} else "utf-8-sig"
-    # A header may be in another encoding than UTF-8.
+    # A header may have an encoding other than UTF-8.
     with path.open(encoding=encoding, errors="replace") as text:
         table = _Table(shown_path(path))
         _read_header(read_lines(text, table.name, ALLOWED), table)
@@ -120,12 +121,11 @@ def read_channels(path: Path) -> list[Channel]:
 
 
 def _lines_of_numbers(text: TextIO, table: _Table) -> Iterator[str]:
-    """Return the lines of a text below its header."""
     return itertools.islice(read_lines(text, table.name, ALLOWED), table.first - 1, None)
 
 
 def _rows(lines: Iterator[str], table: _Table) -> Iterator[tuple[int, list[str], bool]]:
-    """Yield number, numeric cells and quotation of the lines that may show the decimal mark."""
+    """Yield number, numeric cells and use of quotes of lines that may show the decimal mark."""
     for number, line in enumerate(lines, table.first):
         if "." in line or "," in line:
             cells = table.cells(line)
@@ -133,16 +133,16 @@ def _rows(lines: Iterator[str], table: _Table) -> Iterator[tuple[int, list[str],
 
 
 def _require_separators(lines: Iterator[str], table: _Table) -> None:
-    """Raise InputError where commas may be separators or decimal marks."""
+    """Raise InputError if commas may be separators or decimal marks."""
     if table.has_commas:
-        # Whole numbers are not written as 05 or -0.
+        # As separate numbers, 05 and -0 would be unusual.
         texts = filter(None, map(strip_comment, lines))
         if any("," not in text or DECIMAL_COMMA.match(text) for text in texts):
             return
     elif table.separator != "," or table.decimal.line or any(map(any, table.titles)):
         return
     else:
-        # A cell that begins with a sign is no decimal fraction.
+        # A cell with a sign is not the fraction of the number before it.
         signed = {0}
         for line in lines:
             if '"' in line or "." in line:
@@ -157,14 +157,14 @@ def _require_separators(lines: Iterator[str], table: _Table) -> None:
 
 
 def _read_header(lines: Iterator[str], table: _Table) -> None:
-    """Sort the lines above the numbers into a table; find its separator and used columns."""
+    """Find the separator and the numeric columns, and read the header and the titles."""
     above: list[str] = []
     for line in itertools.islice(lines, MAX_HEADER):
         text = strip_comment(line)
         table.separator = find_separator(text)
         cells = table.cells(line)
         used = [i for i, cell in enumerate(cells) if is_number(cell)]
-        # Other columns may hold words, such as a state.
+        # Further columns may hold words, such as a state.
         if used[:1] == [0] and len(used) > len(cells) / 2:
             table.first, table.width, table.used = len(above) + 1, len(cells), used
             _sort_header(above, table)
@@ -179,7 +179,7 @@ def _read_header(lines: Iterator[str], table: _Table) -> None:
 
 
 def _require_rows(above: list[str], table: _Table) -> None:
-    """Raise InputError where a line above the numbers looks like an unreadable row."""
+    """Raise InputError if a line above the numbers looks like an unreadable row."""
     for number, line in enumerate(above, 1):
         cells = table.cells(line)
         if line.lstrip()[:1] in COMMENTS or len(cells) != table.width:
@@ -191,7 +191,7 @@ def _require_rows(above: list[str], table: _Table) -> None:
 
 
 def _is_one_column(text: str, table: _Table) -> bool:
-    """Whether a comma is no separator: there is a rate, no time, and no title for each side."""
+    """Whether commas are decimal marks: with a rate, no title, and one number in the line."""
     return is_number(text) and not table.titles and find_rate(table.header) is not None
 
 
@@ -211,20 +211,20 @@ def _sort_header(above: list[str], table: _Table) -> None:
         if len(pair) == 1:
             pair = text.rsplit(maxsplit=1)
         if len(pair) == 2:  # noqa: PLR2004 - name and value
-            # The first value of several channels.
+            # Of values for several channels, the first is used.
             table.header.append((pair[0], re.split(r"[\t;]", pair[1].strip(" :=\t;,"))[0]))
 
 
 def _read_numbers(lines: Iterator[str], table: _Table) -> dict[int, NDArray[np.float64]]:
-    """Return the columns of numbers by their index, without columns of words."""
+    """Return the columns of numbers by their index in the table."""
     if table.width > MAX_COLUMNS:
         refuse(f"{table.name}: {table.width} columns", f"up to {MAX_COLUMNS}")
     blocks: list[NDArray[np.float64]] = []
     number, count = table.first, 0
-    words = sorted({*range(table.width)} - {*table.used})
+    word_columns = sorted({*range(table.width)} - {*table.used})
     while block := list(itertools.islice(lines, BLOCK)):
-        if words:
-            _require_words(block, number, words, table)
+        if word_columns:
+            _require_words(block, number, word_columns, table)
         values = _convert(block, table)
         if values is None:
             values = _convert_each(block, number, table)
@@ -238,21 +238,20 @@ def _read_numbers(lines: Iterator[str], table: _Table) -> dict[int, NDArray[np.f
     return {i: np.concatenate([block[:, k] for block in blocks]) for k, i in enumerate(table.used)}
 
 
-def _require_words(block: list[str], first: int, words: list[int], table: _Table) -> None:
-    """Raise InputError where a column of words has a number."""
+def _require_words(block: list[str], first: int, word_columns: list[int], table: _Table) -> None:
     for number, line in enumerate(block, first):
         cells = table.cells(line)
-        column = next((i for i in words if i < len(cells) and is_number(cells[i])), None)
+        column = next((i for i in word_columns if i < len(cells) and is_number(cells[i])), None)
         if column is not None:
             refuse(
-                f"{table.name}: line {number}: column {column + 1} has the number "
-                f"{shown_text(cells[column])} and none in line {table.first}",
+                f"{table.name}: line {number}: column {column + 1} has a number, "
+                f"{shown_text(cells[column])}, but none in line {table.first}",
                 "columns of numbers or of words",
             )
 
 
 def _convert(block: list[str], table: _Table) -> NDArray[np.float64] | None:
-    """Return the numbers of some lines; None if a line is empty, unusual or wrong."""
+    """Return the numbers of a block of lines; None if a line is empty, unusual or wrong."""
     separator, decimal = table.separator, table.decimal.mark
     joined = "\n".join(block)
     if separator is None:
@@ -272,7 +271,7 @@ def _convert(block: list[str], table: _Table) -> NDArray[np.float64] | None:
 
 
 def _convert_each(block: list[str], first: int, table: _Table) -> NDArray[np.float64]:
-    """Return the numbers of some lines, read one by one; raise InputError where one is wrong."""
+    """Return the numbers of a block, line by line; raise InputError if a line is wrong."""
     rows = []
     for number, line in enumerate(block, first):
         if not strip_comment(line):
@@ -284,14 +283,13 @@ def _convert_each(block: list[str], first: int, table: _Table) -> NDArray[np.flo
             wrong = table.decimal.explain(shown_text(used[row.index(None)]))
             refuse(f"{table.name}: line {number}: {wrong}", ALLOWED)
         if len(cells) != table.width:
-            count = f"{len(cells)} columns, {table.width} above it"
+            count = f"{len(cells)} columns, {table.width} in the lines above"
             refuse(f"{table.name}: line {number}: {count}", ALLOWED)
         rows.append(row)
     return np.array(rows, dtype=np.float64).reshape(len(rows), len(table.used))
 
 
 def _channels(table: _Table, values: dict[int, NDArray[np.float64]]) -> list[Channel]:
-    """Return the columns of a table except the times."""
     numeric = list(values)
     rows = len(values[numeric[0]])
     if rows < MIN_SAMPLES:
@@ -335,12 +333,10 @@ def _are_times(column: NDArray[np.float64]) -> bool:
 
 
 def _is_time_unit(unit: str) -> bool:
-    """Whether a unit is a unit of time."""
     return bool(unit) and unit.casefold() in TIME_UNITS and not find_unit(unit)
 
 
 def _titles(table: _Table, width: int) -> tuple[list[str], list[str]]:
-    """Return the titles of the columns and their units."""
     titles, units = [""] * width, [""] * width
     for cells in table.titles:
         pairs = [split_title(cell) for cell in cells]

@@ -17,7 +17,7 @@ from thud.recordings.uniform_grid import uniform_grid
 if TYPE_CHECKING:
     from pathlib import Path
 
-# Maximum size in bytes: the library holds the text and a list of its numbers.
+# Maximum size, bytes: the library keeps the text and a list of its numbers in memory.
 MAX_SIZE = 2**25
 MAX_SETS = 1024
 TIME_RESPONSE = 1
@@ -41,18 +41,16 @@ def read_channels(path: Path) -> list[Channel]:
 
 
 def _is_history(data_set: dict[str, Any]) -> bool:
-    """Whether a data set is a real time history."""
     return data_set.get("func_type") == TIME_RESPONSE and data_set.get("ord_data_type") in REAL
 
 
 def _channel(path: Path, number: int, data_set: dict[str, Any]) -> Channel:
-    """Return the channel of a data set."""
     name = f"{shown_path(path)}: data set {number}"
     data = np.asarray(data_set["data"], dtype=np.float64)
     expected = int(data_set["num_pts"])
-    # Binary sets may end with a line feed.
+    # A final line feed may add a value to binary data sets.
     if data.size < expected or expected < 1:
-        refuse(f"{name}: {data.size} samples, {expected} are due", "a complete file")
+        refuse(f"{name}: {data.size} samples, {expected} expected", "a complete file")
     scale = TIME_UNITS.get(data_set["abscissa_axis_units_lab"].casefold(), 1.0)
     steps: tuple[str, ...] = ()
     if data_set["abscissa_spacing"] == 1:
@@ -64,7 +62,7 @@ def _channel(path: Path, number: int, data_set: dict[str, Any]) -> Channel:
     unit = data_set["ordinate_axis_units_lab"].strip()
     if unit.upper() in NONE and data_set["ordinate_spec_data_type"] in FORCES:
         unit = "N"
-        steps += ("The data set states no unit; as a force it is read in N.",)
+        steps += ("The data set states no unit; its quantity is a force, read in N.",)
     label = data_set["ordinate_axis_lab"].strip()
     return Channel(
         name=data_set["id1"].strip() if label.upper() in NONE else label,
