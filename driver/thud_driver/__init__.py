@@ -99,7 +99,7 @@ class _Interrupt:
 
 
 def _open_streams() -> None:
-    """Open closed standard descriptors, so that no file gets their numbers, and wrap the streams."""
+    """Open closed standard descriptors, so that no file gets their number; wrap the streams."""
     for number in range(3):
         try:
             os.fstat(number)
