@@ -1,7 +1,7 @@
-"""The process of ``thud-driver``: its signals and its standard streams.
+"""Signals and standard streams of the process ``thud-driver``.
 
-Imports only small modules of the standard library, so that interrupts and closed outputs have their
-message from the start, also while the other modules are imported.
+This module imports only small modules of the standard library, so that interrupts and closed
+outputs are handled even while the other modules are imported.
 """
 
 from __future__ import annotations
@@ -21,17 +21,18 @@ if TYPE_CHECKING:
     from types import FrameType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-# Errors of an output that nobody reads: its pipe or its descriptor is closed.
+# Errors of an output whose pipe or descriptor is closed.
 _CLOSED = frozenset({errno.EPIPE, errno.EBADF})
-# Time in which a signal repeats the first, s: some callers signal both the process and its group.
-_COPIES = 1.0
+# Time during which a second signal counts as a copy of the first, s: some callers signal both the
+# process and its group.
+_COPY_TIME = 1.0
 
 
 def main() -> int:
     """Run the command line of this process; return the exit code."""
     _handle(_end)
     _open_streams()
-    # Figures are written to files, whatever else is set.
+    # Figures are written to files, even if the environment states another backend.
     os.environ["MPLBACKEND"] = "agg"
     try:
         from thud.cli import main as run
@@ -40,7 +41,7 @@ def main() -> int:
         sys.stderr.write(f"thud-driver: a library cannot be loaded ({reason})\n")
         return 1
 
-    # Coroutines that an interrupt ends would warn that they were never awaited.
+    # After an interrupt, coroutines would warn that they were never awaited.
     warnings.filterwarnings("ignore", "coroutine ")
     interrupt = _Interrupt()
     sys.unraisablehook = interrupt.show_lost
@@ -53,14 +54,14 @@ def main() -> int:
             raise
         code = _report_interrupt(interrupt.number)
     if interrupt.number and code != 128 + interrupt.number:
-        # The interrupt became an error of a figure, which was left out.
+        # The interrupt became an error of a figure, which only raised a warning.
         code = _report_interrupt(interrupt.number)
     _handle(signal.SIG_IGN)
     return code
 
 
 def _handle(handler: Any) -> None:  # noqa: ANN401 - as `signal.signal` takes it
-    """Handle the signals that end the process, except those that it was started to ignore."""
+    """Set the handler of the signals that end the process, except ignored signals."""
     for number in SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, handler)
@@ -88,7 +89,7 @@ class _Interrupt:
         if not self.number:
             self.number, self.time = number, time.monotonic()
             raise KeyboardInterrupt(number)
-        if time.monotonic() > self.time + _COPIES:
+        if time.monotonic() > self.time + _COPY_TIME:
             _end(number, frame)
 
     def show_lost(self, lost: sys.UnraisableHookArgs) -> None:
@@ -113,7 +114,7 @@ def _open_streams() -> None:
 
 
 class _Stream:
-    """Standard output or error that drops text which it cannot write for one of some reasons."""
+    """Standard stream that discards text if writing fails with one of some error numbers."""
 
     def __init__(self, stream: TextIO, reasons: frozenset[int]) -> None:
         self._stream = stream

@@ -311,7 +311,7 @@ def requests_of(client: TestClient) -> list[tuple[str, str, str]]:
     for route in client.app.routes:  # type: ignore[attr-defined]
         address = OPEN.get(route.path, re.sub(r"\{.*?\}", "case.nml", route.path))
         found += [(route.path, method, address) for method in route.methods]
-    assert {"/about", "/solve", "/measure", "/download/{what}"} < {path for path, *_ in found}
+    assert {"/about", "/solve", "/measure", "/download/{name}"} < {path for path, *_ in found}
     return found
 
 

@@ -75,7 +75,7 @@ async def reports_of(jobs: Jobs) -> list[dict[str, Any]]:
 
 
 def test_process_that_stops_while_it_sends_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_do_tasks", send_half)
+    monkeypatch.setattr(module, "_run_tasks", send_half)
     last = anyio.run(reports_of, Jobs(1, 0.5))[-1]
     assert list(last) == ["error"]
     assert "0.5 s" in last["error"]

@@ -178,12 +178,12 @@ def test_two_users_do_not_meet(browser: Browser, server: Served) -> None:
 def test_floor_and_room_are_shown(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
     page.locator("#has_room").check()
-    sync_api.expect(page.locator("#room_words")).to_contain_text("standardized")
+    sync_api.expect(page.locator("#room_text")).to_contain_text("standardized")
     page.locator("#floor").select_option("joist_floor")
     sync_api.expect(page.locator("#floor_title")).to_contain_text("joist floor")
-    sync_api.expect(page.locator("#floor_words")).to_contain_text("energy into the floor 2.7")
+    sync_api.expect(page.locator("#floor_text")).to_contain_text("energy into the floor 2.7")
     page.locator("#pin").click()
-    sync_api.expect(page.locator("#ball_words")).to_contain_text("magnified")
+    sync_api.expect(page.locator("#ball_text")).to_contain_text("magnified")
     page.locator("#floor").select_option("")
     sync_api.expect(page.locator("#variants li")).to_have_text(
         [
@@ -229,7 +229,7 @@ def test_link_without_a_case_is_said(browser: Browser, server: Served, case: str
     page = new_page(browser, server[0])
     page.goto("about:blank")
     page.goto(f"{server[0].partition('#')[0]}#case={quote(case)}")
-    sync_api.expect(page.locator("#message")).to_contain_text("the link holds no case")
+    sync_api.expect(page.locator("#message")).to_contain_text("the link does not contain a case")
     sync_api.expect(page.locator("#verdict")).to_contain_text("Hollow sphere does not conform")
 
 
@@ -278,7 +278,7 @@ def test_page_is_accessible(
     page = new_page(browser, server[0], width, scheme)
     page.locator("#pin").click()
     page.locator("#has_room").check()
-    sync_api.expect(page.locator("#room_words")).to_contain_text("standardized")
+    sync_api.expect(page.locator("#room_text")).to_contain_text("standardized")
     page.screenshot(path=tmp_path / "page.png", full_page=True)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     found = axe.Axe().run(page).response["violations"]

@@ -372,7 +372,7 @@ def test_number_of_poles_has_the_least_information_criterion(
     monkeypatch.setattr(mobility_fit, "_fit", fit)
     for n_line in (20, 25, 40, 100, 400):
         tried.clear()
-        found = mobility_fit._chosen("a", np.arange(1.0, n_line + 1), np.ones(n_line, complex))  # noqa: SLF001
+        found = mobility_fit._best_fit("a", np.arange(1.0, n_line + 1), np.ones(n_line, complex))  # noqa: SLF001
         count = 2 * n_line
         criteria = {
             k: count * np.log(errors.get(k, 0.0799) ** 2) + (2 * k + 1) * np.log(count)
@@ -396,12 +396,12 @@ def test_exact_fit_ends_the_choice(monkeypatch: pytest.MonkeyPatch) -> None:
         return SimpleNamespace(order=order, error=1e-8 if order == 4 else 1.1e-8)
 
     monkeypatch.setattr(mobility_fit, "_fit", fit)
-    found = mobility_fit._chosen("a", np.arange(1.0, 401), np.ones(400, complex))  # noqa: SLF001
+    found = mobility_fit._best_fit("a", np.arange(1.0, 401), np.ones(400, complex))  # noqa: SLF001
     assert tried == [2, 4]
     assert found.order == 4  # type: ignore[attr-defined]
     # Few lines have few poles, and one at least.
     tried.clear()
-    assert mobility_fit._chosen("a", np.arange(1.0, 3), np.ones(2, complex)).order == 1  # type: ignore[attr-defined]  # noqa: SLF001
+    assert mobility_fit._best_fit("a", np.arange(1.0, 3), np.ones(2, complex)).order == 1  # type: ignore[attr-defined]  # noqa: SLF001
 
 
 def test_line_at_0_hz_is_left_out_and_two_are_enough(exact: thud.MobilityFit) -> None:

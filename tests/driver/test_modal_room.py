@@ -272,7 +272,7 @@ def test_each_mode_of_the_room_decays_as_the_nearest_third(found: thud.ModalRoom
     # Between 63 and 80 Hz the border is their geometric mean.
     asked = np.array([0.0, 20.0, 50.0, 70.9, 71.1, 400.0, 2000.0])
     expected = times[[0, 0, 0, 1, 2, 9, 11]]
-    assert module._times(prediction, asked).tolist() == expected.tolist()  # noqa: SLF001
+    assert module._reverberation_times(prediction, asked).tolist() == expected.tolist()  # noqa: SLF001
 
 
 def test_numbers_of_all_positions_are_shown(found: thud.ModalRoom) -> None:

@@ -1,4 +1,4 @@
-"""Results of a case or of a recording for the page, as plain data."""
+"""Results of a case or a recording for the page, as data for JSON."""
 
 from __future__ import annotations
 
@@ -36,25 +36,25 @@ if TYPE_CHECKING:
 
     Answer = dict[str, Any]
 
-# Points of a curve on the page, and instants of an animation.
+# Maximum number of points of a curve on the page, and of instants of an animation.
 MAX_POINTS = 400
 MAX_INSTANTS = 60
 # Time between instants of finite elements, s.
 SNAPSHOT_INTERVAL = 1e-3
 # Maximum number of samples of a record.
 MAX_SAMPLES = 200_000
-# Maximum estimated time of a case that is computed while a slider moves, s.
-QUICK = 0.1
-# End of the displayed time, in contact times.
-MARGIN = 1.05
+# Maximum estimated duration of a computation while a slider moves, s.
+MAX_QUICK_TIME = 0.1
+# Length of the displayed time range divided by the contact time.
+TIME_RANGE = 1.05
 # Significant digits of curves.
 DIGITS = 6
 
 
 def new_case(values: Mapping[str, Mapping[str, object]]) -> Case:
-    """Return the case of groups of values, as the page has them.
+    """Return the case of values by group and key from the page.
 
-    Raise InputError, or TypeError and ValueError where values are of other types.
+    Raise InputError if a value is not allowed, or TypeError or ValueError if its type is wrong.
     """
     case = tables_case(values)
     samples = case.sampling.sample_rate * case.sampling.duration
@@ -64,22 +64,22 @@ def new_case(values: Mapping[str, Mapping[str, object]]) -> Case:
 
 
 def answer_quickly(case: Case) -> Answer | None:
-    """Return the answer of a case that is quick enough to compute while a slider moves, or None.
+    """Return the answer of a case, or None if it takes too long while a slider moves.
 
-    Raise InputError if it is invalid.
+    Raise InputError if the case is invalid.
     """
-    return answer_case(case) if get_cost(case, ()) <= QUICK else None
+    return answer_case(case) if get_cost(case, ()) <= MAX_QUICK_TIME else None
 
 
 def answer_case(case: Case) -> Answer:
-    """Return force, levels, verdict, warnings and, if the case has them, motion, floor and room."""
+    """Return force, levels, verdict and warnings, and motion, floor and room if they exist."""
     start = time.perf_counter()
     if isinstance(case.model, FiniteElement):
         case = replace(case, model=replace(case.model, snapshot_interval=SNAPSHOT_INTERVAL))
     impact = compute(case)
     force = case.levels.force
     answer = _answer(impact, *contact_force(impact, force))
-    answer["force"]["words"] = FORCE_NAMES[force]
+    answer["force"]["title"] = FORCE_NAMES[force]
     answer["warnings"] += impact.warnings
     on_floor = impact.on_floor
     answer["motion"] = _motion(on_floor or impact)
@@ -93,25 +93,26 @@ def answer_case(case: Case) -> Answer:
 
 
 def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answer:
-    """Return the answer of a recording, from the path of a copy and the name of the original.
+    """Return the answer of a recording.
 
-    The settings are arguments of `read_recording`.
+    `path` is a copy of the file, `name` the name of the original file, and `settings` are keyword
+    arguments of `read_recording`.
     """
     start = time.perf_counter()
     try:
         recording = read_recording(path, **settings)
         drop = recording.drop_force()
         times, force = drop.time, drop.force
-        contact = (times >= 0) & (times <= MARGIN * recording.contact_time)
+        contact = (times >= 0) & (times <= TIME_RANGE * recording.contact_time)
         curve = 1e3 * times[contact], 1e-3 * force[contact]
         answer = _answer(recording, *curve)
     except ThudError as error:
-        # The user knows the original, not the copy.
+        # The message names the original file instead of the copy.
         raise type(error)(str(error).replace(path, shown(name))) from error
     answer["seconds"] = time.perf_counter() - start
     answer["drops"] = len(recording.drops)
     copy = Path(path).name
-    # The page shows the name of the recording beside its warnings.
+    # The page shows the name of the recording next to its warnings.
     answer["warnings"] += [
         warning.removeprefix(f"{copy}: ").replace(copy, name) for warning in recording.warnings
     ]
@@ -119,7 +120,7 @@ def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answe
 
 
 def _answer(source: ImpactResult, times: NDArray[np.float64], force: NDArray[np.float64]) -> Answer:
-    """Return the common entries of answers; times in ms, the force in kN."""
+    """Return the entries that all answers have; times are in ms, and `force` is in kN."""
     verdict = source.assess()
     return {
         "force": _curve(times, 1e3 * force),
@@ -136,7 +137,7 @@ def _answer(source: ImpactResult, times: NDArray[np.float64], force: NDArray[np.
 
 
 def _numbers(source: ImpactResult) -> list[list[Any]]:
-    """Return title, value and unit of the known quantities, and the peak of the assessed force."""
+    """Return title, value and unit of known quantities, with the peak of the assessed force."""
     other = "peak_force" if source.assessed_force() == "elastic" else "peak_elastic_force"
     rows: list[list[Any]] = []
     for name in SAMPLE_QUANTITIES:
@@ -147,7 +148,7 @@ def _numbers(source: ImpactResult) -> list[list[Any]]:
 
 
 def _criterion(criterion: Criterion) -> Answer:
-    """Return a criterion; times are in ms, as on the screen."""
+    """Return a criterion for the page; times are in ms."""
     scale, unit = (1e3, "ms") if criterion.unit == "s" else (1.0, criterion.unit)
     name, band = criterion.name.rpartition("octave_")[1:]
     expanded = scale * criterion.estimate.expanded
@@ -164,27 +165,28 @@ def _criterion(criterion: Criterion) -> Answer:
 
 
 def _motion(impact: Impact) -> Answer | None:
-    """Return the surfaces of the ball over the floor, and the floor, against time, mm and ms.
+    """Return the surfaces of the ball relative to the floor, and the floor, mm, at times, ms.
 
-    None for models without a shape. The shell of the paper is a sphere flattened by its deflection.
+    None for models without a shape. The shape of the shell model is a sphere that is flattened by
+    its deflection.
     """
-    until = impact.touch_time + MARGIN * impact.contact_time
+    end = impact.touch_time + TIME_RANGE * impact.contact_time
     motion = impact.motion
     if motion is None and "shell_force" not in impact.components:
         return None
     times = impact.time if motion is None else motion.time
-    chosen = _thin_out(np.flatnonzero(times <= until), MAX_INSTANTS)
+    chosen = _thin_out(np.flatnonzero(times <= end), MAX_INSTANTS)
     answer: Answer = {"time": _to_json(1e3 * (times[chosen] - impact.touch_time))}
     if motion is not None:
         depth = motion.floor_displacement[chosen]
-        over = motion.position[chosen] + np.stack([0 * depth, depth], -1)[:, None, None]
+        relative = motion.position[chosen] + np.stack([0 * depth, depth], -1)[:, None, None]
         answer["outer"], answer["inner"] = (
             [[[round(float(x), 2) for x in point] for point in line] for line in 1e3 * surface]
-            for surface in (over[:, :, -1], over[:, :, 0])
+            for surface in (relative[:, :, -1], relative[:, :, 0])
         )
     else:
-        moving = impact.floor_displacement if isinstance(impact, FloorImpact) else 0 * impact.time
-        depth = moving[chosen]
+        floor = impact.floor_displacement if isinstance(impact, FloorImpact) else 0 * impact.time
+        depth = floor[chosen]
         ball = impact.case.ball
         answer["deflection"] = _to_json(1e3 * impact.deflection[chosen])
         answer |= {"radius": 1e3 * ball.outer_radius, "wall": 1e3 * ball.wall_thickness}
@@ -192,27 +194,27 @@ def _motion(impact: Impact) -> Answer | None:
     return answer
 
 
-def _floor(impact: Impact, moving: FloorImpact) -> Answer:
-    """Return force and velocity on a mobile floor, and the change in octaves."""
-    shown = np.flatnonzero(moving.time <= moving.touch_time + 2 * moving.contact_time)
-    times = 1e3 * (moving.time - moving.touch_time)
-    contact = contact_force(moving, "floor")
-    head, *rows = moving.rows()
+def _floor(impact: Impact, on_floor: FloorImpact) -> Answer:
+    """Return force and velocity of a mobile floor, its quantities, and a table of octaves."""
+    shown = np.flatnonzero(on_floor.time <= on_floor.touch_time + 2 * on_floor.contact_time)
+    times = 1e3 * (on_floor.time - on_floor.touch_time)
+    contact = contact_force(on_floor, "floor")
+    header, *rows = on_floor.rows()
     return {
-        "name": humanize(moving.floor.name),
+        "name": humanize(on_floor.floor.name),
         "force": _curve(contact[0], 1e3 * contact[1]),
-        "velocity": _curve(times[shown], 1e3 * moving.floor_velocity[shown]),
+        "velocity": _curve(times[shown], 1e3 * on_floor.floor_velocity[shown]),
         "numbers": [
             [
                 "peak force relative to rigid floor",
-                20 * np.log10(moving.peak_force / impact.peak_force),
+                20 * np.log10(on_floor.peak_force / impact.peak_force),
                 "dB",
             ],
-            ["restitution", moving.restitution, ""],
-            ["maximum displacement", 1e3 * moving.floor_displacement.max(), "mm"],
-            ["energy into the floor", moving.floor_work, "J"],
+            ["restitution", on_floor.restitution, ""],
+            ["maximum displacement", 1e3 * on_floor.floor_displacement.max(), "mm"],
+            ["energy into the floor", on_floor.floor_work, "J"],
         ],
-        "head": head,
+        "header": header,
         "rows": rows,
     }
 
@@ -230,18 +232,18 @@ def _room(impact: Impact) -> Answer:
 
 
 def _curve(times: NDArray[np.float64], values: NDArray[np.float64]) -> Answer:
-    """Return at most `MAX_POINTS` points of a curve."""
+    """Return a curve of at most `MAX_POINTS` points."""
     chosen = _thin_out(np.arange(len(times)), MAX_POINTS)
     return {"time": _to_json(times[chosen]), "value": _to_json(values[chosen])}
 
 
 def _thin_out(indices: NDArray[np.intp], count: int) -> NDArray[np.intp]:
-    """Return at most `count` of the indices, evenly spaced, with the first and the last."""
+    """Return at most `count` of the indices, evenly spaced, including the first and the last."""
     chosen = np.linspace(0, len(indices) - 1, min(len(indices), count)).astype(int)
     result: NDArray[np.intp] = indices[np.unique(chosen)]
     return result
 
 
 def _to_json(values: Iterable[float]) -> list[float | None]:
-    """Return numbers for JSON, which has no NaN and no infinity."""
+    """Return numbers for JSON, with None for NaN and infinity."""
     return [float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None for value in values]

@@ -1,4 +1,4 @@
-"""The connections of the server: their number, their time limits, and what is logged."""
+"""Connections of the server: their maximum number, time limits and log."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 
     from starlette.applications import Starlette
 
-# Time limit to send the head of the next request, and to read on in an answer, s.
+# Time limit for receiving the head of a request, and for a client to continue reading an answer, s.
 HEAD_TIME = 10
-# Messages of one kind are logged once in this time, s.
+# Minimum time between two logged messages of the same kind, s.
 LOG_INTERVAL = 60.0
 
 
-# Maximum number of connections at a time: as many again may be open before the surplus is closed,
-# and tasks open files, too.
+# Maximum number of connections, a quarter of the allowed open files: until surplus connections are
+# closed there may be twice as many, and tasks also open files.
 _FILES, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
 MAX_CONNECTIONS = 500 if _FILES == resource.RLIM_INFINITY else min(500, _FILES // 4)
 
@@ -37,7 +37,7 @@ MAX_CONNECTIONS = 500 if _FILES == resource.RLIM_INFINITY else min(500, _FILES /
 def run_server(application: Starlette, listener: socket.socket, folder: Path) -> None:
     """Serve an application on a listening socket until a signal.
 
-    A second signal ends the process; the folder of temporary files is removed then.
+    A second signal ends the process immediately and removes the folder of temporary files.
     """
     config = Config(
         application,
@@ -54,7 +54,7 @@ def run_server(application: Starlette, listener: socket.socket, folder: Path) ->
 
 
 class _Server(Server):
-    """A server that a second signal ends at once."""
+    """Server that a second signal ends immediately."""
 
     def __init__(self, config: Config, folder: Path) -> None:
         super().__init__(config)
@@ -71,23 +71,23 @@ class _Server(Server):
 
 
 class _Connection(H11Protocol):
-    """A connection with time limits for the head of each request and for reading each answer.
+    """Connection with time limits for the head of each request and for reading each answer.
 
-    If there are too many, the one that has been idle the longest is closed.
+    If there are too many connections, the longest idle connection is closed.
     """
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
-        # The base class does so after an answer only.
+        # The base class starts this timer only after an answer.
         self.timeout_keep_alive_task = self.loop.call_later(
             HEAD_TIME, self.timeout_keep_alive_handler
         )
         if len(self.connections) > MAX_CONNECTIONS:
             waiting = {
-                connection: end.when()
+                connection: timer.when()
                 for connection in self.connections
                 if isinstance(connection, _Connection)
-                and (end := connection.timeout_keep_alive_task)
+                and (timer := connection.timeout_keep_alive_task)
             }
             oldest = min(waiting, key=lambda connection: waiting[connection])
             self.connections.discard(oldest)
@@ -102,17 +102,17 @@ class _Connection(H11Protocol):
         self._unread.cancel()
 
     def data_received(self, data: bytes) -> None:
-        # The base class gives up the end of the wait at the first byte of a head.
-        end, self.timeout_keep_alive_task = self.timeout_keep_alive_task, None
+        # The base class would cancel the timer at the first byte of a head.
+        timer, self.timeout_keep_alive_task = self.timeout_keep_alive_task, None
         super().data_received(data)
-        if end and (self.cycle is None or self.cycle.response_complete):
-            self.timeout_keep_alive_task = end
-        elif end:
-            end.cancel()
+        if timer and (self.cycle is None or self.cycle.response_complete):
+            self.timeout_keep_alive_task = timer
+        elif timer:
+            timer.cancel()
 
 
 class _Throttle(logging.Filter):
-    """Filter that passes messages of one kind once in a while, and none of cancelled tasks."""
+    """Filter that passes a message of each kind per interval, and none of cancelled tasks."""
 
     def __init__(self) -> None:
         super().__init__()

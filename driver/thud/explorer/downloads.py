@@ -1,4 +1,4 @@
-"""Files to download from the page: case, force, report, and a study of the moved sliders."""
+"""Files to download from the page: case, force, report, and a study of changed keys."""
 
 from __future__ import annotations
 
@@ -23,10 +23,11 @@ if TYPE_CHECKING:
 
     Values = dict[str, dict[str, Any]]
 
-# Points of a grid along each of up to two parameters, and samples of a design with more.
+# Number of values of each parameter in a grid of up to two parameters, and number of samples of a
+# study with more parameters.
 POINTS = 11
 SAMPLES = 256
-# Group of a request for the ranges over which sliders were moved, by group.key.
+# Group of a request with the ranges in which sliders were moved, by group.key.
 MOVED = "moved"
 
 
@@ -38,7 +39,7 @@ def namelist(values: Values) -> bytes:
 
 
 def force(values: Values) -> bytes:
-    """Return time and force as comma-separated values."""
+    """Return time and assessed force as comma-separated values."""
     impact = compute(new_case(values))
     table = io.StringIO()
     np.savetxt(
@@ -53,7 +54,7 @@ def force(values: Values) -> bytes:
 
 
 def report(values: Values) -> bytes:
-    """Return the comparison page of the case alone."""
+    """Return the comparison page of this case only."""
     impact = compute(new_case(values))
     comparison = compare({impact.case.name: impact})
     source = impact.case.limits.source
@@ -62,7 +63,7 @@ def report(values: Values) -> bytes:
 
 def study(values: Values) -> bytes:
     """Return the file of a sweep over the ranges in which sliders were moved."""
-    moved = _moves(values.pop(MOVED, {}))
+    moved = _moved_ranges(values.pop(MOVED, {}))
     case = new_case(values)
     check_case(case)
     names = {f"{key.group}.{key.name}": name for name, key in known_keys(key_owners(case)).items()}
@@ -74,7 +75,7 @@ def study(values: Values) -> bytes:
         if group in values:
             stated = [f"{key} = {_toml(keys[key])}" for key in keys if key in values[group]]
             lines += ["", f"[case.{group}]", *stated]
-    grid = len(ranges) <= 2  # noqa: PLR2004 - more would be many samples
+    grid = len(ranges) <= 2  # noqa: PLR2004 - a grid of more parameters has too many samples
     lines += ["", "[design]"]
     lines += ['kind = "grid"'] if grid else ['kind = "sobol"', f"size = {SAMPLES}", "seed = 1"]
     lines += ["", "[parameters]"]
@@ -86,13 +87,13 @@ def study(values: Values) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
-def _moves(moved: object) -> dict[str, tuple[float, float]]:
-    """Return the minimum and maximum of each key that was moved."""
+def _moved_ranges(moved: object) -> dict[str, tuple[float, float]]:
+    """Return the minimum and maximum of each key whose slider was moved."""
     if not isinstance(moved, dict):
-        refuse(f"{MOVED} = {shown(moved)} holds no keys", "the ends of the moves by group.key")
+        refuse(f"{MOVED} = {shown(moved)} is not a table", "minimum and maximum by group.key")
     for key, ends in moved.items():
         if not isinstance(ends, list) or len(ends) != 2:  # noqa: PLR2004
-            refuse(f"{MOVED}: {key} = {shown(ends)} is no pair", "two numbers")
+            refuse(f"{MOVED}: {key} = {shown(ends)} is not a pair", "two numbers")
         for end in ends:
             require_number(f"{MOVED}: {key}", end)
     return {key: (float(min(ends)), float(max(ends))) for key, ends in moved.items()}
@@ -104,7 +105,7 @@ def _count(key: Key, low: float, high: float) -> int:
 
 
 def _toml(value: object) -> str:
-    """Return a value of a key in TOML."""
+    """Return the text of a value in TOML."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
@@ -112,7 +113,7 @@ def _toml(value: object) -> str:
     return repr(value)
 
 
-# Function that makes the file, and its media type, by the name of the request.
+# Function that returns the content, and media type, by the name of the file.
 DOWNLOADS: dict[str, tuple[Callable[[Values], bytes], str]] = {
     "case.nml": (namelist, "text/plain"),
     "force.csv": (force, "text/csv"),

@@ -17,29 +17,30 @@ if TYPE_CHECKING:
 
     from thud.base.key import Group, Key
 
-# A logarithmic slider spans its initial value divided and multiplied by this.
-SPAN = 3.0
-# A linear slider spans the allowed range if that is positive and up to this long, and the initial
-# value lies above this fraction of it.
+# The range of a logarithmic slider is the initial value divided and multiplied by this factor.
+SLIDER_FACTOR = 3.0
+# The range of a linear slider is the allowed range, if that is positive, at most MAX_LENGTH long,
+# and the initial value is not in its lowest fraction MIN_FRACTION.
 MAX_LENGTH, MIN_FRACTION = 3.0, 0.1
-# Fraction of such a range that is left out at its ends.
+# Fraction of the allowed range that a linear slider omits at both ends.
 INSET = 0.01
-_RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
-# Groups without fields on the page.
-LEFT_OUT = ("case", "modes", "compression", "output")
+_SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+# Groups of keys that are not on the page.
+OMITTED_GROUPS = ("case", "modes", "compression", "output")
 
 
 def form() -> list[dict[str, Any]]:
-    """Return the groups of fields: name, title, owner, and the fields.
+    """Return the groups of fields.
 
-    A field has the group and the name of its key, label, kind, help, choices and default. A number
-    also has a unit, the power of ten that converts it to that of the key, limits of the allowed
-    range (None: open) and ends and scale of a slider, all in its unit.
+    A group has part (``"model"``, ``"floor"``, ``"room"`` or its name), name, title and fields. A
+    field has group and name of its key, label, kind, help, choices and default. A field of a number
+    also has a unit, the power of ten that converts it to the unit of the key, limits of the allowed
+    range in its unit (None: open), and a slider.
     """
     groups = [
         _group(name, name, kind(), [key for key in KEYS if key.group == name and not key.owner])
         for name, kind in GROUPS.items()
-        if name not in LEFT_OUT
+        if name not in OMITTED_GROUPS
     ]
     models = [_options("model", name, kind) for name, kind in MODELS.items()]
     floors = [_options("floor", name, kind) for name, kind in FLOORS.items()]
@@ -56,7 +57,8 @@ def _options(part: str, name: str, kind: type[Group]) -> dict[str, Any]:
 
 def _group(part: str, name: str, values: Group, keys: Iterable[Key]) -> dict[str, Any]:
     """Return a group of fields."""
-    shown = [_field(key, getattr(values, key.name)) for key in keys if key.group not in LEFT_OUT]
+    used = [key for key in keys if key.group not in OMITTED_GROUPS]
+    shown = [_field(key, getattr(values, key.name)) for key in used]
     return {"part": part, "name": name, "title": _title(name), "fields": shown}
 
 
@@ -75,12 +77,12 @@ def _field(key: Key, default: object) -> dict[str, Any]:
         "power": 0,
     }
     if key.kind in {"real", "whole"} and isinstance(default, int | float):
-        # Times stay in seconds: nobody states a reverberation time as 500 ms.
+        # Times remain in seconds: a reverberation time of 500 ms would be unusual.
         unit = key.unit if key.unit == "s" else display_unit(key.unit, default)[0]
         power = power_of(unit or "1", key.unit, key.name)
-        after = "" if isinstance(key.upper, str) else f" {_typeset(unit)}"
-        allowed = f"allowed: {_end(key.lower, power)} to {_end(key.upper, power)}{after}"
-        value, lower, upper = (_shown(end, power) for end in (default, key.lower, key.upper))
+        suffix = "" if isinstance(key.upper, str) else f" {_typeset(unit)}"
+        allowed = f"allowed: {_limit(key.lower, power)} to {_limit(key.upper, power)}{suffix}"
+        value, lower, upper = (_converted(x, power) for x in (default, key.lower, key.upper))
         field |= {
             "unit": _typeset(unit),
             "power": power,
@@ -103,34 +105,34 @@ def _capitalize(words: str) -> str:
 
 def _typeset(unit: str) -> str:
     """Return a unit with superscript powers."""
-    return re.sub(r"(?<=[a-z])[23]", lambda digit: digit[0].translate(_RAISED), unit)
+    return re.sub(r"(?<=[a-z])[23]", lambda digit: digit[0].translate(_SUPERSCRIPTS), unit)
 
 
-def _shown(value: float | str, power: int) -> float | None:
-    """Return a number in the unit of the page; None for an end that is open or another key."""
+def _converted(value: float | str, power: int) -> float | None:
+    """Return a number in the unit of its field; None for a limit that is infinite or a formula."""
     return None if isinstance(value, str) or math.isinf(value) else scaled(value, -power)
 
 
-def _end(end: float | str, power: int) -> str:
-    """Return the end of a range in words."""
-    if isinstance(end, str):
-        return humanize(end)
-    number = f"{scaled(end, -power):g}"
-    return re.sub(r"1e\+0?(\d+)", lambda match: "10" + match[1].translate(_RAISED), number)
+def _limit(limit: float | str, power: int) -> str:
+    """Return the text of a limit in the unit of its field."""
+    if isinstance(limit, str):
+        return humanize(limit)
+    number = f"{scaled(limit, -power):g}"
+    return re.sub(r"1e\+0?(\d+)", lambda match: "10" + match[1].translate(_SUPERSCRIPTS), number)
 
 
 def _slider(
     value: float, lower: float | None, upper: float | None, *, whole: bool
 ) -> dict[str, Any] | None:
-    """Return ends and scale of a slider around a value; None if the value has no scale."""
+    """Return ends and scale of a slider around a value; None if there is no range for a slider."""
     if lower is not None and upper is not None and lower >= 0:
         length = upper - lower
         if length <= MAX_LENGTH and (value <= 0 or value >= lower + MIN_FRACTION * length):
-            # The ends themselves may be excluded, but the default is allowed.
+            # The limits may not be allowed values, but the default is.
             inner = lower + INSET * length, upper - INSET * length
             return {"ends": [min(value, inner[0]), max(value, inner[1])], "log": False}
     if value <= 0:
         return None
-    low = max(value / SPAN, -math.inf if lower is None else lower)
-    high = min(value * SPAN, math.inf if upper is None else upper)
+    low = max(value / SLIDER_FACTOR, -math.inf if lower is None else lower)
+    high = min(value * SLIDER_FACTOR, math.inf if upper is None else upper)
     return {"ends": [math.ceil(low), math.floor(high)] if whole else [low, high], "log": not whole}

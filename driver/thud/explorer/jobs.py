@@ -1,4 +1,4 @@
-"""Computations in their own processes, which end when nobody waits for them."""
+"""Computations in separate processes, which are killed if the caller stops waiting."""
 
 from __future__ import annotations
 
@@ -26,48 +26,48 @@ if TYPE_CHECKING:
 
     Report = dict[str, Any]
 
-# Functions of the tasks by name; each takes plain data.
+# Functions of the tasks by name; arguments and return values are plain data.
 TASKS: dict[str, Callable[..., Any]] = {
     "quick case": lambda values: answer_quickly(new_case(values)),
     "case": lambda values: answer_case(new_case(values)),
     "recording": answer_recording,
     "download": lambda name, values: DOWNLOADS[name][0](values),
 }
-# Errors of bad values: those of wrong types are raised at their first use.
-REFUSALS = (ThudError, TypeError, ValueError, KeyError, OverflowError)
+# Errors of invalid values; values of wrong types raise TypeError or ValueError when they are used.
+INPUT_ERRORS = (ThudError, TypeError, ValueError, KeyError, OverflowError)
 # Time between two reports, s.
 INTERVAL = 0.05
-# Maximum memory of a task, bytes: small files can hold long recordings.
+# Maximum memory of a task, bytes, as small files can hold long recordings.
 MAX_MEMORY = 4_000_000_000
 
 
 class Jobs:
-    """Processes that compute a few answers at a time; other requests wait."""
+    """Processes that run a limited number of tasks concurrently; other tasks wait."""
 
     def __init__(
-        self, width: int, limit: float, *, late: Report | None = None, reuse: bool = False
+        self, width: int, time_limit: float, *, late: Report | None = None, reuse: bool = False
     ) -> None:
-        """Take the number of processes and what they may do.
+        """Start the server that forks the processes.
 
         Parameters
         ----------
         width
-            Maximum number of tasks at a time.
-        limit
-            Maximum time of a task, s.
+            Maximum number of concurrent tasks.
+        time_limit
+            Maximum duration of a task, s.
         late
-            The last report of a task that takes longer; by default an error.
+            Last report of a task that exceeds the time limit; by default an error.
         reuse
-            A process does one task after the other: for tasks that leave nothing behind.
+            Use a process for several tasks; requires that tasks do not change global state.
         """
-        # A server that has modules loaded forks each process at once.
+        # The fork server has loaded the modules, so that new processes start immediately.
         self._context = get_context("forkserver")
         self._context.set_forkserver_preload([__name__])
         forkserver.ensure_running()
-        # What ends the reports need not be the task that asked for them.
+        # A semaphore, as it may be released by another task of anyio than the one that acquired it.
         self._slots = anyio.Semaphore(width)
-        self._limit = limit
-        message = f"the computation takes longer than {limit:g} s; allowed: less"
+        self._time_limit = time_limit
+        message = f"the computation takes longer than {time_limit:g} s; allowed: less"
         self._late = late or {"error": message}
         self._reuse = reuse
         self._idle: list[tuple[ForkServerProcess, Connection]] = []
@@ -75,68 +75,70 @@ class Jobs:
     async def run(self, task: str, *arguments: object) -> AsyncGenerator[Report, None]:
         """Yield reports ``{"done": fraction}``, then ``{"answer": …}`` or ``{"error": message}``.
 
-        The first report comes before the task begins. If the caller stops asking, the process is
-        ended and its temporary files are removed.
+        The first report precedes the start of the task. If the caller stops iterating, the process
+        is killed and its temporary files are removed.
         """
         report: Report = {"done": 0.0}
         yield report
         async with self._slots:
             with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-                process, near, far = self._take()
+                process, connection, child_end = self._take()
                 reusable = False
                 try:
-                    if far:
-                        with far:
+                    if child_end:
+                        with child_end:
                             await anyio.to_thread.run_sync(process.start)
-                    end = anyio.current_time() + self._limit
-                    report = await self._call(end, _exchange, near, (folder, task, arguments))
+                    end = anyio.current_time() + self._time_limit
+                    request = (folder, task, arguments)
+                    report = await self._call(end, _exchange, connection, request)
                     while "done" in report:
                         yield report
-                        report = await self._call(end, near.recv)
+                        report = await self._call(end, connection.recv)
                     reusable = self._reuse and report is not self._late
                 except (EOFError, OSError):
                     message = "the computation ended without an answer, perhaps for lack of memory"
                     report = {"error": message}
                 finally:
                     if reusable:
-                        self._idle.append((process, near))
+                        self._idle.append((process, connection))
                     else:
                         _kill(process)
-        # The slot is free by now: the reader may be slow.
+        # The slot is released before this report, as the caller may read it slowly.
         yield report
 
     def close(self) -> None:
-        """End the processes that wait for tasks."""
+        """Kill the idle processes."""
         while self._idle:
             _kill(self._idle.pop()[0])
 
     def _take(self) -> tuple[ForkServerProcess, Connection, Connection | None]:
-        """Return a process and its connection; of a new process also the end that it takes."""
+        """Return a process, its connection, and the child's end if the process is new."""
         while self._idle:
-            process, near = self._idle.pop()
-            # The connection of a process that has ended is at its end.
-            if not near.poll():
-                return process, near, None
+            process, connection = self._idle.pop()
+            # If the process has ended, its connection is readable (end of file).
+            if not connection.poll():
+                return process, connection, None
             _kill(process)
-        near, far = self._context.Pipe()
-        return self._context.Process(target=_do_tasks, args=(far,), daemon=True), near, far
+        connection, child_end = self._context.Pipe()
+        process = self._context.Process(target=_run_tasks, args=(child_end,), daemon=True)
+        return process, connection, child_end
 
     async def _call(
         self, end: float, function: Callable[..., Report], *arguments: object
     ) -> Report:
-        """Return the report of a function in a thread, or the late report after a time.
+        """Return the report of a function in a thread, or the late report at time `end`.
 
-        A thread that still waits then ends with the process.
+        An abandoned thread ends when its process is killed.
         """
         with anyio.CancelScope(deadline=end):
             return await anyio.to_thread.run_sync(function, *arguments, abandon_on_cancel=True)
         return self._late
 
 
-def _exchange(near: Connection, task: object) -> Report:
-    """Send a task; return its first report."""
-    near.send(task)
-    report: Report = near.recv()
+def _exchange(connection: Connection, request: object) -> Report:
+    """Send a request to a process; return its first report."""
+    connection.send(request)
+    report: Report = connection.recv()
     return report
 
 
@@ -146,39 +148,39 @@ def _kill(process: ForkServerProcess) -> None:
         process.join()
 
 
-def _do_tasks(far: Connection) -> None:
-    """Do tasks in this process and report; end with the server."""
-    # An interrupt may reach the whole process group; the server ends this process itself.
+def _run_tasks(connection: Connection) -> None:
+    """Run the tasks that arrive in this process until the server ends."""
+    # An interrupt may reach the whole process group, but the server kills this process itself.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # The usual lock is a semaphore of the system, which a process that is killed leaves behind.
+    # The default lock is a semaphore of the system, which would outlive a killed process.
     tqdm.set_lock(threading.RLock())
     resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY, MAX_MEMORY))
     with suppress(EOFError, OSError):
         while True:
-            tempfile.tempdir, task, arguments = far.recv()
-            far.send(_last_report(far, task, arguments))
+            tempfile.tempdir, task, arguments = connection.recv()
+            connection.send(_run_task(connection, task, arguments))
 
 
-def _last_report(far: Connection, task: str, arguments: tuple[Any, ...]) -> Report:
-    """Return the last report of a task; send the others meanwhile."""
-    over = threading.Event()
+def _run_task(connection: Connection, task: str, arguments: tuple[Any, ...]) -> Report:
+    """Return the last report of a task, after sending reports of its progress."""
+    finished = threading.Event()
 
-    def report() -> None:
+    def report_progress() -> None:
         try:
-            while not over.wait(INTERVAL):
-                far.send({"done": progress()})
+            while not finished.wait(INTERVAL):
+                connection.send({"done": progress()})
         except OSError:
             os._exit(1)
 
-    thread = threading.Thread(target=report, daemon=True)
+    thread = threading.Thread(target=report_progress, daemon=True)
     thread.start()
     try:
         return {"answer": TASKS[task](*arguments)}
     except MemoryError:
         limit = f"{MAX_MEMORY / 1e9:g} GB"
         return {"error": f"the computation needs more than {limit} of memory; allowed: less"}
-    except (*REFUSALS, OSError) as error:
+    except (*INPUT_ERRORS, OSError) as error:
         return {"error": str(error) or InputError.__name__}
     finally:
-        over.set()
+        finished.set()
         thread.join()

@@ -1,4 +1,4 @@
-"""The server of the page: processes compute the answers, sent at once or as reports."""
+"""Server of the page; separate processes compute the answers."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from thud.base.checks import refuse, shown
 from thud.case.case import read_case
 from thud.explorer.downloads import DOWNLOADS
 from thud.explorer.form import form
-from thud.explorer.jobs import REFUSALS, Jobs
+from thud.explorer.jobs import INPUT_ERRORS, Jobs
 from thud.recordings.channel import channel_of
 
 if TYPE_CHECKING:
@@ -40,15 +40,16 @@ MAX_CASE = 100_000
 MAX_RECORDING = 200_000_000
 # Header that carries the token.
 TOKEN = "x-thud-token"  # noqa: S105 - its name
-# Maximum silence while a body is sent, s.
+# Maximum pause between two chunks of a body, s.
 BODY_TIMEOUT = 20.0
-# Time limit of a task, s, and of one that is expected to be quick, which then begins again.
+# Time limits of a task and of a task that is expected to be quick, s; after that it runs again as a
+# slow task.
 TIME_LIMIT = 300.0
 QUICK_TIME_LIMIT = 1.0
 # Files of the page, by name.
 FILES = {file.name: file for file in (resources.files("thud.explorer") / "page").iterdir()}
 TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css"}
-# The page loads nothing from elsewhere.
+# The page loads files of this server only.
 POLICY = (
     "default-src 'self'; img-src 'self' data:; "
     "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
@@ -69,18 +70,17 @@ def new_application(
     Parameters
     ----------
     start
-        What the page starts with, see `start_with`.
+        Initial values of the page, see `start_with`.
     token
         Secret that requests must carry.
     hosts
-        Names under which the server may be asked.
+        Host names in requests that the server accepts.
     width
-        Maximum number of slow tasks, and of copies of recordings, at a time; of quick tasks twice
-        as many.
-
+        Maximum number of concurrent slow tasks, and of copies of recordings; the maximum number of
+        quick tasks is twice as large.
     """
     if not token:
-        refuse("the token is empty", "one that nobody can guess")
+        refuse("the token is empty", "a secret text")
     slow = Jobs(width, TIME_LIMIT)
     quick = Jobs(2 * width, QUICK_TIME_LIMIT, late={"answer": None}, reuse=True)
 
@@ -99,19 +99,20 @@ def new_application(
                     ("/about", _about, ["GET"]),
                     ("/solve", _solve, ["POST"]),
                     ("/measure", _measure, ["POST"]),
-                    ("/download/{what}", _download, ["POST"]),
+                    ("/download/{name}", _download, ["POST"]),
                 )
             ),
         ],
         middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=list(hosts))],
-        exception_handlers=dict.fromkeys(REFUSALS, _refuse) | {ClientDisconnect: _forget},
+        exception_handlers=dict.fromkeys(INPUT_ERRORS, _report_error)
+        | {ClientDisconnect: _ignore_error},
         lifespan=lifespan,
     )
     application.state.about = {
         "form": form(),
         "version": version(),
         "start": start,
-        "largest": MAX_RECORDING,
+        "max_recording": MAX_RECORDING,
     }
     application.state.token = token
     application.state.slow = slow
@@ -156,14 +157,14 @@ async def _measure(request: Request) -> Response:
         await stack.enter_async_context(state.copies)
         path = Path(stack.enter_context(TemporaryDirectory()), f"recording.{ending}")
         async with await anyio.open_file(path, "wb") as copy:
-            async for part in _body(request, MAX_RECORDING):
-                await copy.write(part)
+            async for chunk in _body(request, MAX_RECORDING):
+                await copy.write(chunk)
         reports = state.slow.run("recording", str(path), name, settings)
         return _Reports(reports, stack.pop_all())
 
 
 async def _download(request: Request) -> Response:
-    if (name := request.path_params["what"]) not in DOWNLOADS:
+    if (name := request.path_params["name"]) not in DOWNLOADS:
         raise HTTPException(404, "there is no such file")
     reports = request.app.state.slow.run("download", name, await _values(request))
     content = await _answer(request, reports)
@@ -171,17 +172,17 @@ async def _download(request: Request) -> Response:
 
 
 async def _answer(request: Request, reports: AsyncGenerator[dict[str, Any], None]) -> Any:  # noqa: ANN401 - of any task
-    """Return the answer at the end of reports; stop them if the page disconnects."""
+    """Return the answer at the end of reports; cancel the task if the page disconnects."""
     report: dict[str, Any] = {}
 
-    async def await_leave() -> None:
+    async def cancel_on_disconnect() -> None:
         while (await request.receive())["type"] != "http.disconnect":
             pass
         group.cancel_scope.cancel()
 
     async with anyio.create_task_group() as group, aclosing(reports):
-        group.start_soon(await_leave)
-        async for report in reports:  # noqa: B007 - the last one
+        group.start_soon(cancel_on_disconnect)
+        async for report in reports:  # noqa: B007 - the last report is used
             pass
         group.cancel_scope.cancel()
     if "error" in report:
@@ -192,7 +193,7 @@ async def _answer(request: Request, reports: AsyncGenerator[dict[str, Any], None
 
 
 def _guarded(endpoint: Endpoint) -> Endpoint:
-    """Return an endpoint that refuses requests of other pages, and those without the token."""
+    """Return an endpoint that rejects requests from other pages or without the token."""
 
     async def answer(request: Request) -> Response:
         origin = f"{request.url.scheme}://{request.headers.get('host')}"
@@ -207,17 +208,17 @@ def _guarded(endpoint: Endpoint) -> Endpoint:
     return answer
 
 
-async def _refuse(request: Request, error: Exception) -> Response:  # noqa: ARG001 - what is given
+async def _report_error(request: Request, error: Exception) -> Response:  # noqa: ARG001 - an error handler
     return PlainTextResponse(str(error), 400, headers=HEADERS)
 
 
-async def _forget(request: Request, error: Exception) -> Response:  # noqa: ARG001 - what is given
-    """Answer a page that disconnected while it sent: nobody reads it, and nothing is wrong."""
+async def _ignore_error(request: Request, error: Exception) -> Response:  # noqa: ARG001 - an error handler
+    """Return an empty response, which nobody reads, to a page that has disconnected."""
     return Response(status_code=400)
 
 
 class _Reports(StreamingResponse):
-    """Reports as lines; the response ends them and their resources, even if never begun."""
+    """Response with reports as lines; closes the reports and their resources at its end."""
 
     def __init__(
         self, reports: AsyncGenerator[dict[str, Any], None], stack: AsyncExitStack
@@ -239,41 +240,41 @@ def _number(key: str, text: str) -> float:
         refuse(f"{key} = {shown(text)} is not a number", "a number", error)
 
 
-async def _body(request: Request, largest: int) -> AsyncIterator[bytes]:
-    """Yield the parts of a body; refuse one that is too long without reading the rest."""
+async def _body(request: Request, max_length: int) -> AsyncIterator[bytes]:
+    """Yield the chunks of a body; raise HTTPException if it is too long or stops."""
     length = 0
-    parts = request.stream()
+    chunks = request.stream()
     while True:
         try:
             with anyio.fail_after(BODY_TIMEOUT):
-                part = await anext(parts)
+                chunk = await anext(chunks)
         except StopAsyncIteration:
             return
         except TimeoutError:
-            message = f"no data came for {BODY_TIMEOUT:g} s; allowed: less"
+            message = f"no data received for {BODY_TIMEOUT:g} s; allowed: less"
             raise HTTPException(408, message) from None
-        length += len(part)
-        if length > largest:
-            message = f"the data are longer than {largest / 1e6:g} MB; allowed: shorter"
+        length += len(chunk)
+        if length > max_length:
+            message = f"the data are larger than {max_length / 1e6:g} MB; allowed: less"
             raise HTTPException(413, message)
-        yield part
+        yield chunk
 
 
 async def _values(request: Request) -> dict[str, dict[str, Any]]:
-    """Return the values of keys by group that a request holds."""
+    """Return the values in the body of a request, by group and key."""
     try:
-        values = json.loads(b"".join([part async for part in _body(request, MAX_CASE)]))
+        values = json.loads(b"".join([chunk async for chunk in _body(request, MAX_CASE)]))
     except (UnicodeDecodeError, ValueError, RecursionError):
         values = None
     if not isinstance(values, dict):
-        raise HTTPException(400, "the request holds no groups of keys")
+        raise HTTPException(400, "the request does not contain groups of keys")
     return values
 
 
 def start_with(path: Path | None) -> dict[str, Any]:
-    """Return the values of a case that the page starts with, by group.
+    """Return the initial values of the page, by group and key.
 
-    The path is a namelist file or a directory of results; None is the default case.
+    The path is a namelist file or a directory of results; None means the default case.
     """
     if path is None:
         return {}

@@ -1,4 +1,4 @@
-"""The blocked force of an impact or a recording, in files for other programs."""
+"""Files of the blocked force of an impact or a recording for other programs."""
 
 from __future__ import annotations
 
@@ -26,30 +26,31 @@ if TYPE_CHECKING:
 
 KINDS = {"floor": "force on the floor", "elastic": "elastic force"}
 CONVENTION = (
-    "F(f) = integral of F(t) exp(-i 2 pi f t) dt, N s, t = 0 at first touch; frequencies from 0, "
-    "not doubled: F(-f) is the complex conjugate, the energy of a band is 2 * integral of |F|^2 df"
+    "F(f) = integral of F(t) exp(-i 2 pi f t) dt, N s, t = 0 at first touch; two-sided spectrum "
+    "at f >= 0: F(-f) is the complex conjugate, the energy of a band is 2 * integral of |F|^2 df"
 )
-# Resampling: allowed rates, Hz, the maximum whole number of the ratio, and the reach of the filter
-# of scipy.signal.resample_poly in samples of the lower rate.
+# Minimum and maximum rate of resampled forces, Hz.
 RATES = (2500.0, 1e6)
+# Maximum numerator and denominator of the ratio of rates.
 MAX_RATIO = 1000
-REACH = 10
-# Start of the last line of the header.
-NOTE_END = "Written by thud "
-# Length of the lines of a universal file and of its names.
+# Half the length of the filter of scipy.signal.resample_poly, in samples of the lower rate.
+HALF_LENGTH = 10
+# Start of the last line of a header, by which files of thud are recognized.
+SIGNATURE = "Written by thud "
+# Maximum lengths of lines and names in a universal file.
 UFF_LINE = 80
 UFF_NAME = 10
 
 
 class BlockedForce(DropForce):
-    """The force of a source on a rigid floor, for other programs."""
+    """Force of a source on a rigid floor, for other programs."""
 
     def spectrum(self) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
         """Return frequencies, Hz, and the transform ∫ F exp(-i 2π f t) dt, N s, of the force.
 
-        Time is 0 at first touch. The frequencies, shape (n_frequency,), run from 0 to half the
-        sample rate in steps of at most 1 Hz. The force counts as band-limited to that: the
-        integral is the sum of its samples.
+        Time is 0 at first touch. The frequencies, shape (n_frequency,), range from 0 to half the
+        sample rate in steps of at most 1 Hz. The force is assumed to be band-limited to half the
+        sample rate, so that the integral is the sum of the samples divided by the rate.
         """
         count = max(math.ceil(self.sample_rate), len(self.force))
         frequency = np.fft.rfftfreq(count, 1 / self.sample_rate)
@@ -58,7 +59,7 @@ class BlockedForce(DropForce):
         return frequency.astype(np.float64), spectrum
 
     def header_lines(self) -> tuple[str, ...]:
-        """Return the header for another program or reader, a line each."""
+        """Return the lines of the header, which describes the force."""
         lines = (
             f"Blocked force of {self.name}: {KINDS[self.kind]}, N, positive into the floor",
             f"{len(self.force)} samples, first sample at {self.start!r} s since first touch",
@@ -66,14 +67,14 @@ class BlockedForce(DropForce):
             f"Origin: {self.origin}",
             f"SHA-256: {self.checksum}",
             *self.notes,
-            f"{NOTE_END}{version()}",
+            f"{SIGNATURE}{version()}",
         )
-        # Names of files may not be UTF-8, and notes of a laboratory have several lines.
+        # Names of files may not be UTF-8, and notes of a laboratory may have several lines.
         texts = (line.encode("utf-8", "replace").decode() for line in lines)
         return tuple(" ".join(text.split()) for text in texts)
 
     def save(self, path: str | os.PathLike[str], kind: str = "csv") -> list[Path]:
-        """Write the force to a file, which is replaced if it exists; return the paths.
+        """Write the force to a file, replacing an existing file, and return the paths.
 
         Parameters
         ----------
@@ -85,22 +86,22 @@ class BlockedForce(DropForce):
         Raises
         ------
         InputError
-            If the format cannot hold the force, the file is the recording of the force, or the
-            text beside a WAV file would replace one that is not of thud.
+            If the format cannot represent the force, `path` is the recording of the force, or the
+            text file next to a WAV file exists and was not written by thud.
         OSError
             If a file cannot be written.
         """
         require_choice("kind", kind, EXPORTS)
         contents = EXPORTS[kind][1](self, os.fspath(path))
-        for name in map(Path, contents):
-            existing = content_of(name.resolve())
+        for file in map(Path, contents):
+            existing = content_of(file.resolve())
             if existing is not None and hashlib.sha256(existing).hexdigest() == self.checksum:
-                refuse(f"{name} is the recording of the force", "another path")
-            if existing is not None and name != Path(path) and NOTE_END.encode() not in existing:
-                refuse_foreign(name)
-        for file, content in contents.items():
-            replace_file(file, content)
-        return [Path(file) for file in contents]
+                refuse(f"{file} is the recording of the force", "another path")
+            if existing is not None and file != Path(path) and SIGNATURE.encode() not in existing:
+                refuse_foreign(file)
+        for name, content in contents.items():
+            replace_file(name, content)
+        return [Path(name) for name in contents]
 
 
 def blocked_force(
@@ -113,14 +114,14 @@ def blocked_force(
     source
         Impact or recording.
     drop
-        Number of the drop of a recording, from 1.
+        Number of the drop in a recording, from 1.
     rate
-        Samples per second of the result, Hz; by default those of the source.
+        Samples per second of the result, Hz; by default the rate of the source.
 
     Raises
     ------
     InputError
-        If the drop or the rate are not possible.
+        If the drop does not exist, or the rate is not possible.
     """
     require_kind("source", source, ImpactResult)
     force = BlockedForce(**vars(source.drop_force(drop)))
@@ -128,7 +129,7 @@ def blocked_force(
 
 
 def _resampled(original: BlockedForce, rate: float) -> BlockedForce:
-    """Return a force at another rate, band-limited to half of the lower rate."""
+    """Return a force resampled at a rate, band-limited to half the lower rate."""
     from scipy.signal import resample_poly
 
     require_number("rate", rate)
@@ -138,17 +139,17 @@ def _resampled(original: BlockedForce, rate: float) -> BlockedForce:
     up, down = ratio.numerator, ratio.denominator
     if up > MAX_RATIO or abs(original.sample_rate * up / down - rate) > 1e-9 * rate:
         refuse(
-            f"rate = {rate:g} Hz is no ratio of small whole numbers to {original.sample_rate:g} Hz",
-            f"ratios of whole numbers up to {MAX_RATIO}",
+            f"rate = {rate:g} Hz divided by {original.sample_rate:g} Hz is not a simple fraction",
+            f"numerator and denominator up to {MAX_RATIO}",
         )
-    # The filter spreads the force beyond its ends.
-    margin = math.ceil(REACH * max(1.0, down / up)) + 1
+    # The filter extends the force at both ends.
+    margin = math.ceil(HALF_LENGTH * max(1.0, down / up)) + 1
     force = resample_poly(np.pad(original.force, margin), up, down)
     start = original.start - margin / original.sample_rate
     result = replace(original, force=force, sample_rate=rate, start=start)
-    (frequency, old), (grid, new) = original.spectrum(), result.spectrum()
-    band = np.arange(1, min(RECORDED_BAND, frequency[-1], grid[-1]))
-    old, new = (np.interp(band, f, s) for f, s in ((frequency, old), (grid, new)))
+    (old_frequency, old), (new_frequency, new) = original.spectrum(), result.spectrum()
+    band = np.arange(1, min(RECORDED_BAND, old_frequency[-1], new_frequency[-1]))
+    old, new = np.interp(band, old_frequency, old), np.interp(band, new_frequency, new)
     error = float(np.abs(new - old).max() / np.abs(old).max())
     note = (
         f"Resampled from {original.sample_rate:g} Hz, band-limited; to {RECORDED_BAND:g} Hz the "
@@ -158,18 +159,18 @@ def _resampled(original: BlockedForce, rate: float) -> BlockedForce:
 
 
 def wav_files(force: BlockedForce, path: str) -> dict[str, bytes]:
-    """Return a WAV file of 32-bit floats, and a text file of its header.
+    """Return a WAV file of 32-bit floats, and a text file with the header.
 
-    The samples are fractions of full scale. A full scale is a power of two in newtons, so that
-    scaling costs no digit; it stands in the comment of the file and in the text. Raise InputError
-    where the sample rate is not a whole number.
+    The samples are fractions of full scale, which is a power of two in newtons, so that scaling is
+    exact. The comment of the WAV file and the text state it. Raise InputError if the sample rate is
+    not a whole number.
     """
     soundfile = library("soundfile", "WAV")
     rate = round(force.sample_rate)
     if rate != force.sample_rate:
         refuse(
             f"{path}: WAV cannot hold a sample rate of {force.sample_rate!r} Hz",
-            "whole numbers of Hz; rate resamples",
+            "whole numbers of Hz; rate = a whole number resamples the force",
         )
     peak = float(np.abs(force.force).max())
     scale = 2.0 ** math.ceil(math.log2(peak)) if peak > 0 else 1.0
@@ -184,16 +185,16 @@ def wav_files(force: BlockedForce, path: str) -> dict[str, bytes]:
 
 
 def csv_files(force: BlockedForce, path: str) -> dict[str, bytes]:
-    """Return a table of time, s, and force, N, each with all its digits."""
+    """Return a table of time, s, and force, N, in full precision."""
     header = [*(f"# {line}" for line in force.header_lines()), "time_s,force_N"]
     rows = zip(force.time.tolist(), force.force.tolist(), strict=True)
     return {path: _lines([*header, *(f"{time!r},{value!r}" for time, value in rows)])}
 
 
 def uff_files(force: BlockedForce, path: str) -> dict[str, bytes]:
-    """Return a universal file, data set 58 in text: a time response, excitation force, N.
+    """Return a universal file with a text data set 58: time history of an excitation force, N.
 
-    The format holds 12 digits of the force and 6 of the time step.
+    The format has 12 digits for the force and 6 digits for the time step.
     """
     pyuff = library("pyuff", "universal")
     kind = f"{KINDS[force.kind]}, N, positive into the floor"
@@ -264,7 +265,7 @@ def spectrum_files(force: BlockedForce, path: str) -> dict[str, bytes]:
     return {path: _lines([*header, *(",".join(map(repr, row)) for row in table.tolist())])}
 
 
-# By option of the command: end of the file name, and function that returns the contents.
+# End of the file name, and function that returns the contents, by the option of the command.
 EXPORTS = {
     "wav": (".wav", wav_files),
     "csv": (".csv", csv_files),
@@ -279,5 +280,5 @@ def _lines(lines: list[str] | tuple[str, ...]) -> bytes:
 
 
 def _plain(text: str) -> str:
-    """Return a text in the characters that a universal file holds."""
+    """Return a text in ASCII, as universal files require."""
     return text.encode("ascii", "replace").decode("ascii")

@@ -252,7 +252,7 @@ def fit_mobility(
         require_whole("order", order, 1, _ORDERS[-1])
     try:
         if order is None:
-            return _fit_best_order(name, frequency, values)
+            return _best_fit(name, frequency, values)
         return _fit(name, frequency, values, order)
     except ThudError as error:
         message = f"{label}: {error}"
@@ -275,7 +275,7 @@ def _checked(table: tuple[ArrayLike, ...]) -> tuple[Array, NDArray[np.complex128
     return frequency, values.astype(complex)
 
 
-def _fit_best_order(name: str, frequency: Array, values: NDArray[np.complex128]) -> MobilityFit:
+def _best_fit(name: str, frequency: Array, values: NDArray[np.complex128]) -> MobilityFit:
     """Return the fit with the minimum information criterion for relative errors of equal size."""
     best, minimum, worse_count = None, np.inf, 0
     failure: ThudError | None = None

@@ -1,9 +1,10 @@
-// The ball on the floor at one instant, and its animation.
+// Section of the ball on the floor at an instant, and its animation.
 import { byId, rounded } from "./page.js";
 
-// Duration of the animation, ms, and how far a floor is shown to move at most, as part of the ball.
+// Duration of the animation, ms.
 const DURATION = 4000;
-const REACH = 0.12;
+// Maximum displayed displacement of the floor as a fraction of the height of the ball.
+const MAX_DISPLACEMENT = 0.12;
 let motion = null;
 let playing = 0;
 
@@ -22,26 +23,26 @@ export function listenToBall() {
 function render() {
   const canvas = byId("ball");
   const context = canvas.getContext("2d");
-  const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const color = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const last = motion.time.length - 1;
   const i = Math.round(Number(byId("instant").value) * last);
   const top = motion.outer ? Math.max(...motion.outer.flat().map(([, z]) => z)) : 2 * motion.radius;
-  const times = magnification(top);
+  const factor = magnification(top);
   const ground = canvas.height - 70;
   const scale = (ground - 20) / Math.max(200, top);
   const x = (r) => canvas.width / 2 + scale * r;
-  const y = (z) => ground - scale * (z - times * motion.floor[i]);
+  const y = (z) => ground - scale * (z - factor * motion.floor[i]);
   context.clearRect(0, 0, canvas.width, canvas.height);
   context.lineWidth = 2;
-  context.fillStyle = colour("--floor");
+  context.fillStyle = color("--floor");
   context.fillRect(0, y(0), canvas.width, canvas.height);
-  context.strokeStyle = colour("--quiet");
+  context.strokeStyle = color("--quiet");
   context.beginPath();
   context.moveTo(0, y(0));
   context.lineTo(canvas.width, y(0));
   context.stroke();
-  context.fillStyle = colour("--rubber");
-  context.strokeStyle = colour("--ink");
+  context.fillStyle = color("--rubber");
+  context.strokeStyle = color("--ink");
   context.beginPath();
   const [outer, inner] = motion.outer ? [motion.outer[i], motion.inner[i]] : flattened(i);
   for (const line of [outer, inner]) {
@@ -52,23 +53,23 @@ function render() {
   context.fill("evenodd");
   context.stroke();
   const time = `${motion.time[i].toFixed(1)} ms`;
-  byId("instant_words").textContent = time;
+  byId("instant_text").textContent = time;
   byId("instant").setAttribute("aria-valuetext", time);
   const shape = motion.outer ? "Computed section." : "Shape that the model assumes: a sphere, flattened by its deflection.";
-  const moved = times > 1 ? ` The floor moves by up to ${rounded(Math.max(...motion.floor), "mm")}, magnified ${times}×.` : "";
-  byId("ball_words").textContent = shape + moved;
+  const displacement = factor > 1 ? ` The floor moves by up to ${rounded(Math.max(...motion.floor), "mm")}, magnified ${factor}×.` : "";
+  byId("ball_text").textContent = shape + displacement;
 }
 
-/** Return by what round number the motion of the floor is enlarged. */
+/** Return the round factor by which the displacement of the floor is magnified; `top` is the height of the ball. */
 function magnification(top) {
-  const most = Math.max(...motion.floor);
-  if (!(most > 0)) return 1;
-  const free = (REACH * top) / most;
-  const power = 10 ** Math.floor(Math.log10(free));
-  return Math.max(1, power * [5, 2, 1].find((factor) => factor * power <= free));
+  const maximum = Math.max(...motion.floor);
+  if (!(maximum > 0)) return 1;
+  const limit = (MAX_DISPLACEMENT * top) / maximum;
+  const power = 10 ** Math.floor(Math.log10(limit));
+  return Math.max(1, power * [5, 2, 1].find((factor) => factor * power <= limit));
 }
 
-/** Return the surfaces of a sphere whose lower part, and the wall on it, lies flat on the floor. */
+/** Return the outer and inner surface of a hollow sphere, flattened by the floor and the wall on it. */
 function flattened(i) {
   const deflection = Math.max(0, motion.deflection[i]);
   return [0, motion.wall].map((wall) => {
@@ -81,11 +82,11 @@ function flattened(i) {
 }
 
 function play() {
-  const on = !playing;
-  byId("play").textContent = on ? "Pause" : "Play";
+  const starts = !playing;
+  byId("play").textContent = starts ? "Pause" : "Play";
   cancelAnimationFrame(playing);
   playing = 0;
-  if (!on) return;
+  if (!starts) return;
   let last = performance.now();
   const step = (now) => {
     const slider = byId("instant");

@@ -1,113 +1,114 @@
-// The page: requests the values of the form from the server; the latest request wins.
-import { build, caseValues, changedWords, isCase, mark, startWith, state, titleOf } from "./form.js";
+// Main module of the page: sends the values of the form to the server and shows the latest answer.
+import { build, caseValues, describeChanges, isCase, markField, startWith, state, titleOf } from "./form.js";
 import { byId, element } from "./page.js";
 import { listenToBall } from "./ball.js";
-import { Loss, Refusal, ask, follow, linkedCase, takeToken } from "./request.js";
+import { ConnectionError, ServerError, ask, follow, linkedCase, storeToken } from "./request.js";
 import { show } from "./results.js";
 
-// Pause of the changes before a slow case is requested, and time between tries to reach the server, ms.
-const REST = 120;
-const RETRY = 1500;
+// Pause after a change before a slow case is requested, ms.
+const PAUSE = 120;
+// Time between attempts to reach the server, ms.
+const RETRY_INTERVAL = 1500;
 const pinned = [];
 let about = null;
 let current = null;
 let job = null;
 let timer = 0;
-let tries = 0;
+let retryTimer = 0;
 
 // ---- Messages.
 
-function say(message) {
+function showMessage(message) {
   byId("message").textContent = message;
   byId("message").hidden = false;
 }
 
-function hush() {
+function hideMessage() {
   byId("message").hidden = true;
-  document.body.classList.remove("old");
-  mark(null);
+  document.body.classList.remove("outdated");
+  markField(null);
 }
 
-/** Show an error; if the server is gone, wait for it. */
-function fail(error) {
+/** Show an error; if the server cannot be reached, try again later. */
+function showError(error) {
   if (error.name === "AbortError") return;
-  if (!(error instanceof Loss || error instanceof Refusal)) throw error;
-  say(error.message);
-  mark(error.message);
-  if (error instanceof Loss) {
-    clearTimeout(tries);
-    tries = setTimeout(() => ask("about").then(() => { hush(); solve(); }, fail), RETRY);
+  if (!(error instanceof ConnectionError || error instanceof ServerError)) throw error;
+  showMessage(error.message);
+  markField(error.message);
+  if (error instanceof ConnectionError) {
+    clearTimeout(retryTimer);
+    retryTimer = setTimeout(() => ask("about").then(() => { hideMessage(); solve(); }, showError), RETRY_INTERVAL);
   }
 }
 
 // ---- Tasks of the server.
 
-/** Follow a task; show it with a button to cancel it, by default from its first report. */
-async function runTask(name, path, body, stop, { atOnce = false, reported = () => {} } = {}) {
+/** Return the answer of a task; show its progress and a button to cancel it, by default from its first report. */
+async function runTask(name, path, body, controller, { showNow = false, onReport = () => {} } = {}) {
   const bar = element("progress", { max: 1, "aria-label": name });
   const button = element("button", { type: "button" }, "Cancel");
-  button.addEventListener("click", () => stop.abort());
+  button.addEventListener("click", () => controller.abort());
   const line = element("div", { class: "task" }, element("span", {}, name), bar, button);
-  const appear = () => { if (!line.isConnected) byId("tasks").append(line); };
-  if (atOnce) appear();
+  const showTask = () => { if (!line.isConnected) byId("tasks").append(line); };
+  if (showNow) showTask();
   try {
-    return await follow(path, body, stop.signal, (fraction) => {
-      appear();
+    return await follow(path, body, controller.signal, (fraction) => {
+      showTask();
       if (fraction > 0) bar.value = fraction;
-      reported();
+      onReport();
     });
   } finally {
     line.remove();
   }
 }
 
-/** Request the case; a new request cancels a slow one and waits for a quick one. */
+/** Compute the case of the form, after cancelling a slow computation or waiting for a quick one. */
 async function solve() {
   clearTimeout(timer);
-  if (job && !job.slow) { job.again = true; return; }
-  job?.stop.abort();
-  const own = { stop: new AbortController(), slow: false, again: false, start: performance.now() };
-  job = own;
+  if (job && !job.slow) { job.repeat = true; return; }
+  job?.controller.abort();
+  const thisJob = { controller: new AbortController(), slow: false, repeat: false, start: performance.now() };
+  job = thisJob;
   try {
-    const answer = await runTask("Computing", "solve", JSON.stringify(caseValues()), own.stop, { reported: () => { own.slow = true; } });
-    hush();
-    current = { name: titleOf("model", state.model), short: titleOf("model", state.model), words: changedWords(), answer, slow: own.slow };
+    const answer = await runTask("Computing", "solve", JSON.stringify(caseValues()), thisJob.controller, { onReport: () => { thisJob.slow = true; } });
+    hideMessage();
+    current = { name: titleOf("model", state.model), short: titleOf("model", state.model), description: describeChanges(), answer, slow: thisJob.slow };
     refresh();
-    // From the request to the next picture, for tests and benchmarks.
-    requestAnimationFrame(() => { document.body.dataset.latency = String(performance.now() - own.start); });
+    // Time from the request to the next frame, for tests and benchmarks.
+    requestAnimationFrame(() => { document.body.dataset.latency = String(performance.now() - thisJob.start); });
   } catch (error) {
-    if (error.name !== "AbortError") document.body.classList.add("old");
-    fail(error);
+    if (error.name !== "AbortError") document.body.classList.add("outdated");
+    showError(error);
   } finally {
-    if (job === own) {
+    if (job === thisJob) {
       job = null;
-      if (own.again) solve();
+      if (thisJob.repeat) solve();
     }
   }
 }
 
-/** Request the case after a change of the form; a slow case only when changes pause. */
-function changed() {
+/** Compute the case after a change of the form; a slow case only after a pause. */
+function onChange() {
   if (!(job ?? current)?.slow) return solve();
-  job?.stop.abort();
+  job?.controller.abort();
   clearTimeout(timer);
-  timer = setTimeout(solve, REST);
+  timer = setTimeout(solve, PAUSE);
 }
 
 async function measure(file) {
-  if (file.size > about.largest) return say(`${file.name} is longer than ${about.largest / 1e6} MB; allowed: shorter`);
+  if (file.size > about.max_recording) return showMessage(`${file.name} is larger than ${about.max_recording / 1e6} MB; allowed: less`);
   const query = new URLSearchParams({ name: file.name });
   for (const key of ["height", "mass", "calibration", "unit", "channel"]) {
     const value = byId(`recording_${key}`).value;
     if (value) query.set(key, value);
   }
   try {
-    const answer = await runTask(`Measuring ${file.name}`, `measure?${query}`, file, new AbortController(), { atOnce: true });
-    hush();
+    const answer = await runTask(`Measuring ${file.name}`, `measure?${query}`, file, new AbortController(), { showNow: true });
+    hideMessage();
     const name = `${file.name}, ${answer.drops} drop${answer.drops === 1 ? "" : "s"}`;
-    pinned.push({ name, short: name, words: answer.verdict, answer, pinned: true });
+    pinned.push({ name, short: name, description: answer.verdict, answer, pinned: true });
     refresh();
-  } catch (error) { fail(error); }
+  } catch (error) { showError(error); }
 }
 
 async function download(name) {
@@ -118,8 +119,8 @@ async function download(name) {
     const link = element("a", { href: URL.createObjectURL(await response.blob()), download: name });
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-    hush();
-  } catch (error) { fail(error); }
+    hideMessage();
+  } catch (error) { showError(error); }
 }
 
 function refresh() {
@@ -135,7 +136,7 @@ function pin() {
   refresh();
 }
 
-async function link() {
+async function copyLink() {
   const address = `${location.origin}/#case=${encodeURIComponent(JSON.stringify(caseValues()))}`;
   history.replaceState(null, "", address);
   const copied = await navigator.clipboard?.writeText(address).then(() => true, () => false);
@@ -146,10 +147,10 @@ async function link() {
 function listen() {
   byId("form").addEventListener("submit", (event) => event.preventDefault());
   const rebuild = () => {
-    // Take the text being typed before its field is replaced.
+    // Losing the focus enters the text being typed, before the field is replaced.
     if (byId("form").contains(document.activeElement) && document.activeElement.matches("input")) document.activeElement.blur();
-    build(changed);
-    changed();
+    build(onChange);
+    onChange();
   };
   byId("model").addEventListener("change", (event) => { state.model = event.target.value; rebuild(); });
   byId("floor").addEventListener("change", (event) => {
@@ -163,12 +164,12 @@ function listen() {
     rebuild();
   });
   byId("pin").addEventListener("click", pin);
-  byId("reset").addEventListener("click", () => { pinned.length = 0; startWith(about.start, changed); changed(); });
-  byId("link").addEventListener("click", link);
+  byId("reset").addEventListener("click", () => { pinned.length = 0; startWith(about.start, onChange); onChange(); });
+  byId("link").addEventListener("click", copyLink);
   for (const button of document.querySelectorAll("[data-file]")) button.addEventListener("click", () => download(button.dataset.file));
   byId("file").addEventListener("change", (event) => {
     if (event.target.files[0]) measure(event.target.files[0]);
-    // The same file may be chosen again, with another calibration.
+    // Otherwise choosing the same file again, with another calibration, would raise no event.
     event.target.value = "";
   });
   addEventListener("dragover", (event) => { event.preventDefault(); document.body.classList.add("dragging"); });
@@ -183,18 +184,18 @@ function listen() {
 }
 
 async function begin() {
-  takeToken();
+  storeToken();
   try {
     about = await (await ask("about")).json();
-  } catch (error) { return say(error.message); }
+  } catch (error) { return showMessage(error.message); }
   state.form = about.form;
   let start = about.start;
   try { start = JSON.parse(linkedCase()) ?? start; } catch { start = null; }
-  const known = isCase(start);
-  startWith(known ? start : about.start, changed);
+  const isValid = isCase(start);
+  startWith(isValid ? start : about.start, onChange);
   listen();
   await solve();
-  if (!known) say("the link holds no case; allowed: one that this page has copied");
+  if (!isValid) showMessage("the link does not contain a case; allowed: links copied from this page");
 }
 
 begin();

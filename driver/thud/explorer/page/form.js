@@ -1,95 +1,95 @@
-// Fields of the case, made from the declarations of the keys.
+// Form of the case, with fields from the declarations of the keys.
 import { byId, capitalize, element, scaled } from "./page.js";
 
 /** State of the case: values that differ from their defaults, and ranges of moved sliders. */
 export const state = { form: [], values: {}, model: "", floor: "", room: false, moved: {} };
 
-const part = (name) => state.form.filter((group) => group.part === name);
-const own = () => state.form.filter((group) => group.part === group.name && group.part !== "room");
-/** Return the group of the model, floor or room that is chosen. */
-const chosen = (name, which) => part(name).find((group) => group.name === which);
+const groupsOf = (part) => state.form.filter((group) => group.part === part);
+const commonGroups = () => state.form.filter((group) => group.part === group.name && group.part !== "room");
+/** Return the group of a model or floor. */
+const findGroup = (part, name) => groupsOf(part).find((group) => group.name === name);
 
 /** Return the title of a model or floor. */
-export function titleOf(name, which) {
-  return chosen(name, which)?.title ?? which;
+export function titleOf(part, name) {
+  return findGroup(part, name)?.title ?? name;
 }
 
-/** Return the groups of keys in use. */
-function used() {
-  const groups = [...own(), chosen("model", state.model)];
-  if (state.floor) groups.push(chosen("floor", state.floor));
-  if (state.room) groups.push(...part("room"));
+/** Return the groups of the current model, floor and room. */
+function usedGroups() {
+  const groups = [...commonGroups(), findGroup("model", state.model)];
+  if (state.floor) groups.push(findGroup("floor", state.floor));
+  if (state.room) groups.push(...groupsOf("room"));
   return groups;
 }
 
-/** Return the case as groups of keys. */
+/** Return the values of the case by group and key. */
 export function caseValues() {
   const values = { case: { name: "explored" }, model: { name: state.model } };
   if (state.floor) values.floor = { name: state.floor };
-  for (const { fields } of used())
+  for (const { fields } of usedGroups())
     for (const { group } of fields) if (state.values[group]) values[group] = state.values[group];
   if (state.room) values.room ??= {};
   return structuredClone(values);
 }
 
-/** Return floor, room and the values that differ from their defaults, in words. */
-export function changedWords() {
-  const words = [];
-  if (state.floor) words.push(`Floor: ${titleOf("floor", state.floor)}`);
-  if (state.room) words.push("Room below");
-  for (const { fields } of used()) {
+/** Return a text of floor, room and the values that differ from their defaults. */
+export function describeChanges() {
+  const changes = [];
+  if (state.floor) changes.push(`Floor: ${titleOf("floor", state.floor)}`);
+  if (state.room) changes.push("Room below");
+  for (const { fields } of usedGroups()) {
     for (const field of fields) {
       const value = state.values[field.group]?.[field.name];
       if (value === undefined) continue;
       const shown = field.choices[value] ?? (typeof value === "number" ? scaled(value, -field.power) : String(value));
-      words.push(`${field.label} ${shown} ${field.unit}`.trim());
+      changes.push(`${field.label} ${shown} ${field.unit}`.trim());
     }
   }
-  return words.join(", ");
+  return changes.join(", ");
 }
 
-/** Return whether values are those of a case; unknown models and floors are no case. */
+/** Return whether values are a case with a known model and floor. */
 export function isCase(values) {
   if (!values || typeof values !== "object") return false;
-  const known = (name) => !values[name] || chosen(name, values[name].name);
-  return Boolean(known("model") && known("floor"));
+  const isKnown = (part) => !values[part] || findGroup(part, values[part].name);
+  return Boolean(isKnown("model") && isKnown("floor"));
 }
 
-/** Take the values of a case, and show them. */
-export function startWith(values, changed) {
+/** Fill the form with the values of a case. */
+export function startWith(values, onChange) {
   const { model, floor, ...rest } = values;
-  Object.assign(state, { model: model?.name ?? part("model")[0].name, floor: floor?.name ?? "", room: Boolean(rest.room), values: {}, moved: {} });
-  for (const { fields } of used()) {
+  Object.assign(state, { model: model?.name ?? groupsOf("model")[0].name, floor: floor?.name ?? "", room: Boolean(rest.room), values: {}, moved: {} });
+  for (const { fields } of usedGroups()) {
     for (const field of fields) {
       let value = rest[field.group]?.[field.name];
       if (value === undefined || value === null) continue;
       if (field.kind === "list" && !Array.isArray(value)) value = [value];
-      put(field, value);
+      setValue(field, value);
     }
   }
-  build(changed);
+  build(onChange);
 }
 
-function current(field) {
+function getValue(field) {
   return state.values[field.group]?.[field.name] ?? field.default;
 }
 
-function put(field, value) {
+function setValue(field, value) {
   const group = (state.values[field.group] ??= {});
   if (JSON.stringify(value) === JSON.stringify(field.default)) delete group[field.name];
   else group[field.name] = value;
   if (!Object.keys(group).length) delete state.values[field.group];
 }
 
-/** Fill the form for the chosen model, floor and room; `changed` is called on each change. */
-export function build(changed) {
-  const open = (names) => own().filter((group) => names.includes(group.name));
-  const shown = (groups, isOpen) => groups.filter((group) => group?.fields.length).map((group) => groupElement(group, isOpen, changed));
-  byId("groups").replaceChildren(...shown([...open(["ball", "drop"]), chosen("model", state.model)], true));
-  byId("floor_groups").replaceChildren(...shown([chosen("floor", state.floor)], true));
-  byId("room_groups").replaceChildren(...shown(state.room ? part("room") : [], true));
-  byId("further_groups").replaceChildren(...shown(own().filter((group) => !["ball", "drop"].includes(group.name)), false));
-  const options = (name) => part(name).map((group) => element("option", { value: group.name }, group.title));
+/** Build the form for the current model, floor and room; `onChange` is called after each change. */
+export function build(onChange) {
+  const named = (names) => commonGroups().filter((group) => names.includes(group.name));
+  const elements = (groups, isOpen) => groups.filter((group) => group?.fields.length).map((group) => groupElement(group, isOpen, onChange));
+  byId("groups").replaceChildren(...elements([...named(["ball", "drop"]), findGroup("model", state.model)], true));
+  byId("floor_groups").replaceChildren(...elements([findGroup("floor", state.floor)], true));
+  byId("room_groups").replaceChildren(...elements(state.room ? groupsOf("room") : [], true));
+  byId("other_groups").replaceChildren(...elements(commonGroups().filter((group) => !["ball", "drop"].includes(group.name)), false));
+  const options = (name) => groupsOf(name).map((group) => element("option", { value: group.name }, group.title));
   byId("model").replaceChildren(...options("model"));
   byId("floor").replaceChildren(element("option", { value: "" }, "Rigid test floor"), ...options("floor").filter((option) => option.value !== "rigid"));
   byId("model").value = state.model;
@@ -97,56 +97,56 @@ export function build(changed) {
   byId("has_room").checked = state.room;
 }
 
-function groupElement(group, open, changed) {
-  return element("details", { open }, element("summary", {}, group.title), ...group.fields.map((field) => fieldElement(field, changed)));
+function groupElement(group, open, onChange) {
+  return element("details", { open }, element("summary", {}, group.title), ...group.fields.map((field) => fieldElement(field, onChange)));
 }
 
-function fieldElement(field, changed) {
+function fieldElement(field, onChange) {
   const id = `${field.group}.${field.name}`;
   const label = element("label", { for: id, title: field.help }, field.unit ? `${field.label}, ${field.unit}` : field.label);
-  const take = (value) => { put(field, value); changed(); };
-  const make = { choice: choiceInput, flag: flagInput, list: listInput }[field.kind] ?? numberInput;
-  const inputs = make(field, id, take);
+  const onInput = (value) => { setValue(field, value); onChange(); };
+  const newInputs = { choice: choiceInput, flag: flagInput, list: listInput }[field.kind] ?? numberInput;
+  const inputs = newInputs(field, id, onInput);
   for (const input of inputs) input.setAttribute("aria-describedby", `${id}.help`);
   const help = element("p", { class: "help", id: `${id}.help` }, `${field.help}.`);
   return element("div", { class: "field" }, label, ...inputs, help);
 }
 
-function choiceInput(field, id, take) {
-  const options = Object.entries(field.choices).map(([value, words]) => element("option", { value }, capitalize(words)));
+function choiceInput(field, id, onInput) {
+  const options = Object.entries(field.choices).map(([value, text]) => element("option", { value }, capitalize(text)));
   const select = element("select", { id }, ...options);
-  select.value = current(field);
-  select.addEventListener("change", () => take(select.value));
+  select.value = getValue(field);
+  select.addEventListener("change", () => onInput(select.value));
   return [select];
 }
 
-function flagInput(field, id, take) {
+function flagInput(field, id, onInput) {
   const box = element("input", { id, type: "checkbox" });
-  box.checked = current(field);
-  box.addEventListener("change", () => take(box.checked));
+  box.checked = getValue(field);
+  box.addEventListener("change", () => onInput(box.checked));
   return [box];
 }
 
-function listInput(field, id, take) {
-  const text = element("input", { id, type: "text", value: [current(field)].flat().join(" "), placeholder: "such as 10 20" });
+function listInput(field, id, onInput) {
+  const text = element("input", { id, type: "text", value: [getValue(field)].flat().join(" "), placeholder: "such as 10 20" });
   text.addEventListener("change", () => {
     const numbers = text.value.split(/[\s;,]+/).filter(Boolean).map(Number);
     text.setAttribute("aria-invalid", String(numbers.some(Number.isNaN)));
-    if (!numbers.some(Number.isNaN)) take(numbers);
+    if (!numbers.some(Number.isNaN)) onInput(numbers);
   });
   return [text];
 }
 
-function numberInput(field, id, take) {
-  const value = scaled(current(field), -field.power);
-  const whole = field.kind === "whole";
-  const number = element("input", { id, type: "number", step: whole ? 1 : "any", min: field.lower, max: field.upper, value });
+function numberInput(field, id, onInput) {
+  const value = scaled(getValue(field), -field.power);
+  const isWhole = field.kind === "whole";
+  const number = element("input", { id, type: "number", step: isWhole ? 1 : "any", min: field.lower, max: field.upper, value });
   const send = (entered) => {
     const key = `${field.group}.${field.name}`;
     const converted = scaled(entered, field.power);
-    const ends = (state.moved[key] ??= [current(field), current(field)]);
+    const ends = (state.moved[key] ??= [getValue(field), getValue(field)]);
     state.moved[key] = [Math.min(ends[0], converted), Math.max(ends[1], converted)];
-    take(converted);
+    onInput(converted);
   };
   const slider = field.slider ? sliderInput(field, value, (entered) => {
     number.value = entered;
@@ -154,37 +154,37 @@ function numberInput(field, id, take) {
     send(entered);
   }) : null;
   number.addEventListener("change", () => {
-    const bad = number.value === "" || !Number.isFinite(Number(number.value));
-    number.setAttribute("aria-invalid", String(bad));
-    if (bad) return;
+    const isInvalid = number.value === "" || !Number.isFinite(Number(number.value));
+    number.setAttribute("aria-invalid", String(isInvalid));
+    if (isInvalid) return;
     slider?.moveTo(Number(number.value));
     send(Number(number.value));
   });
   return slider ? [number, slider] : [number];
 }
 
-/** Return a slider; that of a positive number moves in its logarithm. */
-function sliderInput(field, value, moved) {
+/** Return a slider on a linear or logarithmic scale; `onMove` is called with the selected value. */
+function sliderInput(field, value, onMove) {
   const { ends: [low, high], log } = field.slider;
-  const whole = field.kind === "whole";
-  const to = log ? Math.log : (x) => x;
-  const from = log ? Math.exp : (x) => x;
-  const slider = element("input", { type: "range", "aria-label": field.label, min: to(low), max: to(high), step: whole ? 1 : "any" });
+  const isWhole = field.kind === "whole";
+  const toSlider = log ? Math.log : (x) => x;
+  const fromSlider = log ? Math.exp : (x) => x;
+  const slider = element("input", { type: "range", "aria-label": field.label, min: toSlider(low), max: toSlider(high), step: isWhole ? 1 : "any" });
   const announce = (selected) => slider.setAttribute("aria-valuetext", `${selected} ${field.unit}`.trim());
-  slider.moveTo = (selected) => { slider.value = to(selected); announce(selected); };
+  slider.moveTo = (selected) => { slider.value = toSlider(selected); announce(selected); };
   slider.moveTo(value);
   slider.addEventListener("input", () => {
-    const exact = from(Number(slider.value));
-    // The ends themselves, not numbers that are rounded beyond them.
-    const selected = Math.min(high, Math.max(low, whole ? Math.round(exact) : Number(exact.toPrecision(4))));
+    const exact = fromSlider(Number(slider.value));
+    // Rounding must not exceed the ends.
+    const selected = Math.min(high, Math.max(low, isWhole ? Math.round(exact) : Number(exact.toPrecision(4))));
     announce(selected);
-    moved(selected);
+    onMove(selected);
   });
   return slider;
 }
 
-/** Mark the field that a message of the server names, and no other. */
-export function mark(message) {
+/** Mark only the field that is named in a message of the server as invalid. */
+export function markField(message) {
   for (const input of document.querySelectorAll("#form [aria-invalid=true]")) input.setAttribute("aria-invalid", "false");
   const [, group, name] = message?.match(/&(\w+): (\w+)/) ?? [];
   byId(`${group}.${name}`)?.setAttribute("aria-invalid", "true");

@@ -1,24 +1,24 @@
-// Small helpers: elements, numbers.
+// Functions for elements and for the text of numbers.
 
 export const byId = (id) => document.getElementById(id);
 
-/** Return an element with attributes (true: empty, false or null: left out) and children. */
+/** Return an element with attributes (true: empty value; false or null: omitted) and children. */
 export function element(name, attributes = {}, ...children) {
   return fill(document.createElement(name), attributes, children);
 }
 
-/** Return an element of a drawing. */
-export function drawn(name, attributes = {}, ...children) {
+/** Return an SVG element, as `element` does. */
+export function svgElement(name, attributes = {}, ...children) {
   return fill(document.createElementNS("http://www.w3.org/2000/svg", name), attributes, children);
 }
 
-function fill(made, attributes, children) {
+function fill(target, attributes, children) {
   for (const [key, value] of Object.entries(attributes)) {
-    if (value === true) made.setAttribute(key, "");
-    else if (value !== null && value !== undefined && value !== false) made.setAttribute(key, value);
+    if (value === true) target.setAttribute(key, "");
+    else if (value !== null && value !== undefined && value !== false) target.setAttribute(key, value);
   }
-  made.append(...children);
-  return made;
+  target.append(...children);
+  return target;
 }
 
 /** Return a number times a power of ten, correctly rounded. */
@@ -27,23 +27,23 @@ export function scaled(value, power) {
   return Number(`${digits}e${Number(exponent) + power}`);
 }
 
-/** Return a number with its unit: levels with two decimals, others with four digits. */
+/** Return the text of a number with its unit: levels with two decimals, others with four digits. */
 export function rounded(value, unit = "") {
   if (value === null || value === undefined) return "not known";
   return `${minus(unit === "dB" ? value.toFixed(2) : Number(value.toPrecision(4)))} ${unit}`.trim();
 }
 
-/** Return a number with a sign: levels with two decimals, others with two digits. */
+/** Return the text of a number with its sign: levels with two decimals, others with two digits. */
 export function signed(value, unit = "") {
   const size = Math.abs(value);
   return `${value < 0 ? "−" : "+"}${unit === "dB" ? size.toFixed(2) : Number(size.toPrecision(2))}`;
 }
 
-/** Return a number as text, with the minus of the field. */
+/** Return the text of a number with a typographic minus sign. */
 export function minus(value) {
   return String(value).replace("-", "−");
 }
 
-export function capitalize(words) {
-  return words.charAt(0).toUpperCase() + words.slice(1);
+export function capitalize(text) {
+  return text.charAt(0).toUpperCase() + text.slice(1);
 }

@@ -1,11 +1,11 @@
-// Plots: curves over numbers or bands, with bars of tolerance; drawn at the size of their element.
-import { drawn, element, minus, rounded } from "./page.js";
+// Plots of curves against numbers or bands, with limits; drawn at the size of their element.
+import { svgElement, element, minus, rounded } from "./page.js";
 
 const MARKS = [
-  (x, y) => drawn("circle", { cx: x, cy: y, r: 4 }),
-  (x, y) => drawn("rect", { x: x - 3.5, y: y - 3.5, width: 7, height: 7 }),
-  (x, y) => drawn("path", { d: `M${x} ${y - 5}l5 5l-5 5l-5-5z` }),
-  (x, y) => drawn("path", { d: `M${x} ${y - 5}l4.5 8h-9z` }),
+  (x, y) => svgElement("circle", { cx: x, cy: y, r: 4 }),
+  (x, y) => svgElement("rect", { x: x - 3.5, y: y - 3.5, width: 7, height: 7 }),
+  (x, y) => svgElement("path", { d: `M${x} ${y - 5}l5 5l-5 5l-5-5z` }),
+  (x, y) => svgElement("path", { d: `M${x} ${y - 5}l4.5 8h-9z` }),
 ];
 /** Number of styles of curves. */
 export const STYLES = 6;
@@ -14,8 +14,8 @@ const watcher = new ResizeObserver((entries) => entries.forEach((entry) => rende
 
 /** Draw a plot in an element.
  *
- * `curves` have name, style, x, y, `marks` and `thin`; `x` and `y` have a title and a unit, bands
- * a list of names in `x.bands`; `limits` are [lower, upper] of each band.
+ * `curves` have name, style, x, y and the options `marks` and `thin`. The axes `x` and `y` have a
+ * title and a unit; `x.bands` is a list of names of bands. `limits` are [lower, upper] of each band.
  */
 export function plot(host, content) {
   if (!shown.has(host)) watcher.observe(host);
@@ -23,10 +23,10 @@ export function plot(host, content) {
   render(host);
 }
 
-/** Return a piece of a curve, for a list of variants. */
+/** Return a short line in the style of a curve, for legends. */
 export function swatch(style) {
-  const line = drawn("line", { x1: 0, y1: 6, x2: 26, y2: 6, class: `curve style${style % STYLES}` });
-  return drawn("svg", { width: 26, height: 12, "aria-hidden": "true" }, line);
+  const line = svgElement("line", { x1: 0, y1: 6, x2: 26, y2: 6, class: `curve style${style % STYLES}` });
+  return svgElement("svg", { width: 26, height: 12, "aria-hidden": "true" }, line);
 }
 
 function render(host) {
@@ -42,62 +42,62 @@ function render(host) {
   const box = { left, right: width - 8, top: 8, bottom: height - (small ? 18 : 38) };
   const toX = (value) => box.left + ((value - across[0]) / (across[1] - across[0])) * (box.right - box.left);
   const toY = (value) => box.bottom - ((value - up[0]) / (up[1] - up[0])) * (box.bottom - box.top);
-  const image = drawn("svg", { width, height, role: "img", "aria-label": describe(content), class: small ? "small" : "" });
+  const image = svgElement("svg", { width, height, role: "img", "aria-label": describe(content), class: small ? "small" : "" });
   for (const [i, [lower, upper]] of (content.limits ?? []).entries())
-    image.append(drawn("rect", { class: "limits", x: toX(i - 0.38), width: toX(0.76) - toX(0), y: toY(upper), height: toY(lower) - toY(upper) }));
+    image.append(svgElement("rect", { class: "limits", x: toX(i - 0.38), width: toX(0.76) - toX(0), y: toY(upper), height: toY(lower) - toY(upper) }));
   for (const value of marksUp) {
-    image.append(drawn("line", { class: "grid", x1: box.left, x2: box.right, y1: toY(value), y2: toY(value) }));
-    image.append(drawn("text", { x: box.left - 5, y: toY(value) + 4, "text-anchor": "end" }, minus(value)));
+    image.append(svgElement("line", { class: "grid", x1: box.left, x2: box.right, y1: toY(value), y2: toY(value) }));
+    image.append(svgElement("text", { x: box.left - 5, y: toY(value) + 4, "text-anchor": "end" }, minus(value)));
   }
   const marksAcross = content.x.bands ? content.x.bands.map((_, i) => i) : ticks(across, (box.right - box.left) / 60);
-  // Names of bands that would touch each other are left out, every other one.
-  const room = (box.right - box.left) / marksAcross.length;
-  const every = content.x.bands ? Math.ceil((letter * Math.max(...content.x.bands.map((name) => name.length)) + 4) / room) : 1;
+  // If the names of bands do not fit, only every second, third … name is shown.
+  const spacing = (box.right - box.left) / marksAcross.length;
+  const every = content.x.bands ? Math.ceil((letter * Math.max(...content.x.bands.map((name) => name.length)) + 4) / spacing) : 1;
   for (const [i, value] of marksAcross.entries()) {
-    if (!content.x.bands) image.append(drawn("line", { class: "grid", x1: toX(value), x2: toX(value), y1: box.top, y2: box.bottom }));
-    if (i % every === 0) image.append(drawn("text", { x: toX(value), y: box.bottom + (small ? 13 : 16), "text-anchor": "middle" }, content.x.bands?.[i] ?? minus(value)));
+    if (!content.x.bands) image.append(svgElement("line", { class: "grid", x1: toX(value), x2: toX(value), y1: box.top, y2: box.bottom }));
+    if (i % every === 0) image.append(svgElement("text", { x: toX(value), y: box.bottom + (small ? 13 : 16), "text-anchor": "middle" }, content.x.bands?.[i] ?? minus(value)));
   }
   if (!small) {
-    image.append(drawn("text", { x: (box.left + box.right) / 2, y: height - 4, "text-anchor": "middle" }, `${content.x.title}, ${content.x.unit}`));
-    image.append(drawn("text", { transform: `translate(12 ${(box.top + box.bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, `${content.y.title}, ${content.y.unit}${content.y.reference ?? ""}`));
+    image.append(svgElement("text", { x: (box.left + box.right) / 2, y: height - 4, "text-anchor": "middle" }, `${content.x.title}, ${content.x.unit}`));
+    image.append(svgElement("text", { transform: `translate(12 ${(box.top + box.bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, `${content.y.title}, ${content.y.unit}${content.y.reference ?? ""}`));
   }
   for (const curve of content.curves) {
     const points = curve.x.map((x, i) => [x, curve.y[i]]).filter(([, y]) => y !== null);
     const line = points.map(([x, y]) => `${toX(x).toFixed(1)} ${toY(y).toFixed(1)}`).join("L");
-    const group = drawn("g", { class: `curve style${curve.style % STYLES}${curve.thin ? " thin" : ""}` }, drawn("path", { d: `M${line}` }));
+    const group = svgElement("g", { class: `curve style${curve.style % STYLES}${curve.thin ? " thin" : ""}` }, svgElement("path", { d: `M${line}` }));
     if (curve.marks) for (const [x, y] of points) group.append(MARKS[curve.style % MARKS.length](toX(x), toY(y)));
     image.append(group);
   }
-  const reading = drawn("line", { class: "reading", y1: box.top, y2: box.bottom, visibility: "hidden" });
-  image.append(reading);
-  const words = element("div", { class: "readout", hidden: true });
+  const cursor = svgElement("line", { class: "cursor", y1: box.top, y2: box.bottom, visibility: "hidden" });
+  image.append(cursor);
+  const readout = element("div", { class: "readout", hidden: true });
   image.addEventListener("pointermove", (event) => {
     const at = across[0] + ((event.offsetX - box.left) / (box.right - box.left)) * (across[1] - across[0]);
-    read(content, at, words);
+    showValues(content, at, readout);
     const x = content.x.bands ? toX(Math.round(at)) : event.offsetX;
-    reading.setAttribute("x1", x);
-    reading.setAttribute("x2", x);
+    cursor.setAttribute("x1", x);
+    cursor.setAttribute("x2", x);
     const inside = event.offsetX >= box.left && event.offsetX <= box.right;
-    reading.setAttribute("visibility", inside ? "visible" : "hidden");
-    words.hidden = !inside;
-    // Beside the cursor, not under it.
-    words.classList.toggle("left", event.offsetX > (box.left + box.right) / 2);
+    cursor.setAttribute("visibility", inside ? "visible" : "hidden");
+    readout.hidden = !inside;
+    // On the side of the plot away from the cursor.
+    readout.classList.toggle("left", event.offsetX > (box.left + box.right) / 2);
   });
-  image.addEventListener("pointerleave", () => { words.hidden = true; reading.setAttribute("visibility", "hidden"); });
-  host.replaceChildren(image, words);
+  image.addEventListener("pointerleave", () => { readout.hidden = true; cursor.setAttribute("visibility", "hidden"); });
+  host.replaceChildren(image, readout);
 }
 
-/** Show the values of all curves at a position. */
-function read(content, at, words) {
+/** Show the values of all curves at the position `at` of the x axis. */
+function showValues(content, at, readout) {
   const position = content.x.bands ? content.x.bands[Math.round(at)] : rounded(at);
   const lines = content.curves.map((curve) => {
-    const near = curve.x.reduce((best, x, i) => (Math.abs(x - at) < Math.abs(curve.x[best] - at) ? i : best), 0);
-    return element("div", {}, swatch(curve.style), ` ${rounded(curve.y[near], content.y.unit)}`);
+    const nearest = curve.x.reduce((best, x, i) => (Math.abs(x - at) < Math.abs(curve.x[best] - at) ? i : best), 0);
+    return element("div", {}, swatch(curve.style), ` ${rounded(curve.y[nearest], content.y.unit)}`);
   });
-  words.replaceChildren(`${position} ${content.x.unit}`, ...lines);
+  readout.replaceChildren(`${position} ${content.x.unit}`, ...lines);
 }
 
-/** Return what a plot shows, for those who do not see it. */
+/** Return a description of a plot for screen readers. */
 function describe(content) {
   const lines = content.curves.map((curve) => {
     if (content.x.bands) return `${curve.name}: ${curve.y.map((y, i) => `${content.x.bands[i]} ${content.x.unit} ${rounded(y)}`).join(", ")}`;
@@ -116,7 +116,7 @@ function padded([low, high]) {
   return [low - pad, high + pad];
 }
 
-/** Return round values within a range, at most so many. */
+/** Return round values within a range, about `count` of them. */
 function ticks([low, high], count) {
   const rough = (high - low) / Math.max(2, Math.floor(count));
   const power = 10 ** Math.floor(Math.log10(rough));

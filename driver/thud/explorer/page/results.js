@@ -1,21 +1,21 @@
-// Display of the answers: verdict, plots, criteria, floor, room, warnings.
+// Display of answers: verdict, plots, criteria, floor, room and warnings.
 import { byId, capitalize, element, minus, rounded, signed } from "./page.js";
 import { showBall } from "./ball.js";
 import { plot, swatch } from "./plot.js";
 
-/** Show variants, first that of the form; `remove` removes a variant. */
+/** Show variants, of which the first belongs to the form; `remove` removes a variant. */
 export function show(variants, remove) {
   if (!variants.length) return;
   const [first] = variants;
   summarize(first);
-  const curve = (variant, style, x, y, more = {}) => ({ name: variant.name, style, x, y, ...more });
+  const curve = (variant, style, x, y, options = {}) => ({ name: variant.name, style, x, y, ...options });
   const forces = variants.flatMap((variant, i) => {
     const { force, floor } = variant.answer;
-    const moved = floor ? [curve({ name: `${variant.name}, ${floor.name}` }, i, floor.force.time, floor.force.value, { thin: true })] : [];
-    return [curve(variant, i, force.time, force.value), ...moved];
+    const onFloor = floor ? [curve({ name: `${variant.name}, ${floor.name}` }, i, floor.force.time, floor.force.value, { thin: true })] : [];
+    return [curve(variant, i, force.time, force.value), ...onFloor];
   });
-  const thin = first.answer.floor ? element("small", {}, ` thin: on the ${first.answer.floor.name}`) : "";
-  byId("force_title").replaceChildren(capitalize(first.answer.force.words ?? "force"), thin);
+  const legend = first.answer.floor ? element("small", {}, ` thin: on the ${first.answer.floor.name}`) : "";
+  byId("force_title").replaceChildren(capitalize(first.answer.force.title ?? "force"), legend);
   plot(byId("force"), { curves: forces, x: { title: "Time", unit: "ms" }, y: { title: "Force, low-passed at 1.25 kHz", unit: "N", zero: true } });
   const names = (levels) => levels.frequency.map(String);
   const bands = (variant, i, levels) => curve(variant, i, levels.frequency.map((_, k) => k), levels.level, { marks: true });
@@ -34,7 +34,7 @@ export function show(variants, remove) {
       x: { title: "One-third-octave band", unit: "Hz", bands: names(rooms[0].answer.room) },
       y: { title: "Maximum Fast level", unit: "dB", reference: " re 20 µPa" },
     });
-    byId("room_words").replaceChildren(...rooms.map((variant) => element("li", {}, key(variants, variant), "L", element("sub", {}, "iA,Fmax"),
+    byId("room_text").replaceChildren(...rooms.map((variant) => element("li", {}, label(variants, variant), "L", element("sub", {}, "iA,Fmax"),
       ` ${variant.answer.room.rating} dB, standardized ${variant.answer.room.standardized} dB`)));
   }
   showCriteria(variants);
@@ -42,15 +42,15 @@ export function show(variants, remove) {
   showBall(first.answer.motion);
   const warnings = variants.flatMap((variant) => variant.answer.warnings.map((warning) => [variant, warning]));
   byId("warnings_section").hidden = !warnings.length;
-  byId("warnings").replaceChildren(...warnings.map(([variant, warning]) => element("li", {}, key(variants, variant), warning)));
+  byId("warnings").replaceChildren(...warnings.map(([variant, warning]) => element("li", {}, label(variants, variant), warning)));
 }
 
-/** Return the swatch and name of a variant if there are several. */
-function key(variants, variant) {
+/** Return the swatch and the name of a variant; empty if there is only one variant. */
+function label(variants, variant) {
   return variants.length > 1 ? element("span", {}, swatch(variants.indexOf(variant)), ` ${variant.name}: `) : "";
 }
 
-/** Return the distance of a value to its nearer limit, negative outside. */
+/** Return the distance of a value from the nearer limit, negative outside. */
 function margin(criterion) {
   return Math.min(criterion.value - criterion.lower, criterion.upper - criterion.value);
 }
@@ -63,11 +63,11 @@ function missedSide(criterion) {
 
 function summarize({ name, answer }) {
   const failed = answer.criteria.filter((criterion) => criterion.verdict !== "conforms");
-  const words = failed.map((criterion) => {
+  const reasons = failed.map((criterion) => {
     const by = criterion.value !== null && margin(criterion) < 0 ? `${Number((-margin(criterion)).toPrecision(2))} ${criterion.unit} `.replace("  ", " ") : "";
     return `${criterion.name} ${by}${missedSide(criterion)}`;
   });
-  byId("verdict").textContent = `${name} ${answer.verdict}${words.length ? `: ${words.join(", ")}` : ""}`;
+  byId("verdict").textContent = `${name} ${answer.verdict}${reasons.length ? `: ${reasons.join(", ")}` : ""}`;
   byId("verdict").className = answer.conforms ? "conforms" : "fails";
   const numbers = answer.numbers.map(([title, value, unit]) => `${title} ${rounded(value, unit)}`);
   const time = `computed in ${Number((1e3 * answer.seconds).toPrecision(2))} ms`;
@@ -98,7 +98,7 @@ function showCriteria(variants) {
 function showVariants(variants, remove) {
   byId("variants_section").hidden = variants.length < 2;
   byId("variants").replaceChildren(...variants.map((variant, i) => {
-    const line = element("li", {}, swatch(i), element("b", {}, ` ${variant.short}`), variant.words ? ` ${variant.words} ` : " ");
+    const line = element("li", {}, swatch(i), element("b", {}, ` ${variant.short}`), variant.description ? ` ${variant.description} ` : " ");
     if (variant.pinned) {
       const button = element("button", { type: "button", "aria-label": `Remove ${variant.short}` }, "×");
       button.addEventListener("click", () => { remove(variant); byId("pin").focus(); });
@@ -117,10 +117,10 @@ function showFloors(variants, curve) {
     curves: floors.map((variant) => curve(variant, variants.indexOf(variant), variant.answer.floor.velocity.time, variant.answer.floor.velocity.value)),
     x: { title: "Time", unit: "ms" }, y: { title: "Velocity of the floor", unit: "mm/s", zero: true },
   });
-  byId("floor_words").replaceChildren(...floors.map((variant) => element("li", {}, key(variants, variant),
+  byId("floor_text").replaceChildren(...floors.map((variant) => element("li", {}, label(variants, variant),
     variant.answer.floor.numbers.map(([title, value, unit]) => `${title} ${unit === "dB" ? `${signed(value, unit)} dB` : rounded(value, unit)}`).join("; "))));
-  const { head, rows } = floors[0].answer.floor;
+  const { header, rows } = floors[0].answer.floor;
   byId("floor_table").replaceChildren(
-    element("thead", {}, element("tr", {}, ...head.map((title) => element("th", { scope: "col" }, capitalize(title))))),
+    element("thead", {}, element("tr", {}, ...header.map((title) => element("th", { scope: "col" }, capitalize(title))))),
     element("tbody", {}, ...rows.map(([first, ...cells]) => element("tr", {}, element("th", { scope: "row" }, first), ...cells.map((cell) => element("td", {}, minus(cell)))))));
 }
