@@ -145,7 +145,7 @@ def test_residuals_of_a_target_have_its_share_of_the_parameters() -> None:
     for factor, expected in ((0.99, 0), (1.01, 2)):
         wanted = factor * stats.chi2.isf(UNLIKELY, 4.5)
         told = fit(float(np.sqrt(square / wanted))).warnings
-        assert sum("given uncertainty" in one for one in told) == expected
+        assert sum("uncertainty of the target" in one for one in told) == expected
 
 
 def test_heights_do_not_tell_modulus_from_wall(drops: list[Record]) -> None:

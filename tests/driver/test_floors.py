@@ -163,9 +163,9 @@ def test_points_without_a_second_coordinate_are_refused_in_the_group_of_their_fl
 
 
 def test_points_are_of_floors_with_sides(moved: thud.FloorImpact) -> None:
-    with pytest.raises(thud.InputError, match=naming("points")):
+    with pytest.raises(thud.InputError, match=naming("no point except")):
         moved.velocity_at(1.0, 1.0)
-    with pytest.raises(thud.InputError, match=naming("points")):
+    with pytest.raises(thud.InputError, match=naming("no point except")):
         thud.mobility(LIGHT, [50.0], (1.0, 1.0))
 
 
