@@ -94,7 +94,7 @@ def truth(table: str, touch: float, height: float, impact: thud.Impact) -> str:
 {table}
 onset = {touch:.7f}
 height = {height:.5f}
-contact_time = {impact.measured_contact_time:.6f}
+contact_time = {impact.contact_time_as_recorded:.6f}
 restitution = {impact.restitution:.5f}
 peak_force = {impact.peak_force:.2f}
 impulse = {impulse:.4f}

@@ -1,4 +1,4 @@
-"""The commands that run studies: one for each kind."""
+"""The commands that run studies: one for each kind of study."""
 
 from __future__ import annotations
 
@@ -40,24 +40,24 @@ def study_commands() -> dict[str, Command]:
     """Return the command of each kind of study."""
     return {
         name: Command(
-            entry.help,
+            info.help,
             (
                 _STUDY,
                 *output(
                     "the results"
-                    + ("; an interrupted study resumes there" if entry.has_samples else "")
+                    + ("; an interrupted study resumes there" if info.has_samples else "")
                     + " (default: outputs/<study name>)"
                 ),
-                *(_SAMPLES if entry.has_samples else ()),
+                *(_SAMPLES if info.has_samples else ()),
                 NO_FIGURES,
                 QUIET,
             ),
             run_study,
             Command._field_defaults["after_interrupt"]
-            if entry.has_samples
+            if info.has_samples
             else "nothing is written",
         )
-        for name, entry in KINDS.items()
+        for name, info in KINDS.items()
     }
 
 
@@ -73,14 +73,14 @@ def run_study(options: argparse.Namespace) -> int:
             "scheduler": options.scheduler,
             "allow_large": options.allow_large,
         }
-    kind.require(study, **run_options)
+    kind.require_runnable(study, **run_options)
     folder = Path(options.output or Path("outputs", study.name))
     if not options.quiet:
         print(kind.describe(study), file=sys.stderr)
-    drawn = not options.no_figures
-    with open_results(folder, kind, study, replace=options.replace, figures=drawn) as results:
+    figures = not options.no_figures
+    with open_results(folder, kind, study, replace=options.replace, figures=figures) as directory:
         try:
-            result = kind.compute(study, results, **run_options)
+            result = kind.compute(study, directory, **run_options)
         except ThudError as error:
             message = f"{options.study}: {error}"
             raise type(error)(message) from error
@@ -88,12 +88,12 @@ def run_study(options: argparse.Namespace) -> int:
             tqdm.write(result.table())
         print_notes(f"{options.study}: {text}" for text in (*result.warnings, *result.notes))
         contents = kind.files(result, study)
-        if drawn:
+        if figures:
             with warn_if_not_drawn("the figure of the study"):
                 from thud.plot import figure_files
 
                 contents |= figure_files(result.figures(study.name))
-        results.write(contents)
+        directory.write(contents)
     if not options.quiet:
         tqdm.write(f"Results: {folder}")
     return 0 if result.succeeded else NumericalError.exit_code

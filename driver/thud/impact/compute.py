@@ -9,7 +9,7 @@ from thud.base.bridge import ask, text
 from thud.base.checks import refuse, require_kind
 from thud.case.case import Case, case_text
 from thud.impact.floor_impact import new_floor_impact
-from thud.impact.impact import Impact, history
+from thud.impact.impact import Impact, impact_fields
 from thud.impact.room_level import new_room_level
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def compute(case: Case) -> Impact:
 def new_impact(case: Case, answer: Bundle) -> Impact:
     """Return the impact from a bundle of the library."""
     warnings = tuple(map(text, answer.get("warnings", {}).values()))
-    common = history(case, answer, warnings)
+    common = impact_fields(case, answer, warnings)
     return Impact(
         **common,
         on_floor=new_floor_impact(case, answer, common["floor_force"]),

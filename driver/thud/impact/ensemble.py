@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 MAX_THREADS = 1024
 # Approximate duration of one call of the library, s; interrupts are handled between calls.
 _CALL_TIME = 1.0
-# Limits of the memory of one call: number of samples, and number of values of their forces.
+# Limits of one call, for its memory: number of samples, and number of values of their forces.
 _MAX_SAMPLES = 2**17
 _MAX_VALUES = 2**26
 
@@ -65,7 +65,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     source: LimitsSource | None = None,
     progress: bool = False,
 ) -> Ensemble:
-    """Compute many drops on a rigid floor and on the floor of the case.
+    """Compute many drops on a rigid floor and, if the case has a floor, on this floor.
 
     Results are identical to those of `solve`, except for the shell model, which is computed in
     batches: its forces agree to 1e-10, and its levels to 1e-6 dB in bands with at least 1e-8 of the
@@ -77,10 +77,11 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     ----------
     parameters
         Scalars or arrays of one dimension by the names of keys, such as a pandas.DataFrame; they
-        are broadcast against each other. Entries of lists are named as ``"frequency(2)"``. A key of
-        floor or room whose name is not unique has its group, as ``"plate.loss_factor"``.
+        are broadcast against each other. An entry of a list is named like ``"frequency(2)"``. If
+        the name of a key of floor or room is not unique, its group precedes it, as in
+        ``"plate.loss_factor"``.
     case
-        All other keys; by default the ball and the drop of the paper.
+        Values of all other keys; by default the ball and the drop of the paper.
     model
         Source model in place of the model of the case, with its default options.
     threads
@@ -89,12 +90,12 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     levels
         Also compute levels and verdicts, which takes longer.
     bands
-        Bands of the levels in addition to octaves, such as ``"third"``; by default those of the
-        case.
+        Bands of the levels in addition to octaves, such as ``"third"``; by default the bands of
+        the case.
     forces
         Return the force histories, which take 16 bytes for each instant of each sample.
     sample_rate, duration, substeps
-        As in `solve`, for all samples; by default those of the case.
+        As in `solve`, for all samples; by default the values of the case.
     source
         ``"rubber_ball"`` or ``"tyre"``, whose limits apply; by default the source of the case.
     progress
@@ -109,7 +110,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     Raises
     ------
     InputError
-        If a key is not known, arrays are not numeric or do not broadcast, the case, the bands
+        If a key is unknown, arrays are not numeric or do not broadcast, the case, the bands
         or the number of threads are invalid, or the results do not fit in memory.
     """
     from tqdm import tqdm
@@ -135,7 +136,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     content = case_text(base)
     if not hasattr(parameters, "keys"):
         refuse_value("parameters", parameters, "arrays by their keys")
-    # Without parameters there is one drop, that of the case.
+    # Without parameters, there is only the drop of the case.
     varied = dict(parameters) or {"height": base.drop.height}
     try:
         columns, numbers = _columns(varied, base)
@@ -145,21 +146,21 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         if name in keywords or (name == "source" and source is not None):
             refuse(f"{name!r} is stated twice", "once, as a parameter or as a keyword")
     cost = _cost(content, columns)
-    width = min(len(os.sched_getaffinity(0)), MAX_THREADS) if threads is None else threads
-    require_whole("threads", width, 1, MAX_THREADS)
-    width = 1 if _FORKED else width
+    n_thread = min(len(os.sched_getaffinity(0)), MAX_THREADS) if threads is None else threads
+    require_whole("threads", n_thread, 1, MAX_THREADS)
+    n_thread = 1 if _FORKED else n_thread
     length = int(cost["force_length"]) if forces else 0
     max_count = min(_MAX_SAMPLES, _MAX_VALUES // max(1, len(FORCES) * length))
-    work = int(np.clip(_CALL_TIME * width / cost["cost"], 1, max(1, max_count)))
+    block_size = int(np.clip(_CALL_TIME * n_thread / cost["cost"], 1, max(1, max_count)))
     blocks = []
     try:
         # Raises MemoryError before the computation if the results do not fit.
         np.empty((len(numbers), len(FORCES), length))
         with tqdm(total=len(numbers), unit="sample", disable=not progress, leave=False) as bar:
-            for start in range(0, max(len(numbers), 1), work):
-                block = numbers[start : start + work]
+            for start in range(0, max(len(numbers), 1), block_size):
+                block = numbers[start : start + block_size]
                 blocks.append(
-                    _compute(content, columns, block, width, levels=levels, forces=forces)
+                    _compute(content, columns, block, n_thread, levels=levels, forces=forces)
                 )
                 bar.update(len(block))
         results = (
@@ -171,7 +172,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         size = f"{len(numbers)} samples"
         size += f" with forces of {length} values" if forces else ""
         refuse(f"forces = {forces} for {size} does not fit in memory", "fewer samples", error)
-    # Forces may fill the memory; frozen arrays are not copied.
+    # Forces may fill the memory; `Ensemble` does not copy frozen arrays.
     force = freeze(results["force"])
     return Ensemble(
         case=base,
@@ -192,7 +193,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
 
 
 def _floor_results(values: NDArray[np.float64], case: Case) -> dict[str, Any]:
-    """Return the additional results of cases with a floor by name; see `Ensemble`."""
+    """Return the additional fields of `Ensemble` for cases with a floor."""
     if not case.floor:
         return {}
     requested = case.levels.bands
@@ -213,7 +214,7 @@ def _floor_results(values: NDArray[np.float64], case: Case) -> dict[str, Any]:
 def _by_bands(
     level: NDArray[np.float64], requested: LevelsBands
 ) -> dict[tuple[LevelsForce, BandSet], NDArray[np.float64]]:
-    """Return levels by force and bands; the columns hold octaves, then other requested bands."""
+    """Return levels by force and bands; the last axis has octaves, then other requested bands."""
     result = {}
     start = 0
     for bands in BANDWIDTHS:
@@ -234,7 +235,7 @@ def _compute(  # noqa: PLR0913 - the arguments of the library
     levels: bool,
     forces: bool,
 ) -> dict[str, NDArray[Any]]:
-    """Return the results of a block of samples; the first dimension is the sample."""
+    """Return the results of a block of samples; the first axis is the sample."""
     answer = ask(
         "samples", case=content, **_key_arguments(keys), values=numbers.T, threads=threads,
         levels=levels, forces=forces,
@@ -267,14 +268,14 @@ def _key_arguments(keys: Iterable[str]) -> dict[str, Any]:
 
 
 def get_cost(case: Case, keys: Iterable[str]) -> float:
-    """Return the estimated time per sample, s, on one core, if samples differ in some keys."""
+    """Return the estimated time per sample, s, on one core, if samples differ in these keys."""
     return float(_cost(case_text(case), keys)["cost"])
 
 
 def _columns(
     parameters: Mapping[str, ArrayLike], case: Case
 ) -> tuple[dict[str, NDArray[Any]], NDArray[np.float64]]:
-    """Return an array for each key, all of the same length, and their numbers for the library."""
+    """Return arrays of one length by key, and their numbers for the library, [n_sample, n_key]."""
     assert case.model is not None  # noqa: S101 - `solve_many` has set it
     keys = [find_key(name, key_owners(case))[0] for name in parameters]
     for key in keys:

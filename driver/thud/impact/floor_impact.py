@@ -12,7 +12,7 @@ from thud.base.checks import require_pair
 from thud.base.extras import require_extra
 from thud.base.immutable import Immutable
 from thud.case.case import Case, case_text
-from thud.impact.impact import Impact, history
+from thud.impact.impact import Impact, impact_fields
 from thud.impact.mobility import mobility
 from thud.impact.quantities import FLOOR_QUANTITIES
 from thud.level.levels import force_exposure_levels
@@ -52,7 +52,8 @@ class FloorEnergy(Immutable):
 class FloorImpact(Impact):
     """Impact on a mobile floor; `floor_force` is the contact force.
 
-    It is `on_floor` of the `Impact` on a rigid floor, whose force the standards assess.
+    The `Impact` of the same drop on a rigid floor, whose force the standards assess, refers to this
+    impact as `on_floor`.
 
     Attributes
     ----------
@@ -96,7 +97,7 @@ class FloorImpact(Impact):
     def difference(
         self, bands: BandSet = "octave", method: LevelsMethod | None = None
     ) -> NDArray[np.float64]:
-        """Return level of the contact force − level of the blocked force, dB, shape (n_band,)."""
+        """Return the level differences contact − blocked force, dB, shape (n_band,)."""
         return self.levels(bands, method, "floor") - self.blocked_levels(bands, method)
 
     def injected_energy(self, bands: BandSet = "octave") -> FloorEnergy:
@@ -110,7 +111,7 @@ class FloorImpact(Impact):
     def mobility(
         self, frequency: ArrayLike, point: tuple[float, float] | None = None
     ) -> NDArray[np.complex128]:
-        """Return the mobility of the floor at the source or at a point; see `mobility`."""
+        """Return the mobility at the source or a point; see `thud.impact.mobility.mobility`."""
         return mobility(self.floor, frequency, point)
 
     def velocity_at(self, x: float, y: float) -> NDArray[np.float64]:
@@ -134,7 +135,7 @@ class FloorImpact(Impact):
         return [header, *zip((f"{f:g}" for f in energy.frequency), *cells, energies, strict=True)]
 
     def _floor_histories(self) -> dict[str, NDArray[np.float64]]:
-        """Return the force on a rigid floor and the motion of this floor."""
+        """Return the force on a rigid floor and the motion of the mobile floor."""
         points = enumerate(self.point_velocity, 1)
         return {
             "blocked_force_N": self.blocked_force,
@@ -152,7 +153,7 @@ class FloorImpact(Impact):
         return super().to_xarray().assign(floor_work=((), self.floor_work, attrs))
 
     def plot(self) -> Figure:
-        """Draw contact against blocked force, their levels, and the mobility of the floor."""
+        """Return a figure of contact and blocked force, their levels and the floor mobility."""
         from thud.plot.floor_figures import draw_floor
 
         return draw_floor(self)
@@ -161,12 +162,12 @@ class FloorImpact(Impact):
 def new_floor_impact(
     case: Case, answer: Bundle, blocked_force: NDArray[np.float64]
 ) -> FloorImpact | None:
-    """Return the impact on a mobile floor from a bundle of the library; None without one."""
+    """Return the impact on a mobile floor from an answer of the library; None if it has none."""
     prefix = "on_floor."
     floor_answer = {key[len(prefix) :]: answer[key] for key in answer if key.startswith(prefix)}
     if not floor_answer:
         return None
-    common = history(case, floor_answer, ())
+    common = impact_fields(case, floor_answer, ())
     points = zip(
         getattr(case.floor, "point_x", ()), getattr(case.floor, "point_y", ()), strict=True
     )

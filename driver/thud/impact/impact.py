@@ -36,17 +36,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Impact(ImpactQuantities, Displayed):
-    """Force and motion of an impact, sampled from first touch on.
+    """Force and motion of an impact, sampled at a constant rate.
 
-    Attributes are those of `ImpactQuantities` and the following. The peak force of finite elements
-    is the maximum of the force below 1.25 kHz, which a force plate records.
+    Attributes are those of `ImpactQuantities` and the following. The peak forces of the model
+    `finite_element` are maxima of the content below 1.25 kHz, which a force plate records.
 
     Attributes
     ----------
     case : Case
         The input.
     time : ndarray, shape (n_sample,)
-        Time since first touch, s.
+        Time since the first sample, s; first touch is at `touch_time`.
     deflection, velocity : ndarray, shape (n_sample,)
         Deflection of the source, m, and its rate, m/s.
     elastic_force : ndarray, shape (n_sample,)
@@ -105,8 +105,8 @@ class Impact(ImpactQuantities, Displayed):
         return self.case.limits.source
 
     @property
-    def measured_contact_time(self) -> float:
-        """Contact time by the definition for recordings (`thud.impact.contact_time`), s."""
+    def contact_time_as_recorded(self) -> float:
+        """Contact time, s, by the definition for recordings (`thud.impact.contact_time`)."""
         first = round(self.touch_time * self.sample_rate)
         last = math.ceil((self.touch_time + self.exact_contact_time) * self.sample_rate)
         begin, end = contact_span(self.floor_force[first : last + 1], self.sample_rate)
@@ -157,7 +157,7 @@ class Impact(ImpactQuantities, Displayed):
         )
 
     def quantity(self, name: str) -> float:
-        """Return the value of a quantity, SI units, by its name in the table; NaN if unknown."""
+        """Return a quantity, SI units, by its name, such as ``"contact_time"``; NaN if none."""
         return float(getattr(self, name, math.nan))
 
     def assessed_force(self, force: LevelsForce | None = None) -> LevelsForce:
@@ -214,7 +214,7 @@ class Impact(ImpactQuantities, Displayed):
         )
 
     def drop_force(self, drop: int = 1) -> DropForce:
-        """Return the assessed force; `drop` must be 1."""
+        """Return the assessed force; `drop` must be 1: only recordings have several drops."""
         require_whole("drop", drop, 1, 1)
         case = self.case
         model = case.model.name if case.model else ""
@@ -268,8 +268,8 @@ class Impact(ImpactQuantities, Displayed):
         return {}
 
 
-def history(case: Case, answer: Bundle, warnings: tuple[str, ...]) -> dict[str, Any]:
-    """Return the fields of an `Impact` or `FloorImpact` from a bundle of the library."""
+def impact_fields(case: Case, answer: Bundle, warnings: tuple[str, ...]) -> dict[str, Any]:
+    """Return arguments of `Impact` or `FloorImpact` from an answer of the library."""
     samples, quantities = answer["samples"], answer["quantities"]
     return {
         "case": case,

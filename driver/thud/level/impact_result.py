@@ -68,8 +68,8 @@ class DropForce(Immutable):
 class ImpactResult(Protocol):
     """Result of a drop: an `Impact` of a model, or a `Recording` of one or more drops.
 
-    For a recording, the force is that of the first drop, and all other results are averages over
-    the drops. It has the force on the floor only, which it returns for every `force`.
+    The force of a recording is that of the first drop; all other results are averages over its
+    drops. A recording has only the force on the floor and returns it for every `force`.
     """
 
     @property
@@ -137,7 +137,7 @@ class ImpactResult(Protocol):
         """The same drop on the mobile floor of the case; None without one."""
 
     def quantity(self, name: str) -> float:
-        """Return the value of a quantity, SI units, by its name in the table; NaN if unknown."""
+        """Return a quantity, SI units, by its name, such as ``"contact_time"``; NaN if none."""
 
     @property
     def room_level(self) -> RoomLevel | None:

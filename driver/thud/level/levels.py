@@ -134,8 +134,9 @@ def low_pass(
 
 
 def peak_count(force: ArrayLike, sample_rate: float) -> int:
-    """Return the number of peaks of a force: maxima with a decrease by 10 % on both sides.
+    """Return the number of peaks of a force.
 
+    A local maximum is a peak if the force falls by more than 10 % of the peak force on both sides.
     The force, N, shape (n_sample,), starts and ends at zero; only content below 1.25 kHz is used.
     Raise InputError if the force is empty, not finite or not one-dimensional, or the rate, Hz, is
     not positive.
@@ -151,7 +152,7 @@ def peak_count(force: ArrayLike, sample_rate: float) -> int:
 
 
 def _record(values: ArrayLike, name: str = "force") -> NDArray[np.float64]:
-    """Return a record as a contiguous array; raise InputError if it is not one."""
+    """Return values as a contiguous array; raise InputError unless real and one-dimensional."""
     return require_real(name, require_array(name, values, dimensions=(1,)))
 
 

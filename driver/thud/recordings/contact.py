@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from thud.recordings.noise import Cells
     from thud.recordings.plate import Plate
 
-# Length of background used on either side of the contact, s. More of it lowers the noise of the
-# offset by less than 5 %.
+# Maximum length of the background on either side of the contact, s. A longer background lowers the
+# noise of the offset by less than 5 %.
 MAX_BACKGROUND = 0.1
 # The background is averaged over cells. Pairs: width of a cell, and distance from the contact up to
 # which this width is used, s.
@@ -34,23 +34,24 @@ BACKGROUND_CELLS = ((5e-4, 5e-3), (2e-3, 25e-3), (3e-3, MAX_BACKGROUND))
 FLANK = 3e-3
 # Margin between background and pulse, s.
 MARGIN = 2e-3
-# Maximum time from the start of the pulse, by the search for drops, to the touch, s.
+# Maximum time from the start of the pulse that the search for drops returns to the touch, s.
 MAX_DELAY = 1e-3
-# Width of the cells of a flank, s: at least MIN_CELL, at most MAX_CELL near the touch, and GROWTH
-# times the distance from it farther away.
+# Width of the cells of a flank, s: from MIN_CELL to MAX_CELL in the interval of the touch; outside,
+# GROWTH times the distance from this interval, if this is more.
 MIN_CELL = 2e-5
 MAX_CELL = 1e-4
 GROWTH = 0.15
 # Width of the cells of the contact, s.
 CONTACT_CELL = 2e-4
 # The gate of the levels extends this many samples beyond the contact, and (GATE_RATE / rate)**2
-# more at low rates, whose anti-aliasing filter is close to the octave of 500 Hz.
+# more at low rates, at which the anti-aliasing filter is close to the octave of 500 Hz.
 GATE_SAMPLES = 8
 GATE_RATE = 10_000.0
-# Duration of the impulse response of a force plate's correction on either side, in periods of the
-# resonance.
+# Duration of the impulse response of a force plate's correction before and after the impulse, in
+# periods of the resonance.
 PLATE_PERIODS = 2.0
-# Error of touch and release due to content above the corrected frequencies, in periods.
+# Error of begin and end due to content above the corrected frequencies, in periods of the
+# resonance.
 PLATE_ERROR = 0.03
 # Errors of samples due to quantization and the filter of the recorder, as a fraction of the peak.
 SAMPLE_ERROR = 2e-4
@@ -70,17 +71,18 @@ class Contact(Immutable):
     peak : float
         Approximate maximum of the force below 1.25 kHz without the offset, N.
     span : tuple of int
-        First and stop index of `force`: the gate and up to MAX_BACKGROUND on either side.
+        First and stop index of `force` in the window: the gate and up to MAX_BACKGROUND on either
+        side.
     force, removed : ndarray, shape (span[1] - span[0],)
         Force without background, N, and the removed background, N.
     gate : tuple of int
-        First and stop index of the contact with its margins.
+        First and stop index of the contact with its margins in the window.
     covariance : ndarray, shape (n_cell, n_cell)
         Covariance of the error of the background in uniform cells of the gate, N2.
     background_lengths : tuple of float
         Length of the background before and after, s.
     background : Background
-        The fitted noise.
+        The fitted background and its noise.
     sample_rate : float
         Samples per second, Hz.
     """
@@ -106,12 +108,15 @@ class Contact(Immutable):
         return self.force[self.gate[0] - first : self.gate[1] - first]
 
     def summed(self, functionals: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return functionals, [k, n] over samples of the gate, summed within cells: [k, n_cell]."""
+        """Return functionals of the samples of the gate, [k, n], summed in cells: [k, n_cell]."""
         bounds = np.rint(np.linspace(0, functionals.shape[1], len(self.covariance) + 1))
         return np.add.reduceat(functionals, bounds[:-1].astype(int), axis=1)
 
     def covariance_of(self, functionals: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the covariance, [k, k], of functionals, [k, n], of the samples of the gate."""
+        """Return the covariance, [k, k], of the errors of weighted sums of the force in the gate.
+
+        The rows of `functionals`, [k, n], are the weights of the samples.
+        """
         white_variance = self.background.variances[0] * self.sample_rate / 2
         summed = self.summed(functionals)
         result: NDArray[np.float64] = white_variance * functionals @ functionals.T
@@ -119,7 +124,7 @@ class Contact(Immutable):
 
 
 def cells_between(bounds: NDArray[np.intp], rate: float, middle: float) -> Cells:
-    """Return begins and ends of cells from bounds in samples, s from the middle of the contact."""
+    """Return begins and ends of cells, s from the middle of the contact; bounds are in samples."""
     time = np.asarray((bounds - 0.5) / rate - middle, dtype=np.float64)
     return time[:-1], time[1:]
 
@@ -130,7 +135,7 @@ def _means(force: NDArray[np.float64], bounds: NDArray[np.intp]) -> NDArray[np.f
 
 
 def _background_bounds(length: int, rate: float) -> NDArray[np.intp]:
-    """Return bounds of background cells, in samples from the contact, up to a length."""
+    """Return bounds of background cells up to a length, in samples from the contact."""
     bounds = [0.0]
     for width, max_distance in BACKGROUND_CELLS:
         count = int((max_distance - bounds[-1]) / width + 1e-9)
@@ -150,7 +155,8 @@ class Edges:
     """Posteriors of first touch, and of release in reversed time, s from the first sample.
 
     `background_limits` are the stop index of the background before the contact and the first index
-    of that after it. `offset` is the median of this background, N, subtracted before the fit.
+    of the background after it. `offset` is the median of the background, N, that is subtracted
+    before the fit.
     """
 
     touch: Posterior
@@ -168,7 +174,7 @@ def estimate_limits(window: Window, noise: Background | None = None) -> tuple[Es
 
 
 def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
-    """Return the contact in a window; its force, N, may have been repaired."""
+    """Return the contact in a window; `force`, N, is its force, with any dropouts filled."""
     rate, contact = window.sample_rate, window.contact
     middle = (contact[0] + contact[1]) / 2 / rate
     edges = find_edges(window, force, None, passes=2)
@@ -186,7 +192,7 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
     _, covariance = background.predict(cells_between(inner, rate, middle))
     length = int(MAX_BACKGROUND * rate)
     span = (max(0, gate[0] - length), min(len(force), gate[1] + length))
-    # Five times the rate makes the cells five times as wide.
+    # Cells outside the gate are five times as wide; the width in samples is proportional to `rate`.
     sides = [uniform_bounds(*side, 5 * rate) for side in ((span[0], gate[0]), (gate[1], span[1]))]
     cells = cells_between(np.unique(np.concatenate([*sides, inner])), rate, middle)
     time = np.arange(*span) / rate - middle
@@ -212,9 +218,9 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
 def find_edges(
     window: Window, force: NDArray[np.float64], noise: Background | None, passes: int
 ) -> Edges:
-    """Return the edges of a contact; a second pass starts from the limits found by the first.
+    """Return the edges of a contact; a second pass starts from the edges of the first pass.
 
-    Noise fitted to another part of the signal is used as it is; None fits the noise.
+    `noise` is the fit to another part of the signal; if None, the noise is fitted.
     """
     rate, (first, stop) = window.sample_rate, window.contact
     middle = (first + stop) / 2 / rate
@@ -228,7 +234,7 @@ def find_edges(
     width = max(1, round(rate / RECORDED_BAND))
     peak = float(uniform_filter1d(force[first:stop], width).max())
     for pass_index in range(passes):
-        # The first of two passes needs the coarse grid only.
+        # The first of two passes needs only the coarse grid.
         searches = 1 + 2 * pass_index if passes > 1 else 2
         cells, mean = background_means(force, before_stop, after_start, rate, middle)
         if noise is None:
@@ -253,7 +259,7 @@ def find_edges(
                 _interval(posterior.edge(), 3 / rate + 1e-4) for posterior in posteriors
             )
             release = (-reverse[1], -reverse[0])
-            # Samples that a filter affects are no background.
+            # Samples into which filters spread the flanks are no background.
             spread = _spread(rate, window.plate)
             before_stop = max(int(touch[0] * rate) - spread, first // 2)
             after_start = min(int(release[1] * rate) + 1 + spread, (stop + len(force) + 1) // 2)
@@ -299,7 +305,8 @@ def find_posterior(  # noqa: PLR0913, PLR0917 - all of them describe one flank
 ) -> Posterior:
     """Return the posterior of the touch within an interval, s, from cells with bounds in samples.
 
-    If the bounds decrease, it is that of the release, in reversed time as is the interval.
+    If the bounds decrease, the posterior is that of the release, and its time and `interval` are
+    reversed.
     """
     reversed_ = bounds[0] > bounds[-1]
     bounds = bounds[::-1] if reversed_ else bounds
@@ -329,7 +336,7 @@ def find_posterior(  # noqa: PLR0913, PLR0917 - all of them describe one flank
 
 @lru_cache(maxsize=4)
 def _response(plate: Plate, rate: float) -> NDArray[np.float64]:
-    """Return the impulse response of a force plate's correction, the impulse in the middle."""
+    """Return the impulse response of a force plate's correction; the impulse is in the middle."""
     length = int(PLATE_PERIODS * rate / plate.frequency)
     impulse = np.zeros(2 * length + 1)
     impulse[length] = 1
@@ -341,7 +348,7 @@ def flank_bounds(
 ) -> NDArray[np.intp]:
     """Return bounds of flank cells in samples, from the end of the background to a time, s.
 
-    The interval, s, includes the touch; cells that are not fine have the maximum width.
+    The interval, s, includes the touch. Without `fine`, all cells have the maximum width.
     """
     touch = (interval[0] + interval[1]) / 2 * rate
     half_width = (interval[1] - interval[0]) / 2 * rate

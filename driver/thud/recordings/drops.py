@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -19,22 +20,23 @@ if TYPE_CHECKING:
     from thud.recordings.plate import Plate
     from thud.recordings.signal import Signal
 
-# Pulses are searched in means over cells of CELL s, in pieces of PIECE cells. Pieces overlap by
-# OVERLAP cells, more than a pulse with its background.
+# Pulses are searched in means over cells, each CELL seconds long, in pieces of PIECE cells. Pieces
+# overlap by OVERLAP cells, more than a pulse with its background.
 CELL = 1e-3
 PIECE = 30_000
 OVERLAP = 2_000
-# Number of cells in a segment, whose median is one value of the baseline.
+# Number of cells in a segment; the baseline is interpolated between the medians of the segments.
 SEGMENT = 1_000
-# A pulse rises above this many deviations of the cells or this fraction of the maximum, whichever
-# is less. The maximum exceeds MIN_DEVIATIONS deviations.
+# A pulse must rise above RISE standard deviations of the noise or RISE_FRACTION of the maximum,
+# whichever is less; the maximum must exceed MIN_DEVIATIONS standard deviations of the noise.
 RISE = 6.0
 RISE_FRACTION = 0.4
 MIN_DEVIATIONS = 4.0
-# A pulse ends MARGIN cells outside the level FOOT times its peak.
+# A pulse starts and ends MARGIN cells beyond the points where it falls below FOOT times its peak.
 FOOT = 0.2
 MARGIN = 2
-# Background next to a pulse, in cells: distance from the points at half its height, and length.
+# Background next to a pulse, in cells from the points at half its height. DISTANCE: the nearest
+# distance. LENGTH: the farthest distance on the left, the length on the right.
 DISTANCE = 6
 LENGTH = 20
 # Maximum gap within one pulse, in cells.
@@ -43,12 +45,12 @@ MAX_GAP = 4
 MIN_HEIGHT = 0.03
 # Duration of a pulse above half its peak, s: contacts of balls and tyres last 12 to 40 ms.
 DURATIONS = (0.003, 0.06)
-# Two peaks are two impacts if the valley between them is below this fraction of the lower one.
+# Two peaks are two impacts if the force between them falls below this fraction of the lower peak.
 VALLEY = 0.3
 # A pulse whose peak reaches this fraction of the previous peak is a new drop. The limits of the
 # standards let a ball return with 0.9 of its velocity, and the force follows the velocity.
 NEW_DROP = 0.93
-# Duration of a flight, s: 2 v0/g for a drop height of 2 m, and of 0.5 mm.
+# Longest and shortest flight, s: 2 v0/g for drop heights of 2 m and of 0.5 mm.
 MAX_FLIGHT = 1.3
 MIN_FLIGHT = 0.02
 # Length of a window before and after a pulse, s.
@@ -102,7 +104,7 @@ class Window:
 
 @dataclass
 class _Pulse:
-    """One pulse: samples from start to before stop, and its height, N."""
+    """One pulse: first and stop index in the signal, and its height, N."""
 
     start: int
     stop: int
@@ -123,12 +125,14 @@ def find_windows(signal: Signal, *, progress: bool = False) -> list[Window]:
     pulses: list[_Pulse] = []
     width = max(1, round(rate * CELL))
     for first, cells in _pieces(signal, progress=progress):
-        # The next piece includes pulses that the end of this piece may cut.
-        complete = first + (len(cells) - OVERLAP // 2) * width
+        # Pulses that the end of a piece may cut are left to the next piece; the last accepts all.
+        accept_until = first + (len(cells) - OVERLAP // 2) * width
         if first + len(cells) * width >= signal.n_sample:
-            complete = first + (len(cells) + OVERLAP) * width
+            accept_until = first + (len(cells) + OVERLAP) * width
         last = pulses[-1].stop if pulses else 0
-        pulses += [p for p in _pulses(cells, first, rate) if last <= p.start < p.stop <= complete]
+        pulses += [
+            p for p in _pulses(cells, first, rate) if last <= p.start < p.stop <= accept_until
+        ]
     highest = max((p.peak for p in pulses), default=0.0)
     pulses = [pulse for pulse in pulses if pulse.peak > MIN_HEIGHT * highest]
     if not pulses:
@@ -140,33 +144,33 @@ def _pieces(signal: Signal, *, progress: bool) -> Iterator[tuple[int, NDArray[np
     """Yield the index of the first sample and the cell means of each piece of a signal."""
     width = max(1, round(signal.sample_rate * CELL))
     cells = np.empty(0)
-    first = 0
+    first_cell = 0
     bar = tqdm(
         total=signal.n_sample, unit="sample", unit_scale=True, desc=signal.name,
         disable=not progress,
     )  # fmt: skip
     block = 4_096 * width
-    ready = 0
+    n_collected = 0
     means: list[NDArray[np.float64]] = []
     for start in range(0, signal.n_sample, block):
         stop = min(start + block, signal.n_sample)
         force = signal.read(start, stop)
-        complete = len(force) // width * width
-        means.append(force[:complete].reshape(-1, width).mean(1))
-        if complete < len(force):
-            means.append(force[complete:].mean(keepdims=True))
-        ready += len(means[-1]) if complete == len(force) else len(means[-1]) + len(means[-2])
+        n_in_cells = len(force) // width * width
+        means.append(force[:n_in_cells].reshape(-1, width).mean(1))
+        if n_in_cells < len(force):
+            means.append(force[n_in_cells:].mean(keepdims=True))
+        n_collected += math.ceil(len(force) / width)
         bar.update(stop - start)
-        if ready + len(cells) >= PIECE or stop == signal.n_sample:
+        if n_collected + len(cells) >= PIECE or stop == signal.n_sample:
             cells = np.concatenate([cells, *means])
-            yield first * width, cells
-            first += max(len(cells) - OVERLAP, 0)
-            cells, means, ready = cells[-OVERLAP:], [], 0
+            yield first_cell * width, cells
+            first_cell += max(len(cells) - OVERLAP, 0)
+            cells, means, n_collected = cells[-OVERLAP:], [], 0
     bar.close()
 
 
 def _baseline(cells: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the force between the pulses, N: medians of segments; if short, a low quantile."""
+    """Return the force between the pulses, N, from medians, or a low quantile of few cells."""
     n = len(cells)
     if n < 2 * SEGMENT:
         # The quantile excludes a contact of up to 25 cells.
@@ -197,7 +201,7 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]
         if top < earliest:
             continue
         low, high = (_find_edge(level, top, step, level[top] / 2) for step in (-1, 1))
-        # Noise on the flank of a higher pulse is no pulse.
+        # A maximum on the flank of a higher pulse is noise.
         if level[low : high + 1].max() > level[top]:
             continue
         if not DURATIONS[0] <= (high - low + 1) * width / rate <= DURATIONS[1]:
@@ -240,8 +244,8 @@ def _double_peak_warning(envelope: NDArray[np.float64]) -> str:
         k = int(np.argmax(side - lowest))
         if lowest[k] < VALLEY * side[k] and side[k] > VALLEY * envelope[top]:
             return (
-                f"two impacts meet: a second peak of {side[k]:.0f} N rises from {lowest[k]:.0f} N, "
-                "without background between them"
+                f"two impacts overlap: a second peak of {side[k]:.0f} N rises from "
+                f"{lowest[k]:.0f} N; the force does not return to the background between them"
             )
     return ""
 

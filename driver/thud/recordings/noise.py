@@ -26,20 +26,20 @@ N_HARMONIC = 5
 # Wide prior standard deviations of offset, and of drift per second, as fractions of the peak force.
 OFFSET = 1.0
 DRIFT = 0.1
-# The exact covariance of two cells is used below this ratio of squared lag and mean squared length.
+# The exact covariance of two cells is used if squared lag / mean squared length is less than this.
 EXACT_LAG = 8.0
-# The priors of the logarithms of the variances are proportional to these powers of the variance,
-# and fall beyond a standard deviation of a cell of PRIOR_DEVIATION times the peak force.
+# The priors of the logarithms of the variances are proportional to these powers of the variances,
+# lowered by 1 if the standard deviation of a cell is above PRIOR_DEVIATION times the peak force.
 SLOPE = np.array([0.5, 0.25, 1.0, 0.25, 0.25])
 PRIOR_DEVIATION = 0.03
 # Standard deviation of each cell due to quantization, as a fraction of the peak force.
 QUANTIZATION = 1e-6
-# Number of draws of the variances, and number of them resampled by their posterior.
+# Number of draws of the variances, and number of draws after resampling by the posterior.
 N_DRAW = 64
 N_RESAMPLED = 16
 # Degrees of freedom of the Student distribution of the draws.
 DEGREES_OF_FREEDOM = 5
-# Maximum iterations in the search for the maximum of the posterior, and tolerance of its logarithm.
+# Search for the maximum of the posterior: maximum number of iterations, tolerance of the logarithm.
 MAX_ITERATIONS = 25
 TOLERANCE = 0.02
 
@@ -77,10 +77,10 @@ class Noise:
 def noise_covariances(cells: Cells, other: Cells) -> NDArray[np.float64]:
     """Return covariances of means over cells that are equal or disjoint: [4, n_cell, n_other].
 
-    The first axis is pink and brown noise of density 1 at 1 Hz, and hum of 50 and 60 Hz of
-    variance 1. Pink and brown noise have the covariances -ln|lag| and -pi**2 |lag|, up to a
-    constant that the unknown offset absorbs; the mean of -ln|lag| over two distant cells is exact
-    to second order in their lengths.
+    The first axis is pink noise, brown noise (each of density 1 at 1 Hz), and hum of 50 Hz and of
+    60 Hz (each of variance 1). Pink and brown noise have the covariances -ln|lag| and -pi**2 |lag|,
+    except for a constant, which the unknown offset absorbs. For distant cells, the mean of -ln|lag|
+    is exact to second order in the lengths of the cells.
     """
     (a, b), (c, d) = cells, other
     lag = np.abs(((a + b) / 2)[:, None] - (c + d) / 2)
@@ -103,7 +103,7 @@ def noise_covariances(cells: Cells, other: Cells) -> NDArray[np.float64]:
 def _waves(cells: Cells) -> NDArray[np.float64]:
     """Return means over cells of the waves of each hum, [n_mains, n_cell, n_wave].
 
-    Each harmonic has waves at two frequencies, MAINS_DEVIATION on either side.
+    Each harmonic has waves of two fundamentals, MAINS plus and minus MAINS_DEVIATION.
     """
     middle, width = (cells[0] + cells[1]) / 2, cells[1] - cells[0]
     order = np.arange(1, N_HARMONIC + 1)
@@ -118,9 +118,10 @@ def _waves(cells: Cells) -> NDArray[np.float64]:
 class Background(Immutable):
     """Background during the contact, predicted linearly from cells next to the contact.
 
-    `cells` has their begins and ends, s, `mean` their mean forces, N, [n_cell], and `draws`,
-    [n_draw, 5], densities of white, pink and brown noise, N2/Hz, and variances of hum of 50 and of
-    60 Hz, N2; known ones are a single draw. The peak force, N, scales the priors.
+    `cells` are begins and ends of cells, s, and `mean`, [n_cell], their mean forces, N. Each row of
+    `draws`, [n_draw, 5], has the densities of white, pink and brown noise, N2/Hz, and the variances
+    of hum of 50 and of 60 Hz, N2; if they are known, there is one row. The peak force, N, scales
+    the priors.
     """
 
     cells: Cells
@@ -130,7 +131,7 @@ class Background(Immutable):
 
     @property
     def variances(self) -> NDArray[np.float64]:
-        """Mean of the draws."""
+        """Mean of the draws: densities, N2/Hz, and variances of hum, N2."""
         return np.asarray(self.draws.mean(axis=0), dtype=np.float64)
 
     def density(self, frequency: float) -> tuple[float, float]:
@@ -155,8 +156,8 @@ class Background(Immutable):
     def predict(self, cells: Cells) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the expected background in cells, N, and the covariance of its error, N2.
 
-        Both are those of the mixture of all draws. The covariance excludes the white noise of the
-        predicted cells.
+        They are the mean and the covariance of the mixture of all draws. The covariance excludes
+        the white noise of the predicted cells.
         """
         cross_covariances = noise_covariances(self.cells, cells)
         trend = _trend(self.cells, cells, self.peak)
@@ -192,7 +193,7 @@ class Background(Immutable):
 
     @property
     def hum(self) -> tuple[float, float, float]:
-        """Frequency of the stronger hum, Hz, its amplitude, N, and the deviation of this, N."""
+        """Frequency of the stronger hum, Hz, amplitude, N, and its standard deviation, N."""
         k = int(np.argmax(self.variances[3:]))
         waves = _waves(self.cells)[k]
         scaled = [draw[3 + k] * w for draw, w in zip(self.draws, self._weights, strict=True)]
@@ -213,12 +214,12 @@ def _trend(cells: Cells, other: Cells, peak: float) -> NDArray[np.float64]:
 
 
 def _fixed(cells: Cells, peak: float) -> NDArray[np.float64]:
-    """Return the covariance of cells that no variance scales: offset, drift and quantization."""
+    """Return the part of the covariance of cells due to offset, drift and quantization."""
     return _trend(cells, cells, peak) + (QUANTIZATION * peak) ** 2 * np.eye(len(cells[0]))
 
 
 def covariances(cells: Cells) -> NDArray[np.float64]:
-    """Return covariances of means over cells: white, pink, brown, hum of 50 and of 60 Hz."""
+    """Return unit covariances of white, pink and brown noise and both hums: [5, n_cell, n_cell]."""
     white = np.diag(0.5 / (cells[1] - cells[0]))
     return np.concatenate([white[None], noise_covariances(cells, cells)])
 
@@ -226,14 +227,14 @@ def covariances(cells: Cells) -> NDArray[np.float64]:
 def fit_background(cells: Cells, mean: NDArray[np.float64], peak: float) -> Background:
     """Return the background with variances drawn from their posterior.
 
-    Arguments as in `Background`; the times are from about the middle of the contact.
+    Arguments are as in `Background`; times are from about the middle of the contact.
     """
     unit = covariances(cells)
     scale = np.array([np.mean(np.diagonal(unit[0])), 1.0, np.pi**2 * 0.02, 1.0, 1.0])
     posterior = _Posterior(unit, _fixed(cells, peak), mean, (PRIOR_DEVIATION * peak) ** 2 / scale)
-    # First guess of the variance: half the mean square difference of adjoining cells.
-    adjoining = cells[0][1:] - cells[1][:-1] < 1e-3 * (cells[1] - cells[0])[1:]
-    differences = np.diff(mean)[adjoining]
+    # First guess of the variance: half the mean square difference of adjacent cells.
+    adjacent = cells[0][1:] - cells[1][:-1] < 1e-3 * (cells[1] - cells[0])[1:]
+    differences = np.diff(mean)[adjacent]
     variance = np.mean(differences**2) / 2 if differences.size else 0.0
     variance += (QUANTIZATION * peak) ** 2
     guess = np.log(variance * np.array([1, 0.1, 0.1, 0.05, 0.05]) / scale)
@@ -245,9 +246,9 @@ def fit_background(cells: Cells, mean: NDArray[np.float64], peak: float) -> Back
 class _Posterior:
     """Posterior of the logarithms of the variances.
 
-    The covariance of the cells is linear in the variances: `unit` has the covariances for unit
-    variances, `fixed` the rest. The priors rise with the variances up to `large`, so that the
-    estimate of absent noise is small and not zero.
+    The covariance of the cells is linear in the variances: `unit` has the covariance for each unit
+    variance, `fixed` is the part that does not depend on the variances. The priors increase with
+    the variances up to about `large`, so that the estimate of absent noise is small and not zero.
     """
 
     unit: NDArray[np.float64]
@@ -268,7 +269,7 @@ class _Posterior:
     def _derivatives(
         self, phi: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the gradient, and the average information including that of the priors."""
+        """Return the gradient, and the average information of likelihood and priors."""
         theta = np.exp(phi)
         factor, _ = lapack.dpotrf(np.tensordot(theta, self.unit, 1) + self.fixed, lower=True)
         inverse = lapack.dpotri(factor, lower=True)[0]
@@ -277,11 +278,11 @@ class _Posterior:
         products = (self.unit @ weighted) * theta[:, None]
         trace = theta * np.einsum("kij,ij->k", self.unit, inverse)
         score = 0.5 * (products @ weighted - trace) + SLOPE - theta / (theta + self.large)
-        # At the maximum the score of the likelihood is minus that of the prior, about SLOPE.
+        # At the maximum, the scores of likelihood and prior cancel; the latter is about SLOPE.
         return score, 0.5 * products @ inverse @ products.T + np.diag(SLOPE)
 
     def maximum(self, phi: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the most probable logarithms, from a first guess, and the curvature there."""
+        """Return the most probable logarithms, from a first guess, and the curvature at them."""
         value = self.logarithm(phi)
         score, curvature = self._derivatives(phi)
         for _ in range(MAX_ITERATIONS):

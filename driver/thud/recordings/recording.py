@@ -276,7 +276,7 @@ class Recording(Displayed):
         return tuple(dict.fromkeys(f"levels: {describe_low_pass(rate)}" for rate in rates))
 
     def quantity(self, name: str) -> float:
-        """Return a quantity of the table by its name, SI units; NaN if unknown."""
+        """Return a quantity, SI units, by its name, such as ``"contact_time"``; NaN if none."""
         if name in ESTIMATES and not hasattr(self, name):
             return float(np.mean([getattr(drop, name).value for drop in self.drops]))
         return float(getattr(self, name, math.nan))

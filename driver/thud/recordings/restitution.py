@@ -12,7 +12,7 @@ from thud.level.estimate import Estimate
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-# Default of the models, m/s2.
+# Gravity, m/s2, the default of the models.
 GRAVITY = Drop.gravity
 IMPULSE, BOUNCES = "impulse", "bounces"
 
@@ -37,7 +37,7 @@ class DropConditions:
 
     @property
     def speed(self) -> float:
-        """Velocity at first touch, m/s; NaN without the height."""
+        """Velocity at first touch, m/s; NaN if the drop height is unknown."""
         return math.sqrt(2 * GRAVITY * self.height) if self.height else math.nan
 
     def restitutions(
@@ -69,18 +69,20 @@ class DropConditions:
     def shared_effects(
         self, methods: dict[str, Estimate], impulse: Estimate
     ) -> dict[str, dict[str, float]]:
-        """Return the change of each restitution by one standard uncertainty of each cause."""
+        """Return the change of each restitution due to one standard uncertainty of each cause."""
         effects: dict[str, dict[str, float]] = {}
-        speed_uncertainty = self.height_uncertainty / (2 * self.height) if self.height else 0.0
+        relative_speed_uncertainty = (
+            self.height_uncertainty / (2 * self.height) if self.height else 0.0
+        )
         if IMPULSE in methods:
             ratio = impulse.value / ((self.mass or math.nan) * self.speed)
             effects[IMPULSE] = {
                 "calibration": ratio * self.calibration_uncertainty,
                 "mass": -ratio * self.mass_uncertainty / (self.mass or math.nan),
-                "drop height": -(1 + methods[IMPULSE].value) * speed_uncertainty,
+                "drop height": -(1 + methods[IMPULSE].value) * relative_speed_uncertainty,
             }
         if BOUNCES in methods:
-            effects[BOUNCES] = {"drop height": -methods[BOUNCES].value * speed_uncertainty}
+            effects[BOUNCES] = {"drop height": -methods[BOUNCES].value * relative_speed_uncertainty}
         return effects
 
     def mean(
@@ -88,8 +90,8 @@ class DropConditions:
     ) -> tuple[Estimate, dict[str, float]]:
         """Return the weighted mean over the methods, and the shared effects on this mean.
 
-        The weights are the inverse variances including shared effects, which the uncertainty of the
-        mean excludes.
+        The weights are the inverse variances, shared effects included. The uncertainty of the mean
+        does not include the shared effects.
         """
         if not methods:
             return Estimate.unknown(), {}

@@ -196,7 +196,7 @@ class FitStudy(Study):
     options: dict[str, Any] = field(default_factory=lambda: dict(OPTIONS))
     surrogate: Surrogate | None = None
 
-    def own_identity(self) -> dict[str, str]:
+    def kind_settings(self) -> dict[str, str]:
         """Return the settings of targets and search."""
         tables = self.tables["target"]
         tables = tables if isinstance(tables, list) else [tables]

@@ -90,7 +90,7 @@ class Kind(ABC, Generic[S, R]):
             study = self.with_surrogate(study, get_surrogate(surrogate))
             if isinstance(surrogate, str | os.PathLike):
                 study = dataclasses.replace(study, inputs=(*study.inputs, surrogate))
-        self.require(study, **options)
+        self.require_runnable(study, **options)
         if output is None:
             return self.compute(study, None, **options)
         replace = options.get("replace", False)
@@ -113,7 +113,7 @@ class Kind(ABC, Generic[S, R]):
         """Return a study whose drops a surrogate predicts."""
         refuse(f"surrogate is not allowed for a {self.name} study", "studies of samples of drops")
 
-    def require(self, study: S, **options: Unpack[RunOptions]) -> None:
+    def require_runnable(self, study: S, **options: Unpack[RunOptions]) -> None:
         """Raise InputError if a study cannot be computed with these options."""
 
     def describe(self, study: S) -> str:

@@ -95,7 +95,7 @@ class DropsKind(Kind[SampleStudy, R]):
         trained.require(study.case, study.key_columns(study.parameter_columns(0, 1)))
         return replace(study, plan=None, surrogate=trained)
 
-    def require(self, study: SampleStudy, **options: Unpack[RunOptions]) -> None:
+    def require_runnable(self, study: SampleStudy, **options: Unpack[RunOptions]) -> None:
         """Raise InputError for too many samples or an unknown backend."""
         if study.count > MAX_SAMPLES and not options.get("allow_large"):
             refuse(

@@ -35,7 +35,7 @@ _SURROGATE_BLOCK_SIZE = 2**16
 
 @dataclass(frozen=True)
 class SampleStudy(Study):
-    """A study whose samples differ from its case in the values of its parameters.
+    """A study whose samples differ from its case in the values of the parameters.
 
     Attributes
     ----------
@@ -64,8 +64,8 @@ class SampleStudy(Study):
     # Whether the peaks of the assessed force are counted in each sample.
     counts_peaks: ClassVar[bool] = False
 
-    def own_identity(self) -> dict[str, str]:
-        """Return the settings of design, temperature and surrogate."""
+    def kind_settings(self) -> dict[str, str]:
+        """Return the settings of design, temperature and surrogate on which results depend."""
         result = sampler_versions(self.design) | {"[design] kind": self.design}
         if self.size:
             result |= {"[design] size": f"{self.size}", "[design] seed": f"{self.seed}"}
@@ -99,7 +99,7 @@ class SampleStudy(Study):
         if self.plan or self.surrogate:
             return _SURROGATE_BLOCK_SIZE
         if self.design in {"grid", "list"}:
-            # A full grid may exceed the memory; its first value is enough here.
+            # One sample is enough here; the full grid may exceed the memory.
             first = {p.name: replace(p, count=min(p.count, 2)).grid()[:1] for p in self.parameters}
         else:
             first = self.parameter_columns(0, 1)
@@ -136,7 +136,7 @@ class SampleStudy(Study):
 class Block:
     """Samples from index `start` on that are computed together.
 
-    `columns` are the values, shape (n_sample,), of the keys in which they differ from the case.
+    `columns` are the values, shape (n_sample,), of the keys in which samples differ from the case.
     `version` is the required version of thud; `surrogate` replaces the model if there is one.
     """
 
@@ -149,9 +149,9 @@ class Block:
 
 
 def evaluate(block: Block) -> Columns:
-    """Return the results of a block by their names in `ALL_QUANTITIES`; NaN where a sample fails.
+    """Return the results of a block by names as in `ALL_QUANTITIES`; NaN for a failed sample.
 
-    Raises InputError if the version of thud differs.
+    Raise InputError if the block requires another version of thud.
     """
     if block.version != version():
         refuse(

@@ -76,8 +76,8 @@ class Study:
 
     @property
     def identity(self) -> dict[str, str]:
-        """Everything that its results depend on, as texts by group and key."""
-        result = {"thud": version(), "kind": self.kind, **self.own_identity()}
+        """Version and settings on which the results depend, as texts by group and key."""
+        result = {"thud": version(), "kind": self.kind, **self.kind_settings()}
         result["[parameters]"] = ", ".join(p.name for p in self.parameters)
         result |= {f"[parameters] {p.name}": str(p) for p in self.parameters}
         if self.density is not None:
@@ -93,8 +93,8 @@ class Study:
         case = with_values(self.case, {name: v for name, v in result.items() if v is not None})
         return case if self.density is None else with_density(case, self.density)
 
-    def own_identity(self) -> dict[str, str]:
-        """Return the additional settings on which results of this kind depend."""
+    def kind_settings(self) -> dict[str, str]:
+        """Return the settings of this kind of study on which its results depend."""
         return {}
 
 

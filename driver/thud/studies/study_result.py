@@ -20,7 +20,7 @@ class StudyResult(Displayed):
     Attributes
     ----------
     warnings : tuple of str
-        Why numbers may be wrong or missing.
+        Reasons why numbers may be wrong or missing.
     """
 
     warnings: tuple[str, ...]
@@ -44,7 +44,7 @@ class StudyResult(Displayed):
         """Return the figure of the result."""
 
     def figures(self, name: str) -> dict[str, Figure]:
-        """Return all figures by the names of their files; `name` is that of the study."""
+        """Return all figures by the names of their files; `name` is the name of the study."""
         return {name: self.plot()} if self.succeeded else {}
 
 
@@ -71,7 +71,7 @@ class SampleResult(StudyResult):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Accuracy of the surrogate, and how many verdicts it leaves undecided."""
+        """Accuracy of the surrogate, and the number of verdicts that it leaves undecided."""
         if "surrogate" not in self.dataset.attrs:
             return ()
         undecided = self.dataset["undecided"]

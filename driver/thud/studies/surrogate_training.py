@@ -49,9 +49,9 @@ class TrainingStudy(SampleStudy):
 
     counts_peaks: ClassVar[bool] = True
 
-    def own_identity(self) -> dict[str, str]:
+    def kind_settings(self) -> dict[str, str]:
         """Return design and range of the drops."""
-        return super().own_identity() | {"first drop": f"{self.first}"}
+        return super().kind_settings() | {"first drop": f"{self.first}"}
 
     @property
     def shape(self) -> tuple[int, ...]:
