@@ -2,7 +2,8 @@
 !> left for good. Gravity is left out, as on a rigid floor: a return by gravity is another impact.
 module thud_coupled_impact
    use thud_contact_source, only: coarse_error, contact_source_type
-   use thud_coupled_phases, only: begin_contact, get_distance, get_event, impact_type, no_event, pass_event, update_maxima
+   use thud_coupled_phases, only: begin_contact, get_event, get_event_function, impact_type, no_event, pass_event, &
+      update_maxima
    use thud_coupled_step, only: coupled_state_type, get_relative_state, take_coupled_step
    use thud_drop, only: drop_type
    use thud_error, only: error_type, input_error
@@ -49,8 +50,8 @@ contains
       allocate (history%floor_displacement(n), history%floor_velocity(n), source=0.0_wp)
       impact%receiver = receiver
       impact%stages = new_receiver_stages(receiver, step)
-      impact%scale = history%impact_velocity
-      impact%motion%motion = new_receiver_motion(receiver)
+      impact%velocity_scale = history%impact_velocity
+      impact%motion%receiver_motion = new_receiver_motion(receiver)
       allocate (impact%motion%displacement(source%n_mass), impact%motion%acceleration(source%n_mass), source=0.0_wp)
       allocate (impact%motion%velocity(source%n_mass), source=history%impact_velocity)
       call begin_contact(source, impact, error)
@@ -70,6 +71,8 @@ contains
       if (allocated(error)) return
       call finish_record(source, impact, history)
       state = get_relative_state(source, impact%motion)
+      ! Absolute displacements and velocities of the masses replace the relative ones; the other components of the state do
+      ! not depend on the motion of the floor.
       state(1:2*source%n_mass:2) = impact%motion%displacement
       state(2:2*source%n_mass:2) = impact%motion%velocity
    end subroutine solve_coupled
@@ -94,6 +97,7 @@ contains
          call take_step(source, drop, remaining, impact, end, error)
          if (allocated(error)) return
          event = get_event(source, end)
+         ! A captured source has no further events.
          if (event == no_event .or. impact%captured) then
             impact%motion = end
             impact%time = impact%time + remaining
@@ -123,12 +127,13 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(zero_search_type) :: search
 
-      search = new_zero_search(get_distance(source, event, impact%motion), remaining, get_distance(source, event, end))
+      search = new_zero_search(get_event_function(source, event, impact%motion), remaining, &
+         get_event_function(source, event, end))
       do while (.not. is_converged(search))
          call advance_search(search)
          call take_step(source, drop, search%trial, impact, end, error)
          if (allocated(error)) return
-         call update_bracket(search, get_distance(source, event, end))
+         call update_bracket(search, get_event_function(source, event, end))
       end do
       call take_step(source, drop, search%right, impact, end, error)
       if (allocated(error)) return
@@ -149,10 +154,11 @@ contains
       logical :: valid, converged
 
       if (length < impact%stages%interval) then
-         call take_coupled_step(source, new_receiver_stages(impact%receiver, length), impact%time, impact%scale, &
+         call take_coupled_step(source, new_receiver_stages(impact%receiver, length), impact%time, impact%velocity_scale, &
             impact%motion, end, valid, converged)
       else
-         call take_coupled_step(source, impact%stages, impact%time, impact%scale, impact%motion, end, valid, converged)
+         call take_coupled_step(source, impact%stages, impact%time, impact%velocity_scale, impact%motion, end, valid, &
+            converged)
       end if
       if (.not. valid) then
          error = source%get_failure(drop, impact%time, get_relative_state(source, impact%motion))
@@ -171,10 +177,11 @@ contains
       type(force_history_type), intent(inout) :: history
 
       associate (coupled => impact%motion)
-         history%floor_displacement(i) = coupled%motion%displacement
+         history%floor_displacement(i) = coupled%receiver_motion%displacement
          history%floor_velocity(i) = coupled%floor_velocity
          call source%record_sample(get_relative_state(source, coupled), i, history)
-         ! Force and floor velocity may jump at first touch: the first sample is the mean of both sides.
+         ! Force and floor velocity may jump at first touch: the first sample is the mean of both sides. `record_sample` has
+         ! set the first force.
          if (i > 1) history%floor_force(i) = coupled%force
          if (i == 1) history%floor_velocity(i) = coupled%floor_velocity/2
       end associate
@@ -187,8 +194,9 @@ contains
       type(impact_type), intent(in) :: impact
       !> Set if the source touches the floor, or if the floor can strike it again.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: lowest(2)
+      real(wp) :: center(2), gap, speed
 
+      ! The floor has stopped the source for good.
       if (impact%captured) return
       if (source%touching) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration) &
@@ -197,17 +205,20 @@ contains
       end if
       associate (coupled => impact%motion)
          associate (state => get_relative_state(source, coupled))
-            ! Maximum displacement that the first mass can reach, m, and velocity of the center of mass, m/s.
-            lowest = source%get_center(state) + [source%get_amplitude(state), 0.0_wp]
+            center = source%get_center(state)
+            ! Minimum gap between the first mass, which oscillates about the center of mass, and the floor, m.
+            gap = -(center(1) + source%get_amplitude(state))
          end associate
-         if (can_strike(impact%receiver, coupled%motion, -lowest(1), -lowest(2) - coupled%floor_velocity)) then
+         ! Velocity of the center of mass upwards, m/s, not relative to the floor.
+         speed = -center(2) - coupled%floor_velocity
+         if (can_strike(impact%receiver, coupled%receiver_motion, gap, speed)) then
             error = input_error('&sampling: duration = '//to_text(sampling%duration) &
                //' s ends while the floor may strike the source again; allowed: longer')
          end if
       end associate
    end subroutine check_end
 
-   !> Clears the flight after the last contact, and writes floor work, peak force and number of contacts.
+   !> Sets the motion after the last contact to zero, and writes floor work, peak force and number of contacts.
    pure subroutine finish_record(source, impact, history)
       class(contact_source_type), intent(in) :: source
       type(impact_type), intent(in) :: impact

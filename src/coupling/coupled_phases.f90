@@ -11,7 +11,7 @@ module thud_coupled_phases
    implicit none (type, external)
    private
 
-   public :: begin_contact, get_distance, get_event, impact_type, pass_event, update_maxima
+   public :: begin_contact, get_event, get_event_function, impact_type, pass_event, update_maxima
 
    !> A light floor may stop the source, so that it never leaves. The floor has captured the source, and the contact ends, if
    !> kinetic energy and force times deflection are both below this fraction of the initial energy.
@@ -34,20 +34,21 @@ module thud_coupled_phases
       type(receiver_stages_type) :: stages
       !> Motion of source and floor.
       type(coupled_state_type) :: motion
-      !> Time since first touch, s; velocity at first touch as a scale, m/s.
-      real(wp) :: time = 0.0_wp, scale = 0.0_wp
+      !> Time since first touch, s; velocity at first touch, the scale of velocities, m/s.
+      real(wp) :: time = 0.0_wp, velocity_scale = 0.0_wp
       !> Maximum force on the floor so far, N.
       real(wp) :: peak_force = 0.0_wp
       !> Number of contacts so far.
       integer :: n_contact = 0
-      !> Whether the floor has captured the source.
+      !> Whether the floor has captured the source, that is, stopped it for good.
       logical :: captured = .false.
    end type impact_type
 
 contains
 
    !> Sets force and velocity of the floor at touch. The force depends on the velocity, and by the direct mobility of the
-   !> receiver the velocity depends on the force. The cap has no mass yet.
+   !> receiver the velocity depends on the force. The part of the ball that lies flat on the floor (the cap) has no mass at
+   !> first touch.
    pure subroutine begin_contact(source, impact, error)
       class(contact_source_type), intent(inout) :: source
       type(impact_type), intent(inout) :: impact
@@ -63,10 +64,10 @@ contains
       impact%n_contact = impact%n_contact + 1
       associate (coupled => impact%motion, index => 2*source%n_mass + 1)
          coupled%force = 0.0_wp
-         length = 1.0e-7_wp*impact%scale
+         length = 1.0e-7_wp*impact%velocity_scale
          ! The force grows at most with the square of the velocity: Newton's method converges from one side.
          do k = 1, max_iterations
-            coupled%floor_velocity = get_receiver_velocity(impact%receiver, coupled%force, coupled%motion)
+            coupled%floor_velocity = get_receiver_velocity(impact%receiver, coupled%force, coupled%receiver_motion)
             state = get_relative_state(source, coupled)
             slower = state
             slower(2) = state(2) - length
@@ -111,25 +112,25 @@ contains
    end function get_event
 
    !> Quantity that falls to zero at an event: gap, deflection or velocity.
-   pure function get_distance(source, event, motion) result(distance)
+   pure function get_event_function(source, event, motion) result(value)
       class(contact_source_type), intent(in) :: source
       !> The event.
       integer, intent(in) :: event
       type(coupled_state_type), intent(in) :: motion
       !> Positive before the event, m or m/s.
-      real(wp) :: distance
+      real(wp) :: value
       real(wp) :: state(source%n_state)
 
       state = get_relative_state(source, motion)
       select case (event)
       case (touch)
-         distance = -state(1)
+         value = -state(1)
       case (release)
-         distance = state(1)
+         value = state(1)
       case default
-         distance = merge(state(2), -state(2), source%compressing)
+         value = merge(state(2), -state(2), source%compressing)
       end select
-   end function get_distance
+   end function get_event_function
 
    !> Changes the phase at an event.
    pure subroutine pass_event(source, event, impact, history, error)
@@ -151,10 +152,10 @@ contains
             source%touching = .false.
             history%contact_time = impact%time
             coupled%force = 0.0_wp
-            coupled%floor_velocity = get_receiver_velocity(impact%receiver, 0.0_wp, coupled%motion)
-            coupled%displacement(1) = coupled%motion%displacement
+            coupled%floor_velocity = get_receiver_velocity(impact%receiver, 0.0_wp, coupled%receiver_motion)
+            coupled%displacement(1) = coupled%receiver_motion%displacement
          case default
-            coupled%displacement(1) = coupled%motion%displacement
+            coupled%displacement(1) = coupled%receiver_motion%displacement
             call begin_contact(source, impact, error)
          end select
       end associate
@@ -174,12 +175,12 @@ contains
       associate (coupled => impact%motion)
          impact%peak_force = max(impact%peak_force, coupled%force)
          impact%captured = max(maxval(coupled%velocity**2), coupled%force*state(1)/source%mass) &
-            <= capture_tolerance*impact%scale**2
+            <= capture_tolerance*impact%velocity_scale**2
          if (.not. impact%captured) return
          source%touching = .false.
          history%contact_time = impact%time
          coupled%force = 0.0_wp
-         coupled%floor_velocity = get_receiver_velocity(impact%receiver, 0.0_wp, coupled%motion)
+         coupled%floor_velocity = get_receiver_velocity(impact%receiver, 0.0_wp, coupled%receiver_motion)
       end associate
    end subroutine update_maxima
 

@@ -40,7 +40,7 @@ module thud_coupled_step
       !> Impulse on the floor, N s; energy given to the floor and energy lost in the source, J.
       real(wp) :: impulse = 0.0_wp, work = 0.0_wp, loss = 0.0_wp
       !> Motion of the floor.
-      type(receiver_motion_type) :: motion
+      type(receiver_motion_type) :: receiver_motion
    end type coupled_state_type
 
    !> Trial values of the unknowns, and the rate of the source's state that they give.
@@ -70,7 +70,7 @@ contains
 
       n = 2*source%n_mass
       state = 0.0_wp
-      state(1:n:2) = coupled%displacement - coupled%motion%displacement
+      state(1:n:2) = coupled%displacement - coupled%receiver_motion%displacement
       state(2:n:2) = coupled%velocity - coupled%floor_velocity
       state(n + 1:n + 2) = [coupled%impulse, coupled%loss]
    end function get_relative_state
@@ -98,7 +98,7 @@ contains
       trial%acceleration = spread(start%acceleration, 1, n_stage)
       allocate (trial%state(source%n_state, n_stage), trial%rate(source%n_state, n_stage), &
          trial%derivative(source%n_state, 2*source%n_mass, n_stage), source=0.0_wp)
-      call get_free_motion(stages, start%motion, trial%free_velocity, trial%free_displacement)
+      call get_free_motion(stages, start%receiver_motion, trial%free_velocity, trial%free_displacement)
       converged = .false.
       do iteration = 1, max_iterations
          call evaluate_stages(source, stages, start, trial, valid)
@@ -131,7 +131,7 @@ contains
          end%work = start%work + h*dot_product(weight, trial%force*trial%floor_velocity)
          end%loss = start%loss + h*dot_product(weight, trial%rate(k + 2, :))
       end associate
-      call advance_stages(stages, trial%force, end%motion)
+      call advance_stages(stages, trial%force, end%receiver_motion)
    end subroutine take_coupled_step
 
    !> Motion at the stages under the trial forces and accelerations, and the rate of the source's state.

@@ -8,7 +8,7 @@ module thud_ceiling
    implicit none (type, external)
    private
 
-   public :: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_fraction, get_mass_law
+   public :: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_velocity_ratio, get_mass_law
 
    !> A ceiling; a mass of 0 means no ceiling.
    type :: ceiling_type
@@ -37,16 +37,17 @@ contains
    end function get_ceiling_fields
 
    !> Ratio of the squared velocity of the ceiling to that of the floor, averaged over a band. The floor drives the ceiling
-   !> through the stiffness of the air; the ceiling's mass and radiation rho0 c0 sigma react:
-   !> abs((1 + i eta)/(1 + i eta + i k depth sigma - (f/f0)**2))**2, f0 = sqrt(rho0 c0**2/(depth mass))/(2 pi).
-   elemental function get_forced_fraction(ceiling, air, radiation_factor, lower, upper) result(fraction)
+   !> through the stiffness of the air; the ceiling's mass and its radiation resistance rho0 c0 sigma oppose the motion:
+   !> abs((1 + i eta)/(1 + i eta + i k depth sigma - (f/f0)**2))**2, f0 = sqrt(rho0 c0**2/(depth mass))/(2 pi)
+   !> (eta: loss factor, sigma: radiation factor, k: wavenumber in air).
+   elemental function get_forced_velocity_ratio(ceiling, air, radiation_factor, lower, upper) result(ratio)
       type(ceiling_type), intent(in) :: ceiling
       type(air_type), intent(in) :: air
       !> Radiation factor of floor and ceiling.
       real(wp), intent(in) :: radiation_factor
       !> Edges of the band, Hz.
       real(wp), intent(in) :: lower, upper
-      real(wp) :: fraction
+      real(wp) :: ratio
       complex(wp) :: b
       real(wp) :: period, damping
 
@@ -54,12 +55,13 @@ contains
       period = 2*pi*sqrt(max(ceiling%depth*ceiling%mass/(air%density*air%sound_speed**2), tiny(1.0_wp)))
       damping = ceiling%loss_factor + 2*pi*sqrt(lower*upper)*ceiling%depth*radiation_factor/air%sound_speed
       associate (low => lower*period, high => upper*period)
-         ! 1/((1 - x**2)**2 + damping**2) = Im(1/(b**2 - x**2))/damping with b**2 = 1 - i damping. The difference of
-         ! atanh(x/b) at both ends is one atanh on the same branch, because their imaginary parts lie between 0 and pi/2.
+         ! 1/((1 - x**2)**2 + damping**2) = Im(1/(b**2 - x**2))/damping with b**2 = 1 - i damping, and
+         ! atanh(high/b) - atanh(low/b) = atanh((high - low) b/(b**2 - low high)) without a multiple of i pi, because the
+         ! imaginary parts of both lie between 0 and pi/2.
          b = sqrt(cmplx(1.0_wp, -damping, wp))
-         fraction = (1 + ceiling%loss_factor**2)/(damping*(high - low))*aimag(atanh((high - low)*b/(b**2 - low*high))/b)
+         ratio = (1 + ceiling%loss_factor**2)/(damping*(high - low))*aimag(atanh((high - low)*b/(b**2 - low*high))/b)
       end associate
-   end function get_forced_fraction
+   end function get_forced_velocity_ratio
 
    !> Modes per hertz of the cavity: lateral modes for each number of half waves that fits across its depth.
    elemental function get_cavity_mode_density(ceiling, air, area, frequency) result(density)

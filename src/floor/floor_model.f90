@@ -19,7 +19,7 @@ module thud_floor_model
    !> Length of the text that says what limits the validity of a floor.
    integer, parameter :: reason_length = 112
 
-   !> A floor with its options as components.
+   !> The floor, whose components are its options: procedures name it `options`.
    type, abstract :: floor_model_type
       !> Coordinates along length and width of further points whose velocity is output (rectangular floors), m.
       type(list_type) :: point_x, point_y
@@ -51,6 +51,7 @@ module thud_floor_model
          implicit none (type, external)
          !> The options, checked.
          class(floor_model_type), intent(in) :: options
+         !> The mobility, as poles and residues.
          type(receiver_type), intent(out) :: receiver
          !> Set if the receiver cannot be made.
          type(error_type), allocatable, intent(out) :: error
@@ -105,6 +106,7 @@ contains
       class(floor_model_type), intent(in) :: options
       !> Coordinates of the point along length and width, m.
       real(wp), intent(in) :: x, y
+      !> The transfer mobility, as poles and residues.
       type(receiver_type), intent(out) :: transfer
       !> Set if the floor has no such point.
       type(error_type), allocatable, intent(out) :: error

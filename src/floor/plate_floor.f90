@@ -42,7 +42,7 @@ contains
       plates = [options%plate]
    end subroutine get_plates
 
-   !> Transfer mobility from the source to a point.
+   !> Transfer mobility from the source to a point, as poles and residues.
    subroutine get_mobility_at(options, source, point, receiver, error)
       class(plate_floor_type), intent(in) :: options
       real(wp), intent(in) :: source(2), point(2)

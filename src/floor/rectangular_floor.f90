@@ -47,6 +47,7 @@ module thud_rectangular_floor
          class(rectangular_floor_type), intent(in) :: options
          !> Positions of source and point, as fractions of length and width: [2].
          real(wp), intent(in) :: source(2), point(2)
+         !> The transfer mobility, as poles and residues.
          type(receiver_type), intent(out) :: receiver
          !> Set if the losses are too high.
          type(error_type), allocatable, intent(out) :: error

@@ -2,7 +2,7 @@
 !> force injects energy into the floor, the floor radiates into the room, and the Fast detector shows the level.
 module thud_room
    use thud_band, only: band_type
-   use thud_ceiling, only: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_fraction, get_mass_law
+   use thud_ceiling, only: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_velocity_ratio, get_mass_law
    use thud_constants, only: pi
    use thud_energy_flow, only: add_subsystem, connect, energy_flow_type, get_loss, new_energy_flow
    use thud_error, only: error_type, input_error
@@ -282,7 +282,7 @@ contains
             [2*pi*f*plates%loss_factor + radiated, decay_of_60_db/prediction%reverberation_time(band)])
          if (ceiling%mass > 0.0_wp) then
             transmission = get_mass_law(ceiling, air, f)
-            forced = get_forced_fraction(ceiling, air, prediction%radiation_factor(band), third%lower, third%upper)
+            forced = get_forced_velocity_ratio(ceiling, air, prediction%radiation_factor(band), third%lower, third%upper)
             free = max(1 - forced, 0.0_wp)
             call add_subsystem(flow, get_cavity_mode_density(ceiling, air, area, f), 2*pi*f*ceiling%loss_factor)
             call connect(flow, 1, at_cavity, radiated(1)*free*(1 - transmission**2))

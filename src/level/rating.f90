@@ -38,10 +38,12 @@ module thud_rating
    !> Reference volume, m3, and reverberation time, s (ISO 16283-2).
    real(wp), parameter :: reference_volume = 50.0_wp, reference_reverberation = 0.5_wp
 
-   !> Reverberation time of a decay with the time constant of the Fast detector, s: 0.125 s * 6 ln 10.
+   !> Reverberation time of a decay with the time constant of the Fast detector, s: 0.125 s * 6 ln 10, with
+   !> 6 ln 10 rounded to 13.82 as in ISO 16283-2.
    real(wp), parameter :: fast_reverberation = 1.7275_wp
 
-   !> If C differs from 1 by less than this, a series gives ln C/(C - 1), to 1e-16.
+   !> C is the reverberation time divided by `fast_reverberation`. If C differs from 1 by less than this, a series gives
+   !> ln C/(C - 1), to 1e-16.
    real(wp), parameter :: near_one = 1.0e-5_wp
 
    !> Upper limits of the A-weighted level for the classes 1 to 4, dB (KS F 2863-2).

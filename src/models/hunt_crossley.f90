@@ -112,7 +112,7 @@ contains
       real(wp), intent(in) :: state(:)
       !> k d^n and k d^n * 3/2 alpha d', N: [2].
       real(wp), intent(out) :: components(:)
-      !> The whole force including damping, as there is no flux of momentum to leave out, N.
+      !> Spring plus damping force, N: elastic means without the flux of momentum, of which this model has none.
       real(wp), intent(out) :: elastic_force
       real(wp) :: force(3)
 
@@ -226,7 +226,8 @@ contains
 
       force = options%stiffness*(deflection/2)**options%exponent
       if (.not. options%stiffness > 0.0_wp) error = input_error('&hunt_crossley: stiffness = 0 is not allowed with ' &
-         //'&compression, as contact_time gives one for a drop only; allowed: above 0, without contact_time')
+         //'&compression, because contact_time gives a stiffness for a drop only; allowed: stiffness above 0, without ' &
+         //'contact_time')
    end subroutine compress
 
    !> Force history of one drop.

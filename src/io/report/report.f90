@@ -14,7 +14,7 @@ module thud_report
    private
 
    public :: get_model_histories_csv, get_model_quantities, get_force_csv, get_levels_csv, get_quantity_lines
-   public :: get_summary, get_word, line
+   public :: get_summary, get_verdict_word, line
 
 contains
 
@@ -97,10 +97,11 @@ contains
       limits = ',,no limit'
       do i = 1, octave_count
          associate (criterion => assessment%criteria(i, get_assessed_force(case)))
-            limits(i) = to_text(criterion%lower)//','//to_text(criterion%upper)//','//get_word(criterion)
+            limits(i) = to_text(criterion%lower)//','//to_text(criterion%upper)//','//get_verdict_word(criterion)
          end associate
       end do
-      ! The verdict needs the octaves even if the case asks only for other bands.
+      ! The octaves come first, because the verdict always needs them; `first_band` leaves them out of the file if the case
+      ! does not ask for them. The name of the band's set is the first column.
       associate (bands => assessment%bands(assessment%first_band:), first => assessment%first_band)
          text = get_table_csv(header//',lower_limit_dB,upper_limit_dB,verdict_'//trim(case%level_force), &
             reshape([bands%nominal, bands%lower, bands%upper, assessment%level(first:, :)], &
@@ -183,7 +184,7 @@ contains
    end function warning_group
 
    !> Verdict on one value: `conforms`, `too low` or `too high`.
-   function get_word(criterion) result(word)
+   function get_verdict_word(criterion) result(word)
       type(criterion_type), intent(in) :: criterion
       character(len=:), allocatable :: word
 
@@ -192,7 +193,7 @@ contains
       else
          word = trim(merge('too low ', 'too high', criterion%value < criterion%lower))
       end if
-   end function get_word
+   end function get_verdict_word
 
    !> One line of a namelist group.
    pure function line(key, value, note) result(text)

@@ -9,7 +9,7 @@ module thud_table
    use thud_kinds, only: wp
    use thud_quantities, only: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
       sample_quantity_count
-   use thud_report, only: get_word
+   use thud_report, only: get_verdict_word
    use thud_source_limits, only: conforms, criterion_type
    use thud_text, only: fixed, flush_right, newline, padded, replaced, to_text
    implicit none (type, external)
@@ -167,7 +167,7 @@ contains
       character(len=:), allocatable :: text
 
       text = '  '//padded(name, 22)//flush_right(fixed(value, decimals), 10)//' '//padded(unit, 5)
-      if (present(criterion) .and. present(scale)) text = text//get_limits(criterion, scale)//get_word(criterion)
+      if (present(criterion) .and. present(scale)) text = text//get_limits(criterion, scale)//get_verdict_word(criterion)
       text = trim(text)//newline
    end function row
 
