@@ -16,7 +16,12 @@ from scipy import stats
 from scipy.linalg import toeplitz
 
 import thud
-from thud.recordings.noise import Background, covariances, fit_background, noise_covariances
+from thud.recordings.noise import (
+    Background,
+    covariances_without_white,
+    fit_background,
+    unit_covariances,
+)
 from thud.studies.fitting import force_misfit, inference, record_noise, search
 from thud.studies.fitting.inference import UNLIKELY, residual_warnings
 from thud.studies.fitting.record_noise import (
@@ -58,7 +63,9 @@ def pulls(fit: thud.Fit) -> NDArray[np.float64]:
 def test_covariance_on_the_grid_is_that_of_samples(kind: int) -> None:
     # The closed form of the double sum over samples against that sum.
     time = np.arange(300) / RATE
-    row = noise_covariances((time[:1], time[:1] + 1 / RATE), (time, time + 1 / RATE))[kind, 0]
+    row = covariances_without_white((time[:1], time[:1] + 1 / RATE), (time, time + 1 / RATE))[
+        kind, 0
+    ]
     dense = to_grid(to_grid(toeplitz(row), 41).T, 41)
     found = grid_covariance(row, 41)
     np.testing.assert_allclose(found, dense, atol=1e-12 * np.abs(dense).max())
@@ -132,7 +139,7 @@ def test_weights_of_a_record_are_those_of_its_samples(
     )
     time = (np.arange(n) - 145) / rate
     cells = time - 0.5 / rate, time + 0.5 / rate
-    white, pink, brown, fifty, sixty = draws.mean(axis=0)[:, None, None] * covariances(cells)
+    white, pink, brown, fifty, sixty = draws.mean(axis=0)[:, None, None] * unit_covariances(cells)
     predicted = (fifty + sixty) * mains + (0.1 * 900) ** 2 * np.outer(time, time)
     noise = white + pink + brown if given is None else given**2 * np.eye(n)
     waves = np.stack([np.ones(n), np.cos(140 * np.pi * time), np.sin(140 * np.pi * time)], 1)
@@ -199,7 +206,7 @@ def test_likelihood_of_quiet_is_that_of_normal_cells() -> None:
     values = [
         record_noise._log_likelihood(one)  # noqa: SLF001
         - stats.multivariate_normal.logpdf(
-            one.mean, cov=np.tensordot(one.variances, covariances(one.cells), 1) + trend
+            one.mean, cov=np.tensordot(one.variances, unit_covariances(one.cells), 1) + trend
         )
         for one in (background, other)
     ]

@@ -16,7 +16,7 @@ from scipy.stats import binom
 
 import thud
 from thud.cli.recording_commands import run_history
-from thud.level.assessment import RESULTS, assess
+from thud.level.assessment import VERDICTS, assess
 from thud.level.estimate import Contribution, Estimate
 from thud.level.levels import get_bands
 from thud.report.ball_history import YEAR, History, _trend, read_history
@@ -62,7 +62,7 @@ def report(day: str, levels: Any = LEVELS, deviation: float = 0.1, **keys: Any) 
     ]
     return {
         "format": FORMAT, "ball": "ball", "serial": "7", "source": "rubber_ball", "date": day,
-        "verdict": RESULTS[0], "criteria": rows, **keys,
+        "verdict": VERDICTS[0], "criteria": rows, **keys,
     }  # fmt: skip
 
 

@@ -17,7 +17,7 @@ from conftest import REPOSITORY, naming, python
 import thud
 from thud.base import units
 from thud.base._schema import KEYS, MODELS
-from thud.studies.parameter import fitted
+from thud.studies.parameter import read_fitted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -269,5 +269,5 @@ def test_quantity_does_not_guess(text: str, words: str) -> None:
 def test_quantity_takes_the_units_of_studies(name: str) -> None:
     (unit,) = {key.unit for key in KEYS if key.name == name}
     for multiple in units.MULTIPLES[unit]:
-        parameter = fitted(name, {"start": 3.1, "unit": multiple}, "hollow_sphere")
+        parameter = read_fitted(name, {"start": 3.1, "unit": multiple}, "hollow_sphere")
         assert thud.quantity(f"3.1 {multiple}") == parameter.start

@@ -276,7 +276,7 @@ def test_walks_scatter_with_the_steps_of_their_flank() -> None:
         is_line = not kind.rough and kind.mean[1] == kind.mean[2] == 0
         assert kind.error[2] == (5e-6 if is_line else 20e-6)
     # What is likely at touch and at release.
-    np.testing.assert_allclose(np.exp(flanks.PRIOR).sum(axis=0), 1)
+    np.testing.assert_allclose(np.exp(flanks.LOG_PRIOR).sum(axis=0), 1)
 
 
 def test_table_holds_smoothed_shapes() -> None:
@@ -315,7 +315,7 @@ def test_edge_is_where_the_force_of_a_line_begins_and_passes_a_percent() -> None
     )
     found = flanks.find_touch(one, -1e-3, 1e-3, 3)
     assert found.weight.sum() == pytest.approx(1)
-    (touch, touch_error), (begin, begin_error) = found.edge()
+    (touch, touch_error), (begin, begin_error) = found.edge_times()
     assert abs(touch - shift) < 4 * touch_error
     # 1 % of the peak, averaged over 0.1 ms, at 0.01/0.16 ms.
     assert abs(begin - shift - 0.01 / 160) < 4 * begin_error
@@ -345,7 +345,7 @@ def test_only_rough_flanks_fall() -> None:
     factors[:, :, -1, 6] = 1e6 * -0.07 / flanks.SPREADS[kinds, 6][:, None]
     # The two kinds touch at different times.
     found = flanks.Posterior(np.array([0.0, 1e-3]), kinds, 0.5 * np.eye(2), factors, release=False)
-    (touch, _), _ = found.edge()
+    (touch, _), _ = found.edge_times()
     assert touch == 1e-3
 
 

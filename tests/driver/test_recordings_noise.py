@@ -19,9 +19,9 @@ from thud.recordings.band_noise import band_functionals, band_noise
 from thud.recordings.noise import (
     Background,
     Noise,
-    covariances,
+    covariances_without_white,
     fit_background,
-    noise_covariances,
+    unit_covariances,
 )
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def test_covariances_are_means_over_cells(brown: bool) -> None:  # noqa: FBT001
     begins = np.array([0.0, 1e-3, 2e-3, 5e-3, 9e-3, 0.1])
     ends = np.array([1e-3, 2e-3, 4e-3, 6e-3, 12e-3, 0.103])
     cells = begins, ends
-    found = noise_covariances(cells, cells)[int(brown)]
+    found = covariances_without_white(cells, cells)[int(brown)]
     for i, k in product(range(6), range(6)):
         one, other = ((begins[j], ends[j]) for j in (i, k))
         # Cells that are apart: what the second order leaves, by the fourth moment of the lags.
@@ -92,7 +92,7 @@ def test_covariances_belong_to_spectra_of_density_1() -> None:
     """Differences of autocovariances are integrals of S(f) (cos(2 pi f t1) - cos(2 pi f t2))."""
     points = np.array([0.0, 0.01, 0.03])
     cells = points, points + 1e-9
-    pink, brown = noise_covariances(cells, cells)[:2, 0, 1:]
+    pink, brown = covariances_without_white(cells, cells)[:2, 0, 1:]
     f = np.linspace(1e-3, 1e4, 1_000_000)
     change = np.cos(2 * np.pi * f * 0.01) - np.cos(2 * np.pi * f * 0.03)
     step = f[1] - f[0]
@@ -102,7 +102,7 @@ def test_covariances_belong_to_spectra_of_density_1() -> None:
 
 
 def test_hum_has_harmonics_of_random_phases_and_an_uncertain_frequency() -> None:
-    found = noise_covariances(QUIET, CONTACT)[2:]
+    found = covariances_without_white(QUIET, CONTACT)[2:]
     nodes, weights = np.polynomial.legendre.leggauss(12)
     time, other = (
         middle(cells)[:, None] + (cells[1] - cells[0])[:, None] / 2 * nodes
@@ -122,7 +122,7 @@ def dense(draw: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return covariances of quiet, quiet and contact, and contact for some variances."""
     both = tuple(np.concatenate(pair) for pair in zip(QUIET, CONTACT, strict=True))
     time = middle(both)  # type: ignore[arg-type]
-    whole = np.tensordot(draw[1:], noise_covariances(both, both), 1)  # type: ignore[arg-type]
+    whole = np.tensordot(draw[1:], covariances_without_white(both, both), 1)  # type: ignore[arg-type]
     whole += PEAK**2 * (OFFSET**2 + DRIFT**2 * np.multiply.outer(time, time))
     n = len(QUIET[0])
     quiet = whole[:n, :n] + draw[0] / 2 * np.diag(1 / (QUIET[1] - QUIET[0]))
@@ -160,7 +160,7 @@ def test_drift_and_hum_are_means_given_the_quiet(background: Background) -> None
         quiet, *_ = dense(draw)
         slopes.append(prior * time @ np.linalg.solve(quiet, background.mean))
         variances.append(prior - prior**2 * time @ np.linalg.solve(quiet, time))
-        hum = draw[4] * noise_covariances(QUIET, QUIET)[3]
+        hum = draw[4] * covariances_without_white(QUIET, QUIET)[3]
         hums.append(hum @ np.linalg.solve(quiet, background.mean))
     assert background.drift == pytest.approx(
         (np.mean(slopes), np.sqrt(np.mean(variances) + np.var(slopes))), rel=1e-4
@@ -182,7 +182,7 @@ def test_density_is_that_of_the_draws(background: Background) -> None:
 def posterior(background: Background, large: float = 1e3) -> module._Posterior:
     time = middle(QUIET)
     trend = PEAK**2 * (OFFSET**2 + DRIFT**2 * np.multiply.outer(time, time))
-    parts = covariances(QUIET)
+    parts = unit_covariances(QUIET)
     return module._Posterior(parts, trend, background.mean, np.full(5, large))  # noqa: SLF001
 
 
@@ -208,7 +208,7 @@ def test_derivatives_of_the_posterior(background: Background) -> None:
     # Average information of the likelihood (Gilmour, Thompson and Cullis 1995), and the priors'.
     inverse = np.linalg.inv(dense(DRAWS[1])[0])
     turned = [theta * part @ inverse @ background.mean for theta, part in zip(
-        DRAWS[1], covariances(QUIET), strict=True)]  # fmt: skip
+        DRAWS[1], unit_covariances(QUIET), strict=True)]  # fmt: skip
     expected = 0.5 * np.array(turned) @ inverse @ np.transpose(turned) + np.diag(SLOPE)
     np.testing.assert_allclose(curvature, expected, rtol=1e-4)
 

@@ -34,7 +34,7 @@ from thud.recordings.recording import Recording
 from thud.report.contents import read_date, report_data
 from thud.report.fonts import missing_characters
 from thud.report.notes import group_messages, shorten
-from thud.report.page import _range, report_page
+from thud.report.page import _range_picture, report_page
 from thud.report.write import write_report
 
 if TYPE_CHECKING:
@@ -513,7 +513,7 @@ def test_long_lists_are_shortened_with_their_count() -> None:
 def test_picture_of_a_criterion_has_value_and_uncertainty_between_the_limits(
     value: float, expanded: float | None, bar: tuple[float, float] | None, mark: str
 ) -> None:
-    picture = _range({
+    picture = _range_picture({
         "value": value, "expanded_uncertainty": expanded, "lower": 10.0, "upper": 20.0
     })  # fmt: skip
     drawn = re.search(r"M([\d.]+) 5H([\d.]+)", picture)

@@ -18,7 +18,7 @@ from thud.base._schema import KEYS
 from thud.impact.quantities import RATING
 from thud.studies import sampling
 from thud.studies.design import KIND as DESIGN, Design, _mark
-from thud.studies.parameter import MAX_VALUES, Parameter, varied
+from thud.studies.parameter import MAX_VALUES, Parameter, read_varied
 from thud.studies.sensitivity import sobol_indices
 from thud.studies.surrogate_levels import SurrogateLevels, recompute, within_region
 from thud.studies.surrogate_training import regress
@@ -48,18 +48,18 @@ def whole(**words: Any) -> Parameter:  # noqa: ANN401 - of any kind
 
 def test_quantiles_are_the_inverse_of_their_distributions() -> None:
     share = np.array([0.0, 0.1, 0.25, 0.5, 0.9, 0.999])
-    assert real(low=2.0, high=6.0).quantile(share) == pytest.approx(2 + 4 * share)
-    logarithmic = real(low=2.0, high=32.0, scale="log").quantile(share)
+    assert real(low=2.0, high=6.0).quantiles(share) == pytest.approx(2 + 4 * share)
+    logarithmic = real(low=2.0, high=32.0, scale="log").quantiles(share)
     assert np.log2(logarithmic) == pytest.approx(1 + 4 * share)
-    normal = real(mean=5.0, std=0.5).quantile(share)
+    normal = real(mean=5.0, std=0.5).quantiles(share)
     assert norm.cdf(normal[1:], 5, 0.5) == pytest.approx(share[1:])
     assert 5 - 0.5 * 9 < normal[0] < 5 - 0.5 * 8
-    assert real(values=(7, 8, 9, 5)).quantile(share).tolist() == [7, 7, 8, 9, 5, 5]
+    assert real(values=(7, 8, 9, 5)).quantiles(share).tolist() == [7, 7, 8, 9, 5, 5]
     # Each whole number has the share up to the next; of logarithms its own.
-    found = whole(low=10, high=12).quantile(np.array([0, 0.33, 0.34, 0.66, 0.67, 0.9999]))
+    found = whole(low=10, high=12).quantiles(np.array([0, 0.33, 0.34, 0.66, 0.67, 0.9999]))
     assert found.tolist() == [10, 10, 11, 11, 12, 12]
     edges = np.log(np.array([3, 4]) / 2) / np.log(2)
-    found = whole(low=2, high=3, scale="log").quantile(np.append(edges[0] + [-1e-9, 1e-9], 1.0))
+    found = whole(low=2, high=3, scale="log").quantiles(np.append(edges[0] + [-1e-9, 1e-9], 1.0))
     assert found.tolist() == [2, 3, 3]
 
 
@@ -109,9 +109,11 @@ def test_trial_is_the_start_or_a_quantile() -> None:
 def test_bounds_of_parameters(name: str, given: dict[str, Any], words: str) -> None:
     if words:
         with pytest.raises(thud.InputError, match=words):
-            varied(name, given, OWNERS, 1.0)
+            read_varied(name, given, OWNERS, 1.0)
     else:
-        found = varied(name, {**given, "unit": "cm"} if name == "height" else given, OWNERS, 0.7)
+        found = read_varied(
+            name, {**given, "unit": "cm"} if name == "height" else given, OWNERS, 0.7
+        )
         size = 0.01 if name == "height" else 1
         for word in ("low", "high", "std"):
             if word in given:
@@ -222,7 +224,7 @@ def test_modulus_of_a_case_changes_with_its_coefficient() -> None:
 )  # fmt: skip
 def test_bounds_of_the_law_of_temperature(given: dict[str, float] | None, words: str) -> None:
     case = thud.Case(model=thud.ModalBall(damping_law="rising"))
-    varying = (varied("temperature", {"values": [20, 30]}, OWNERS, None),)
+    varying = (read_varied("temperature", {"values": [20, 30]}, OWNERS, None),)
     if words:
         with pytest.raises(thud.InputError, match=words):
             read_temperature(given, case, varying)

@@ -249,7 +249,7 @@ def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray) -> tuple[float, f
         found = contact_module.find_edges(window, record, contact.background, passes=2)
     finally:
         contact_module.BACKGROUND_CELLS = saved
-    spread = float(np.hypot(*(edge.edge()[1][1] for edge in (found.touch, found.release))))
+    spread = float(np.hypot(*(edge.edge_times()[1][1] for edge in (found.touch, found.release))))
     if draw.shape != "half sine":
         return spread, np.nan
     count = max(4, int(contact_module.FLANK * min(rate, 2e4)))

@@ -130,7 +130,7 @@ def shown(value: object) -> str:
     return f"an object of {type(value).__name__}"
 
 
-def require_words(
+def refuse_unknown(
     label: str, words: Iterable[str], known: Iterable[str], also: Iterable[str] = ()
 ) -> None:
     """Raise InputError for an unknown word; its message may also suggest one of `also`."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from functools import wraps
 from typing import TYPE_CHECKING, Literal, ParamSpec, Self, TypeVar
 
-from thud.base.checks import refuse, require_words
+from thud.base.checks import refuse, refuse_unknown
 from thud.base.immutable import Plain
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def require_keywords(label: str, keywords: Collection[str], allowed: Collection[
                 " or ".join(f"{name}({word}=...)" for name in owners),
             )
     also = [word for name, names in keys.items() for word in (name.lower(), *names)]
-    require_words(label, unknown, allowed, also)
+    refuse_unknown(label, unknown, allowed, also)
 
 
 def check_keywords(function: Callable[P, R]) -> Callable[P, R]:

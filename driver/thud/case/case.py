@@ -31,10 +31,10 @@ from thud.base.bridge import ask, text
 from thud.base.checks import (
     MAX_NUMBER,
     refuse,
+    refuse_unknown,
     refuse_value,
     require_choice,
     require_kind,
-    require_words,
     shown,
 )
 from thud.base.display import Displayed
@@ -215,7 +215,7 @@ def tables_case(tables: Mapping[str, Any]) -> Case:
     Raise InputError if a group, or the name of model or floor, is not known, or a group is not a
     table; `check_case` checks the values.
     """
-    require_words("the case", tables, {key.group for key in KEYS} | {"model", "floor"})
+    refuse_unknown("the case", tables, {key.group for key in KEYS} | {"model", "floor"})
     for group, keys in tables.items():
         if not isinstance(keys, Mapping):
             refuse(f"&{group} = {shown(keys)} is not a table", "keys and their values")

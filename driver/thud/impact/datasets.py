@@ -92,7 +92,7 @@ def ensemble_dataset(ensemble: Ensemble) -> xr.Dataset:
     coordinates, variables = sample_variables(sample_results(ensemble))
     for name, values in ensemble.parameters.items():
         key, _ = find_key(name, key_owners(ensemble.case))
-        coordinates[coordinate(name, key)] = ("sample", values, attributes(key))
+        coordinates[coordinate_name(name, key)] = ("sample", values, attributes(key))
     for force in ("elastic", "floor"):
         if (values := getattr(ensemble, f"{force}_force")) is not None:
             seconds = np.arange(values.shape[1]) / ensemble.sample_rate
@@ -126,7 +126,7 @@ def _attributes(unit: str, meaning: str) -> dict[str, str]:
     return {"units": unit or "1", "long_name": meaning}
 
 
-def coordinate(parameter: str, key: Key) -> str:
+def coordinate_name(parameter: str, key: Key) -> str:
     """Return the name of a parameter's coordinate, which differs from the names of results."""
     name = parameter.replace("(", "_").replace(".", "_").rstrip(")")
     return f"{key.group}_{name}" if name in ALL_QUANTITIES else name

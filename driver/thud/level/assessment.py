@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from thud.base._schema import LimitsSource
 
-RESULTS = ("conforms", "does not conform", "inconclusive")
+VERDICTS = ("conforms", "does not conform", "inconclusive")
 _MAX_PEAKS = 2**31
 
 
@@ -63,7 +63,7 @@ class Criterion(Displayed):
         The guard band is the expanded uncertainty (JCGM 106). An upper bound cannot conform.
         """
         value, expanded = self.value, self.estimate.expanded
-        conforms, fails, inconclusive = RESULTS
+        conforms, fails, inconclusive = VERDICTS
         if math.isnan(value) or not math.isfinite(expanded):
             return inconclusive
         below, above = value + expanded < self.lower, value - expanded > self.upper
@@ -77,7 +77,7 @@ class Criterion(Displayed):
     @property
     def conforms(self) -> bool:
         """Whether the criterion is met."""
-        return self.result == RESULTS[0]
+        return self.result == VERDICTS[0]
 
     @property
     def margin(self) -> float:
@@ -115,7 +115,7 @@ class Criterion(Displayed):
         value = f"{self.value:.4g} {self.unit}".strip()
         expanded = f"{self.estimate.expanded:.2g}" if self.estimate.uncertainty else ""
         result = self.result
-        if result == RESULTS[1]:
+        if result == VERDICTS[1]:
             result = "too low" if self.value < self.lower else "too high"
         return name, value, expanded, limits, result
 
@@ -139,12 +139,14 @@ class Verdict(Displayed):
     def result(self) -> str:
         """``"does not conform"`` if any criterion fails, else ``"inconclusive"`` if any is."""
         results = {criterion.result for criterion in self.criteria}
-        return next(result for result in (RESULTS[1], RESULTS[2], RESULTS[0]) if result in results)
+        return next(
+            result for result in (VERDICTS[1], VERDICTS[2], VERDICTS[0]) if result in results
+        )
 
     @property
     def conforms(self) -> bool:
         """Whether all criteria are met."""
-        return self.result == RESULTS[0]
+        return self.result == VERDICTS[0]
 
     def __bool__(self) -> bool:
         """Return whether all criteria are met."""

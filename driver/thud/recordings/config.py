@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from thud.base.checks import refuse, require_choice, require_number, require_words, shown
+from thud.base.checks import refuse, refuse_unknown, require_choice, require_number, shown
 from thud.base.errors import InputError
 from thud.level.assessment import get_criteria
 from thud.level.levels import SOURCES
@@ -99,7 +99,7 @@ def _linearity(value: object, key: str) -> tuple[tuple[float, float], ...]:
 
 def _limits(value: object, key: str) -> dict[str, tuple[float, float]]:
     table = _table(value, key)
-    require_words(key, table, [criterion.name for criterion in get_criteria(SOURCES[0])])
+    refuse_unknown(key, table, [criterion.name for criterion in get_criteria(SOURCES[0])])
     limits = {}
     for name, span in table.items():
         low, high = _pair(span, f"{key}: {name}", "minimum, maximum", -1e6, 1e6)
@@ -267,5 +267,5 @@ def checked_config(config: Config) -> Config:
 def _checked(table: Mapping[str, object], kind: type[Any], prefix: str) -> dict[str, Any]:
     """Return the values of a table; raise InputError for an unknown key or a wrong value."""
     checks = {key.name: key.metadata["check"] for key in fields(kind)}
-    require_words(prefix.removesuffix(": "), table, checks)
+    refuse_unknown(prefix.removesuffix(": "), table, checks)
     return {key: checks[key](value, f"{prefix}{key}") for key, value in table.items()}

@@ -169,7 +169,7 @@ class Edges:
 def estimate_limits(window: Window, noise: Background | None = None) -> tuple[Estimate, Estimate]:
     """Return begin and end of a contact, s from the first sample, accurate to about 0.1 ms."""
     edges = find_edges(window, window.force, noise, passes=1)
-    (t0, s0), (t1, s1) = edges.touch.edge()[1], edges.release.edge()[1]
+    (t0, s0), (t1, s1) = edges.touch.edge_times()[1], edges.release.edge_times()[1]
     return Estimate(t0, s0), Estimate(-t1, s1)
 
 
@@ -179,8 +179,8 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
     middle = (contact[0] + contact[1]) / 2 / rate
     edges = find_edges(window, force, None, passes=2)
     background, (before_stop, after_start) = edges.background, edges.background_limits
-    (t0, s0), begin = edges.touch.edge()
-    (t1, s1), end = edges.release.edge()
+    (t0, s0), begin = edges.touch.edge_times()
+    (t1, s1), end = edges.release.edge_times()
     t1 = -t1
     plate_error = PLATE_ERROR / window.plate.frequency if window.plate else 0.0
     margin = GATE_SAMPLES + _spread(rate, window.plate)
@@ -256,7 +256,7 @@ def find_edges(
             )
         if pass_index + 1 < passes:
             touch, reverse = (
-                _interval(posterior.edge(), 3 / rate + 1e-4) for posterior in posteriors
+                _interval(posterior.edge_times(), 3 / rate + 1e-4) for posterior in posteriors
             )
             release = (-reverse[1], -reverse[0])
             # Samples into which filters spread the flanks are no background.

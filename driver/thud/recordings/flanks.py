@@ -18,17 +18,18 @@ if TYPE_CHECKING:
 
     from thud.recordings.plate import Plate
 
-# A flank is a sum of shapes, t in ms since the touch: a jump, a filtered jump, powers t**n, a steep
-# rise 1 - exp(-t / STEEP), a parabola, and a random walk between knots.
+# A flank is a sum of shapes, t in ms since the touch: a jump, a jump that a filter spreads over a
+# sampling interval, powers t**n, a steep rise 1 - exp(-t / RISE_TIME), a parabola, and a random
+# walk between knots.
 POWERS = np.array([1.0, 1.5, 1.75])
-STEEP = 0.6
+RISE_TIME = 0.6
 KNOTS = np.array([
     0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5, 4.0, 6.0,
     9.0,
 ])  # fmt: skip
-# Number of jumps, and of the shapes after them whose mean may not be zero.
+# Number of jumps, and of the shapes after them whose mean can be nonzero: powers and steep rise.
 N_JUMP = 2
-N_MEAN = len(POWERS) + 1
+N_WITH_MEAN = len(POWERS) + 1
 
 
 class _Kind(NamedTuple):
@@ -39,12 +40,14 @@ class _Kind(NamedTuple):
     mean, spread : tuple of float
         Means and standard deviations of powers and steep rise.
     walk : float
-        Standard deviation of the walk: for smooth kinds of a step, as a fraction of the mean
-        flank's step; for rough kinds after 1 ms.
+        Smooth kinds: standard deviation of a step of the walk, as a fraction of the increment of
+        the mean flank between the same knots. Rough kinds: standard deviation of the walk after
+        1 ms.
     probability : tuple of float
-        Prior probability at touch and at release: only a strike is likely to have a jump.
+        Prior probability at touch and at release: a jump is likely at touch only.
     error : tuple of float
-        Standard uncertainty due to the shapes, s: of first touch, release, and begin or end.
+        Standard uncertainty due to the shapes, s: of first touch, of release, and of the begin or
+        end of the contact, when the force passes 1 % of the peak.
     rough : bool
         Whether the force may fall during the flank.
     jump, filtered, parabola : float
@@ -62,32 +65,39 @@ class _Kind(NamedTuple):
     parabola: float = 0.0
 
 
-# Lines; soft feet of bodies that touch at a point (Hertz: power 3/2 for a sphere) and roll off;
-# rippling flanks; flanks of bodies of which a fraction stops instantly. Smooth kinds come first.
+# Kinds: lines, without and with a jump; feet, which start with zero slope, of bodies that touch at
+# a point (Hertz: power 3/2 for a sphere) and roll off; rough, rippling flanks; steep flanks of
+# bodies of which a fraction stops instantly. Smooth kinds, whose force must not fall, come first.
 _LINE = (0.16, 0.0, 0.0, 0.0), (0.08, 0.0, 0.0, 0.0)
-_SMOOTH, _FOOT, _ROUGH = (5e-6, 60e-6, 5e-6), (30e-6, 60e-6, 20e-6), (40e-6, 140e-6, 20e-6)
+_SMOOTH_ERROR = (5e-6, 60e-6, 5e-6)
+_FOOT_ERROR = (30e-6, 60e-6, 20e-6)
+_ROUGH_ERROR = (40e-6, 140e-6, 20e-6)
 KINDS = (
-    _Kind(*_LINE, 0.15, (0.25, 0.38), _SMOOTH, parabola=0.06),
-    _Kind(*_LINE, 0.15, (0.15, 0.01), _SMOOTH, parabola=0.06, jump=0.2),
-    _Kind(*_LINE, 0.15, (0.10, 0.01), _SMOOTH, parabola=0.06, filtered=0.2),
-    _Kind((0.0, 0.055, 0.0, 0.0), (0.0, 0.02, 0.0, 0.0), 0.3, (0.05, 0.2), _FOOT),
-    _Kind((0.0, 0.0, 0.045, 0.0), (0.0, 0.0, 0.015, 0.0), 0.3, (0.05, 0.2), _FOOT),
-    _Kind(*_LINE, 0.12, (0.15, 0.15), _ROUGH, rough=True, parabola=0.06),
-    _Kind(*_LINE, 0.5, (0.1, 0.05), _ROUGH, rough=True, parabola=0.06),
-    _Kind((0.08, 0.0, 0.0, 0.45), (0.05, 0.0, 0.0, 0.15), 0.2, (0.15, 0.0), _ROUGH, rough=True),
+    _Kind(*_LINE, 0.15, (0.25, 0.38), _SMOOTH_ERROR, parabola=0.06),
+    _Kind(*_LINE, 0.15, (0.15, 0.01), _SMOOTH_ERROR, parabola=0.06, jump=0.2),
+    _Kind(*_LINE, 0.15, (0.10, 0.01), _SMOOTH_ERROR, parabola=0.06, filtered=0.2),
+    _Kind((0.0, 0.055, 0.0, 0.0), (0.0, 0.02, 0.0, 0.0), 0.3, (0.05, 0.2), _FOOT_ERROR),
+    _Kind((0.0, 0.0, 0.045, 0.0), (0.0, 0.0, 0.015, 0.0), 0.3, (0.05, 0.2), _FOOT_ERROR),
+    _Kind(*_LINE, 0.12, (0.15, 0.15), _ROUGH_ERROR, rough=True, parabola=0.06),
+    _Kind(*_LINE, 0.5, (0.1, 0.05), _ROUGH_ERROR, rough=True, parabola=0.06),
+    _Kind(
+        (0.08, 0.0, 0.0, 0.45), (0.05, 0.0, 0.0, 0.15), 0.2, (0.15, 0.0), _ROUGH_ERROR, rough=True
+    ),
 )
 N_SMOOTH = sum(not kind.rough for kind in KINDS)
 with np.errstate(divide="ignore"):
-    PRIOR = np.log([kind.probability for kind in KINDS])
+    LOG_PRIOR = np.log([kind.probability for kind in KINDS])
 ERRORS = np.array([kind.error for kind in KINDS])
 # Relative error of the force due to the shapes: smooth kinds, rough kinds.
 MISFIT = (0.005, 0.1)
-# Fraction of the peak by which the force may be negative, or fall in smooth kinds. The force
-# reaches the threshold within FOOT_TIME ms after the touch, and FOOT within FOOT_TIME ms more.
+# A draw is rejected if its force is negative, or falls in a smooth kind, by more than MAX_FALL; if
+# it reaches THRESHOLD later than FOOT_TIME ms after the touch; or if it reaches FOOT_LEVEL later
+# than FOOT_TIME ms after that. Forces are fractions of the peak.
 MAX_FALL = 0.002
-FOOT = 0.03
+FOOT_LEVEL = 0.03
 FOOT_TIME = 1.0
-# Number of times in a search, which covers the previous result ± SEARCH_DEVIATIONS deviations.
+# Number of candidate times in a search. The next search covers the mean ± SEARCH_DEVIATIONS
+# standard deviations of the result.
 N_TIME = 33
 SEARCH_DEVIATIONS = 6.0
 # Number of draws of each kind of flank, and minimum posterior probability of a kind.
@@ -109,9 +119,20 @@ DELAY = np.concatenate([np.linspace(0, 0.5, 51), np.linspace(0.55, 4, 70)])
 class Flank:
     """The start of a pulse, or with `release` its end in reversed time.
 
-    Times are the middles of cells, s. The force is the mean over each cell without the background,
-    N, with its covariance, N2. The peak force is in N, the sampling interval in s. The plate is the
-    one whose resonance was corrected, if any.
+    Attributes
+    ----------
+    time : ndarray, shape (n_cell,)
+        Middles of the cells over which the samples are averaged, s.
+    force : ndarray, shape (n_cell,)
+        Mean force in each cell without the background, N.
+    covariance : ndarray, shape (n_cell, n_cell)
+        Covariance of the errors of `force`, N2.
+    peak : float
+        Peak force, N.
+    interval : float
+        Sampling interval, s.
+    plate : Plate or None
+        Force plate whose resonance was corrected.
     """
 
     time: NDArray[np.float64]
@@ -127,8 +148,16 @@ class Flank:
 class Posterior:
     """Posterior of the first touch of a flank, or with `release` of the end of a pulse.
 
-    Attributes are uniform times, s; indices of `KINDS`; probabilities by kind and time, [n_kind,
-    n_time]; and the factors that `_evidence` returns, [n_kind, n_time, n_column, n_column].
+    Attributes
+    ----------
+    time : ndarray, shape (n_time,)
+        Uniformly spaced candidate times, s.
+    kinds : ndarray, shape (n_kind,)
+        Indices of `KINDS`.
+    weight : ndarray, shape (n_kind, n_time)
+        Posterior probabilities.
+    factors : ndarray, shape (n_kind, n_time, n_column, n_column)
+        Factors that `_evidence` returns.
     """
 
     time: NDArray[np.float64]
@@ -137,10 +166,11 @@ class Posterior:
     factors: NDArray[np.float64]
     release: bool
 
-    def edge(self) -> tuple[tuple[float, float], tuple[float, float]]:
+    def edge_times(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return first touch and begin of the contact, s, with their standard deviations.
 
-        Draws of kind, time and shape with an implausible flank are excluded.
+        At the begin of the contact, the force passes 1 % of the peak. Draws of kind, time and shape
+        with an implausible flank are excluded.
         """
         kind = np.repeat(self.kinds, N_DRAW)
         kind_probability = np.repeat(self.weight.sum(axis=1), N_DRAW)
@@ -148,46 +178,49 @@ class Posterior:
         index = np.ravel([np.searchsorted(w.cumsum(), quantiles * w.sum()) for w in self.weight])
         index = np.minimum(index, len(self.time) - 1)
         touch = self.time[index]
-        path = self._paths(kind, index)
-        highest = np.where(kind[:, None] < N_SMOOTH, np.maximum.accumulate(path, axis=1), 0.0)
-        delay = _crossing(path, THRESHOLD)
-        plausible = (delay <= FOOT_TIME) & (_crossing(path, FOOT) <= delay + FOOT_TIME)
-        probability = kind_probability * ((highest - path).max(axis=1) <= MAX_FALL) * plausible
+        force = self._force_draws(kind, index)
+        highest = np.where(kind[:, None] < N_SMOOTH, np.maximum.accumulate(force, axis=1), 0.0)
+        delay = _crossing(force, THRESHOLD)
+        plausible = (delay <= FOOT_TIME) & (_crossing(force, FOOT_LEVEL) <= delay + FOOT_TIME)
+        probability = kind_probability * ((highest - force).max(axis=1) <= MAX_FALL) * plausible
         if not probability.any():
             probability = kind_probability
         probability /= probability.sum()
         jump_probability = probability @ (delay == 0)
         results = []
-        for value, cell, error in (
-            (touch, self._cell, ERRORS[kind, int(self.release)]),
-            (touch + 1e-3 * delay, self._cell * jump_probability, ERRORS[kind, 2]),
+        for value, variance, error in (
+            (touch, self._time_variance, ERRORS[kind, int(self.release)]),
+            (touch + 1e-3 * delay, self._time_variance * jump_probability, ERRORS[kind, 2]),
         ):
             mean = float(probability @ value)
             results.append(
-                (mean, float(np.sqrt(probability @ ((value - mean) ** 2 + error**2) + cell)))
+                (mean, float(np.sqrt(probability @ ((value - mean) ** 2 + error**2) + variance)))
             )
         return results[0], results[1]
 
     @property
-    def _cell(self) -> float:
-        """Variance of a time within its cell, s2."""
+    def _time_variance(self) -> float:
+        """Variance of a time due to the spacing of the candidate times, s2."""
         return float((self.time[1] - self.time[0]) ** 2 / 12)
 
-    def _paths(self, kind: NDArray[np.intp], index: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Return draws of the averaged force as a fraction of the peak: [n, n_delay]."""
+    def _force_draws(self, kind: NDArray[np.intp], index: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Return draws of the averaged force as a fraction of the peak: [n_draw, n_delay]."""
         row = np.repeat(np.arange(len(self.kinds)), N_DRAW)
-        cells, cell = np.unique(row * len(self.time) + index, return_inverse=True)
-        lower = self.factors.reshape(-1, *self.factors.shape[2:])[cells]
+        pairs, pair = np.unique(row * len(self.time) + index, return_inverse=True)
+        lower = self.factors.reshape(-1, *self.factors.shape[2:])[pairs]
         inverse = np.linalg.inv(lower[:, :-1, :-1])
         normal = np.tile(_normal_draws(lower.shape[-1] - 1), (len(self.kinds), 1))
-        right = lower[cell, -1, :-1] + normal
-        units = (right[:, None] @ inverse[cell])[:, 0]
+        right = lower[pair, -1, :-1] + normal
+        units = (right[:, None] @ inverse[pair])[:, 0]
         shapes = units * SPREADS[kind] + MEANS[kind]
-        return np.asarray(shapes @ PATHS.T, dtype=np.float64)
+        return np.asarray(shapes @ AVERAGED_SHAPES.T, dtype=np.float64)
 
 
 def find_touch(flank: Flank, low: float, high: float, searches: int) -> Posterior:
-    """Return the posterior of the first touch of a flank between two times, s, by searches."""
+    """Return the posterior of the first touch of a flank between two times, s.
+
+    There are up to `searches` searches, each in a shorter interval.
+    """
     relative_force = flank.force / flank.peak
     whitening = []
     for misfit in MISFIT:
@@ -210,7 +243,7 @@ def find_touch(flank: Flank, low: float, high: float, searches: int) -> Posterio
             if members.size
         ]
         logarithm = np.concatenate([likelihood for likelihood, _ in evidence])
-        logarithm += PRIOR[kinds, int(flank.release), None]
+        logarithm += LOG_PRIOR[kinds, int(flank.release), None]
         weight = np.exp(logarithm - logarithm.max())
         weight /= weight.sum()
         likely = weight.sum(axis=1) > MIN_PROBABILITY
@@ -254,14 +287,14 @@ def _evidence(
     return likelihood - np.log(diagonal[..., :-1]).sum(axis=-1), factors
 
 
-def _crossing(path: NDArray[np.float64], level: float) -> NDArray[np.float64]:
-    """Return the delays at which paths first reach a level, ms; the last delay if never."""
-    above = path >= level
-    rows = np.arange(len(path))
+def _crossing(force: NDArray[np.float64], level: float) -> NDArray[np.float64]:
+    """Return the delays at which forces first reach a level, ms; the last delay if never."""
+    above = force >= level
+    rows = np.arange(len(force))
     first = np.where(above.any(axis=1), np.argmax(above, axis=1), len(DELAY) - 1)
     before = np.maximum(first - 1, 0)
-    rise = path[rows, first] - path[rows, before]
-    fraction = np.where(rise > 0, (level - path[rows, before]) / np.where(rise > 0, rise, 1), 1)
+    rise = force[rows, first] - force[rows, before]
+    fraction = np.where(rise > 0, (level - force[rows, before]) / np.where(rise > 0, rise, 1), 1)
     delay = DELAY[before] + np.clip(fraction, 0, 1) * (DELAY[first] - DELAY[before])
     return np.asarray(delay, dtype=np.float64)
 
@@ -292,13 +325,13 @@ def _table(interval: float, plate: Plate | None) -> NDArray[np.float64]:
 
 
 def _columns(
-    table: NDArray[np.float64], tau: NDArray[np.float64], level: NDArray[np.float64]
+    table: NDArray[np.float64], tau: NDArray[np.float64], relative_force: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return shapes at times since the touch, ms, then the force: [n_time, n_cell, n_column]."""
     index = np.rint(tau / TICK).astype(int) + round(BEFORE / TICK)
     result = np.empty((*tau.shape, table.shape[1] + 1))
     result[..., :-1] = table[np.clip(index, 0, len(table) - 1)]
-    result[..., -1] = level
+    result[..., -1] = relative_force
     return result
 
 
@@ -308,29 +341,29 @@ def _shapes(tau: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
     filtered = np.clip(tau / interval + 0.5, 0, 1) if interval else tau >= 0
     walk = np.clip((tau[:, None] - KNOTS[:-1]) / np.diff(KNOTS), 0, 1)
     jumps = np.stack([tau >= 0, filtered], axis=1)
-    return np.hstack([jumps, after**POWERS, 1 - np.exp(-after / STEEP), after**2 / 2, walk])
+    return np.hstack([jumps, after**POWERS, 1 - np.exp(-after / RISE_TIME), after**2 / 2, walk])
 
 
 def _spread(kind: _Kind) -> NDArray[np.float64]:
     """Return the standard deviations of the shapes of a kind: [n_column]."""
-    mean = _shapes(KNOTS, 0)[:, N_JUMP : N_JUMP + N_MEAN] @ kind.mean
+    mean = _shapes(KNOTS, 0)[:, N_JUMP : N_JUMP + N_WITH_MEAN] @ kind.mean
     steps = np.sqrt(np.diff(KNOTS)) if kind.rough else np.diff(mean)
     return np.array([kind.jump, kind.filtered, *kind.spread, kind.parabola, *(kind.walk * steps)])
 
 
-def _paths() -> NDArray[np.float64]:
-    """Return the shapes averaged over AVERAGED, at the delays: [n_delay, n_column]."""
+def _averaged_shapes() -> NDArray[np.float64]:
+    """Return the shapes averaged over AVERAGING_WIDTH, at the delays: [n_delay, n_column]."""
     time = np.arange(0, DELAY[-1] + 1, 2 * TICK)
     return average_within(_shapes(time, 0), time, DELAY, 1e3 * AVERAGING_WIDTH)
 
 
 SPREADS = np.array([_spread(kind) for kind in KINDS])
 MEANS = np.zeros_like(SPREADS)
-MEANS[:, N_JUMP : N_JUMP + N_MEAN] = [kind.mean for kind in KINDS]
+MEANS[:, N_JUMP : N_JUMP + N_WITH_MEAN] = [kind.mean for kind in KINDS]
 # By kind, [n_kind, n_column, n_column]: scale the shapes to unit deviation, and subtract the mean
 # from the force.
 TRANSFORMS = np.zeros((len(KINDS), SPREADS.shape[1] + 1, SPREADS.shape[1] + 1))
 TRANSFORMS[:, np.arange(SPREADS.shape[1]), np.arange(SPREADS.shape[1])] = SPREADS
 TRANSFORMS[:, :-1, -1] = -MEANS
 TRANSFORMS[:, -1, -1] = 1
-PATHS = _paths()
+AVERAGED_SHAPES = _averaged_shapes()

@@ -28,8 +28,9 @@ OFFSET = 1.0
 DRIFT = 0.1
 # The exact covariance of two cells is used if squared lag / mean squared length is less than this.
 EXACT_LAG = 8.0
-# The priors of the logarithms of the variances are proportional to these powers of the variances,
-# lowered by 1 if the standard deviation of a cell is above PRIOR_DEVIATION times the peak force.
+# The prior density of the logarithm of a variance is proportional to this power of the variance.
+# The power is lower by 1 for large variances: standard deviation of a cell above PRIOR_DEVIATION
+# times the peak force.
 SLOPE = np.array([0.5, 0.25, 1.0, 0.25, 0.25])
 PRIOR_DEVIATION = 0.03
 # Standard deviation of each cell due to quantization, as a fraction of the peak force.
@@ -50,7 +51,8 @@ class Noise:
 
     `deviation` is the standard deviation of one sample, N. `white`, `pink` and `brown` are the
     one-sided densities at 1 Hz, N2/Hz, of spectra that are constant, proportional to 1/f and to
-    1/f**2. `source` is the background from which they were estimated: ``"before and after"``.
+    1/f**2. `source` states the background from which they were estimated: that
+    ``"before and after"`` the contact.
     """
 
     deviation: float
@@ -74,13 +76,13 @@ class Noise:
         return float(np.sqrt(sum(variances)))
 
 
-def noise_covariances(cells: Cells, other: Cells) -> NDArray[np.float64]:
-    """Return covariances of means over cells that are equal or disjoint: [4, n_cell, n_other].
+def covariances_without_white(cells: Cells, other: Cells) -> NDArray[np.float64]:
+    """Return unit covariances of the means over two sets of cells: [4, n_cell, n_other].
 
-    The first axis is pink noise, brown noise (each of density 1 at 1 Hz), and hum of 50 Hz and of
-    60 Hz (each of variance 1). Pink and brown noise have the covariances -ln|lag| and -pi**2 |lag|,
-    except for a constant, which the unknown offset absorbs. For distant cells, the mean of -ln|lag|
-    is exact to second order in the lengths of the cells.
+    Any two cells are equal or disjoint. The first axis is pink noise, brown noise (each of density
+    1 at 1 Hz), and hum of 50 Hz and of 60 Hz (each of variance 1). Pink and brown noise have the
+    covariances -ln|lag| and -pi**2 |lag|, except for a constant, which the unknown offset absorbs.
+    For distant cells, the mean of -ln|lag| is exact to second order in the lengths of the cells.
     """
     (a, b), (c, d) = cells, other
     lag = np.abs(((a + b) / 2)[:, None] - (c + d) / 2)
@@ -142,7 +144,7 @@ class Background(Immutable):
     @cached_property
     def _factors(self) -> list[NDArray[np.float64]]:
         """Cholesky factor of the covariance of the cells for each draw."""
-        unit, fixed = covariances(self.cells), _fixed(self.cells, self.peak)
+        unit, fixed = unit_covariances(self.cells), _fixed(self.cells, self.peak)
         return [
             np.asarray(np.linalg.cholesky(np.tensordot(draw, unit, 1) + fixed), dtype=np.float64)
             for draw in self.draws
@@ -159,9 +161,9 @@ class Background(Immutable):
         They are the mean and the covariance of the mixture of all draws. The covariance excludes
         the white noise of the predicted cells.
         """
-        cross_covariances = noise_covariances(self.cells, cells)
+        cross_covariances = covariances_without_white(self.cells, cells)
         trend = _trend(self.cells, cells, self.peak)
-        total = np.tensordot(self.variances[1:], noise_covariances(cells, cells), 1)
+        total = np.tensordot(self.variances[1:], covariances_without_white(cells, cells), 1)
         total += _trend(cells, cells, self.peak)
         means = np.empty((len(self.draws), len(cells[0])))
         for k, (draw, factor) in enumerate(zip(self.draws, self._factors, strict=True)):
@@ -175,7 +177,7 @@ class Background(Immutable):
 
     def predict_mean(self, cells: Cells) -> NDArray[np.float64]:
         """Return the expected background in cells, N."""
-        cross_covariances = noise_covariances(self.cells, cells)
+        cross_covariances = covariances_without_white(self.cells, cells)
         mean = np.mean(self._weights, axis=0) @ _trend(self.cells, cells, self.peak)
         for draw, weights in zip(self.draws, self._weights, strict=True):
             mean += np.tensordot(draw[1:], weights @ cross_covariances, 1) / len(self.draws)
@@ -218,18 +220,20 @@ def _fixed(cells: Cells, peak: float) -> NDArray[np.float64]:
     return _trend(cells, cells, peak) + (QUANTIZATION * peak) ** 2 * np.eye(len(cells[0]))
 
 
-def covariances(cells: Cells) -> NDArray[np.float64]:
+def unit_covariances(cells: Cells) -> NDArray[np.float64]:
     """Return unit covariances of white, pink and brown noise and both hums: [5, n_cell, n_cell]."""
     white = np.diag(0.5 / (cells[1] - cells[0]))
-    return np.concatenate([white[None], noise_covariances(cells, cells)])
+    return np.concatenate([white[None], covariances_without_white(cells, cells)])
 
 
 def fit_background(cells: Cells, mean: NDArray[np.float64], peak: float) -> Background:
     """Return the background with variances drawn from their posterior.
 
-    Arguments are as in `Background`; times are from about the middle of the contact.
+    Arguments are as in `Background`; times are relative to about the middle of the contact.
     """
-    unit = covariances(cells)
+    unit = unit_covariances(cells)
+    # Approximate variance of a cell per unit of each variance; for brown noise over 0.02 s, the
+    # duration of a contact.
     scale = np.array([np.mean(np.diagonal(unit[0])), 1.0, np.pi**2 * 0.02, 1.0, 1.0])
     posterior = _Posterior(unit, _fixed(cells, peak), mean, (PRIOR_DEVIATION * peak) ** 2 / scale)
     # First guess of the variance: half the mean square difference of adjacent cells.
@@ -304,7 +308,8 @@ class _Posterior:
     ) -> NDArray[np.float64]:
         """Return draws from the posterior, [N_RESAMPLED, 5], by importance resampling."""
         steps, logarithm = _student(len(maximum))
-        # Rows x with covariance inverse(curvature) = inverse(L)' inverse(L).
+        # Each row of `phi` is a draw, whose covariance is proportional to inverse(curvature) =
+        # inverse(L)' inverse(L).
         lower = np.linalg.cholesky(curvature)
         phi = maximum + solve_triangular(lower, steps.T, lower=True, trans="T").T
         weight = np.array([self.logarithm(draw) for draw in phi]) - logarithm

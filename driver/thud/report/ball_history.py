@@ -15,9 +15,9 @@ from scipy.stats import t as student
 from thud.base.checks import refuse
 from thud.base.files import read_input
 from thud.base.immutable import Immutable
-from thud.level.assessment import RESULTS
+from thud.level.assessment import VERDICTS
 from thud.report.contents import FORMAT, read_date
-from thud.report.rows import Style, criterion_row, limits_of, number, style_of
+from thud.report.rows import Style, criterion_row, criterion_style, limits_of, number
 
 if TYPE_CHECKING:
     import os
@@ -35,7 +35,7 @@ MAX_YEARS = 100.0
 # Maximum number of reports in the table: the first and the most recent ones.
 MAX_COLUMNS = 8
 # Marks of values in the table by verdict.
-MARKS = {RESULTS[0]: "", RESULTS[1]: " no", RESULTS[2]: " ?"}
+MARKS = {VERDICTS[0]: "", VERDICTS[1]: " no", VERDICTS[2]: " ?"}
 # Maximum size of a report, bytes.
 MAX_SIZE = 2**28
 # Entries of a report, and of each of its criteria, that a history needs.
@@ -131,7 +131,7 @@ class History:
     def table(self) -> list[tuple[str, ...]]:
         """Return rows of text: values by date, change per year and date of the limit."""
         criteria, last = self.criteria(), len(self.dates) - 1
-        styles = [style_of(entries[0]) for entries in criteria]
+        styles = [criterion_style(entries[0]) for entries in criteria]
         columns = [("", *(style.title for style in styles), "verdict")]
         for i in range(last + 1):
             if 0 < i <= last + 1 - MAX_COLUMNS:
@@ -151,7 +151,7 @@ class History:
         for entries, trend in zip(self.criteria(), self.trends(), strict=True):
             if trend is None or not trend.significant:
                 continue
-            style = style_of(entries[0])
+            style = criterion_style(entries[0])
             text = f"{style.title}: changes by {_slope(style, trend).rstrip(' *')} per year"
             date = self._date_text(trend.reached)
             if date:
@@ -276,7 +276,7 @@ def _is_complete(report: dict[str, Any]) -> bool:
             )
         )
         and all(isinstance(entry[key], str) for key in ("name", "unit"))
-        and entry["verdict"] in RESULTS
+        and entry["verdict"] in VERDICTS
         for entry in entries
     )  # fmt: skip
 

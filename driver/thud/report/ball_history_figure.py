@@ -10,7 +10,7 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.ticker import MultipleLocator
 
 from thud.plot.style import COLORS, GRAY, WIDTH, legend_above, new_figure, own_style
-from thud.report.rows import NOT_KNOWN, limits_of, style_of
+from thud.report.rows import NOT_KNOWN, criterion_style, limits_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,7 +57,7 @@ def draw_history(history: History) -> Figure:
 def _draw_criterion(
     axes: Axes, history: History, entries: list[dict[str, Any]], trend: Trend | None
 ) -> None:
-    style = style_of(entries[0])
+    style = criterion_style(entries[0])
     bounds = np.array([limits_of(entry) for entry in entries]) / style.unit
     # A count has a single allowed value: its area gets a height.
     is_count = bounds[0, 0] == bounds[0, 1]

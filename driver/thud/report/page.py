@@ -6,17 +6,18 @@ import html
 import io
 import math
 import re
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import QUANTITIES
 from thud.base.display import warn_if_not_drawn
-from thud.level.assessment import RESULTS
+from thud.level.assessment import VERDICTS
 from thud.plot.style import own_style
 from thud.recordings.measured_drop import ESTIMATES
 from thud.recordings.recorded_levels import BACKGROUND, MARGIN
 from thud.report.fonts import FAMILY, font_faces
 from thud.report.notes import group_by_kind, shorten
-from thud.report.rows import HEAD, NOT_KNOWN, criterion_row, limits_of, number, style_of
+from thud.report.rows import HEAD, NOT_KNOWN, criterion_row, criterion_style, limits_of, number
 from thud.report.template import BODY, PAGE
 
 if TYPE_CHECKING:
@@ -24,16 +25,16 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-# Maximum length of the lists of instruments, files and notes.
-INSTRUMENTS, FILES, NOTES = 6, 5, 7
-# Number of drops up to which none can be an outlier.
-MIN_DROPS = 2
+# Maximum length of the lists of instruments and of files, and of each list of notes.
+MAX_INSTRUMENTS, MAX_FILES, MAX_NOTES = 6, 5, 7
+# Minimum number of drops for the test for outliers.
+MIN_DROPS = 3
 STANDARDS = {
     "rubber_ball": "JIS A 1418-2, ISO 10140-5 and ISO 16283-2",
     "tyre": "JIS A 1418-2",
 }
-# Positions of the limits in the picture of a criterion, of width 100.
-LOW, HIGH = 25.0, 75.0
+# Horizontal positions of the limits in the picture of a criterion, whose width is 100.
+LOWER_LIMIT_X, UPPER_LIMIT_X = 25.0, 75.0
 
 
 def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) -> str:
@@ -49,12 +50,12 @@ def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) 
         reason=_text(_reason(data["criteria"])),
         about=_pairs(_about(data)),
         measured=_pairs(_measured(data)),
-        head="".join(f"<th>{_text(name)}</th>" for name in _columns(HEAD, "")),
+        head="".join(f"<th>{_text(name)}</th>" for name in _with_picture(HEAD, "")),
         rows="\n".join(map(_row, data["criteria"])),
         rule=_text(_rule(data)),
         figures="\n".join(_cells(figures)),
-        results=_notes("Drops and methods", _results(data)),
-        done=_notes("Signal processing", _messages(data, "steps") or ["nothing"]),
+        drops=_notes("Drops and methods", _drops_and_methods(data)),
+        processing=_notes("Signal processing", _messages(data, "steps") or ["nothing"]),
         warnings=_notes("Warnings", _messages(data, "warnings") or ["none"]),
         files=_files(data["files"]),
         footer=_text(f"thud {data['thud']} · report.json: SHA-256 {checksum}"),
@@ -69,8 +70,8 @@ def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) 
     )
 
 
-def page_text(data: dict[str, Any]) -> str:
-    """Return the texts that the laboratory stated, which may have any characters."""
+def laboratory_text(data: dict[str, Any]) -> str:
+    """Return the texts that the laboratory stated, in any script."""
     keys = ("laboratory", "ball", "serial", "date", "name")
     files = [file[key] for file in data["files"] for key in ("name", "calibration")]
     return _plain("".join([*(data[key] for key in keys), *data["instruments"], *files]))
@@ -89,9 +90,9 @@ def _text(text: str) -> str:
 def _reason(criteria: Sequence[dict[str, Any]]) -> str:
     """Return the criteria that are inconclusive or not met, as text."""
     parts = []
-    for verdict in RESULTS[1:]:
+    for verdict in VERDICTS[1:]:
         matching = [criterion for criterion in criteria if criterion["verdict"] == verdict]
-        names = [style_of(criterion).title.split(",")[0] for criterion in matching]
+        names = [criterion_style(criterion).title.split(",")[0] for criterion in matching]
         if names:
             parts.append(f"{verdict}: {', '.join(names).lower().replace(' hz', ' Hz')}")
     return "; ".join(parts) or "all criteria are met"
@@ -123,7 +124,7 @@ def _measured(data: dict[str, Any]) -> list[tuple[str, str]]:
     return [
         ("Recordings", amount),
         ("Calibration", f"{calibration}; {uncertainty}"),
-        ("Instruments", "\n".join(shorten(data["instruments"], INSTRUMENTS))),
+        ("Instruments", "\n".join(shorten(data["instruments"], MAX_INSTRUMENTS))),
     ]
 
 
@@ -135,29 +136,34 @@ def _pairs(pairs: Iterable[tuple[str, str]]) -> str:
     return "\n".join(rows)
 
 
-def _columns(row: Sequence[str], picture: str) -> list[str]:
+def _with_picture(row: Sequence[str], picture: str) -> list[str]:
     """Insert a picture before the verdict, the last cell of a row."""
     return [*row[:-1], picture, row[-1]]
 
 
 def _row(criterion: dict[str, Any]) -> str:
-    cells = _columns([_text(cell) for cell in criterion_row(criterion)], _range(criterion))
+    cells = _with_picture(
+        [_text(cell) for cell in criterion_row(criterion)], _range_picture(criterion)
+    )
     style = criterion["verdict"].replace(" ", "-")
     return f'<tr class="{style}">' + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
 
 
-def _range(criterion: dict[str, Any]) -> str:
+def _range_picture(criterion: dict[str, Any]) -> str:
+    """Return the limits of a criterion, its value and its expanded uncertainty as SVG."""
     (lower, upper), value = limits_of(criterion), criterion["value"]
-    box = f'<rect x="{LOW}" y="1" width="{HIGH - LOW}" height="8" fill="#ccc"/>'
+    span = UPPER_LIMIT_X - LOWER_LIMIT_X
+    box = f'<rect x="{LOWER_LIMIT_X}" y="1" width="{span}" height="8" fill="#ccc"/>'
     if value is None or lower == upper:
         return ""
-    scale = (HIGH - LOW) / (upper - lower)
-    position = LOW + scale * (value - lower)
+    scale = span / (upper - lower)
+    position = LOWER_LIMIT_X + scale * (value - lower)
     shown = min(max(position, 2.0), 98.0)
-    width = scale * (criterion["expanded_uncertainty"] or 0.0)
-    ends = [min(max(end, 1.0), 99.0) for end in (position - width, position + width)]
-    bar = "".join(f"M{end:.2f} 2.5V7.5" for end in ends) + f"M{ends[0]:.2f} 5H{ends[1]:.2f}"
-    bar *= ends[0] < ends[1]
+    half_width = scale * (criterion["expanded_uncertainty"] or 0.0)
+    ends = [min(max(end, 1.0), 99.0) for end in (position - half_width, position + half_width)]
+    bar = ""
+    if ends[0] < ends[1]:
+        bar = "".join(f"M{end:.2f} 2.5V7.5" for end in ends) + f"M{ends[0]:.2f} 5H{ends[1]:.2f}"
     mark = f'<circle cx="{shown:.2f}" cy="5" r="1.8"/>'
     if shown != position:
         tip = math.copysign(3.0, position - shown)
@@ -171,7 +177,7 @@ def _range(criterion: dict[str, Any]) -> str:
 def _rule(data: dict[str, Any]) -> str:
     has_own_limits = any(not criterion["limits_of_standard"] for criterion in data["criteria"])
     limits = f"Limits of {STANDARDS.get(data['source'], 'the standards')}"
-    limits += ", those marked * of the laboratory. " if has_own_limits else ". "
+    limits += "; those marked * are the laboratory's own. " if has_own_limits else ". "
     return limits + (
         "U: expanded uncertainty for 95 % (JCGM 100, Student's t). A criterion conforms if "
         "value ± U lies within its limits, does not conform if it lies outside, and is "
@@ -183,6 +189,7 @@ def _means(drops: Sequence[dict[str, Any]]) -> list[str]:
     means = []
     for name in ESTIMATES:
         known = [drop[name]["value"] for drop in drops if drop[name]["value"] is not None]
+        # Contact time and restitution are rows of the table of criteria.
         if known and name not in {"contact_time", "restitution"}:
             quantity = QUANTITIES[name]
             unit = f" {quantity.display_unit}" if quantity.display_unit else ""
@@ -200,7 +207,7 @@ def _means(drops: Sequence[dict[str, Any]]) -> list[str]:
     ]
 
 
-def _results(data: dict[str, Any]) -> list[str]:
+def _drops_and_methods(data: dict[str, Any]) -> list[str]:
     drops, low, high = data["drops"], *BACKGROUND
     results = _means(drops)
     averaged = "energy average of the drops" if len(drops) > 1 else "of one drop"
@@ -213,7 +220,8 @@ def _results(data: dict[str, Any]) -> list[str]:
         results.append(f"levels {low:g} to {high:g} dB above the background were corrected for it")
     if "background" in flags:
         results.append(f"levels less than {low:g} dB above the background are upper bounds")
-    met = [entry["reason"] for entry in data["plate"] if entry["met"]]
+    plate_checks = data["plate"]
+    met = [check["reason"] for check in plate_checks if check["met"]]
     if met:
         results.append(f"force plate: {'; '.join(met)}")
     bands = [f"{entry['band']:g}" for entry in data["criteria"] if entry["band"] is not None]
@@ -221,9 +229,10 @@ def _results(data: dict[str, Any]) -> list[str]:
         if any(differences):
             values = " / ".join("–" if d is None else number(d, 2) for d in differences)
             results.append(
-                f"method {method} differs by up to {values} dB at {bands[0]} to {bands[-1]} Hz"
+                f"method {method} differs from exact by up to {values} dB in the octaves of "
+                f"{bands[0]} to {bands[-1]} Hz, in this order"
             )
-    return [*results, _outliers(data["outliers"])] if len(drops) > MIN_DROPS else results
+    return [*results, _outliers(data["outliers"])] if len(drops) >= MIN_DROPS else results
 
 
 def _outliers(outliers: Iterable[dict[str, Any]]) -> str:
@@ -244,16 +253,18 @@ def _messages(data: dict[str, Any], kind: str) -> list[str]:
 
 
 def _notes(title: str, messages: Sequence[str]) -> str:
-    items = "".join(f"<li>{_text(message)}</li>" for message in shorten(messages, NOTES))
+    items = "".join(f"<li>{_text(message)}</li>" for message in shorten(messages, MAX_NOTES))
     return f"<h2>{_text(title)}</h2><ul>{items}</ul>"
 
 
 def _files(files: Sequence[dict[str, Any]]) -> str:
-    names = shorten([_plain(file["name"]) for file in files], FILES)
-    checksums = [*(file["sha256"] for file in files[: len(names) - (len(files) > FILES)]), ""]
+    names = shorten([_plain(file["name"]) for file in files], MAX_FILES)
+    # If there are more files, the last text says how many and has no checksum.
+    listed = files if len(files) <= MAX_FILES else files[: MAX_FILES - 1]
+    checksums = [file["sha256"] for file in listed]
     return "\n".join(
         f"<tr><td>{_text(name)}</td><td>{checksum}</td></tr>"
-        for name, checksum in zip(names, checksums, strict=False)
+        for name, checksum in zip_longest(names, checksums, fillvalue="")
     )
 
 

@@ -13,7 +13,7 @@ from thud.base.bridge import version
 from thud.base.display import draw_all, warn_if_not_drawn
 from thud.base.errors import InputError, ReportWarning
 from thud.base.extras import require_extra
-from thud.level.assessment import RESULTS
+from thud.level.assessment import VERDICTS
 from thud.level.estimate import Estimate
 from thud.level.levels import get_bands
 from thud.report.contents import criteria_data, report_data
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 # Columns of the page that the printed table omits.
 _HIDDEN = ("Spread", "Background")
 # Verdicts of several criteria.
-_PLURALS = {RESULTS[0]: "conform", RESULTS[1]: "do not conform"}
+_PLURALS = {VERDICTS[0]: "conform", VERDICTS[1]: "do not conform"}
 DATASET = "recording.nc"
 _PAGE = (HTML, PDF, "force.svg", "levels.svg")
 
@@ -108,7 +108,7 @@ def count_verdicts(results: Iterable[str]) -> str:
     '2 criteria conform, 1 does not conform'
     """
     listed = list(results)
-    counts = {verdict: listed.count(verdict) for verdict in RESULTS if verdict in listed}
+    counts = {verdict: listed.count(verdict) for verdict in VERDICTS if verdict in listed}
     parts = [
         f"{count} {verdict if count == 1 else _PLURALS.get(verdict, verdict)}"
         for verdict, count in counts.items()

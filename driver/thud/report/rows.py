@@ -34,7 +34,7 @@ class Style(NamedTuple):
         return unknown if value is None else number(value / self.unit, self.decimals)
 
 
-def style_of(criterion: dict[str, Any]) -> Style:
+def criterion_style(criterion: dict[str, Any]) -> Style:
     """Return the format of a criterion of a report."""
     if criterion["band"] is not None:
         return Style(f"{criterion['band']:g} Hz, dB", 1.0, 2)
@@ -45,7 +45,7 @@ def style_of(criterion: dict[str, Any]) -> Style:
 
 def criterion_row(criterion: dict[str, Any]) -> tuple[str, ...]:
     """Return a criterion of a report as texts, in the columns of `HEAD`."""
-    style = style_of(criterion)
+    style = criterion_style(criterion)
     value, margin = criterion["value"], criterion["margin"]
     bound = "at most " if criterion["upper_bound"] else ""
     ends = [f"{end / style.unit:g}".replace("-", "−") for end in limits_of(criterion)]
@@ -78,7 +78,7 @@ def expanded_text(criterion: dict[str, Any]) -> str:
         return "–"
     if not criterion["contributions"]:
         return "not stated"
-    return _width(style_of(criterion), criterion["expanded_uncertainty"], NOT_KNOWN)
+    return _width(criterion_style(criterion), criterion["expanded_uncertainty"], NOT_KNOWN)
 
 
 def number(value: float, decimals: int) -> str:

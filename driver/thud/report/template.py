@@ -25,8 +25,8 @@ $rows
 $figures
 </tr></table>
 <table class="columns"><tr>
-<td>$results</td>
-<td>$done$warnings</td>
+<td>$drops</td>
+<td>$processing$warnings</td>
 </tr></table>
 <h2>Files and their SHA-256</h2>
 <table class="files">$files</table>

@@ -75,7 +75,7 @@ def page_contents(
     Warn if there is no PDF, or no font for some characters; `folder` is named in the warning.
     """
     from thud.report.fonts import missing_characters
-    from thud.report.page import page_text, report_page
+    from thud.report.page import laboratory_text, report_page
     from thud.report.pdf import NEEDED, html_to_pdf
 
     page = report_page(data, figures, hashlib.sha256(json_bytes(data)).hexdigest())
@@ -87,7 +87,7 @@ def page_contents(
         message = f"{folder}: {PDF} is not written ({cause}); allowed: {NEEDED}"
         warnings.warn(message, ReportWarning, stacklevel=3)
         return contents
-    missing = missing_characters(page_text(data))
+    missing = missing_characters(laboratory_text(data))
     if missing:
         message = (
             f"{folder}: no installed font has {missing}, used in {PDF}; allowed: "

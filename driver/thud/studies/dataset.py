@@ -42,7 +42,7 @@ def new_dataset(study: SampleStudy, columns: Columns, results: Columns) -> xr.Da
     coordinates, variables = sample_variables(results)
     for parameter in study.parameters:
         values = _objects(columns[parameter.name])
-        coordinates[parameter.coordinate] = ("sample", values, _attributes(study, parameter))
+        coordinates[parameter.coordinate_name] = ("sample", values, _attributes(study, parameter))
     if study.surrogate:
         for name in study.surrogate.outputs:
             variables[name][-1]["surrogate_error"] = study.surrogate.error_of(name)
@@ -75,7 +75,7 @@ def provenance(study: SampleStudy) -> dict[str, str]:
         "identity": json.dumps(study.identity),
         "design": study.design,
         "seed": str(study.seed) if study.size else "none",
-        "parameters": " ".join(parameter.coordinate for parameter in study.parameters),
+        "parameters": " ".join(parameter.coordinate_name for parameter in study.parameters),
         **({"surrogate": study.surrogate.accuracy} if study.surrogate else {}),
         **sampler_versions(study.design),
         **case_attributes(study.case),
@@ -97,7 +97,7 @@ def grid_of(study: SampleStudy, dataset: xr.Dataset) -> xr.Dataset:
     if study.design != "grid":
         return dataset
     coordinates = {name: dataset[name] for name in BANDS if name in dataset.coords}
-    names = [parameter.coordinate for parameter in study.parameters]
+    names = [parameter.coordinate_name for parameter in study.parameters]
     axes = {
         name: (name, _objects(parameter.grid()), dataset[name].attrs)
         for name, parameter in zip(names, study.parameters, strict=True)

@@ -104,7 +104,7 @@ class DesignKind(SampleKind[Design]):
 
     def new_result(self, study: SampleStudy, dataset: xr.Dataset) -> Design:
         """Return the map of all samples."""
-        first, second = (parameter.coordinate for parameter in study.parameters)
+        first, second = (parameter.coordinate_name for parameter in study.parameters)
         return Design(dataset.load().sortby([first, second]), (first, second), *_mark(study))
 
 

@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypedDict, TypeVar, Unpack
 
-from thud.base.checks import refuse, require_words
+from thud.base.checks import refuse, refuse_unknown
 from thud.studies.directory import open_results
 from thud.studies.study import Study, named_files, read_common, read_tables
 from thud.studies.study_result import StudyResult
@@ -84,7 +84,7 @@ class Kind(ABC, Generic[S, R]):
         **options: Unpack[RunOptions],
     ) -> R:
         """Return the result of a study, also written to an output directory."""
-        require_words("keywords", options, RunOptions.__annotations__)
+        refuse_unknown("keywords", options, RunOptions.__annotations__)
         study = self.read_study(source)
         if (surrogate := options.get("surrogate")) is not None:
             study = self.with_surrogate(study, get_surrogate(surrogate))

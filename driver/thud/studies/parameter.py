@@ -13,18 +13,18 @@ from scipy.special import ndtri
 from thud.base.checks import (
     MAX_NUMBER,
     refuse,
+    refuse_unknown,
     refuse_value,
     require_choice,
     require_number,
     require_whole,
-    require_words,
     shown,
 )
 from thud.base.immutable import Plain
 from thud.base.key import Key
 from thud.base.units import power_of, scaled
 from thud.case.keys import Value, find_key
-from thud.impact.datasets import coordinate
+from thud.impact.datasets import coordinate_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -32,12 +32,18 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Maximum number of values of a parameter, or of base samples, for memory.
+# Maximum number of values of a parameter, or of base samples; it limits the memory.
 MAX_VALUES = 2**30
-# Table keys of a varying parameter, by its form, and of a fitted one, besides `unit`.
-FORMS = {"values": ("values",), "low": ("low", "high", "count", "scale"), "std": ("mean", "std")}
-FITTED = ("start", "low", "high")
-NUMBERS = ("real", "whole", "list")
+# Entries of the table of a varying parameter besides `unit`, by the entry that selects the form
+# (list, range or normal distribution), and entries of the table of a fitted parameter.
+ENTRIES_BY_FORM = {
+    "values": ("values",),
+    "low": ("low", "high", "count", "scale"),
+    "std": ("mean", "std"),
+}
+FIT_ENTRIES = ("start", "low", "high")
+# Kinds of keys whose values are numbers.
+NUMERIC_KINDS = ("real", "whole", "list")
 _SCALES = ("linear", "log")
 
 
@@ -61,10 +67,10 @@ class Parameter(Plain):
         Mean and standard deviation of a normal distribution; the mean is by default the value of
         the case.
     unit : str or None
-        Unit of these numbers; by default that of the key.
+        Unit in which a user states these numbers; by default that of the key. A study converts the
+        numbers to the unit of the key and keeps `unit` for tables and figures.
     name : str
-        Name of the key, or of an entry of a list, such as ``"frequency(2)"``. The study sets it,
-        converts the numbers to the unit of the key, and keeps `unit` for tables and figures.
+        Name of the key, or of an entry of a list, such as ``"frequency(2)"``; set by the study.
     key : Key
         The key; set by the study.
     """
@@ -83,18 +89,18 @@ class Parameter(Plain):
 
     def __new__(cls, *_: object, **words: object) -> Self:
         """Raise InputError for an unknown keyword."""
-        require_words("Parameter()", words, (option.name for option in fields(cls)))
+        refuse_unknown("Parameter()", words, (option.name for option in fields(cls)))
         return super().__new__(cls)
 
     @property
     def numeric(self) -> bool:
         """Whether the values are numbers."""
-        return self.key.kind in NUMBERS
+        return self.key.kind in NUMERIC_KINDS
 
     @property
-    def coordinate(self) -> str:
+    def coordinate_name(self) -> str:
         """Name of its coordinate in datasets."""
-        return coordinate(self.name, self.key)
+        return coordinate_name(self.name, self.key)
 
     @property
     def table(self) -> dict[str, object]:
@@ -125,14 +131,14 @@ class Parameter(Plain):
         values: NDArray[Any] = spaced(self.low, self.high, self.count)
         return np.unique(np.rint(values).astype(int)) if self.key.kind == "whole" else values
 
-    def quantile(self, fraction: NDArray[np.float64]) -> NDArray[np.generic]:
+    def quantiles(self, fraction: NDArray[np.float64]) -> NDArray[np.generic]:
         """Return the values below which fractions of all values lie."""
         if self.values is not None:
             return np.take(self.grid(), (fraction * len(self.values)).astype(int))
         if self.std is not None and self.mean is not None:
             # The quantile of 0 is infinite.
             return np.asarray(self.mean + self.std * ndtri(np.maximum(fraction, 2.0**-54)))
-        assert self.low is not None  # noqa: S101 - see `varied`
+        assert self.low is not None  # noqa: S101 - see `read_varied`
         assert self.high is not None  # noqa: S101
         whole = self.key.kind == "whole"
         # A whole number has the probability of the interval up to the next one.
@@ -149,7 +155,7 @@ class Parameter(Plain):
             return self.start
         if self.values is None and self.std is None and None in {self.low, self.high}:
             return None
-        result: Value = self.quantile(np.array([fraction])).tolist()[0]
+        result: Value = self.quantiles(np.array([fraction])).tolist()[0]
         return result
 
     def __str__(self) -> str:
@@ -169,32 +175,35 @@ def _in_unit(value: Value, power: int) -> Value:
     return scaled(value, -power) if number and power else value  # type: ignore[arg-type]
 
 
-def varied(
+def read_varied(
     name: str, table: object, owners: tuple[str, ...], default_mean: Value | None
 ) -> Parameter:
     """Return a parameter that varies; `default_mean` is its value in the case."""
-    words = [word for form in FORMS.values() for word in form]
+    words = [word for form in ENTRIES_BY_FORM.values() for word in form]
     label, key, table, power = _read_table(name, table, owners, words)
-    form = next((form for form in FORMS if form in table), None)
+    form = next((form for form in ENTRIES_BY_FORM if form in table), None)
     if form is None:
         refuse(
             f"{label} = {shown(table)} has no values",
-            "a table with values = [...], or low and high, or std, and unit",
+            "a table with values = [...], with low and high, or with std; each may have a unit",
         )
-    require_words(f"{label} with {form}", table, (*FORMS[form], "unit"))
-    if form != "values" and key.kind not in NUMBERS:
+    refuse_unknown(f"{label} with {form}", table, (*ENTRIES_BY_FORM[form], "unit"))
+    if form != "values" and key.kind not in NUMERIC_KINDS:
         allowed = ", ".join(map(repr, key.choices)) or "true, false"
-        refuse(f"{label} is not a number", f"values = [...] of {allowed}")
+        refuse(f"{label}: its values are not numbers", f"values = [...] of {allowed}")
 
     def read(word: str) -> float:
-        return float(checked(f"{label}: {word}", key, table[word], power))
+        return float(read_value(f"{label}: {word}", key, table[word], power))
 
     result: dict[str, Any]
     if form == "values":
         values = table["values"]
         if not isinstance(values, list | tuple) or not values:
-            refuse(f"{label}: values = {shown(values)} is empty or not a list", "[one, or, more]")
-        result = {"values": tuple(checked(f"{label}: values", key, v, power) for v in values)}
+            refuse(
+                f"{label}: values = {shown(values)} is empty or not a list",
+                "a list of at least one value",
+            )
+        result = {"values": tuple(read_value(f"{label}: values", key, v, power) for v in values)}
     elif form == "low":
         result = _between(label, key, table, read)
     else:
@@ -202,7 +211,7 @@ def varied(
     return Parameter(**result, unit=table.get("unit"), name=name, key=key)
 
 
-def fitted(name: str, entry: object, owners: tuple[str, ...]) -> Parameter:
+def read_fitted(name: str, entry: object, owners: tuple[str, ...]) -> Parameter:
     """Return a fitted parameter, given as its table, a `Parameter`, its start, or None."""
     if isinstance(entry, Parameter):
         entry = entry.table
@@ -210,7 +219,7 @@ def fitted(name: str, entry: object, owners: tuple[str, ...]) -> Parameter:
         entry = {}
     elif not isinstance(entry, Mapping):
         entry = {"start": entry}
-    label, key, table, power = _read_table(name, entry, owners, FITTED)
+    label, key, table, power = _read_table(name, entry, owners, FIT_ENTRIES)
     numbers: dict[str, Any] = {}
     for word, value in table.items():
         if word != "unit" and value is not None:
@@ -220,22 +229,24 @@ def fitted(name: str, entry: object, owners: tuple[str, ...]) -> Parameter:
 
 
 def _read_table(
-    name: str, table: object, owners: tuple[str, ...], allowed_keys: Sequence[str]
+    name: str, table: object, owners: tuple[str, ...], allowed: Sequence[str]
 ) -> tuple[str, Key, Mapping[str, Any], int]:
     """Return label, key and table of a parameter, and the exponent of ten of its unit."""
     label = f"[parameters] {name}"
-    key, entry = find_key(name, owners)
-    if key.kind == "list" and entry is None:
+    key, index = find_key(name, owners)
+    if key.kind == "list" and index is None:
         refuse(f"{label} is a list", f"one of its entries, such as {name + '(1)'!r}")
     if not isinstance(table, Mapping):
-        refuse(f"{label} = {shown(table)} is not a table", f"{', '.join(allowed_keys)}, unit")
-    require_words(label, table, (*allowed_keys, "unit"))
-    unit = key.unit or "1" if table.get("unit") is None else table["unit"]
+        refuse(f"{label} = {shown(table)} is not a table", f"{', '.join(allowed)}, unit")
+    refuse_unknown(label, table, (*allowed, "unit"))
+    unit = table.get("unit")
+    if unit is None:
+        unit = key.unit or "1"
     return label, key, table, power_of(unit, key.unit, label)
 
 
-def checked(label: str, key: Key, value: object, power: int) -> Value:
-    """Return a value in the unit of its key; raise InputError if the key has another kind."""
+def read_value(label: str, key: Key, value: object, power: int) -> Value:
+    """Return a value in the unit of its key; raise InputError if it is of another kind."""
     number = math.nan
     if isinstance(value, int | float) and not isinstance(value, bool):
         number = scaled(value, power) if -MAX_NUMBER < value < MAX_NUMBER else math.inf
@@ -253,10 +264,10 @@ def _between(
     label: str, key: Key, table: Mapping[str, Any], read: Callable[[str], float]
 ) -> dict[str, Any]:
     if "high" not in table:
-        refuse(f"{label} has no high end", "both low and high")
+        refuse(f"{label} has low but not high", "both low and high")
     low, high = read("low"), read("high")
     whole = key.kind == "whole"
-    # Limits that are names of other keys depend on the sample.
+    # A limit that is the name of another key depends on the sample, so it is not checked here.
     lower = -math.inf if isinstance(key.lower, str) else key.lower
     upper = math.inf if isinstance(key.upper, str) else key.upper
     if whole and not lower <= low <= high <= upper:
@@ -266,9 +277,10 @@ def _between(
         )
     count, scale = table.get("count", 0), table.get("scale", _SCALES[0])
     require_choice(f"{label}: scale", scale, _SCALES)
-    positive = ", 0 < low" if scale == "log" else ""
-    if not low < high or (positive and low <= 0):
-        refuse_value(f"{label}: low", table["low"], f"low < high{positive}")
+    is_logarithmic = scale == "log"
+    if not low < high or (is_logarithmic and low <= 0):
+        allowed = "0 < low < high" if is_logarithmic else "low < high"
+        refuse_value(f"{label}: low", table["low"], allowed)
     if "count" in table:
         require_whole(f"{label}: count", count, 2, int(high - low) + 1 if whole else MAX_VALUES)
     return {"low": low, "high": high, "count": count, "scale": scale}
@@ -282,7 +294,7 @@ def _normal(
     default_mean: Value | None,
 ) -> dict[str, Any]:
     if key.kind == "whole":
-        refuse(f"{label} is a whole number", "values = [...], or low and high")
+        refuse(f"{label}: std is not allowed for a whole number", "values = [...], or low and high")
     std = read("std")
     if not std > 0:
         refuse_value(f"{label}: std", table["std"], "0 < std")
@@ -292,11 +304,11 @@ def _normal(
     return {"mean": float(mean), "std": std}
 
 
-def quantity(label: str, entry: object, unit: str) -> Any:  # noqa: ANN401 - a value of any kind
+def read_quantity(label: str, entry: object, unit: str) -> Any:  # noqa: ANN401 - a value of any kind
     """Return a value or a list, converted to a unit if it is a table of ``value`` and ``unit``."""
     if not isinstance(entry, Mapping):
         return entry
-    require_words(label, entry, ("value", "unit"))
+    refuse_unknown(label, entry, ("value", "unit"))
     power = power_of(entry.get("unit", unit or "1"), unit, label)
     if "value" not in entry:
         refuse(f"{label} has no value", "value, and its unit")

@@ -14,7 +14,7 @@ from thud.studies.blocks import compute_samples, read_identity, result_names
 from thud.studies.dataset import disk_space
 from thud.studies.directory import FORMATS
 from thud.studies.kind import Kind
-from thud.studies.parameter import varied
+from thud.studies.parameter import read_varied
 from thud.studies.samples import SampleStudy
 from thud.studies.sampling import read_design
 from thud.studies.study import table_of
@@ -64,7 +64,7 @@ class DropsKind(Kind[SampleStudy, R]):
                 "[parameters] bands is not allowed", "bands in [fixed], the same for all samples"
             )
         mean = density if name == DENSITY.name else value_in(case, name)
-        return varied(name, entry, key_owners(case), mean)
+        return read_varied(name, entry, key_owners(case), mean)
 
     def complete(self, study: Study, content: Mapping[str, Any], folder: Path) -> SampleStudy:
         """Return a study with its sampling design."""

@@ -116,7 +116,7 @@ class SampleStudy(Study):
         fractions = unit_samples(
             self.design, len(self.parameters), self.size, self.seed, start, stop
         )
-        return {p.name: p.quantile(fractions[:, i]) for i, p in enumerate(self.parameters)}
+        return {p.name: p.quantiles(fractions[:, i]) for i, p in enumerate(self.parameters)}
 
     def key_columns(self, columns: Columns) -> Columns:
         """Return samples of `parameter_columns` as values of keys, shape (n_sample,).

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base.checks import MAX_SEED, refuse, refuse_value, require_whole, require_words
+from thud.base.checks import MAX_SEED, refuse, refuse_unknown, refuse_value, require_whole
 from thud.studies.parameter import MAX_VALUES, Parameter
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def read_design(
     if design not in allowed:
         refuse_value("[design] kind", design, ", ".join(allowed))
     words = ("kind", "size", "seed") if design in SAMPLED else ("kind",)
-    require_words(f"[design] of kind {design}", table, words)
+    refuse_unknown(f"[design] of kind {design}", table, words)
     for parameter in parameters:
         if design in SAMPLED and parameter.count:
             refuse(

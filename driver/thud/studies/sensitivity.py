@@ -170,7 +170,7 @@ def _indices(study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
         variables["surrogate"] = ("output", errors / spread, meaning)
     names = {
         "output": list(outputs),
-        "parameter": [parameter.coordinate for parameter in study.parameters],
+        "parameter": [parameter.coordinate_name for parameter in study.parameters],
     }
     left_out = int((~usable).sum())
     return Sensitivity(dataset, xr.Dataset(variables, names, dataset.attrs), left_out)

@@ -17,12 +17,12 @@ import numpy as np
 
 from thud.base._schema import MODELS
 from thud.base.bridge import version
-from thud.base.checks import refuse, refuse_value, require_kind, require_words, shown
+from thud.base.checks import refuse, refuse_unknown, refuse_value, require_kind, shown
 from thud.base.errors import InputError
 from thud.base.files import read_input
 from thud.case.case import Case, check_case, new_model, read_case, tables_case
 from thud.case.keys import DENSITY, TEMPERATURE, find_key, key_owners, with_values
-from thud.studies.parameter import Parameter, checked, quantity
+from thud.studies.parameter import Parameter, read_quantity, read_value
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -179,7 +179,7 @@ def read_common(
     new_parameter: Callable[[str, object, Case, float | None], Parameter],
 ) -> Study:
     """Read the part that all kinds share; `own_keys` are those besides `COMMON_KEYS`."""
-    require_words("the study", content, (*COMMON_KEYS, *own_keys))
+    refuse_unknown("the study", content, (*COMMON_KEYS, *own_keys))
     fixed, parameters = (table_of(content, name) for name in ("fixed", "parameters"))
     name = content["name"]
     is_text = isinstance(name, str) and name.strip() and name.isprintable()
@@ -232,12 +232,12 @@ def fix_keys(
         key, index = find_key(name, key_owners(case))
         if key == TEMPERATURE:
             refuse(f"{label} is not allowed", "temperature in [parameters]")
-        value = quantity(label, entry, key.unit)
+        value = read_quantity(label, entry, key.unit)
         if key.kind == "list" and index is None:
             entries = value if isinstance(value, list) else [value]
-            values[name] = tuple(checked(label, key, item, 0) for item in entries)
+            values[name] = tuple(read_value(label, key, item, 0) for item in entries)
         else:
-            values[name] = checked(label, key, value, 0)
+            values[name] = read_value(label, key, value, 0)
     density = values.pop(DENSITY.name, None)
     return with_values(case, values), density  # type: ignore[return-value]
 

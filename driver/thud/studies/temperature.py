@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base.checks import refuse, refuse_value, require_words
+from thud.base.checks import refuse, refuse_unknown, refuse_value
 from thud.case.keys import TEMPERATURE
-from thud.studies.parameter import checked
+from thud.studies.parameter import read_value
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -105,14 +105,14 @@ def read_temperature(
         )
     if not isinstance(table, Mapping):
         return None
-    require_words("[temperature]", table, _WORDS)
+    refuse_unknown("[temperature]", table, _WORDS)
     shifts = ["c1", "c2"] if {"c1", "c2"} & set(table) else []
     changes = ["coefficient"] if "coefficient" in table or not shifts else []
     numbers = {}
     for word in ["reference", *changes, *shifts]:
         if word not in table:
             refuse(f"[temperature] has no {word}", "reference with coefficient, or with c1 and c2")
-        numbers[word] = float(checked(f"[temperature] {word}", TEMPERATURE, table[word], 0))
+        numbers[word] = float(read_value(f"[temperature] {word}", TEMPERATURE, table[word], 0))
     for word in ("c1", "c2"):
         if numbers.get(word, 1.0) <= 0:
             refuse_value(f"[temperature] {word}", table[word], f"0 < {word}")

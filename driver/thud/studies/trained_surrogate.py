@@ -16,11 +16,11 @@ from thud.base.bridge import version
 from thud.base.checks import (
     MAX_SEED,
     refuse,
+    refuse_unknown,
     refuse_value,
     require_kind,
     require_number,
     require_whole,
-    require_words,
 )
 from thud.base.extras import require_extra
 from thud.base.files import is_failure, read_input, replace_file
@@ -468,12 +468,12 @@ def read_plan(table: Mapping[str, object], folder: Path) -> Plan | Surrogate:
     """Return the plan of a table ``[surrogate]``, or the surrogate of the file that it names."""
     label = "[surrogate]"
     if "file" in table:
-        require_words(f"{label} with file", table, ("file",))
+        refuse_unknown(f"{label} with file", table, ("file",))
         path = table["file"]
         if not isinstance(path, str) or not path.strip():
             refuse_value(f"{label} file", path, "the path of a saved surrogate")
         return read_surrogate(folder / path)
-    require_words(label, table, ("error", "size", "seed", "file"))
+    refuse_unknown(label, table, ("error", "size", "seed", "file"))
     error, size, seed = (table.get(w, getattr(Plan, w)) for w in ("error", "size", "seed"))
     require_number(f"{label} error", error)
     if not error > 0:  # type: ignore[operator]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base._schema import SAMPLE_QUANTITIES
-from thud.base.checks import refuse, require_choice, require_words, shown
+from thud.base.checks import refuse, refuse_unknown, require_choice, shown
 from thud.base.immutable import Plain, freeze
 from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 from thud.studies.fitting.misfit import Misfit, numbers, require_positive
@@ -82,7 +82,7 @@ class LevelTarget(Plain):
             if isinstance(entries, float | int):
                 entries = [entries] * len(levels)
             deviation = numbers("uncertainty", entries, len(levels))
-        require_words("target: quantities", self.quantities, SAMPLE_QUANTITIES)
+        refuse_unknown("target: quantities", self.quantities, SAMPLE_QUANTITIES)
         quantities = {name: numbers(name, pair, 2) for name, pair in self.quantities.items()}
         if quantities and self.uncertainty is None:
             refuse("target: uncertainty of the levels is missing", "dB, above 0")

@@ -6,7 +6,7 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from thud.base._schema import QUANTITIES, SAMPLE_QUANTITIES
-from thud.base.checks import refuse, refuse_value, require_number, require_words
+from thud.base.checks import refuse, refuse_unknown, refuse_value, require_number
 from thud.base.columns import read_table
 from thud.base.units import power_of, scaled
 from thud.recordings.formats import FORMATS
@@ -14,7 +14,7 @@ from thud.recordings.read_recording import read_recording
 from thud.recordings.uniform_grid import read_record
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.level_target import LevelTarget
-from thud.studies.parameter import quantity
+from thud.studies.parameter import read_quantity
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -40,9 +40,9 @@ def read_target(table: dict[str, Any], folder: Path) -> Target:
     """Return the target of a table [target]; its paths are relative to a folder."""
     if ("file" in table) == ("levels" in table):
         refuse("[target] takes one of file and levels", "file = 'record.csv' or levels = [...]")
-    require_words("[target]", table, _FORCE_KEYS if "file" in table else _LEVEL_KEYS)
+    refuse_unknown("[target]", table, _FORCE_KEYS if "file" in table else _LEVEL_KEYS)
     options = {
-        name: quantity(f"[target] {name}", value, _UNITS[name]) if name in _UNITS else value
+        name: read_quantity(f"[target] {name}", value, _UNITS[name]) if name in _UNITS else value
         for name, value in table.items()
     }
     if "levels" in table:
@@ -87,7 +87,7 @@ def _measured(label: str, entry: object, unit: str) -> tuple[float, float]:
     words = ("value", "uncertainty")
     if not isinstance(entry, dict) or not set(words) <= set(entry):
         refuse_value(label, entry, "a table of value, uncertainty, unit")
-    require_words(label, entry, (*words, "unit"))
+    refuse_unknown(label, entry, (*words, "unit"))
     power = power_of(entry.get("unit", unit or "1"), unit, label)
     for word in words:
         require_number(f"{label}: {word}", entry[word])

@@ -21,9 +21,9 @@ from thud.recordings.noise import (
     MAINS,
     N_HARMONIC,
     OFFSET,
-    covariances,
+    covariances_without_white,
     fit_background,
-    noise_covariances,
+    unit_covariances,
 )
 from thud.studies.fitting.inference import UNLIKELY
 
@@ -266,7 +266,7 @@ def _covariance(background: Background) -> Array:
     """Return the covariance of background cells, offset and drift included, N2."""
     middle = (background.cells[0] + background.cells[1]) / 2
     trend = OFFSET**2 + DRIFT**2 * np.multiply.outer(middle, middle)
-    parts = np.tensordot(background.variances, covariances(background.cells), 1)
+    parts = np.tensordot(background.variances, unit_covariances(background.cells), 1)
     return np.asarray(parts + background.peak**2 * trend, dtype=np.float64)
 
 
@@ -360,7 +360,9 @@ def new_weights(  # noqa: PLR0913 - components of the noise
     white, colored, humming = (noise or 1.0) ** 2, np.zeros(n), np.zeros(n)
     drift = 0.0
     if background is not None:
-        rows = noise_covariances((time[:1], time[:1] + 1 / rate), (time, time + 1 / rate))[:, 0]
+        rows = covariances_without_white((time[:1], time[:1] + 1 / rate), (time, time + 1 / rate))[
+            :, 0
+        ]
         variances = background.variances
         if noise is None:
             white = variances[0] * rate / 2
