@@ -96,6 +96,22 @@ def test_page_lists_the_requirements_that_the_plate_meets(one: Recording) -> Non
     assert "the plate reads up to 6000 N" in report_page(data, [], "")
 
 
+def test_page_says_that_the_background_does_not_count(one: Recording) -> None:
+    (drop,) = one.drops
+    first, stop = drop.gate
+    force = np.full_like(drop.force, 500.0)
+    force[first:stop] = drop.force[first:stop]
+    assert 0 < first < stop < len(force)
+    disturbed = replace(one, drops=(replace(drop, force=force),))
+    np.testing.assert_array_equal(disturbed.levels(), one.levels())
+    # The gate contains the contact, with a margin of less than 3 ms on either side.
+    contact_time = drop.contact_time.value
+    assert -3e-3 < drop.time[first] < 0
+    assert contact_time < drop.time[stop - 1] < contact_time + 3e-3
+    page = report_page(report_data(one), [], "")
+    assert "from first touch to release, with a margin for their uncertainty; zero outside" in page
+
+
 def crowded(one: Recording) -> Recording:
     """Return a recording whose names, lists and sentences are as long as they can be."""
     base = many(one, 500, laboratory="W" * 500, ball="ball " * 100, serial="1 x" * 160,

@@ -14,7 +14,7 @@ from thud.base.display import warn_if_not_drawn
 from thud.level.assessment import VERDICTS
 from thud.plot.style import own_style
 from thud.recordings.measured_drop import ESTIMATES
-from thud.recordings.recorded_levels import BACKGROUND, MARGIN
+from thud.recordings.recorded_levels import BACKGROUND
 from thud.report.fonts import FAMILY, font_faces
 from thud.report.notes import group_by_kind, shorten
 from thud.report.rows import HEAD, NOT_KNOWN, criterion_row, criterion_style, limits_of, number
@@ -212,8 +212,8 @@ def _drops_and_methods(data: dict[str, Any]) -> list[str]:
     results = _means(drops)
     averaged = "energy average of the drops" if len(drops) > 1 else "of one drop"
     results.append(
-        f"levels: {averaged}, method exact (band energy of the contact and at least "
-        f"{1e3 * MARGIN:g} ms of background around it)"
+        f"levels: {averaged}, method exact (band energy of the force from first touch to release, "
+        "with a margin for their uncertainty; zero outside)"
     )
     flags = {entry["flag"] for entry in data["criteria"]}
     if "corrected" in flags:
