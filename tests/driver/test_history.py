@@ -229,6 +229,13 @@ def test_table_of_many_reports_is_not_wide() -> None:
     assert head[-3] == history(count=30).dates[-1].date().isoformat()
 
 
+def test_table_of_one_report_has_no_trend() -> None:
+    head, *rows = history(slope=0.1, count=1).table()
+    assert head == ("", "2015-01-01", "per year", "limit on")
+    assert rows[1] == ("63 Hz, dB", "31.00", "–", "–")
+    assert len(rows) == 11
+
+
 def test_command_writes_the_chart(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     chart = folder / "chart"
     options = argparse.Namespace(

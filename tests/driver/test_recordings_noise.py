@@ -291,6 +291,15 @@ def test_fitted_density_is_that_of_the_noise(colour: str) -> None:
     assert stats.chi2.ppf(1e-3, 8) < square < stats.chi2.ppf(1 - 1e-3, 8)
 
 
+def test_background_in_reversed_time_has_the_same_noise() -> None:
+    amplitude = np.where(middle(QUIET) < 0, 1.0, 8.0)
+    mean = 20 + amplitude * np.random.default_rng(4).normal(size=len(amplitude))
+    found = fit_background(QUIET, mean, PEAK)
+    begins, ends = QUIET
+    reverse = fit_background((-ends[::-1], -begins[::-1]), mean[::-1], PEAK)
+    np.testing.assert_allclose(reverse.draws, found.draws, rtol=1e-6)
+
+
 @pytest.mark.parametrize("rate", [2500.0, 25600.0])
 def test_functionals_have_the_energy_of_a_band(rate: float) -> None:
     force = np.random.default_rng(1).normal(size=int(0.02 * rate))
