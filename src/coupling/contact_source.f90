@@ -1,8 +1,9 @@
-!> A source of a few masses, the first of which touches the floor: interface for rigid and mobile floors.
+!> Interface of a source of a few masses, the first of which touches the floor. The floor may be rigid or mobile.
 !>
 !> The state holds displacement towards the floor (m) and velocity (m/s) of each mass in turn, then impulse on the floor
 !> (N s) and energy lost (J); a source may append components. On a mobile floor displacements and velocities are relative to
-!> the floor; accelerations are absolute, and force and loss are defined as on a rigid floor.
+!> the floor, but the rates that `get_derivative` returns for the velocities are the absolute accelerations of the masses;
+!> force and loss are defined as on a rigid floor.
 module thud_contact_source
    use thud_drop, only: drop_type
    use thud_error, only: error_type, numerical_error
@@ -13,7 +14,7 @@ module thud_contact_source
    implicit none (type, external)
    private
 
-   public :: coarse_error, contact_source_type
+   public :: coarse_step_error, contact_source_type
 
    !> Equations of motion of the source.
    type, abstract, extends(ode_type) :: contact_source_type
@@ -21,17 +22,18 @@ module thud_contact_source
       real(wp) :: mass = 0.0_wp
       !> Number of moving masses, and length of the state.
       integer :: n_mass = 1, n_state = 4
-      !> Mass of the cap that lies on the floor and moves with it, per unit deflection, kg/m.
+      !> Mass of the cap, the flattened part of a hollow ball, which lies on the floor and moves with it, per unit
+      !> deflection, kg/m.
       real(wp) :: cap_mass_per_deflection = 0.0_wp
       !> Whether the source touches the floor, and whether its deflection grows.
       logical :: touching = .true., compressing = .true.
    contains
       procedure(record_sample_interface), deferred :: record_sample
       procedure(record_peaks_interface), deferred :: record_peaks
-      procedure :: get_event
-      procedure :: pass_event
+      procedure :: get_event_component
+      procedure :: begin_next_phase
       procedure :: has_separated
-      procedure :: get_center
+      procedure :: get_center_motion
       procedure :: get_inner_energy
       procedure :: get_failure
       procedure :: get_amplitude
@@ -65,25 +67,26 @@ module thud_contact_source
 
 contains
 
-   !> Component of the state that falls to zero at the end of a phase on a rigid floor: velocity, then deflection.
-   pure function get_event(self) result(component)
+   !> Index of the component of the state that falls to zero at the end of a phase on a rigid floor: the velocity in
+   !> compression, then the deflection.
+   pure function get_event_component(self) result(component)
       class(contact_source_type), intent(in) :: self
       integer :: component
 
       component = merge(2, 1, self%compressing)
-   end function get_event
+   end function get_event_component
 
-   !> Begins the next phase on a rigid floor.
-   pure subroutine pass_event(self, time, state, history)
+   !> Ends a phase on a rigid floor and begins the next: compression, restitution, flight.
+   pure subroutine begin_next_phase(self, time, state, history)
       class(contact_source_type), intent(inout) :: self
       !> Time since first touch, s.
       real(wp), intent(in) :: time
       !> State at the event: [n_state].
       real(wp), intent(inout) :: state(:)
-      !> History, in which the turning point sets the maxima and the release sets the contact time.
+      !> History: the turning point updates its maxima, the release sets its contact time.
       type(force_history_type), intent(inout) :: history
 
-      state(self%get_event()) = 0.0_wp
+      state(self%get_event_component()) = 0.0_wp
       if (self%compressing) then
          self%compressing = .false.
          call self%record_peaks(state, history)
@@ -91,7 +94,7 @@ contains
          self%touching = .false.
          history%contact_time = time
       end if
-   end subroutine pass_event
+   end subroutine begin_next_phase
 
    !> Whether the source has left a rigid floor for good; a single mass leaves at release.
    pure function has_separated(self, state) result(separated)
@@ -104,14 +107,14 @@ contains
    end function has_separated
 
    !> Displacement, m, and velocity, m/s, of the center of mass: [2].
-   pure function get_center(self, state) result(center)
+   pure function get_center_motion(self, state) result(center)
       class(contact_source_type), intent(in) :: self
       !> State: [n_state].
       real(wp), intent(in) :: state(:)
       real(wp) :: center(2)
 
       center = state(1:2)
-   end function get_center
+   end function get_center_motion
 
    !> Energy of the relative motion of the masses and of the springs between them, J.
    pure function get_inner_energy(self, state) result(energy)
@@ -123,7 +126,7 @@ contains
       energy = 0.0_wp
    end function get_inner_energy
 
-   !> Error for a state outside the domain of the equations; sources that have such states override it.
+   !> Error after a step that leaves the domain of the equations. Sources with a limited domain override it.
    function get_failure(self, drop, time, state) result(error)
       class(contact_source_type), intent(in) :: self
       type(drop_type), intent(in) :: drop
@@ -133,12 +136,12 @@ contains
       real(wp), intent(in) :: state(:)
       type(error_type) :: error
 
-      error = numerical_error('&drop: height = '//to_text(drop%height)//' m leads out of the model of a source of ' &
-         //to_text(self%mass)//' kg: '//fixed(1.0e3_wp*time, 3)//' ms after first touch the deflection is ' &
-         //to_text(state(1))//' m; allowed: lower drops')
+      error = numerical_error('&drop: height = '//to_text(drop%height)//' m: the source leaves the domain of its ' &
+         //'equations '//fixed(1.0e3_wp*time, 3)//' ms after first touch, at a deflection of '//to_text(state(1)) &
+         //' m; allowed: a lower height')
    end function get_failure
 
-   !> Amplitude in flight of the first mass relative to the center of mass, m.
+   !> Maximum displacement of the first mass below the center of mass in flight, m.
    pure function get_amplitude(self, state) result(amplitude)
       class(contact_source_type), intent(in) :: self
       !> State: [n_state].
@@ -149,16 +152,16 @@ contains
    end function get_amplitude
 
    !> Error for steps that are too long for the source.
-   pure function coarse_error(finding) result(error)
+   pure function coarse_step_error(finding) result(error)
       !> Symptom, for the message.
       character(len=*), intent(in) :: finding
       type(error_type) :: error
       character(len=:), allocatable :: shown
 
       shown = finding
-      if (index(finding, 'NaN') + index(finding, 'Infinity') > 0) shown = 'the motion leaves the range of numbers'
+      if (index(finding, 'NaN') + index(finding, 'Infinity') > 0) shown = 'the motion grows without bound'
       error = numerical_error('&sampling: substeps is too low for this source: '//shown &
-         //'; allowed: more substeps, a higher sample_rate, or a source of lower stiffness over mass')
-   end function coarse_error
+         //'; allowed: more substeps, a higher sample_rate, or a softer or heavier source')
+   end function coarse_step_error
 
 end module thud_contact_source

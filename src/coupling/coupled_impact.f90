@@ -1,7 +1,7 @@
 !> Impact of a lumped source on a mobile floor: integrates every contact of the record in time and checks that the source has
 !> left for good. Gravity is left out, as on a rigid floor: a return by gravity is another impact.
 module thud_coupled_impact
-   use thud_contact_source, only: coarse_error, contact_source_type
+   use thud_contact_source, only: coarse_step_error, contact_source_type
    use thud_coupled_phases, only: begin_contact, get_event, get_event_function, impact_type, no_event, pass_event, &
       update_maxima
    use thud_coupled_step, only: coupled_state_type, get_relative_state, take_coupled_step
@@ -110,7 +110,7 @@ contains
          if (allocated(error)) return
          if (.not. remaining > 0.0_wp) return
       end do
-      error = coarse_error(to_text(max_events)//' touches, releases and turning points fall into one step')
+      error = coarse_step_error(to_text(max_events)//' touches, releases and turning points fall into one step')
    end subroutine advance
 
    !> Advances source and floor to an event.
@@ -163,7 +163,7 @@ contains
       if (.not. valid) then
          error = source%get_failure(drop, impact%time, get_relative_state(source, impact%motion))
       else if (.not. converged) then
-         error = coarse_error('the equations of a step '//to_text(1.0e3_wp*impact%time) &
+         error = coarse_step_error('the equations of a step '//to_text(1.0e3_wp*impact%time) &
             //' ms after first touch are not solved')
       end if
    end subroutine take_step
@@ -194,7 +194,8 @@ contains
       type(impact_type), intent(in) :: impact
       !> Set if the source touches the floor, or if the floor can strike it again.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: center(2), gap, speed
+      real(wp) :: center(2)
+      real(wp) :: gap, speed
 
       ! The floor has stopped the source for good.
       if (impact%captured) return
@@ -205,7 +206,7 @@ contains
       end if
       associate (coupled => impact%motion)
          associate (state => get_relative_state(source, coupled))
-            center = source%get_center(state)
+            center = source%get_center_motion(state)
             ! Minimum gap between the first mass, which oscillates about the center of mass, and the floor, m.
             gap = -(center(1) + source%get_amplitude(state))
          end associate

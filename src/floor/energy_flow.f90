@@ -4,7 +4,7 @@ module thud_energy_flow
    implicit none (type, external)
    private
 
-   public :: add_subsystem, connect, energy_flow_type, get_loss, new_energy_flow
+   public :: add_subsystem, connect, energy_flow_type, get_loss_matrix, new_energy_flow
 
    !> Subsystems and the flow between them.
    type :: energy_flow_type
@@ -66,19 +66,19 @@ contains
 
    !> Matrix A of dE/dt = -A E. The sum of a column is the loss that goes to no subsystem: the total loss minus the flow to
    !> others, but at least the internal loss.
-   pure function get_loss(flow) result(loss)
+   pure function get_loss_matrix(flow) result(loss_matrix)
       type(energy_flow_type), intent(in) :: flow
       !> A, 1/s: [n, n].
-      real(wp) :: loss(size(flow%internal_loss), size(flow%internal_loss))
+      real(wp) :: loss_matrix(size(flow%internal_loss), size(flow%internal_loss))
       real(wp) :: leaving
       integer :: i
 
-      loss = -flow%rate
+      loss_matrix = -flow%rate
       do i = 1, size(flow%internal_loss)
          leaving = sum(flow%rate(:, i))
-         loss(i, i) = loss(i, i) + leaving + flow%internal_loss(i)
-         if (i <= size(flow%total)) loss(i, i) = max(loss(i, i), flow%total(i))
+         loss_matrix(i, i) = loss_matrix(i, i) + leaving + flow%internal_loss(i)
+         if (i <= size(flow%total)) loss_matrix(i, i) = max(loss_matrix(i, i), flow%total(i))
       end do
-   end function get_loss
+   end function get_loss_matrix
 
 end module thud_energy_flow

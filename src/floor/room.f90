@@ -4,7 +4,7 @@ module thud_room
    use thud_band, only: band_type
    use thud_ceiling, only: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_velocity_ratio, get_mass_law
    use thud_constants, only: pi
-   use thud_energy_flow, only: add_subsystem, connect, energy_flow_type, get_loss, new_energy_flow
+   use thud_energy_flow, only: add_subsystem, connect, energy_flow_type, get_loss_matrix, new_energy_flow
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type
    use thud_flanking, only: get_junction_rate, get_vibration_reduction, get_wall_fields, get_walls, walls_type
@@ -86,9 +86,9 @@ module thud_room
    !> Energies of the subsystems in one band, dE/dt = -A E, and their weights in the detector.
    type :: band_energies_type
       !> A, 1/s: [n, n].
-      real(wp), allocatable :: loss(:, :)
+      real(wp), allocatable :: loss_matrix(:, :)
       !> Initial energies, J, and squared sound pressure per energy, Pa2/J: [n].
-      real(wp), allocatable :: start(:), weight(:)
+      real(wp), allocatable :: initial_energy(:), weight(:)
    end type band_energies_type
 
 contains
@@ -186,7 +186,8 @@ contains
       floor_decay = 2*pi*bands%center*prediction%loss_factor
       do i = 1, size(bands)
          energies(i) = get_band_energies(plate, room, prediction, i)
-         call get_fast_maximum(energies(i)%loss, energies(i)%start, energies(i)%weight, maximum(i), prediction%time(i))
+         call get_fast_maximum(energies(i)%loss_matrix, energies(i)%initial_energy, energies(i)%weight, maximum(i), &
+            prediction%time(i))
          prediction%spread(i) = get_level_spread([ &
             get_band_variance(2, get_mode_density(plate), floor_decay(i), width(i)), &
             get_band_variance(3, get_room_mode_density(room, bands(i)%center), &
@@ -205,27 +206,27 @@ contains
       type(band_energies_type), intent(in) :: energies(:)
       type(room_level_type), intent(inout) :: prediction
       type(error_type), allocatable :: error
-      real(wp), allocatable :: loss(:, :), start(:), weight(:)
+      real(wp), allocatable :: loss_matrix(:, :), initial_energy(:), weight(:)
       real(wp) :: maximum
       integer :: i, j, n, at
 
       call find_rated_bands(octave_set, prediction%octaves, error)
-      n = size(energies(1)%start)
+      n = size(energies(1)%initial_energy)
       allocate (prediction%octave_level(size(prediction%octaves)), prediction%octave_time(size(prediction%octaves)))
-      allocate (start(bands_per_octave*n), weight(bands_per_octave*n))
+      allocate (initial_energy(bands_per_octave*n), weight(bands_per_octave*n))
       do i = 1, size(prediction%octaves)
-         allocate (loss(bands_per_octave*n, bands_per_octave*n), source=0.0_wp)
+         allocate (loss_matrix(bands_per_octave*n, bands_per_octave*n), source=0.0_wp)
          do j = 1, bands_per_octave
             at = (j - 1)*n
             associate (third => energies(bands_per_octave*(i - 1) + j))
-               loss(at + 1:at + n, at + 1:at + n) = third%loss
-               start(at + 1:at + n) = third%start
+               loss_matrix(at + 1:at + n, at + 1:at + n) = third%loss_matrix
+               initial_energy(at + 1:at + n) = third%initial_energy
                weight(at + 1:at + n) = third%weight
             end associate
          end do
-         call get_fast_maximum(loss, start, weight, maximum, prediction%octave_time(i))
+         call get_fast_maximum(loss_matrix, initial_energy, weight, maximum, prediction%octave_time(i))
          prediction%octave_level(i) = 10*log10(maximum/reference_pressure**2)
-         deallocate (loss)
+         deallocate (loss_matrix)
       end do
    end subroutine add_octaves
 
@@ -244,8 +245,8 @@ contains
       allocate (prediction%history(n, size(energies)))
       do i = 1, size(energies)
          associate (third => energies(i))
-            prediction%history(:, i) = 10*log10(get_fast_history(third%loss, third%start, third%weight, history_step, n) &
-               /reference_pressure**2)
+            prediction%history(:, i) = 10*log10(get_fast_history(third%loss_matrix, third%initial_energy, third%weight, &
+               history_step, n)/reference_pressure**2)
          end associate
       end do
    end subroutine add_history
@@ -297,9 +298,10 @@ contains
             call connect(flow, 1, i, get_junction_rate(plate, plates(i), air, &
                get_vibration_reduction(room%walls, plate, plates(i)), f))
          end do
-         allocate (energies%loss, source=get_loss(flow))
-         allocate (energies%start(size(flow%internal_loss)), energies%weight(size(flow%internal_loss)), source=0.0_wp)
-         energies%start(1) = prediction%energy(band)
+         allocate (energies%loss_matrix, source=get_loss_matrix(flow))
+         allocate (energies%initial_energy(size(flow%internal_loss)), energies%weight(size(flow%internal_loss)), &
+            source=0.0_wp)
+         energies%initial_energy(1) = prediction%energy(band)
          energies%weight(at_room) = air%density*air%sound_speed**2/room%volume
       end associate
    end function get_band_energies

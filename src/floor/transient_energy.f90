@@ -17,8 +17,8 @@ module thud_transient_energy
    !> Duration of the search, s. A later maximum would need energy that is stored for longer than any room's decay.
    real(wp), parameter :: search_time = 20.0_wp
 
-   !> Error of the time of a maximum, s; the error of the maximum is of second order.
-   real(wp), parameter :: time_error = 1.0e-13_wp
+   !> Tolerance of the time of a maximum, s; the error of the maximum is of second order in it.
+   real(wp), parameter :: time_tolerance = 1.0e-13_wp
    !> Maximum number of Newton steps.
    integer, parameter :: max_refine = 60
 
@@ -26,48 +26,50 @@ contains
 
    !> Maximum of the Fast detector's response y to a weighted sum of energies: dE/dt = -A E,
    !> y' = fast_rate (w.E - y), y(0) = 0.
-   pure subroutine get_fast_maximum(loss, start, weight, maximum, time)
-      !> A, 1/s; column j: total loss of subsystem j on the diagonal, minus its flows to the others elsewhere: [n, n].
-      real(wp), intent(in) :: loss(:, :)
+   pure subroutine get_fast_maximum(loss_matrix, initial_energy, weight, maximum, time)
+      !> A, 1/s; column j has the total loss rate of subsystem j on the diagonal, and elsewhere the negative rates of its
+      !> flows to the others: [n, n].
+      real(wp), intent(in) :: loss_matrix(:, :)
       !> Initial energies: [n].
-      real(wp), intent(in) :: start(:)
+      real(wp), intent(in) :: initial_energy(:)
       !> Weights w: [n].
       real(wp), intent(in) :: weight(:)
       !> Maximum of y, and its time, s.
       real(wp), intent(out) :: maximum, time
-      real(wp) :: step(size(start) + 1, size(start) + 1)
-      real(wp), dimension(size(start) + 1) :: state, next
+      real(wp) :: step(size(initial_energy) + 1, size(initial_energy) + 1)
+      real(wp), dimension(size(initial_energy) + 1) :: state, next
       integer :: i
 
-      step = get_exponential(search_step*get_system_matrix(loss, weight))
-      state = [start, 0.0_wp]
+      step = get_exponential(search_step*get_system_matrix(loss_matrix, weight))
+      state = [initial_energy, 0.0_wp]
       maximum = 0.0_wp
       time = 0.0_wp
       do i = 1, nint(search_time/search_step)
          next = matmul(step, state)
-         ! The detector starts from rest and may pass a maximum within the first step.
+         ! At time 0 the slope is zero if no subsystem with a weight has energy yet; the first step may still have a maximum.
          if ((i == 1 .or. get_rise(weight, state) > 0.0_wp) .and. get_rise(weight, next) <= 0.0_wp) then
-            call refine(loss, weight, state, (i - 1)*search_step, maximum, time)
+            call refine(loss_matrix, weight, state, (i - 1)*search_step, maximum, time)
             ! The remaining energy cannot raise the detector above this maximum.
-            if (maxval(abs(weight))*sum(next(:size(start))) < maximum) return
+            if (maxval(abs(weight))*sum(next(:size(initial_energy))) < maximum) return
          end if
          state = next
       end do
    end subroutine get_fast_maximum
 
-   !> Response of the Fast detector to a weighted sum of energies, at equal time steps: [n_step].
-   pure function get_fast_history(loss, start, weight, interval, n_step) result(detector)
+   !> Response of the Fast detector to a weighted sum of energies, at equal time steps from one step after the impact on:
+   !> [n_step].
+   pure function get_fast_history(loss_matrix, initial_energy, weight, interval, n_step) result(detector)
       !> As in `get_fast_maximum`: [n, n], [n], [n].
-      real(wp), intent(in) :: loss(:, :), start(:), weight(:)
+      real(wp), intent(in) :: loss_matrix(:, :), initial_energy(:), weight(:)
       !> Time step, s.
       real(wp), intent(in) :: interval
       integer, intent(in) :: n_step
       real(wp) :: detector(n_step)
-      real(wp) :: step(size(start) + 1, size(start) + 1), state(size(start) + 1)
+      real(wp) :: step(size(initial_energy) + 1, size(initial_energy) + 1), state(size(initial_energy) + 1)
       integer :: i
 
-      step = get_exponential(interval*get_system_matrix(loss, weight))
-      state = [start, 0.0_wp]
+      step = get_exponential(interval*get_system_matrix(loss_matrix, weight))
+      state = [initial_energy, 0.0_wp]
       do i = 1, n_step
          state = matmul(step, state)
          detector(i) = state(size(state))
@@ -75,16 +77,16 @@ contains
    end function get_fast_history
 
    !> Matrix M of energies and detector: [E, y]' = M [E, y].
-   pure function get_system_matrix(loss, weight) result(matrix)
+   pure function get_system_matrix(loss_matrix, weight) result(matrix)
       !> A: [n, n].
-      real(wp), intent(in) :: loss(:, :)
+      real(wp), intent(in) :: loss_matrix(:, :)
       !> Weights: [n].
       real(wp), intent(in) :: weight(:)
       !> M: [n + 1, n + 1].
       real(wp) :: matrix(size(weight) + 1, size(weight) + 1)
 
       associate (n => size(weight))
-         matrix(:n, :n) = -loss
+         matrix(:n, :n) = -loss_matrix
          matrix(:n, n + 1) = 0.0_wp
          matrix(n + 1, :n) = fast_rate*weight
          matrix(n + 1, n + 1) = -fast_rate
@@ -102,9 +104,9 @@ contains
    end function get_rise
 
    !> Locates the maximum inside a step in which the response turns from rise to fall.
-   pure subroutine refine(loss, weight, state, begin, maximum, time)
+   pure subroutine refine(loss_matrix, weight, state, begin, maximum, time)
       !> As in `get_fast_maximum`: [n, n], [n].
-      real(wp), intent(in) :: loss(:, :), weight(:)
+      real(wp), intent(in) :: loss_matrix(:, :), weight(:)
       !> Energies and response at the beginning of the step: [n + 1].
       real(wp), intent(in) :: state(:)
       !> Time of the beginning, s.
@@ -115,7 +117,7 @@ contains
       real(wp) :: low, high, offset, rise, next_offset
       integer :: i
 
-      matrix = get_system_matrix(loss, weight)
+      matrix = get_system_matrix(loss_matrix, weight)
       low = 0.0_wp
       high = search_step
       offset = search_step/2
@@ -129,7 +131,7 @@ contains
             high = offset
          end if
          next_offset = offset - rise/get_rise(weight, matmul(matrix, trial))
-         if (abs(next_offset - offset) < time_error) exit
+         if (abs(next_offset - offset) < time_tolerance) exit
          offset = next_offset
          if (.not. (next_offset > low .and. next_offset < high)) offset = (low + high)/2
       end do

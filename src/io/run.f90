@@ -10,8 +10,8 @@ module thud_run
    use thud_floor_report, only: get_floor_force_csv, get_floor_levels_csv, get_floor_summary, get_floor_table
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_mesh_files, only: estimate_motion_bytes, get_modes_files, get_motion_files, modes_names, &
-      motion_names
+   use thud_mesh_files, only: estimate_motion_bytes, get_modes_files, get_motion_files, modes_file_names, &
+      motion_file_names
    use thud_report, only: get_model_histories_csv, get_force_csv, get_levels_csv, get_summary
    use thud_result_directory, only: check_owner, write_results
    use thud_room_report, only: get_room_files, get_room_table, room_file_names
@@ -21,10 +21,10 @@ module thud_run
    implicit none (type, external)
    private
 
-   public :: load_case, outcome_type, replaces, run_case
+   public :: load_case, outcome_type, replacement_note, run_case
 
    !> Beginning of a note; the path of the directory follows.
-   character(len=*), parameter :: replaces = 'replaces the results of another input of the same name in '
+   character(len=*), parameter :: replacement_note = 'replaces the results of another input of the same name in '
 
    !> A warning or a note.
    type :: message_type
@@ -84,12 +84,12 @@ contains
 
       call load_case(path, case, error)
       if (allocated(error)) return
-      call store_case(path, case, output, replace, write_all, results, outcome, error)
+      call compute_and_write(path, case, output, replace, write_all, results, outcome, error)
       if (allocated(error)) error%message = path//': '//error%message
    end subroutine run_case
 
    !> Computes a case and writes its results.
-   subroutine store_case(path, case, output, replace, write_all, results, outcome, error)
+   subroutine compute_and_write(path, case, output, replace, write_all, results, outcome, error)
       !> The file of the case.
       character(len=*), intent(in) :: path
       type(case_type), intent(in), target :: case
@@ -106,26 +106,27 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(text_file_type), allocatable :: files(:)
       type(text_file_type) :: input
-      logical :: differs
+      logical :: has_other_input
       integer :: i
 
-      ! The full input identifies the case of the results.
+      ! The input with all defaults filled in identifies the case of the results.
       input%name = 'effective.nml'
       call get_case_text(case, input%content)
       outcome%directory = output
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)
-      call check_owner(outcome%directory, input, replace, differs, error)
+      call check_owner(outcome%directory, input, replace, has_other_input, error)
       if (.not. allocated(error)) call check_space(case, outcome%directory, error)
+      ! The default scope is all that the case asks for.
       if (.not. allocated(error)) call compute(case, scope_type(), results, error)
       if (allocated(error)) return
-      call describe(case, results, write_all, files, outcome)
-      call write_results(outcome%directory, input, files, [path], replace, differs, error)
+      call format_results(case, results, write_all, files, outcome)
+      call write_results(outcome%directory, input, files, [path], replace, has_other_input, error)
       if (allocated(error)) return
-      if (differs) call outcome%add_message(path, replaces//outcome%directory)
+      if (has_other_input) call outcome%add_message(path, replacement_note//outcome%directory)
       do i = 1, size(results%warning)
          call outcome%add_message(path, trim(results%warning(i)))
       end do
-   end subroutine store_case
+   end subroutine compute_and_write
 
    !> Returns an error if snapshots would fill the disk.
    subroutine check_space(case, directory, error)
@@ -136,8 +137,10 @@ contains
 
       if (.not. case%has_impact) return
       associate (model => case%models(get_model_number(case))%model)
-         wanted = estimate_motion_bytes(model%get_snapshot_shape(case%sampling))*merge(2, 1, case%has_floor)
+         wanted = estimate_motion_bytes(model%get_snapshot_shape(case%sampling))
       end associate
+      ! The drop on a mobile floor has snapshots, too.
+      if (case%has_floor) wanted = 2*wanted
       free = get_free_bytes(directory)
       if (wanted <= free) return
       error = input_error('&output: the snapshots make files of up to '//fixed(wanted/1.0e6_wp, 1)//' MB, and '//directory &
@@ -145,7 +148,7 @@ contains
    end subroutine check_space
 
    !> Makes table, verdict and files from results.
-   subroutine describe(case, results, write_all, files, outcome)
+   subroutine format_results(case, results, write_all, files, outcome)
       type(case_type), intent(in) :: case
       type(results_type), intent(in) :: results
       !> Also write additional quantities of the model.
@@ -161,12 +164,15 @@ contains
       outcome%table = outcome%table//newline
       allocate (files(0))
       if (case%has_modes) then
-         call extend(files, size(modes_names))
+         call extend(files, size(modes_file_names))
          call get_modes_files(results%modes, files)
          outcome%table = outcome%table//newline//get_modes_table(results%modes)
       end if
-      if (.not. case%has_impact) outcome%table = outcome%table//get_defaults_line(case)
-      if (.not. case%has_impact) return
+      ! A case without an impact has free modes alone: neither floor nor room nor compression.
+      if (.not. case%has_impact) then
+         outcome%table = outcome%table//get_defaults_line(case)
+         return
+      end if
       outcome%conforms = is_conforming(case, results%impact%assessment)
       outcome%table = outcome%table//newline//get_table(case, results%impact%history, results%impact%assessment)
       call add_file(files, 'force.csv', get_force_csv(results%impact%history))
@@ -192,11 +198,12 @@ contains
          call get_room_files(results%room, files(size(files) - size(room_file_names) + 1:))
       end if
       outcome%table = outcome%table//get_defaults_line(case)
-      if (.not. case%has_compression) return
-      call add_file(files, 'compression.csv', get_history_csv('deflection_m,force_N', &
-         results%compression%deflection, reshape(results%compression%force, [size(results%compression%force), 1])))
-      outcome%table = outcome%table//newline//get_compression_table(results%compression)
-   end subroutine describe
+      if (case%has_compression) then
+         call add_file(files, 'compression.csv', get_history_csv('deflection_m,force_N', &
+            results%compression%deflection, reshape(results%compression%force, [size(results%compression%force), 1])))
+         outcome%table = outcome%table//newline//get_compression_table(results%compression)
+      end if
+   end subroutine format_results
 
    !> Adds the files with additional quantities and snapshots, if a history has them.
    subroutine add_history_files(history, prefix, write_all, files)
@@ -211,8 +218,8 @@ contains
       if (write_all .and. allocated(history%model_history)) call add_file(files, prefix//'model_histories.csv', &
          get_model_histories_csv(history))
       if (history%motion%n_frame == 0) return
-      call extend(files, size(motion_names))
-      call get_motion_files(history%motion, prefix, files(size(files) - size(motion_names) + 1:))
+      call extend(files, size(motion_file_names))
+      call get_motion_files(history%motion, prefix, files(size(files) - size(motion_file_names) + 1:))
    end subroutine add_history_files
 
    !> Adds a file.

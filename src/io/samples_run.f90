@@ -11,7 +11,7 @@ module thud_samples_run
    use thud_kinds, only: wp
    use thud_progress, only: report_progress
    use thud_result_directory, only: add_text, begin_file, check_owner, close_results, open_results, result_directory_type
-   use thud_run, only: load_case, outcome_type, replaces
+   use thud_run, only: load_case, outcome_type, replacement_note
    use thud_sample_report, only: get_sample_header, get_sample_rows
    use thud_sample_table, only: open_sample_table, read_samples, sample_table_type
    use thud_sweep, only: new_sweep, solve_sweep, sweep_type
@@ -58,7 +58,7 @@ contains
       type(text_file_type) :: marker
       type(result_directory_type) :: results
       character(len=path_length) :: inputs(2)
-      logical :: differs
+      logical :: has_other_input
 
       call load_case(path, case, error, unchecked=.true.)
       if (allocated(error)) return
@@ -74,19 +74,19 @@ contains
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)//'_samples'
       marker%name = input_file
       call get_case_text(case, marker%content)
-      call check_owner(outcome%directory, marker, replace, differs, error)
+      call check_owner(outcome%directory, marker, replace, has_other_input, error)
       if (allocated(error)) return
       inputs(1) = path
       inputs(2) = table_path
       call open_results(outcome%directory, marker, [result_file], inputs, replace, results, error)
       call write_samples(case, table, threads, results, tally, error)
-      call close_results(results, differs, error)
+      call close_results(results, has_other_input, error)
       if (allocated(error)) return
-      if (differs) call outcome%add_message(path, replaces//outcome%directory)
+      if (has_other_input) call outcome%add_message(path, replacement_note//outcome%directory)
       if (tally%computed < tally%samples) call outcome%add_message(path, to_text(tally%samples - tally%computed)//' of ' &
          //to_text(tally%samples)//' samples have no results, such as: '//trim(tally%failure))
       outcome%conforms = tally%conforming == tally%samples
-      call describe(case, table, tally, outcome%table)
+      call format_tally(case, table, tally, outcome%table)
       outcome%table = outcome%table//get_defaults_line(case)
    end subroutine run_samples
 
@@ -169,7 +169,7 @@ contains
    end subroutine add
 
    !> Text for the screen.
-   subroutine describe(case, table, tally, text)
+   subroutine format_tally(case, table, tally, text)
       type(case_type), intent(in) :: case
       type(sample_table_type), intent(in) :: table
       type(tally_type), intent(in) :: tally
@@ -194,6 +194,6 @@ contains
          text = text//get_span_row('level, '//get_band_name(octaves(i))//' Hz octave', tally%span(i + 1, :), 2, 'dB')
       end do
       text = text//get_span_row('contact time', 1.0e3_wp*tally%span(1, :), 3, 'ms')
-   end subroutine describe
+   end subroutine format_tally
 
 end module thud_samples_run

@@ -1,14 +1,15 @@
 !> Band energies of many records at once, by two matrix products.
 !>
 !> The energy of a record f in a band is f'Qf with the sinc kernel Q of the band (see `thud_force_exposure`). All bands lie
-!> below one frequency W. The kernel of all frequencies below W has few eigenvectors with significant eigenvalues: about
-!> 2 W T for records of length T, the discrete prolate spheroidal sequences (Slepian 1978). The kernel commutes with a
-!> tridiagonal matrix: both have the same eigenvectors, and the matrix gives them quickly and without cancellation. A record
+!> below one frequency W. The eigenvectors of the kernel of all frequencies below W are the discrete prolate spheroidal
+!> sequences (Slepian 1978). Only about 2 W T of them have significant eigenvalues for records of length T. The kernel
+!> commutes with a tridiagonal matrix: both have the same eigenvectors, and the matrix gives them quickly and without
+!> cancellation. A record
 !> is projected on the sequences once for all bands; the spectrum of the projection at Gauss-Legendre nodes gives the
 !> energies. The sequences are symmetric or antisymmetric, so records are folded first, which halves the work.
 !>
-!> The omitted sequences change the square root of a band's energy by at most sqrt(max_dropped) times the norm of the record;
-!> the quadrature errs by less than `quadrature_error`.
+!> The omitted sequences change the square root of a band's energy by at most sqrt(max_omitted_energy) times the norm of the
+!> record; the error of the quadrature is below `quadrature_error`.
 module thud_band_projection
    use thud_band, only: band_type
    use thud_constants, only: pi
@@ -18,25 +19,26 @@ module thud_band_projection
    implicit none (type, external)
    private
 
-   public :: band_projection_type, get_band_energies, get_window_length, get_window_index, is_projected, &
+   public :: band_projection_type, get_band_energies, get_window_length, get_window_index, is_projection_fast, &
       new_band_projection
 
-   !> The last sequences are omitted if their energy in all bands together is below this fraction of the maximum energy of a
-   !> sequence.
-   real(wp), parameter :: max_dropped = 1.0e-22_wp
+   !> The last sequences are omitted: those whose energy in all bands together is at most this fraction of the maximum
+   !> energy of a sequence.
+   real(wp), parameter :: max_omitted_energy = 1.0e-22_wp
 
    !> Error of a quadrature over a band, relative to the maximum of its integrand.
    real(wp), parameter :: quadrature_error = 1.0e-17_wp
 
-   !> Number of sequences computed in addition to 2 W T. This is enough: `max_dropped` is reached after 12 to 20 of them.
+   !> Number of sequences computed in addition to 2 W T. This is enough: `max_omitted_energy` is reached
+   !> after 12 to 20 of them.
    integer, parameter :: margin = 32
 
    !> Maximum product of the number of samples and the squared number of sequences, which takes some two seconds. More
    !> would pay only for thousands of records.
    real(wp), parameter :: max_work = 5.0e8_wp
 
-   !> Records are padded with zeros to a few lengths, the windows. Number of windows per doubling of the length: a window is
-   !> at most 1/11 longer than needed.
+   !> Records are padded with zeros to one of a few lengths, their window. Number of windows per doubling of the length: a
+   !> window is at most 1/11 longer than needed.
    integer, parameter :: windows_per_octave = 8
 
    !> Shortest window, samples.
@@ -60,7 +62,7 @@ module thud_band_projection
 
 contains
 
-   !> Class of a record: index, from 1, of the shortest window that holds its samples.
+   !> Index, from 1, of the shortest window that holds the samples of a record.
    elemental function get_window_index(n_sample) result(window)
       !> Samples of the record.
       integer, intent(in) :: n_sample
@@ -73,7 +75,7 @@ contains
       if (get_window_length(window) < n_sample) window = window + 1
    end function get_window_index
 
-   !> Length of the window of a class.
+   !> Length of a window.
    elemental function get_window_length(window) result(n_sample)
       !> Index of the window, from 1.
       integer, intent(in) :: window
@@ -83,18 +85,18 @@ contains
       n_sample = 2*nint(shortest_window/2*2.0_wp**(real(window - 1, wp)/windows_per_octave))
    end function get_window_length
 
-   !> Whether to project records of this length: the matrices must be computed quickly.
-   pure function is_projected(n_sample, sample_rate, bands) result(projected)
+   !> Whether the matrices for records of this length can be computed quickly; only then to project is worthwhile.
+   pure function is_projection_fast(n_sample, sample_rate, bands) result(fast)
       !> Samples of the records.
       integer, intent(in) :: n_sample
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
       !> The bands: [n_band].
       type(band_type), intent(in) :: bands(:)
-      logical :: projected
+      logical :: fast
 
-      projected = n_sample*real(get_rank(n_sample, maxval(bands%upper)/sample_rate), wp)**2 <= max_work
-   end function is_projected
+      fast = n_sample*real(get_rank(n_sample, maxval(bands%upper)/sample_rate), wp)**2 <= max_work
+   end function is_projection_fast
 
    !> Number of sequences to compute.
    pure function get_rank(n_sample, half_width) result(rank)
@@ -118,7 +120,7 @@ contains
       type(band_projection_type), intent(out) :: projection
       !> True if LAPACK does not find the sequences.
       logical, intent(out) :: failed
-      real(wp), allocatable :: node(:), root_weight(:), angle(:, :)
+      real(wp), allocatable :: node(:), root_weight(:), spectrum_weight(:), angle(:, :)
       integer :: i
 
       projection%n_sample = n_sample
@@ -126,16 +128,17 @@ contains
       if (failed) projection%n_sample = 0
       if (failed) return
       call get_nodes(bands, real(n_sample, wp)/sample_rate, node, root_weight, projection%last_node)
-      ! Angles from the middle of the record; the factor 2 below adds the other half of a sequence.
+      ! Angles from the middle of the record.
       allocate (angle(n_sample/2, size(node)))
       do i = 1, n_sample/2
          angle(i, :) = 2*pi/sample_rate*(i - (n_sample + 1)/2.0_wp)*node
       end do
-      root_weight = 2*root_weight/sample_rate
-      call get_spectra(projection%even, cos(angle), root_weight, projection%cosine)
-      call get_spectra(projection%odd, sin(angle), root_weight, projection%sine)
-      call drop_sequences(projection%even, projection%cosine)
-      call drop_sequences(projection%odd, projection%sine)
+      ! The factor 2 adds the other half of a sequence.
+      spectrum_weight = 2*root_weight/sample_rate
+      call get_spectra(projection%even, cos(angle), spectrum_weight, projection%cosine)
+      call get_spectra(projection%odd, sin(angle), spectrum_weight, projection%sine)
+      call omit_sequences(projection%even, projection%cosine)
+      call omit_sequences(projection%odd, projection%sine)
    end subroutine new_band_projection
 
    !> The sequences: eigenvectors of Slepian's tridiagonal matrix.
@@ -229,7 +232,7 @@ contains
    end subroutine get_spectra
 
    !> Removes the last sequences, which have nearly no energy in the bands.
-   subroutine drop_sequences(sequences, spectra)
+   subroutine omit_sequences(sequences, spectra)
       !> Halves of the sequences: [n_half, n_sequence].
       real(wp), allocatable, intent(inout) :: sequences(:, :)
       !> Their weighted spectra: [n_sequence, n_node].
@@ -238,10 +241,10 @@ contains
       integer :: count
 
       energy = sum(spectra**2, dim=2)
-      count = findloc(energy > max_dropped*maxval(energy), .true., dim=1, back=.true.)
+      count = findloc(energy > max_omitted_energy*maxval(energy), .true., dim=1, back=.true.)
       sequences = sequences(:, :count)
       spectra = spectra(:count, :)
-   end subroutine drop_sequences
+   end subroutine omit_sequences
 
    !> Energies of records in bands.
    subroutine get_band_energies(projection, n_record, record, folded, energy, square_sum)
@@ -271,7 +274,7 @@ contains
       energy = 0.0_wp
       call project(n_record, folded, projection%even, projection%cosine, spectrum)
       call add_squares()
-      call project(n_record, folded(1, half + 1), projection%odd, projection%sine, spectrum)
+      call project(n_record, folded(:, half + 1:), projection%odd, projection%sine, spectrum)
       call add_squares()
 
    contains
@@ -290,22 +293,22 @@ contains
    end subroutine get_band_energies
 
    !> Weighted spectra of folded records.
-   subroutine project(n_record, folded, sequences, spectra, spectrum)
+   subroutine project(n_record, folded, sequences, sequence_spectra, record_spectra)
       integer, intent(in) :: n_record
       real(wp), intent(in) :: sequences(:, :)
       !> Weighted spectra of the sequences: [n_sequence, n_node].
-      real(wp), intent(in) :: spectra(:, :)
+      real(wp), intent(in) :: sequence_spectra(:, :)
       !> Folded records: [n_record, n_half].
       real(wp), intent(in) :: folded(n_record, size(sequences, 1))
       !> Weighted spectra of the records: [n_record, n_node].
-      real(wp), intent(inout) :: spectrum(n_record, size(spectra, 2))
+      real(wp), intent(inout) :: record_spectra(n_record, size(sequence_spectra, 2))
       real(wp) :: coefficient(n_record, size(sequences, 2))
 
       associate (half => size(sequences, 1), rank => size(sequences, 2))
          call dgemm('N', 'N', n_record, rank, half, 1.0_wp, folded, n_record, sequences, half, 0.0_wp, coefficient, &
             n_record)
-         call dgemm('N', 'N', n_record, size(spectra, 2), rank, 1.0_wp, coefficient, n_record, spectra, rank, 0.0_wp, &
-            spectrum, n_record)
+         call dgemm('N', 'N', n_record, size(sequence_spectra, 2), rank, 1.0_wp, coefficient, n_record, sequence_spectra, &
+            rank, 0.0_wp, record_spectra, n_record)
       end associate
    end subroutine project
 

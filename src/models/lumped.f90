@@ -1,7 +1,7 @@
 !> Impact of a source of a few masses: integrates in time from first touch until the source has left for good, samples the
 !> forces, and checks the balances of impulse and energy.
 module thud_lumped
-   use thud_contact_source, only: coarse_error, contact_source_type
+   use thud_contact_source, only: coarse_step_error, contact_source_type
    use thud_coupled_impact, only: solve_coupled
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error
@@ -120,12 +120,12 @@ contains
             error = source%get_failure(drop, time + length, new_state)
             return
          end if
-         if (new_state(source%get_event()) > 0.0_wp) exit
-         length = locate_zero(source, time, state, length, source%get_event())
+         if (new_state(source%get_event_component()) > 0.0_wp) exit
+         length = locate_zero(source, time, state, length, source%get_event_component())
          call rk4_step(source, time, state, length, new_state, valid)
          time = time + length
          state = new_state
-         call source%pass_event(time, state, history)
+         call source%begin_next_phase(time, state, history)
          if (source%has_separated(state)) return
       end do
       state = new_state
@@ -145,7 +145,7 @@ contains
       real(wp) :: center(2)
       real(wp) :: energy, momentum
 
-      center = source%get_center(state)
+      center = source%get_center_motion(state)
       associate (v0 => history%impact_velocity, velocity => center(2), mass => source%mass, last => 2*source%n_mass)
          history%restitution = -velocity/v0
          momentum = mass*(v0 - velocity)
@@ -157,7 +157,7 @@ contains
       end associate
       ! Written so that NaN fails too.
       if (.not. max(history%impulse_residual, history%energy_residual) <= max_residual) then
-         error = coarse_error('the balance of impulse misses by '//to_text(history%impulse_residual) &
+         error = coarse_step_error('the balance of impulse misses by '//to_text(history%impulse_residual) &
             //' and that of energy by '//to_text(history%energy_residual)//', more than '//to_text(max_residual))
       end if
    end subroutine finish

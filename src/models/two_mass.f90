@@ -74,10 +74,10 @@ module thud_two_mass
       procedure :: get_derivative
       procedure :: record_sample
       procedure :: record_peaks
-      procedure :: get_event
-      procedure :: pass_event
+      procedure :: get_event_component
+      procedure :: begin_next_phase
       procedure :: has_separated
-      procedure :: get_center
+      procedure :: get_center_motion
       procedure :: get_inner_energy
       procedure :: get_amplitude
    end type tyre_type
@@ -252,21 +252,21 @@ contains
       type(force_history_type), intent(inout) :: history
       real(wp) :: center(2)
 
-      center = self%get_center(state)
+      center = self%get_center_motion(state)
       history%peak_force = max(history%peak_force, sum(get_components(self, state)))
       history%max_deflection = max(history%max_deflection, center(1))
    end subroutine record_peaks
 
    !> Component of the state that falls to zero when the belt leaves or touches the floor.
-   pure function get_event(self) result(component)
+   pure function get_event_component(self) result(component)
       class(tyre_type), intent(in) :: self
       integer :: component
 
       component = merge(at_belt, at_gap, self%touching)
-   end function get_event
+   end function get_event_component
 
    !> Changes between contact and flight.
-   pure subroutine pass_event(self, time, state, history)
+   pure subroutine begin_next_phase(self, time, state, history)
       class(tyre_type), intent(inout) :: self
       real(wp), intent(in) :: time
       real(wp), intent(inout) :: state(:)
@@ -275,17 +275,17 @@ contains
       state([at_belt, at_gap]) = 0.0_wp
       if (self%touching) history%contact_time = time
       self%touching = .not. self%touching
-   end subroutine pass_event
+   end subroutine begin_next_phase
 
    !> Displacement, m, and velocity, m/s, of the center of mass: [2].
-   pure function get_center(self, state) result(center)
+   pure function get_center_motion(self, state) result(center)
       class(tyre_type), intent(in) :: self
       real(wp), intent(in) :: state(:)
       real(wp) :: center(2)
 
       center = (self%belt_mass*state([at_belt, at_belt_velocity]) + self%rim_mass*state([at_rim, at_rim_velocity])) &
          /(self%belt_mass + self%rim_mass)
-   end function get_center
+   end function get_center_motion
 
    !> Energy of the relative motion of belt and rim, and of the sidewall, J.
    pure function get_inner_energy(self, state) result(energy)
@@ -313,7 +313,7 @@ contains
       real(wp), intent(in) :: state(:)
       logical :: separated
 
-      separated = .not. self%touching .and. all(self%get_center(state) + [self%get_amplitude(state), 0.0_wp] < 0.0_wp)
+      separated = .not. self%touching .and. all(self%get_center_motion(state) + [self%get_amplitude(state), 0.0_wp] < 0.0_wp)
    end function has_separated
 
    !> Writes motion and forces of one sample into the history.
@@ -324,7 +324,7 @@ contains
       type(force_history_type), intent(inout) :: history
       real(wp) :: center(2)
 
-      center = self%get_center(state)
+      center = self%get_center_motion(state)
       history%deflection(i) = center(1)
       history%velocity(i) = center(2)
       history%model_history(i, :) = state([at_belt, at_rim])

@@ -6,7 +6,7 @@
 module thud_ensemble
    use thud_band, only: band_type, get_octaves, octave_count
    use thud_band_projection, only: band_projection_type, get_band_energies, get_window_length, get_window_index, &
-      is_projected, new_band_projection
+      is_projection_fast, new_band_projection
    use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
    use thud_cache_line, only: get_aligned_start, line_length
    use thud_constants, only: reference_force, reference_time
@@ -228,7 +228,7 @@ contains
       ! Each sample has its own window, so that its levels do not depend on the other samples of the block.
       do window = minval(window_index, mask=window_index > 0), maxval(window_index)
          if (.not. any(window_index == window)) cycle
-         if (is_projected(get_window_length(window), projections%sample_rate, projections%bands)) then
+         if (is_projection_fast(get_window_length(window), projections%sample_rate, projections%bands)) then
             call project(workspace, force, window, window_index == window, projections, levels)
          else
             call get_levels_one_by_one(workspace, force, window, window_index == window, projections, levels)

@@ -54,23 +54,23 @@ module thud_result_directory
 contains
 
    !> Returns an error if a directory holds anything except results of the same case.
-   subroutine check_owner(path, marker, replace, differs, error)
+   subroutine check_owner(path, marker, replace, has_other_input, error)
       character(len=*), intent(in) :: path
       !> The file that will identify the case.
       type(text_file_type), intent(in) :: marker
       !> Whether to accept a directory with any files.
       logical, intent(in) :: replace
       !> Whether the directory holds results of the same case with another input.
-      logical, intent(out) :: differs
+      logical, intent(out) :: has_other_input
       type(error_type), allocatable, intent(out) :: error
       integer :: owner
 
       call find_owner(path, marker, replace, owner, error)
-      differs = owner == other_input
+      has_other_input = owner == other_input
    end subroutine check_owner
 
    !> Writes a set of files into a directory, completely or not at all.
-   subroutine write_results(path, marker, files, inputs, replace, differs, error)
+   subroutine write_results(path, marker, files, inputs, replace, has_other_input, error)
       !> The directory, created if missing.
       character(len=*), intent(in) :: path
       !> The file that identifies the case.
@@ -82,7 +82,7 @@ contains
       !> Whether to replace even files that thud has not written.
       logical, intent(in) :: replace
       !> Whether the files replace results of the same case with another input.
-      logical, intent(out) :: differs
+      logical, intent(out) :: has_other_input
       !> Set if the files cannot be written; the directory is unchanged then.
       type(error_type), allocatable, intent(out) :: error
       type(result_directory_type) :: directory
@@ -92,7 +92,7 @@ contains
       do i = 1, size(files)
          call write_file(directory, files(i), error)
       end do
-      call close_results(directory, differs, error)
+      call close_results(directory, has_other_input, error)
    end subroutine write_results
 
    !> Waits until no other process writes into a directory, and begins to write.
@@ -131,19 +131,19 @@ contains
    end subroutine open_results
 
    !> Ends the writing: afterwards all files are in the directory, or none.
-   subroutine close_results(directory, differs, error)
+   subroutine close_results(directory, has_other_input, error)
       type(result_directory_type), intent(inout) :: directory
       !> Whether the files replace results of the same case with another input.
-      logical, intent(out) :: differs
+      logical, intent(out) :: has_other_input
       !> Set if an earlier step or this one fails; the directory is unchanged then.
       type(error_type), allocatable, intent(inout) :: error
       logical :: moved
 
-      differs = .false.
+      has_other_input = .false.
       moved = .false.
       call end_file(directory, error)
       call write_file(directory, directory%marker, error)
-      if (.not. allocated(error)) call publish(directory, differs, moved, error)
+      if (.not. allocated(error)) call publish(directory, has_other_input, moved, error)
       ! If the workspace has moved, a workspace of the same name belongs to another process.
       if (directory%workspace_lock >= 0 .and. .not. moved) then
          call clear_workspace(directory%workspace, directory%target)
@@ -393,10 +393,10 @@ contains
    end subroutine lock_target
 
    !> Replaces the files of the directory by those of the workspace.
-   subroutine publish(directory, differs, moved, error)
+   subroutine publish(directory, has_other_input, moved, error)
       type(result_directory_type), intent(inout) :: directory
       !> Whether the files replace results of the same case with another input.
-      logical, intent(out) :: differs
+      logical, intent(out) :: has_other_input
       !> Whether the workspace itself has become the directory.
       logical, intent(out) :: moved
       !> Set if the directory now belongs to something else, or its files cannot be replaced.
@@ -408,7 +408,7 @@ contains
 
       moved = .false.
       call lock_target(directory, owner, error)
-      differs = owner == other_input
+      has_other_input = owner == other_input
       if (allocated(error)) return
       entries = new_entries(directory%names, directory%sums)
       call get_kept(directory%target, directory%names, owner == same_input, kept, gone)

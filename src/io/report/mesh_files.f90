@@ -11,13 +11,13 @@ module thud_mesh_files
    implicit none (type, external)
    private
 
-   public :: estimate_motion_bytes, get_modes_files, get_motion_files, modes_names, motion_names
+   public :: estimate_motion_bytes, get_modes_files, get_motion_files, modes_file_names, motion_file_names
 
    !> Files of free modes.
-   character(len=9), parameter :: modes_names(2) = [character(len=9) :: 'modes.csv', 'modes.vtu']
+   character(len=9), parameter :: modes_file_names(2) = [character(len=9) :: 'modes.csv', 'modes.vtu']
 
    !> Files of the snapshots of an impact.
-   character(len=13), parameter :: motion_names(2) = [character(len=13) :: 'snapshots.xmf', 'pressure.csv']
+   character(len=13), parameter :: motion_file_names(2) = [character(len=13) :: 'snapshots.xmf', 'pressure.csv']
 
    !> Names of the scalars of a snapshot.
    character(len=18), parameter :: motion_scalars(4) = [character(len=18) :: 'contact_pressure', 'contact_shear', &
@@ -34,7 +34,7 @@ contains
       real(wp) :: vector(2, size(modes%mesh%r), size(modes%frequency))
       integer :: i
 
-      files%name = modes_names
+      files%name = modes_file_names
       files(1)%content = 'mode,harmonic,frequency_Hz,pole_participation'//newline &
          //'rigid,1,'//to_text(modes%rigid_frequency)//',1'//newline
       do i = 1, size(modes%frequency)
@@ -87,7 +87,7 @@ contains
             scalar)
       end do
       call end_snapshots(buffer)
-      files%name = prefix//motion_names
+      files%name = prefix//motion_file_names
       files(1)%content = buffer%get_text()
       call get_pressure_csv(motion, files(2)%content)
    end subroutine get_motion_files

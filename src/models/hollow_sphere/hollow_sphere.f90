@@ -3,7 +3,7 @@
 module thud_hollow_sphere
    use thud_ball, only: ball_type
    use thud_constants, only: pi
-   use thud_contact_source, only: coarse_error
+   use thud_contact_source, only: coarse_step_error
    use thud_drop, only: drop_type
    use thud_error, only: error_type, input_error, numerical_error
    use thud_field, only: field_type, name_length
@@ -266,7 +266,7 @@ contains
       type(error_type) :: error
 
       if (is_diverged(self, state)) then
-         error = coarse_error('a step from first touch ends at a deflection of '//to_text(state(at_deflection))//' m')
+         error = coarse_step_error('a step from first touch ends at a deflection of '//to_text(state(at_deflection))//' m')
          return
       end if
       error = numerical_error('&drop: height = '//to_text(drop%height)//' m: the cavity collapses, ' &

@@ -18,7 +18,7 @@ module thud_modal_ball
    use thud_modal_ball_options, only: modal_ball_options_type
    use thud_modal_compression, only: compress_modal_ball
    use thud_modal_damping, only: set_damping
-   use thud_mode_step, only: get_energies, mode_step_type, place_q, place_v, set_factors
+   use thud_mode_step, only: get_energies, mode_step_type, index_amplitude, index_rate, set_factors
    use thud_receiver, only: can_strike, get_impulse_response, get_pole_count, new_receiver_step, receiver_type
    use thud_ring_contact, only: new_ring_contact, ring_contact_type
    use thud_sampling, only: check_contact_samples, get_sample_count, get_step_count, sampling_type
@@ -35,7 +35,7 @@ module thud_modal_ball
    !> Maximum phase angle of a mode in a step; faster modes respond statically.
    real(wp), parameter :: max_phase = pi/2
 
-   !> Maximum energy lost when gaps close within a step, as a fraction of the energy at first touch.
+   !> Maximum magnitude of `contact_loss`, as a fraction of the energy at first touch.
    real(wp), parameter :: max_contact_loss = 0.02_wp
 
    !> Number of harmonics whose energies are recorded separately, from n = 0 on.
@@ -189,7 +189,7 @@ contains
       allocate (zeta, mold=modes%omega)
       call set_damping(options, modes, zeta)
       call set_factors(modes, zeta, interval)
-      response = response + matmul(transpose(modes%shape_at_ring), spread(modes%factor(:, place_q, place_v), 2, &
+      response = response + matmul(transpose(modes%shape_at_ring), spread(modes%factor(:, index_amplitude, index_rate), 2, &
          size(response, 1))*modes%shape_at_ring)
       call new_ring_contact(response, rings%n_dof, contact, failed)
       if (failed) error = numerical_error('&modal_ball: rings = '//to_text(options%rings) &
@@ -278,19 +278,20 @@ contains
             call take_step(modes, interval, ball%mass, state, contact, impulse, error)
             call check_interrupt(error)
             if (allocated(error)) return
-            if (contact%last > 0) then
+            if (contact%outermost > 0) then
                last_contact = n_step
                history%impulse = history%impulse + impulse
                history%component(i, 1) = history%component(i, 1) + impulse*sampling%sample_rate
-               history%model_history(i, 1) = max(history%model_history(i, 1), ball%outer_radius*rings%radius(contact%last))
+               history%model_history(i, 1) = max(history%model_history(i, 1), &
+                  ball%outer_radius*rings%radius(contact%outermost))
             end if
-            if (contact%last == size(rings%radius)) then
+            if (contact%outermost == size(rings%radius)) then
                error = numerical_error('&drop: '//to_text(1.0e3_wp*n_step*interval)//' ms after first touch the ball lies ' &
                   //'on its outermost ring, its center lowered by '//to_text(1.0e3_wp*(ball%outer_radius - state%height)) &
                   //' mm; allowed: a lower height, or a stiffer ball')
                return
             end if
-            has_separated = state%speed > 0.0_wp .and. (n_step - last_contact)*interval > settling_time
+            has_separated = state%velocity > 0.0_wp .and. (n_step - last_contact)*interval > settling_time
             if (has_separated .and. .not. state%floor_moves) exit samples
          end do
          if (state%floor_moves) then
@@ -327,7 +328,7 @@ contains
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
             //to_text(settling_time)//' s after the last contact; allowed: '//trim(allowed))
       else if (state%floor_moves) then
-         if (can_strike(state%floor, state%floor_motion, minval(state%gap(::contact%n_dof)), state%speed)) then
+         if (can_strike(state%floor, state%floor_motion, minval(state%gap(::contact%n_dof)), state%velocity)) then
             error = input_error('&sampling: duration = '//to_text(sampling%duration) &
                //' s ends while the floor may strike the ball again; allowed: longer')
          end if
@@ -354,15 +355,15 @@ contains
       history%peak_elastic_force = history%peak_force
       call continue_to_zero(history)
       ! Extrapolated back to the end of the contact.
-      history%restitution = (state%speed + state%gravity*(time - history%contact_time))/history%impact_velocity
-      gain = ball%mass*(history%impact_velocity + state%speed + state%gravity*time)
+      history%restitution = (state%velocity + state%gravity*(time - history%contact_time))/history%impact_velocity
+      gain = ball%mass*(history%impact_velocity + state%velocity + state%gravity*time)
       history%impulse_residual = abs(history%impulse - gain)/gain
       history%floor_work = state%floor_work
       history%model_quantity_name = [character(len=len(history%model_quantity_name)) :: 'contact_loss']
       history%model_quantity_unit = [character(len=len(history%model_quantity_unit)) :: 'J']
       history%model_quantity = [state%contact_loss]
       initial = ball%mass/2*history%impact_velocity**2
-      energy = ball%mass*(state%speed**2/2 + state%gravity*(state%height - ball%outer_radius)) &
+      energy = ball%mass*(state%velocity**2/2 + state%gravity*(state%height - ball%outer_radius)) &
          + sum(get_energies(modes, state%motion)) + state%loss + state%contact_loss + state%floor_work
       history%energy_residual = abs(energy - initial)/initial
       ! Written so that NaN fails too.
@@ -389,7 +390,7 @@ contains
 
       energy = get_energies(modes, state%motion)
       history%deflection(i) = ball%outer_radius - state%height - state%floor_motion%displacement
-      history%velocity(i) = -state%speed
+      history%velocity(i) = -state%velocity
       if (state%floor_moves) history%floor_displacement(i) = state%floor_motion%displacement
       history%max_deflection = max(history%max_deflection, history%deflection(i))
       do k = 1, size(energy)

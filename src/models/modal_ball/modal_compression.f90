@@ -35,7 +35,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(surface_rings_type) :: rings
       type(ring_contact_type) :: contact
-      real(wp), allocatable :: start(:), gap(:)
+      real(wp), allocatable :: reference_gap(:), gap(:)
       real(wp) :: before, now
       integer :: i, k, n_step
 
@@ -43,8 +43,8 @@ contains
       rings = new_surface_rings(options%rings, options%static_harmonics, options%floor_friction == 'stick')
       call new_press(ball, options, rings, contact, error)
       if (allocated(error)) return
-      allocate (start(size(contact%impulse)), gap(size(contact%impulse)), source=0.0_wp)
-      start(::rings%n_dof) = ball%outer_radius*(1 - rings%height)
+      allocate (reference_gap(size(contact%impulse)), gap(size(contact%impulse)), source=0.0_wp)
+      reference_gap(::rings%n_dof) = ball%outer_radius*(1 - rings%height)
       before = 0.0_wp
       do i = 1, size(deflection)
          ! With sticking rings the result depends on the path.
@@ -54,14 +54,14 @@ contains
             call check_interrupt(error)
             if (allocated(error)) return
             now = before + (deflection(i) - before)*k/n_step
-            gap = start
+            gap = reference_gap
             gap(::rings%n_dof) = gap(::rings%n_dof) - now/2
             call solve_contact(contact, gap, error)
             if (allocated(error)) return
-            call update_sticking(contact, start)
+            call update_sticking(contact, reference_gap)
          end do
          before = deflection(i)
-         if (contact%last == options%rings) then
+         if (contact%outermost == options%rings) then
             error = numerical_error('&compression: max_deflection: at '//to_text(deflection(i)) &
                //' m the ball lies on its outermost ring; allowed: less')
             return

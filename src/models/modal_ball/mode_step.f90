@@ -10,8 +10,8 @@ module thud_mode_step
 
    public :: advance, get_energies, mode_step_type, set_factors
 
-   !> Indices of amplitude q and rate v in the motion of a mode; the strains x of the branches follow.
-   integer, parameter, public :: place_q = 1, place_v = 2
+   !> Indices of amplitude q and rate v = q' in the motion of a mode; the internal variables x_k of the branches follow.
+   integer, parameter, public :: index_amplitude = 1, index_rate = 2
 
    !> The modes and the factors of their time steps. The factors multiply the motion of a mode; an upward impulse p on the
    !> mode at the beginning adds -p times the factors of the rate v.
@@ -49,16 +49,16 @@ contains
          ! With the rate divided by the frequency, the elements are of similar size.
          associate (omega => modes%omega(i))
             matrix = 0.0_wp
-            matrix(place_q, place_v) = omega
-            matrix(place_v, place_q) = -omega*(modes%equilibrium_ratio + sum(modes%relative_modulus))
-            matrix(place_v, place_v) = -2*damping_ratio(i)*omega
-            matrix(place_v, 3:) = omega*modes%relative_modulus
+            matrix(index_amplitude, index_rate) = omega
+            matrix(index_rate, index_amplitude) = -omega*(modes%equilibrium_ratio + sum(modes%relative_modulus))
+            matrix(index_rate, index_rate) = -2*damping_ratio(i)*omega
+            matrix(index_rate, 3:) = omega*modes%relative_modulus
             do k = 3, n
-               matrix(k, [place_q, k]) = [1, -1]/modes%time(k - 2)
+               matrix(k, [index_amplitude, k]) = [1, -1]/modes%time(k - 2)
             end do
             matrix = get_exponential(interval*matrix)
-            matrix(:, place_v) = matrix(:, place_v)/omega
-            matrix(place_v, :) = matrix(place_v, :)*omega
+            matrix(:, index_rate) = matrix(:, index_rate)/omega
+            matrix(index_rate, :) = matrix(index_rate, :)*omega
          end associate
          modes%factor(i, :, :) = matrix
       end do
@@ -88,11 +88,11 @@ contains
       real(wp) :: energy(size(modes%omega))
       integer :: k
 
-      energy = modes%equilibrium_ratio*motion(:, place_q)**2
+      energy = modes%equilibrium_ratio*motion(:, index_amplitude)**2
       do k = 1, size(modes%relative_modulus)
-         energy = energy + modes%relative_modulus(k)*(motion(:, place_q) - motion(:, 2 + k))**2
+         energy = energy + modes%relative_modulus(k)*(motion(:, index_amplitude) - motion(:, 2 + k))**2
       end do
-      energy = (motion(:, place_v)**2 + modes%omega**2*energy)/2
+      energy = (motion(:, index_rate)**2 + modes%omega**2*energy)/2
    end function get_energies
 
 end module thud_mode_step

@@ -1,9 +1,10 @@
 !> Unilateral contact of surface rings with a plane: impulses p >= 0 and gaps g + A p >= 0, one of which is zero for every
 !> ring, a linear complementarity problem.
 !>
-!> Sticking rings have a second gap, to the position of first touch, and a second impulse of any sign. The second impulse
-!> closes the second gap of the rings that touched in the previous step: this set does not depend on the unknowns, so the
-!> solution is unique, and the error of a ring that begins or ceases to stick one step late is proportional to the step.
+!> Sticking rings have a tangential gap, to the position where the ring began to stick, and a tangential impulse of any sign.
+!> This impulse closes the tangential gap of the rings that touched in the previous step: this set does not depend on the
+!> unknowns, so the solution is unique, and the error of a ring that begins or ceases to stick one step late is proportional
+!> to the step.
 module thud_ring_contact
    use thud_error, only: error_type, numerical_error
    use thud_kinds, only: wp
@@ -14,15 +15,15 @@ module thud_ring_contact
 
    public :: new_ring_contact, ring_contact_type, solve_contact, update_sticking
 
-   !> Gap that counts as closed, m: rounding of heights.
-   real(wp), parameter :: closed = 1.0e-12_wp
+   !> Penetration that counts as none, m: rounding of heights.
+   real(wp), parameter :: penetration_tolerance = 1.0e-12_wp
 
    !> Maximum number of rounds in the search for the touching rings.
    integer, parameter :: max_rounds = 200
 
    !> Rings, ordered from the lowest point outwards.
    type :: ring_contact_type
-      !> Degrees of freedom of a ring: 1, or 2 if it sticks; gaps of a ring are adjacent.
+      !> Degrees of freedom of a ring: 1, or 2 if it sticks; the gaps of a ring are adjacent, the normal one first.
       integer :: n_dof = 1
       !> Gaps due to unit impulses, m/(N s): [n_gap, n_gap].
       real(wp), allocatable :: response(:, :)
@@ -30,11 +31,11 @@ module thud_ring_contact
       !> of a leading block is the leading block of the factor.
       real(wp), allocatable :: factor(:, :)
       !> Impulses in the last step, N s, and gaps after it, m: [n_gap].
-      real(wp), allocatable :: impulse(:), after(:)
+      real(wp), allocatable :: impulse(:), gap_after(:)
       !> Rings that touched in the last step, and rings that stick: [n_ring].
       logical, allocatable :: touches(:), sticks(:)
       !> Index of the outermost ring that touches, and of the last gap that an impulse closed; 0 for none.
-      integer :: last = 0, last_gap = 0
+      integer :: outermost = 0, last_closed_gap = 0
    end type ring_contact_type
 
 contains
@@ -55,7 +56,7 @@ contains
       allocate (contact%response, source=response)
       allocate (contact%factor, source=response)
       contact%n_dof = n_dof
-      allocate (contact%impulse(n), contact%after(n), source=0.0_wp)
+      allocate (contact%impulse(n), contact%gap_after(n), source=0.0_wp)
       allocate (contact%touches(n/n_dof), contact%sticks(n/n_dof), source=.false.)
       call dpotrf('L', n, contact%factor, n, info)
       failed = info /= 0
@@ -77,10 +78,11 @@ contains
       do round = 1, max_rounds
          call close_gaps(contact, gap, failed)
          if (failed) exit
-         associate (n => contact%last_gap, n_dof => contact%n_dof)
-            contact%after = gap
-            if (n > 0) contact%after = gap + matmul(contact%response(:, :n), contact%impulse(:n))
-            wrong = merge(contact%impulse(::n_dof) < 0.0_wp, contact%after(::n_dof) < -closed, contact%touches)
+         associate (n => contact%last_closed_gap, n_dof => contact%n_dof)
+            contact%gap_after = gap
+            if (n > 0) contact%gap_after = gap + matmul(contact%response(:, :n), contact%impulse(:n))
+            wrong = merge(contact%impulse(::n_dof) < 0.0_wp, contact%gap_after(::n_dof) < -penetration_tolerance, &
+               contact%touches)
          end associate
          if (.not. any(wrong)) return
          if (round < max_rounds/2) then
@@ -96,18 +98,18 @@ contains
    end subroutine solve_contact
 
    !> Makes the rings that touch at the end of a step stick there.
-   pure subroutine update_sticking(contact, start)
+   pure subroutine update_sticking(contact, reference_gap)
       type(ring_contact_type), intent(inout) :: contact
-      !> Gaps without motion, m: [n_gap]. For rings that do not stick yet, the second gaps are shifted to zero in the
+      !> Gaps without motion, m: [n_gap]. For rings that do not stick yet, the tangential gaps are shifted to zero in the
       !> present position.
-      real(wp), intent(inout) :: start(:)
+      real(wp), intent(inout) :: reference_gap(:)
 
       if (contact%n_dof == 1) return
-      where (.not. contact%sticks) start(2::2) = start(2::2) - contact%after(2::2)
+      where (.not. contact%sticks) reference_gap(2::2) = reference_gap(2::2) - contact%gap_after(2::2)
       contact%sticks = contact%touches
    end subroutine update_sticking
 
-   !> Impulses that close the gaps of touching rings and the second gaps of sticking rings.
+   !> Impulses that close the normal gaps of touching rings and the tangential gaps of sticking rings.
    subroutine close_gaps(contact, gap, failed)
       type(ring_contact_type), intent(inout) :: contact
       real(wp), intent(in) :: gap(:)
@@ -121,12 +123,12 @@ contains
       closes(::contact%n_dof) = contact%touches
       if (contact%n_dof == 2) closes(2::2) = contact%sticks
       n = count(closes)
-      contact%last_gap = findloc(closes, .true., dim=1, back=.true.)
-      contact%last = findloc(contact%touches, .true., dim=1, back=.true.)
+      contact%last_closed_gap = findloc(closes, .true., dim=1, back=.true.)
+      contact%outermost = findloc(contact%touches, .true., dim=1, back=.true.)
       contact%impulse = 0.0_wp
       failed = .false.
       if (n == 0) return
-      if (contact%last_gap == n) then
+      if (contact%last_closed_gap == n) then
          contact%impulse(:n) = -gap(:n)
          call dtrsv('L', 'N', 'N', n, contact%factor, size(gap), contact%impulse, 1)
          call dtrsv('L', 'T', 'N', n, contact%factor, size(gap), contact%impulse, 1)
