@@ -7,7 +7,7 @@ module thud_floor_answers
    use thud_error, only: error_type
    use thud_floor_result, only: get_point_velocity
    use thud_force_history, only: force_history_type
-   use thud_injected_energy, only: get_injected_energies, get_mean_conductances
+   use thud_injected_energy, only: get_injected_energies, get_mean_conductances, get_total_energy
    use thud_kinds, only: wp
    use thud_measured_mobility_floor, only: measured_mobility_floor_type
    use thud_mobility_fit, only: fit_mobility
@@ -50,8 +50,7 @@ contains
       call bundle%add_array('imaginary', shape(mobility), aimag(mobility))
    end subroutine answer_mobility
 
-   !> Energy that the record `force`, N, injects into a case's floor with `velocity`, m/s, at `sample_rate`, Hz, in the band
-   !> set `bands`.
+   !> Energy that the record `force`, N, at `sample_rate`, Hz, injects into a case's floor in the band set `bands`.
    subroutine answer_floor_energy(case, request, bundle, error)
       type(case_type), intent(in) :: case
       type(request_type), intent(in) :: request
@@ -61,20 +60,20 @@ contains
       type(band_type), allocatable :: bands(:)
       type(receiver_type) :: receiver
       character(len=:), allocatable :: set
-      real(wp), allocatable :: by_motion(:), by_mobility(:)
+      real(wp), allocatable :: force(:), energy(:)
 
       call request%get_text('bands', set)
       call find_bands(set, bands, error)
       if (.not. allocated(error)) call case%floors(get_floor_number(case))%model%get_receiver(receiver, error)
       if (allocated(error)) return
-      allocate (by_motion(size(bands)), by_mobility(size(bands)))
-      call get_injected_energies(receiver, request%get_array('force'), request%get_array('velocity'), &
-         request%get_number('sample_rate'), bands, by_motion, by_mobility, error)
+      allocate (force, source=request%get_array('force'))
+      allocate (energy(size(bands)))
+      call get_injected_energies(receiver, force, request%get_number('sample_rate'), bands, energy, error)
       if (allocated(error)) return
       call bundle%add_array('frequency', shape(bands), bands%nominal)
-      call bundle%add_array('by_motion', shape(bands), by_motion)
-      call bundle%add_array('by_mobility', shape(bands), by_mobility)
+      call bundle%add_array('energy', shape(bands), energy)
       call bundle%add_array('conductance', shape(bands), get_mean_conductances(receiver, bands))
+      call bundle%add_number('total', get_total_energy(receiver, force, request%get_number('sample_rate')))
    end subroutine answer_floor_energy
 
    !> Velocity, m/s, of the point `point`, m, of a case's floor under the record `force`, N, at `sample_rate`, Hz.

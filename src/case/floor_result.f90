@@ -6,7 +6,7 @@ module thud_floor_result
    use thud_floor_model, only: floor_model_type
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_history_type
-   use thud_injected_energy, only: get_injected_energies, get_mean_conductances
+   use thud_injected_energy, only: get_injected_energies, get_mean_conductances, get_total_energy
    use thud_kinds, only: wp
    use thud_receiver, only: advance_receiver, get_receiver_velocity, new_receiver_motion, new_receiver_step, &
       receiver_motion_type, receiver_step_type, receiver_type
@@ -21,8 +21,10 @@ module thud_floor_result
       type(band_type), allocatable :: bands(:)
       !> Levels of the force on the floor, dB: [n_band].
       real(wp), allocatable :: contact_level(:)
-      !> Energy injected into the floor, from its velocity and from its mobility, J: [n_band].
-      real(wp), allocatable :: energy_by_motion(:), energy_by_mobility(:)
+      !> Energy injected into the floor, J: [n_band].
+      real(wp), allocatable :: energy(:)
+      !> Energy injected in all frequencies, J; up to errors of the time steps, the work of the simulated motion.
+      real(wp) :: total_energy = 0.0_wp
       !> Mean real part of the mobility, m/(N s): [n_band].
       real(wp), allocatable :: conductance(:)
       !> Velocities of points of the floor, m/s: [n_sample, n_point].
@@ -47,16 +49,17 @@ contains
       call get_level_bands(case%bands, floor_result%bands, first)
       floor_result%bands = floor_result%bands(first:)
       n = size(floor_result%bands)
-      allocate (floor_result%contact_level(n), floor_result%energy_by_motion(n), floor_result%energy_by_mobility(n))
+      allocate (floor_result%contact_level(n), floor_result%energy(n))
       call get_force_exposure_levels(contact%floor_force, contact%sample_rate, floor_result%bands, trim(case%level_method), &
          floor_result%contact_level, error)
       if (allocated(error) .or. .not. energies) return
       associate (floor => case%floors(get_floor_number(case))%model)
          call floor%get_receiver(receiver, error)
          if (allocated(error)) return
-         call get_injected_energies(receiver, contact%floor_force, contact%floor_velocity, contact%sample_rate, &
-            floor_result%bands, floor_result%energy_by_motion, floor_result%energy_by_mobility, error)
+         call get_injected_energies(receiver, contact%floor_force, contact%sample_rate, floor_result%bands, &
+            floor_result%energy, error)
          if (allocated(error)) return
+         floor_result%total_energy = get_total_energy(receiver, contact%floor_force, contact%sample_rate)
          floor_result%conductance = get_mean_conductances(receiver, floor_result%bands)
          allocate (floor_result%point_velocity(size(contact%floor_force), floor%point_x%count))
          do i = 1, floor%point_x%count

@@ -34,18 +34,19 @@ class FloorEnergy(Immutable):
     ----------
     frequency : ndarray, shape (n_band,)
         Rounded mid frequencies, Hz.
-    by_motion : ndarray, shape (n_band,)
-        Time integral of force times velocity of the floor, both filtered into the band, J.
-    by_mobility : ndarray, shape (n_band,)
-        Energy by the mobility Y of the floor, the integral of ``2 |F|**2 Re Y df``, J.
+    energy : ndarray, shape (n_band,)
+        Integral of ``2 |F|**2 Re Y df``, F the contact force and Y the mobility of the floor, J.
     conductance : ndarray, shape (n_band,)
         Mean of Re Y over the band, m/(N s).
+    total : float
+        Energy in all frequencies, J. `FloorImpact.floor_work` is the same energy by the simulated
+        motion of the floor: their difference shows the error of the time steps.
     """
 
     frequency: NDArray[np.float64]
-    by_motion: NDArray[np.float64]
-    by_mobility: NDArray[np.float64]
+    energy: NDArray[np.float64]
     conductance: NDArray[np.float64]
+    total: float
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -101,10 +102,10 @@ class FloorImpact(Impact):
         return self.levels(bands, method, "floor") - self.blocked_levels(bands, method)
 
     def injected_energy(self, bands: BandSet = "octave") -> FloorEnergy:
-        """Return the energy that the force transfers to the floor, by two methods."""
+        """Return the energy that the force transfers to the floor, in bands."""
         answer = ask(
             "floor_energy", case=case_text(Case(floor=self.floor)), bands=bands,
-            force=self.floor_force, velocity=self.floor_velocity, sample_rate=self.sample_rate,
+            force=self.floor_force, sample_rate=self.sample_rate,
         )  # fmt: skip
         return FloorEnergy(**answer)
 
@@ -131,7 +132,7 @@ class FloorImpact(Impact):
         columns = (self.blocked_levels(), self.levels(force="floor"), self.difference())
         header = ("octave, Hz", "blocked, dB", "contact, dB", "difference, dB", "energy, J")
         cells = [[f"{value:.2f}" for value in column] for column in columns]
-        energies = [f"{value:.3g}" for value in energy.by_motion]
+        energies = [f"{value:.3g}" for value in energy.energy]
         return [header, *zip((f"{f:g}" for f in energy.frequency), *cells, energies, strict=True)]
 
     def _floor_histories(self) -> dict[str, NDArray[np.float64]]:

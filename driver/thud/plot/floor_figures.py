@@ -59,18 +59,14 @@ def draw_floor(impact: FloorImpact) -> Figure:
     change.set_ylabel("Contact −\nblocked, dB")
     injected = impact.injected_energy(THIRDS)
     energy.set_yscale("log")
-    energy.plot(x, 1e3 * injected.by_mobility, label="energy by the mobility", **line_style(0))
-    energy.plot(
-        x, 1e3 * injected.by_motion, label="energy by the velocity", color=COLORS[1], marker="o",
-        markersize=3.5, linestyle="none",
-    )  # fmt: skip
+    energy.plot(x, 1e3 * injected.energy, **line_style(0))
     energy.set_ylabel("Energy into\nthe floor, mJ")
     energy.sharex(change)
     change.tick_params(labelbottom=False)
     band_axis(energy, injected.frequency, THIRDS)
     _draw_mobility(mobility, impact)
     figure.align_ylabels()
-    legend_above(history, motion, energy, mobility)
+    legend_above(history, motion, mobility)
     return figure
 
 

@@ -58,9 +58,8 @@ contains
 
       associate (bands => floor_result%bands, blocked => get_blocked_levels(impact), contact => floor_result%contact_level)
          text = get_table_csv('bandwidth,nominal_Hz,lower_edge_Hz,upper_edge_Hz,blocked_level_dB,contact_level_dB,' &
-            //'difference_dB,energy_by_motion_J,energy_by_mobility_J,conductance_m_per_Ns', reshape([bands%nominal, &
-            bands%lower, bands%upper, blocked, contact, contact - blocked, floor_result%energy_by_motion, &
-            floor_result%energy_by_mobility, floor_result%conductance], [size(bands), 9]), bands%set)
+            //'difference_dB,energy_J,conductance_m_per_Ns', reshape([bands%nominal, bands%lower, bands%upper, blocked, &
+            contact, contact - blocked, floor_result%energy, floor_result%conductance], [size(bands), 8]), bands%set)
       end associate
    end subroutine get_floor_levels_csv
 
@@ -108,7 +107,7 @@ contains
          associate (contact_level => floor_result%contact_level(i))
             call get_cells([blocked_level(i), contact_level, contact_level - blocked_level(i)], 2, spread('dB', 1, 3), cells)
          end associate
-         write (energy, '(es11.2, " J")') floor_result%energy_by_motion(i)
+         write (energy, '(es11.2, " J")') floor_result%energy(i)
          text = text//'  '//name//cells//'  '//energy//newline
       end do
       text = text//newline
@@ -121,8 +120,8 @@ contains
       call add_row('velocity of the floor', 0.0_wp, 1.0e3_wp*maxval(abs(contact%floor_velocity)), 3, 'mm/s')
       call add_row('its displacement', 0.0_wp, 1.0e3_wp*maxval(abs(contact%floor_displacement)), 4, 'mm')
       call add_quantity(get_quantity('floor_work'), 0.0_wp, contact%floor_work)
-      text = text//newline//'  Energies by the velocity and by the mobility of the floor differ by at most ' &
-         //fixed(1.0e2_wp*get_disagreement(floor_result), 3)//' % of all bands.'//newline
+      text = text//newline//'  The energy to the floor by its mobility, in all frequencies, differs by ' &
+         //fixed(1.0e2_wp*(floor_result%total_energy/max(contact%floor_work, tiny(1.0_wp)) - 1), 3)//' %.'//newline
 
    contains
 
@@ -150,17 +149,6 @@ contains
       end subroutine add_row
 
    end subroutine get_floor_table
-
-   !> Maximum difference between the two energies of a band, divided by the total energy of the bands of its set.
-   pure function get_disagreement(floor_result) result(ratio)
-      type(floor_result_type), intent(in) :: floor_result
-      real(wp) :: ratio
-      integer :: i
-
-      ratio = maxval([(abs(floor_result%energy_by_motion(i) - floor_result%energy_by_mobility(i)) &
-         /max(sum(floor_result%energy_by_mobility, mask=floor_result%bands%set == floor_result%bands(i)%set), &
-         tiny(1.0_wp)), i=1, size(floor_result%bands))])
-   end function get_disagreement
 
    !> Numbers with their units, each in its column.
    pure subroutine get_cells(values, decimals, units, text)
