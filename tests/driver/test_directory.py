@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+import tracemalloc
 from collections import Counter
 from pathlib import Path
 from types import SimpleNamespace
@@ -64,6 +65,31 @@ def test_zarr_holds_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     found = thud.sweep({"name": "b", **HEIGHTS}, tmp_path).dataset
     assert names_in(tmp_path) == ["a.zarr", "b.zarr"]
     assert values(found).identical(expected)
+
+
+def test_zarr_is_written_in_a_memory_that_does_not_grow(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    peaks = []
+    write = Blocks._write_zarr  # noqa: SLF001
+
+    def traced(store: Blocks, paths: list[Path]) -> None:
+        tracemalloc.start()
+        write(store, paths)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+
+    monkeypatch.setattr(Blocks, "_write_zarr", traced)
+    monkeypatch.setattr(samples.SampleStudy, "block_size", 1000)
+    parameters = {"height": {"low": 0.9, "high": 1.1}}
+    for count in (2000, 12_000):
+        study = {"name": f"of_{count}", "format": "zarr", "parameters": parameters}
+        design = {"kind": "random", "size": count, "seed": 1}
+        found = thud.sweep({**study, "design": design}, tmp_path).dataset
+        expected = thud.sweep({**study, "design": design}).dataset
+        assert values(found).identical(values(expected))
+    # The results are six times as large.
+    assert peaks[1] < 1.5 * peaks[0]
 
 
 def test_blocks_are_compared_with_their_checksums_once_for_all_variables(

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from thud.studies.samples import Columns, SampleStudy
 
 # Results that need more bytes than this are written as Zarr.
-MAX_NETCDF_SIZE = 256 * 2**20
+MAX_NETCDF_SIZE = 24 * 2**20
 # Name of the file with the identity of the blocks.
 IDENTITY = "study"
 # Names of all complete files.
@@ -109,24 +109,38 @@ class Blocks:
         shutil.rmtree(self._partial, ignore_errors=True)
 
     def _write_zarr(self, paths: list[Path]) -> None:
-        """Write a Zarr group, some variables at a time: only these have to fit in memory."""
+        """Write a Zarr group in parts, so that the results need not fit in memory."""
         part = self.path.with_name(f".{self.path.name}.part")
         # An interrupted removal may have left this directory.
         shutil.rmtree(part, ignore_errors=True)
         part = unique_path(part)
-        with _open(paths[0]) as first:
-            sizes = {str(name): values.nbytes for name, values in first.data_vars.items()}
-        names = list(sizes)
-        group_size = max(1, 2 * MAX_NETCDF_SIZE // (max(sizes.values()) * len(paths)))
+        write = self._write_grid if self._study.design == "grid" else _write_samples
         try:
             with _named(self.path):
-                for i in range(0, len(names), group_size):
-                    result = _join(paths, names[i : i + group_size], known_intact=i > 0)
-                    grid = grid_of(self._study, result)
-                    grid.to_zarr(part, mode="a" if i else "w", consolidated=False)
+                write(paths, part)
                 part.rename(self.path)
         finally:
             shutil.rmtree(part, ignore_errors=True)
+
+    def _write_grid(self, paths: list[Path], part: Path) -> None:
+        """Write some variables at a time: only these have to fit in memory."""
+        with _open(paths[0]) as first:
+            sizes = {str(name): values.nbytes for name, values in first.data_vars.items()}
+        names = list(sizes)
+        group_size = max(1, MAX_NETCDF_SIZE // (max(sizes.values()) * len(paths)))
+        for i in range(0, len(names), group_size):
+            result = _join(paths, names[i : i + group_size], known_intact=i > 0)
+            grid = grid_of(self._study, result)
+            grid.to_zarr(part, mode="a" if i else "w", consolidated=False)
+
+
+def _write_samples(paths: list[Path], part: Path) -> None:
+    """Write one block after the other: only one has to fit in memory."""
+    for i, path in enumerate(paths):
+        with _open(path) as dataset:
+            # All blocks but the last are of one size, that of the chunks.
+            dimension = "sample" if i else None
+            _loaded(dataset).to_zarr(part, consolidated=False, append_dim=dimension)
 
 
 def result_names(study: SampleStudy) -> list[str]:
@@ -245,8 +259,8 @@ def _readable(path: Path) -> Iterator[None]:
 def _write(dataset: xr.Dataset, path: Path) -> None:
     """Write a NetCDF file atomically."""
     with uninterrupted():
-        content = bytes(dataset.to_netcdf(engine="h5netcdf"))
-        replace_file(path, content + _SEAL + sha256(content).digest())
+        content = dataset.to_netcdf(engine="h5netcdf")
+        replace_file(path, b"".join((content, _SEAL, sha256(content).digest())))
 
 
 def _require_intact(path: Path) -> None:
