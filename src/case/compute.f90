@@ -1,6 +1,7 @@
 !> Computes all results that a case asks for: free modes, quasi-static compression, the drop on a rigid floor with its levels
 !> and criteria, the drop on the floor of the case, the level in the room below, and warnings. It reads and writes no files.
 module thud_compute
+   !$ use omp_lib, only: omp_get_max_threads
    use thud_band, only: band_type, get_level_bands, octave_count
    use thud_case, only: case_type, check_case, get_floor_number, get_model_number
    use thud_compression, only: compression_type, get_deflections, get_pressed_ball
@@ -12,20 +13,25 @@ module thud_compute
    use thud_kinds, only: wp
    use thud_memory, only: require_memory
    use thud_plate, only: plate_type
+   use thud_progress, only: let_first_thread_report
    use thud_receiver, only: is_rigid, receiver_type
    use thud_room, only: check_below, get_room_bands, get_room_level, room_level_type
    use thud_sampling, only: get_sample_count
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type
+   use thud_system, only: is_forked
    use thud_warnings, only: get_warnings, warning_length
    implicit none (type, external)
    private
 
-   public :: assessment_type, compress_case, compute, compute_floor, compute_impact, drop_on_floor, get_assessed_force
+   public :: assess_floor, assessment_type, compress_case, compute, compute_impact, drop_on_floor, get_assessed_force
    public :: get_cost, impact_type, is_conforming, predict_room_level, results_type, scope_type
 
    !> Memory per sample of a record, including transforms and text, bytes; measured.
    real(wp), parameter :: sample_memory = 600.0_wp
+
+   !> Computing time of a drop from which on a second thread is worth its start, s.
+   real(wp), parameter :: min_thread_cost = 0.01_wp
 
    !> Which of the results that a case asks for are computed.
    type :: scope_type
@@ -87,9 +93,10 @@ contains
       if (case%has_modes .and. .not. allocated(error)) call get_free_modes(case%ball, case%modes%mesh, case%modes%count, &
          results%modes, error)
       if (case%has_compression .and. .not. allocated(error)) call compress_case(case, results%compression, error)
-      if (case%has_impact .and. .not. allocated(error)) call compute_impact(case, scope, results%impact, error)
-      if (case%has_impact .and. .not. allocated(error)) call compute_floor(case, scope, results%impact, &
-         results%on_floor, results%floor, results%room, error)
+      if (case%has_impact .and. .not. allocated(error)) call compute_drops(case, scope, results%impact, &
+         results%on_floor, error)
+      if (case%has_impact .and. .not. allocated(error)) call assess_floor(case, scope, results%impact, results%on_floor, &
+         results%floor, results%room, error)
       if (.not. allocated(error)) call get_warnings(case, results%impact%history, results%warning, results%on_floor)
    end subroutine compute
 
@@ -107,29 +114,60 @@ contains
       if (scope%levels .and. .not. allocated(error)) call assess(case, impact%history, impact%assessment, error)
    end subroutine compute_impact
 
-   !> The drop on the floor and the level in the room below, if the case asks for them.
-   subroutine compute_floor(case, scope, impact, on_floor, floor, room, error)
+   !> The drops of a case on a rigid floor and on its own, at the same time if two threads are allowed and worthwhile.
+   subroutine compute_drops(case, scope, impact, on_floor, error)
+      !> The case, checked.
+      type(case_type), intent(in) :: case
+      type(scope_type), intent(in) :: scope
+      type(impact_type), intent(out) :: impact
+      !> The drop on the floor; not allocated if the floor is rigid or the model does not couple with it.
+      type(force_history_type), allocatable, intent(out) :: on_floor
+      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable :: floor_error
+      integer :: i, n_thread
+
+      n_thread = 1
+      associate (model => case%models(get_model_number(case))%model)
+         !$ if (case%has_floor .and. .not. is_forked()) n_thread = min(2, omp_get_max_threads())
+         if (n_thread > 1) n_thread = merge(2, 1, model%get_cost(case%ball, case%sampling) > min_thread_cost)
+      end associate
+      if (n_thread == 1) then
+         call compute_impact(case, scope, impact, error)
+         if (case%has_floor .and. .not. allocated(error)) call drop_on_floor(case, on_floor, error)
+         return
+      end if
+      call let_first_thread_report(.true.)
+      !$omp parallel do num_threads(n_thread) schedule(static, 1)
+      do i = 1, 2
+         if (i == 1) call compute_impact(case, scope, impact, error)
+         if (i == 2) call drop_on_floor(case, on_floor, floor_error)
+      end do
+      !$omp end parallel do
+      call let_first_thread_report(.false.)
+      if (.not. allocated(error)) call move_alloc(floor_error, error)
+   end subroutine compute_drops
+
+   !> Levels and energies of the drop on the floor and the level in the room below, if the case asks for them.
+   subroutine assess_floor(case, scope, impact, on_floor, floor, room, error)
       !> The case, checked.
       type(case_type), intent(in) :: case
       type(scope_type), intent(in) :: scope
       !> The drop on a rigid floor.
       type(impact_type), intent(in) :: impact
       !> The drop on the floor; not allocated if the floor is rigid or the model does not couple with it.
-      type(force_history_type), allocatable, intent(out) :: on_floor
+      type(force_history_type), allocatable, intent(in) :: on_floor
       type(floor_result_type), intent(out) :: floor
       type(room_level_type), intent(out) :: room
       type(error_type), allocatable, intent(out) :: error
 
-      if (case%has_floor) call drop_on_floor(case, on_floor, error)
-      if (allocated(on_floor) .and. scope%levels .and. .not. allocated(error)) call get_floor_result(case, on_floor, &
-         scope%energies, floor, error)
+      if (allocated(on_floor) .and. scope%levels) call get_floor_result(case, on_floor, scope%energies, floor, error)
       if (allocated(error) .or. .not. (case%has_room .and. scope%room)) return
       if (allocated(on_floor)) then
          call predict_room(case, on_floor%floor_force, on_floor%sample_rate, room, error)
       else
          call predict_room(case, impact%history%floor_force, impact%history%sample_rate, room, error)
       end if
-   end subroutine compute_floor
+   end subroutine assess_floor
 
    !> The drop of a case on its floor.
    subroutine drop_on_floor(case, on_floor, error)

@@ -8,7 +8,7 @@ module thud_sweep
    use thud_blocked_drop, only: blocked_type, solve_blocked
    use thud_case, only: case_type, check_case, get_active_fields
    use thud_column, only: column_type
-   use thud_compute, only: compute_floor, get_assessed_force, get_cost, scope_type
+   use thud_compute, only: assess_floor, drop_on_floor, get_assessed_force, get_cost, scope_type
    use thud_ensemble, only: are_alike, new_projections, projections_type, solve_ensemble
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type
@@ -281,7 +281,8 @@ contains
       end do
       if (.not. allocated(error)) call check_case(case, error)
       if (.not. allocated(error)) call solve_blocked(case, fields, scope, blocked, error)
-      if (.not. allocated(error)) call compute_floor(case, scope, blocked%impact, on_floor, floor, room, error)
+      if (case%has_floor .and. .not. allocated(error)) call drop_on_floor(case, on_floor, error)
+      if (.not. allocated(error)) call assess_floor(case, scope, blocked%impact, on_floor, floor, room, error)
       sweep%status(sample) = 0
       sweep%quantity(:, sample) = not_a_number
       sweep%level(:, :, sample) = not_a_number

@@ -140,9 +140,12 @@ static void resume_calls(void)
    pthread_mutex_unlock(&calls);
 }
 
-// A forked process has none of the threads of the running calls.
+// A forked process has none of the threads of the running calls, nor those of OpenMP, which would be waited for.
+volatile sig_atomic_t thud_is_forked = 0;
+
 static void reset_after_fork(void)
 {
+   thud_is_forked = 1;
    pthread_mutex_init(&calls, NULL);
    forking = 0;
    running = 0;

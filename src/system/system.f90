@@ -10,8 +10,8 @@ module thud_system
    public :: standard_error, standard_output
    public :: add_to_checksum, begin_call, can_exchange, close_descriptor, create_file, defer_interrupts, directory_exists
    public :: end_call, end_process, exchange_directories, flush_directory, get_file_checksum, get_file_size, get_free_bytes
-   public :: get_system_message, interrupt_calls, is_closed, is_missing, is_regular_file, is_same_file, is_terminal
-   public :: link_file, list_directory, lock_directory, open_descriptor, open_end
+   public :: get_system_message, interrupt_calls, is_closed, is_forked, is_missing, is_regular_file, is_same_file
+   public :: is_terminal, link_file, list_directory, lock_directory, open_descriptor, open_end
    public :: pass_interrupts, prepare_process, read_bytes, remove_file, rename_file, resolve_path, write_text
 
    !> Standard descriptors of the process.
@@ -19,6 +19,9 @@ module thud_system
 
    !> Maximum length of the name of a file, and of a path.
    integer, parameter, public :: name_length = 255, path_length = 4096
+
+   !> 1 in a process forked from one that had called the library, else 0; defined in system.c.
+   integer(c_int), volatile, bind(c, name='thud_is_forked') :: forked
 
    abstract interface
       subroutine plain_call() bind(c)
@@ -184,6 +187,13 @@ module thud_system
    end interface
 
 contains
+
+   !> Whether the process was forked from one that had called the library: it lacks the threads of the latter.
+   function is_forked() result(yes)
+      logical :: yes
+
+      yes = forked /= 0_c_int
+   end function is_forked
 
    !> The system's message for an error number.
    function get_system_message(status) result(text)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -12,7 +13,7 @@ import f90nml
 import meshio
 import numpy as np
 import pytest
-from conftest import RESULT_FILES, names_in, naming
+from conftest import RESULT_FILES, names_in, naming, python
 
 import thud
 from thud import cli
@@ -326,3 +327,31 @@ def test_modes_have_the_shapes_of_their_nodes() -> None:
 def test_loss_factors_are_of_positive_frequencies(frequency: object) -> None:
     with pytest.raises(thud.InputError, match="frequency"):
         thud.loss_factors(thud.FiniteElement(), frequency)  # type: ignore[arg-type]
+
+
+def test_drops_at_the_same_time_equal_those_one_after_the_other(tmp_path: Path) -> None:
+    """A forked process, which lacks the threads of its parent, computes them too."""
+    script = tmp_path / "script.py"
+    script.write_text("""
+import hashlib
+import multiprocessing
+import thud
+
+def drops(_=0):
+    model = thud.FiniteElement(snapshot_interval=0)
+    ball = thud.Ball(youngs_modulus=2.08e6)
+    found = thud.solve(thud.Case(ball=ball, model=model, floor=thud.Plate()))
+    return found.force("floor").tobytes(), found.on_floor.force("floor").tobytes()
+
+if __name__ == "__main__":
+    before = drops()
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        assert pool.map(drops, range(1)) == [before]
+    print(hashlib.sha256(b"".join(before)).hexdigest())
+""")
+    answers = [
+        python(script, timeout=60, env=os.environ | {"OMP_NUM_THREADS": str(threads)})
+        for threads in (1, 2)
+    ]
+    assert [answer.returncode for answer in answers] == [0, 0]
+    assert answers[0].stdout == answers[1].stdout != ""

@@ -2,13 +2,14 @@
 module thud_elastic_body
    use thud_ball, only: ball_type
    use thud_cavity, only: add_gas_forces, cavity_type, get_gas_energy, get_gas_pressure, get_volume, new_cavity
-   use thud_element_row, only: add_nodal_forces, element_row_type, get_gradients, n_component, n_point, n_symmetric, &
-      new_element_row
+   use thud_element_block, only: add_nodal_forces, element_block_type, get_gradients, n_component, n_lane, &
+      n_symmetric, new_element_blocks
    use thud_kinds, only: wp
    use thud_material, only: material_type
-   use thud_maxwell_branches, only: add_branch_stress
+   use thud_maxwell_branches, only: add_branch_stress, branch_step_type, new_branch_step
    use thud_mesh, only: mesh_type
-   use thud_rubber, only: add_viscous_stress, get_elastic_stress, get_volume_ratios
+   use thud_rubber, only: add_viscous_stress, get_elastic_stress, get_isochoric, get_jacobians, &
+      get_mean_stress, get_nominal_stress
    implicit none (type, external)
    private
 
@@ -22,14 +23,14 @@ module thud_elastic_body
    type :: elastic_body_type
       !> Mesh of order 1, undeformed, around the origin.
       type(mesh_type) :: mesh
-      !> Rings of elements of the mesh: [n_radial].
-      type(element_row_type), allocatable :: row(:)
+      !> The elements of the mesh: [n_block].
+      type(element_block_type), allocatable :: blocks(:)
       type(material_type) :: material
       type(cavity_type) :: cavity
       !> Masses of the nodes, kg.
       real(wp), allocatable :: mass(:, :)
-      !> Viscous tensor of each Maxwell branch: [n_polar, symmetric, point, branch, n_radial].
-      real(wp), allocatable :: viscous(:, :, :, :, :)
+      !> Viscous tensor of each Maxwell branch: [n_lane, symmetric, branch, n_block].
+      real(wp), allocatable :: viscous(:, :, :, :)
    end type elastic_body_type
 
    !> Energies and status that come with the forces.
@@ -57,25 +58,29 @@ contains
       type(mesh_type), intent(in) :: mesh
       type(material_type), intent(in) :: material
       type(elastic_body_type) :: body
-      integer :: i, n
+      integer :: k, n
 
       n = mesh%n_polar
       body%mesh = mesh
       body%material = material
       body%cavity = new_cavity(ball, mesh%r(:, 0), mesh%z(:, 0))
-      allocate (body%row(mesh%n_radial))
+      body%blocks = new_element_blocks(mesh)
       allocate (body%mass(0:n, 0:mesh%n_radial), source=0.0_wp)
-      do i = 1, mesh%n_radial
-         body%row(i) = new_element_row(mesh, i - 1)
-         body%mass(:n - 1, i - 1) = body%mass(:n - 1, i - 1) + body%row(i)%nodal_volume(:, 1)
-         body%mass(:n - 1, i) = body%mass(:n - 1, i) + body%row(i)%nodal_volume(:, 2)
-         body%mass(1:, i - 1) = body%mass(1:, i - 1) + body%row(i)%nodal_volume(:, 3)
-         body%mass(1:, i) = body%mass(1:, i) + body%row(i)%nodal_volume(:, 4)
+      do k = 1, size(body%blocks)
+         associate (block => body%blocks(k), mass => body%mass)
+            associate (i => block%ring, first => block%before, last => block%after, &
+               volume => block%nodal_volume(:block%n, :))
+               mass(first:last - 1, i - 1) = mass(first:last - 1, i - 1) + volume(:, 1)
+               mass(first:last - 1, i) = mass(first:last - 1, i) + volume(:, 2)
+               mass(first + 1:last, i - 1) = mass(first + 1:last, i - 1) + volume(:, 3)
+               mass(first + 1:last, i) = mass(first + 1:last, i) + volume(:, 4)
+            end associate
+         end associate
       end do
       ! The mesh is a little smaller than the sphere; the mass is that of the ball.
       body%mass = body%mass*(ball%mass/sum(body%mass))
-      allocate (body%viscous(n, n_symmetric, n_point, size(material%branch_time), mesh%n_radial), source=0.0_wp)
-      body%viscous(:, 1:3, :, :, :) = 1.0_wp
+      allocate (body%viscous(n_lane, n_symmetric, size(material%branch_time), size(body%blocks)), source=0.0_wp)
+      body%viscous(:, 1:3, :, :) = 1.0_wp
    end function new_elastic_body
 
    !> Nodal forces of stress and gas.
@@ -94,36 +99,58 @@ contains
       real(wp), intent(out), contiguous :: force(0:, 0:, :)
       !> Energies and power.
       type(body_state_type), intent(out) :: state
-      real(wp) :: f(body%mesh%n_polar, n_component, n_point), rate(body%mesh%n_polar, n_component, n_point)
-      real(wp) :: stress(body%mesh%n_polar, n_component, n_point), cofactor(body%mesh%n_polar, n_component, n_point)
+      real(wp), dimension(n_lane, n_component) :: f, rate, stress
+      real(wp), dimension(n_lane, n_symmetric) :: c, inverse, isochoric, trial
+      real(wp), dimension(n_lane) :: jacobian, root, mean_stress, density, power, energy, loss, lowest
+      type(branch_step_type) :: step(size(body%material%branch_time))
       real(wp) :: volume
-      real(wp) :: jacobian(body%mesh%n_polar, n_point)
-      integer :: i, n
+      integer :: b, k, last
 
-      n = body%mesh%n_polar
+      last = body%mesh%n_polar
       force = 0.0_wp
-      do i = 1, body%mesh%n_radial
-         associate (row => body%row(i), material => body%material)
-            call get_gradients(row, n, position(:, i - 1:i, 1), position(:, i - 1:i, 2), f)
-            call get_volume_ratios(n, f, cofactor, jacobian)
-            state%min_jacobian = min(state%min_jacobian, minval(jacobian))
-            if (.not. state%min_jacobian > 0.0_wp) then
-               state%failure = element_inverted
-               return
-            end if
-            call get_elastic_stress(n, material%shear_modulus, material%mooney_share, material%bulk_modulus, row%weight, &
-               row%volume, f, cofactor, jacobian, stress, state%strain_energy)
-            if (material%viscosity > 0.0_wp) then
-               call get_gradients(row, n, velocity(:, i - 1:i, 1), velocity(:, i - 1:i, 2), rate)
-               call add_viscous_stress(n, material%viscosity, row%weight, rate, cofactor, jacobian, stress, &
-                  state%dissipation)
-            end if
-            if (size(material%branch_time) > 0) call add_branch_stress(n, material%branch_modulus, material%branch_time, &
-               interval, commit, row%weight, f, cofactor, jacobian, body%viscous(:, :, :, :, i), stress, &
-               state%strain_energy, state%dissipation)
-            call add_nodal_forces(row, n, stress, force(:, i - 1:i, 1), force(:, i - 1:i, 2))
-         end associate
-      end do
+      energy = 0.0_wp
+      loss = 0.0_wp
+      lowest = 1.0_wp
+      ! Lanes without an element stay undeformed.
+      f = spread([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 1.0_wp], 1, n_lane)
+      rate = 0.0_wp
+      associate (material => body%material)
+         step = new_branch_step(material%branch_modulus, material%branch_time, interval, .not. commit)
+         do k = 1, size(body%blocks)
+            associate (block => body%blocks(k), i => body%blocks(k)%ring)
+               call get_gradients(block, last, position(:, i - 1:i, 1), position(:, i - 1:i, 2), f)
+               if (material%viscosity > 0.0_wp) call get_gradients(block, last, velocity(:, i - 1:i, 1), &
+                  velocity(:, i - 1:i, 2), rate)
+               call get_jacobians(f, jacobian)
+               call get_mean_stress(block, material%bulk_modulus, jacobian, mean_stress, density)
+               call get_isochoric(f, jacobian, root, c, inverse)
+               call get_elastic_stress(material%shear_modulus, material%mooney_share, c, inverse, isochoric, density)
+               power = 0.0_wp
+               do b = 1, size(step)
+                  if (commit) then
+                     call add_branch_stress(step(b), c, inverse, body%viscous(:, :, b, k), isochoric, density, power)
+                  else
+                     trial = body%viscous(:, :, b, k)
+                     call add_branch_stress(step(b), c, inverse, trial, isochoric, density, power)
+                  end if
+               end do
+               call get_nominal_stress(block%weight, f, root, c, isochoric, mean_stress, stress)
+               if (material%viscosity > 0.0_wp) call add_viscous_stress(material%viscosity, block%weight, f, rate, root, &
+                  stress, power)
+               call add_nodal_forces(block, last, stress, force(:, i - 1:i, 1), force(:, i - 1:i, 2))
+               energy = energy + block%weight*density
+               loss = loss + block%weight*power
+               lowest = merge(jacobian, lowest, jacobian < lowest)
+            end associate
+         end do
+      end associate
+      state%min_jacobian = minval(lowest)
+      if (.not. state%min_jacobian > 0.0_wp) then
+         state%failure = element_inverted
+         return
+      end if
+      state%strain_energy = sum(energy)
+      state%dissipation = sum(loss)
       volume = get_volume(position(:, 0, 1), position(:, 0, 2))
       if (.not. volume > 0.0_wp) then
          state%failure = cavity_closed
@@ -134,7 +161,7 @@ contains
       call add_gas_forces(state%gas_pressure, position(:, 0, 1), position(:, 0, 2), force(:, 0, 1), force(:, 0, 2))
       ! Nodes on the axis stay there.
       force(0, :, 1) = 0.0_wp
-      force(n, :, 1) = 0.0_wp
+      force(last, :, 1) = 0.0_wp
    end subroutine get_internal_forces
 
 end module thud_elastic_body

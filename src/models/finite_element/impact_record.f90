@@ -88,7 +88,7 @@ contains
       real(wp) :: mass, speed, rise, time
       integer :: i
 
-      mass = sum(run%mass(:, :, 2))
+      mass = run%total_mass
       do i = last + 1, size(history%deflection)
          associate (initial_rise => -history%deflection(last), upwards => -history%velocity(last))
             ! The flight ends at the height of first touch.

@@ -18,7 +18,7 @@ module thud_impact_run
       update_velocity
    public :: new_impact_run
 
-   !> Power iterations at the start of a run, and at each later check of the step.
+   !> Power iterations at the start of a run, and whenever the mode is known from before.
    integer, parameter :: first_iterations = 80, next_iterations = 3
 
    !> Maximum number of steps in a sampling interval.
@@ -35,8 +35,12 @@ module thud_impact_run
       real(wp), allocatable :: position(:, :, :)
       !> Velocities half a step before the positions, m/s; at the very start, at the same instant.
       real(wp), allocatable :: velocity(:, :, :)
-      !> Masses of the nodes, kg.
-      real(wp), allocatable :: mass(:, :, :)
+      !> Masses of the nodes, kg, and their inverses, 1/kg.
+      real(wp), allocatable :: mass(:, :, :), inverse_mass(:, :, :)
+      !> Mass of the ball, kg.
+      real(wp) :: total_mass = 0.0_wp
+      !> Forces of stress and gas in the latest step, N.
+      real(wp), allocatable :: force(:, :, :)
       !> Estimated shape of the fastest mode, over all nodes.
       real(wp), allocatable :: direction(:, :, :)
       !> Forces of the floor on the nodes of the outer surface in the latest step, N: [0:n_polar, 2].
@@ -88,6 +92,9 @@ contains
          run%velocity(:, :, 1) = 0.0_wp
          run%velocity(:, :, 2) = -speed
          allocate (run%mass(0:mesh%n_polar, 0:mesh%n_radial, 2), source=spread(run%body%mass, 3, 2))
+         allocate (run%inverse_mass, source=1/run%mass)
+         allocate (run%force, mold=run%mass)
+         run%total_mass = sum(run%body%mass)
          allocate (run%direction(0:mesh%n_polar, 0:mesh%n_radial, 2), source=get_first_direction(run%body))
          allocate (run%floor_force(0:mesh%n_polar, 2), run%node_impulse(0:mesh%n_polar, 2), source=0.0_wp)
       end associate
@@ -123,6 +130,8 @@ contains
             run%direction, stability_ratio)
          ! If there are no forces, the next step reports the reason.
          if (stability_ratio >= huge(stability_ratio)) exit
+         ! The mode depends little on the step.
+         n_iteration = next_iterations
          ratio = stability_ratio/(safety*max_stability_ratio)
          ! The ratio grows with a power of the step from 1 to 2: of the numbers of steps by these two, the higher is taken.
          if (ratio <= 1.0_wp) then
@@ -139,54 +148,86 @@ contains
       type(impact_run_type), intent(inout) :: run
       !> Length of the step, s.
       real(wp), intent(in) :: interval
-      real(wp) :: force(0:run%body%mesh%n_polar, 0:run%body%mesh%n_radial, 2)
-      real(wp) :: before(0:run%body%mesh%n_polar, 0:run%body%mesh%n_radial, 2)
-      real(wp), dimension(0:run%body%mesh%n_polar, 2) :: surface, impulse
+      real(wp), dimension(0:run%body%mesh%n_polar, 2) :: surface, before, impulse
       real(wp) :: span
       logical :: starts
       integer :: last
 
       last = run%body%mesh%n_radial
       span = (run%last_interval + interval)/2
-      call get_internal_forces(run%body, run%position, run%velocity, interval, .true., force, run%state)
+      starts = .not. run%last_interval > 0.0_wp
+      call get_internal_forces(run%body, run%position, run%velocity, interval, .true., run%force, run%state)
       if (run%state%failure /= no_failure) return
-      before = run%velocity
+      before = run%velocity(:, last, :)
       surface = run%position(:, last, :)
-      if (run%floor%moves) then
-         call predict(run%floor, run%last_interval, interval)
-         call find_floor(run%floor, run%contact, run%mass(:, last, 2), surface, &
-            before(:, last, 2) + span*(force(:, last, 2)/run%mass(:, last, 2) - run%gravity), sum(run%floor_force(:, 2)))
-      end if
-      ! Floor displacements are downwards; `stop` is that of the next instant.
-      surface(:, 2) = surface(:, 2) + run%floor%displacement
-      call get_contact_forces(run%contact, surface, run%floor_force, run%contact_energy)
-      force(:, last, :) = force(:, last, :) + run%floor_force
+      associate (force => run%force(:, last, :))
+         if (run%floor%moves) then
+            call predict(run%floor, run%last_interval, interval)
+            call find_floor(run%floor, run%contact, run%mass(:, last, 2), surface, &
+               before(:, 2) + span*(force(:, 2)/run%mass(:, last, 2) - run%gravity), sum(run%floor_force(:, 2)))
+         end if
+         ! Floor displacements are downwards; `stop` is that of the next instant.
+         surface(:, 2) = surface(:, 2) + run%floor%displacement
+         call get_contact_forces(run%contact, surface, run%floor_force, run%contact_energy)
+         force = force + run%floor_force
+      end associate
       run%time = run%time + span
-      run%velocity = before + span*force/run%mass
-      run%velocity(:, :, 2) = run%velocity(:, :, 2) - span*run%gravity
+      run%kinetic = 0.0_wp
+      run%potential = 0.0_wp
+      call accelerate(size(run%mass)/2, span, 0.0_wp, run%mass(:, :, 1), run%inverse_mass(:, :, 1), run%force(:, :, 1), &
+         run%position(:, :, 1), starts, run%velocity(:, :, 1), run%kinetic, run%potential)
+      call accelerate(size(run%mass)/2, span, run%gravity, run%mass(:, :, 2), run%inverse_mass(:, :, 2), &
+         run%force(:, :, 2), run%position(:, :, 2), starts, run%velocity(:, :, 2), run%kinetic, run%potential)
       call stop_at_floor(run%contact, run%mass(:, last, 2), run%position(:, last, 2) + run%floor%stop, interval, &
          run%velocity(:, last, 2), impulse(:, 2))
       call slow_by_friction(run%contact, run%mass(:, last, 1), span*run%floor_force(:, 2) + impulse(:, 2), &
          run%velocity(:, last, 1), impulse(:, 1))
+      if (.not. starts) run%kinetic = run%kinetic + sum(before*impulse)/2
       run%floor_force = run%floor_force + impulse/span
       run%impulse = span*sum(run%floor_force(:, 2))
       run%node_impulse = run%node_impulse + span*run%floor_force
       if (run%floor%moves) call advance_floor(run%floor, sum(run%floor_force(:, 2)))
-      starts = .not. run%last_interval > 0.0_wp
       ! A mobile floor takes up part of the energy that a node loses.
-      call add_lost_work(impulse(:, 2), before(:, last, 2) + run%floor%velocity_before, &
+      call add_lost_work(impulse(:, 2), before(:, 2) + run%floor%velocity_before, &
          run%velocity(:, last, 2) + run%floor%velocity_after, starts, run%contact_loss, run%pending_contact_loss)
-      call add_lost_work(impulse(:, 1), before(:, last, 1), run%velocity(:, last, 1), starts, run%friction_loss, &
+      call add_lost_work(impulse(:, 1), before(:, 1), run%velocity(:, last, 1), starts, run%friction_loss, &
          run%pending_friction_loss)
-      run%kinetic = sum(run%mass*before*run%velocity)/2
-      ! At the start the velocities are not half a step behind.
-      if (starts) run%kinetic = sum(run%mass*before**2)/2
-      run%potential = run%gravity*sum(run%mass(:, :, 2)*run%position(:, :, 2))
       run%dissipated = run%dissipated + span*run%state%dissipation
       ! Stopped nodes lie exactly on a rigid floor; a mobile floor moves on with each force.
       if (run%floor%moves .or. run%contact%layer_stiffness > 0.0_wp) run%penetration = max(run%penetration, &
          -minval(surface(:, 2)))
    end subroutine update_velocity
+
+   !> Accelerates the nodes in one direction, and adds their kinetic and potential energies.
+   pure subroutine accelerate(n, span, gravity, mass, inverse_mass, force, position, starts, velocity, kinetic, potential)
+      !> Number of nodes.
+      integer, intent(in) :: n
+      !> Time between the velocities before and after, s; gravity against this direction, m/s2.
+      real(wp), intent(in) :: span, gravity
+      !> Masses, kg; their inverses, 1/kg; forces, N; positions, m: [n].
+      real(wp), intent(in) :: mass(n), inverse_mass(n), force(n), position(n)
+      !> Whether the velocities before are those of the instant of the forces, not half a step behind.
+      logical, intent(in) :: starts
+      !> Velocities, m/s: [n].
+      real(wp), intent(inout) :: velocity(n)
+      !> Sums to which the energies are added, J.
+      real(wp), intent(inout) :: kinetic, potential
+      real(wp) :: change, moving, height, part
+      integer :: j
+
+      moving = 0.0_wp
+      height = 0.0_wp
+      part = merge(0.0_wp, 1.0_wp, starts)
+      !$omp simd private(change) reduction(+:moving, height)
+      do j = 1, n
+         change = span*(force(j)*inverse_mass(j) - gravity)
+         moving = moving + mass(j)*velocity(j)*(velocity(j) + part*change)
+         height = height + mass(j)*position(j)
+         velocity(j) = velocity(j) + change
+      end do
+      kinetic = kinetic + moving/2
+      potential = potential + gravity*height
+   end subroutine accelerate
 
    !> Adds the work that impulses of the floor take from nodes: half by the velocities before, half by the velocities after.
    !> The second half is added in the next step; in the first step, both halves are.
@@ -234,7 +275,7 @@ contains
       type(impact_run_type), intent(in) :: run
       real(wp) :: height
 
-      height = sum(run%mass(:, :, 2)*run%position(:, :, 2))/sum(run%mass(:, :, 2))
+      height = sum(run%mass(:, :, 2)*run%position(:, :, 2))/run%total_mass
    end function get_mean_height
 
    !> Upward velocity of the center of mass, m/s.
@@ -242,7 +283,7 @@ contains
       type(impact_run_type), intent(in) :: run
       real(wp) :: velocity
 
-      velocity = sum(run%mass(:, :, 2)*run%velocity(:, :, 2))/sum(run%mass(:, :, 2))
+      velocity = sum(run%mass(:, :, 2)*run%velocity(:, :, 2))/run%total_mass
    end function get_mean_velocity
 
 end module thud_impact_run
