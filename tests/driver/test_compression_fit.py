@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import re
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from conftest import naming
-from scipy.interpolate import PchipInterpolator
-from scipy.stats import t
 
 import thud
 from thud.studies.compression_fit import _warnings, _work_ratio
+from thud.studies.fitting.marginal import estimate_marginal
 
-TRUE = thud.Ball(youngs_modulus=1.83e6)
-START = thud.Ball(youngs_modulus=3e6)
+sys.path.insert(0, str(Path(__file__).parents[1] / "validation"))
+from compression_disturbances import MODEL, START, TOUCH, TRUE, curve_of, miss, quiet
+
 Measured = tuple[np.ndarray, np.ndarray]
-# Coarse, and its own truth.
-MODEL = thud.ModalBall(harmonics=20, static_harmonics=60, rings=20)
-TOUCH = 1.2e-3
 
 
 @pytest.fixture(scope="module")
@@ -53,17 +54,27 @@ def test_fit_shows_its_numbers(measured: Measured) -> None:
         ("youngs_modulus", "MPa"), ("touch", "mm")
     ]  # fmt: skip
     table = fit.to_dataframe()
-    np.testing.assert_allclose(table["model_N"] - table["force_N"], fit.residuals)
+    model = table["model_N"] + table["effects_N"]
+    np.testing.assert_allclose(model - table["force_N"], table["residual_N"])
+    assert re.search(r"offset \S+ ± \S+ N, drift .* N, softening \S+ ± \S+\n", str(fit))
+    assert "calibration 1 % high changes youngs_modulus +1 %" in str(fit)
     assert len(fit.plot().axes[0].lines) == 2
     assert fit.curve.case.ball.youngs_modulus == fit.values["youngs_modulus"]
     shown = np.interp(measured[0] - fit.values["touch"], fit.curve.deflection, fit.curve.force)
-    np.testing.assert_allclose(shown - measured[1] - noise, fit.residuals, atol=1.0)
+    np.testing.assert_allclose(shown + fit.effects - measured[1] - noise, fit.residuals, atol=1.0)
 
 
-def test_model_that_does_not_explain_the_curve_is_doubted(measured: Measured) -> None:
-    with pytest.warns(thud.FitWarning, match=naming("sign", "model")):
+def test_model_that_does_not_explain_the_curve_widens_the_interval(measured: Measured) -> None:
+    with (
+        pytest.warns(thud.FitWarning, match=naming("sign", "model")),
+        pytest.warns(thud.FitWarning, match=naming("color", "model")),
+        pytest.warns(thud.FitWarning, match=naming("softening")),
+    ):
         fit = thud.fit_compression(*measured, START, "hollow_sphere")
-    assert len(fit.warnings) == 1
+    assert fit.widened > 1
+    low, high = fit.intervals()["youngs_modulus"]
+    assert low < TRUE.youngs_modulus < high
+    assert "widened" in str(fit)
 
 
 def test_curve_that_begins_under_load_is_doubted(measured: Measured) -> None:
@@ -100,30 +111,62 @@ def test_modulus_of_a_spring_that_has_none_is_refused(measured: Measured) -> Non
         thud.fit_compression(*measured, START, spring)
 
 
-def test_covariance_is_that_of_the_linearised_curve(measured: Measured) -> None:
-    """Noise squared over the normal matrix of both derivatives, by differences of the model."""
-    deflection, force = measured
-    noise = np.random.default_rng(2).normal(scale=2.0, size=len(force))
-    fit = thud.fit_compression(deflection, force + noise, START, MODEL, confidence=0.9)
-    deviation = np.sqrt(fit.residuals @ fit.residuals / (len(force) - 2))
-    assert fit.noise == pytest.approx(deviation)
+@pytest.mark.parametrize(
+    "name", ["softening of 5 %", "offset of 3 N", "drift of 5 N", "friction of 2 N"]
+)
+def test_interval_holds_what_press_and_rubber_add(name: str) -> None:
+    curve = curve_of(name, 1, white=0.2)
+    fit = thud.fit_compression(*curve, START, MODEL)
+    assert not fit.warnings
+    assert miss(fit) < 3
+    assert fit.standard_errors["youngs_modulus"] < 0.02 * TRUE.youngs_modulus
+    if name == "softening of 5 %":
+        assert miss(quiet(curve, unknowns=())) > 3
 
-    def model(modulus: float, touch: float) -> np.ndarray:
-        ball = thud.Ball(youngs_modulus=modulus)
-        curve = thud.compress(ball, MODEL, max_deflection=0.033, points=161)
-        return np.asarray(PchipInterpolator(curve.deflection, curve.force)(
-            np.maximum(deflection - touch, 0)))  # fmt: skip
 
-    best = fit.estimate
-    assert model(*best) - force - noise == pytest.approx(fit.residuals, abs=0.5)
-    steps = np.diag([1e3, 1e-6])
-    slopes = np.stack([(model(*(best + s)) - model(*(best - s))) / (2 * s.sum()) for s in steps])
-    expected = deviation**2 * np.linalg.inv(slopes @ slopes.T)
-    np.testing.assert_allclose(fit.covariance, expected, rtol=0.02)
-    width = t.ppf(0.95, len(force) - 2) * np.sqrt(np.diag(fit.covariance))
-    ends = np.array(list(fit.intervals().values()))
-    np.testing.assert_allclose(ends, np.stack([best - width, best + width], axis=1))
-    assert fit.confidence == 0.9
+def test_uncertainty_of_calibration_is_that_of_the_modulus(measured: Measured) -> None:
+    noise = np.random.default_rng(5).normal(scale=0.1, size=len(measured[1]))
+    plain, gained = (
+        thud.fit_compression(
+            measured[0], measured[1] + noise, START, MODEL, unknowns=(), gain=gain
+        ).standard_errors["youngs_modulus"] / TRUE.youngs_modulus
+        for gain in (0.0, 0.02)
+    )  # fmt: skip
+    assert gained == pytest.approx(np.hypot(0.02, plain), rel=0.03)
+    with pytest.raises(thud.InputError, match=naming("gain", "0 <= gain < 1")):
+        thud.fit_compression(*measured, START, MODEL, gain=-0.1)
+    with pytest.raises(thud.InputError, match=naming("unknowns", "offset")):
+        thud.fit_compression(*measured, START, MODEL, unknowns=("offest",))
+
+
+def test_noise_without_effects_is_that_of_least_squares() -> None:
+    """A straight line through independent noise, whose covariance is known in closed form."""
+    count = 400
+    rng = np.random.default_rng(6)
+    jacobian = np.column_stack([np.ones(count), np.linspace(-1, 1, count)])
+    residual = rng.normal(scale=2.0, size=count)
+    best = estimate_marginal(jacobian, np.empty((count, 0)), residual, 1e-3)
+    inverse = np.linalg.inv(jacobian.T @ jacobian)
+    # The deviation is known to 4 %, the correlation of neighbors to 0.05.
+    assert best.deviation == pytest.approx(2.0, rel=0.12)
+    assert best.correlation < 0.15
+    np.testing.assert_allclose(np.diag(best.covariance), 4 * np.diag(inverse), rtol=0.4)
+    error = np.sqrt(np.diag(best.covariance))
+    assert (np.abs(best.shift + inverse @ jacobian.T @ residual) < 0.2 * error).all()
+
+
+def test_color_of_noise_is_found() -> None:
+    count, correlation = 400, 0.7
+    noise = np.random.default_rng(7).normal(size=count)
+    for i in range(1, count):
+        noise[i] = correlation * noise[i - 1] + np.sqrt(1 - correlation**2) * noise[i]
+    best = estimate_marginal(np.ones((count, 1)), np.empty((count, 0)), noise, 1e-3)
+    assert best.correlation == pytest.approx(correlation, abs=4 * np.sqrt(0.51 / count))
+    white = best.whiten(noise)
+    assert np.corrcoef(white[1:], white[:-1])[0, 1] == pytest.approx(0, abs=4 / np.sqrt(count))
+    # The variance of the mean of a colored process is (1 + r)/(1 - r) times as large.
+    expected = (1 + best.correlation) / (1 - best.correlation) / count
+    assert best.covariance[0, 0] == pytest.approx(expected, rel=0.5)
 
 
 def test_search_starts_with_the_work_of_the_measured_curve() -> None:
@@ -145,10 +188,12 @@ def test_search_starts_with_the_work_of_the_measured_curve() -> None:
     [(-0.04, True), (-0.04 + 2e-6, False), (0.0, False), (0.9 - 2e-6, False), (0.9, True)],
 )
 def test_touch_at_the_limit_of_the_search_is_doubted(place: float, *, doubted: bool) -> None:
-    bounds = ([-np.inf, -0.04], [np.inf, 0.9])
     signs = np.random.default_rng(1).normal(size=60)
-    assert len(_warnings(signs, place, bounds)) == int(doubted)
-    assert len(_warnings(abs(signs), place, bounds)) == int(doubted) + 1
+    position = np.linspace(0, 0.03, 60)
+    texts, ratio = _warnings(signs, position, place)
+    assert (len(texts), ratio) == (int(doubted), 1.0)
+    # The signs of the second do not change, and its spectrum has no low frequencies.
+    assert len(_warnings(abs(signs), position, place)[0]) == int(doubted) + 1
 
 
 @pytest.mark.parametrize("count", [4, 5])

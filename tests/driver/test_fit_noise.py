@@ -437,7 +437,8 @@ def test_gain_is_found_or_known_to_an_extent() -> None:
     # Bayes: what is known and what is measured weigh as 1/variance.
     half = quiet_fit(thud.ForceTarget(louder, gain=free.standard_errors["gain"]), known, case)
     assert half.values["gain"] - 1 == pytest.approx((free.values["gain"] - 1) / 2, rel=0.02)
-    assert half.standard_errors["gain"] == pytest.approx(
+    # The gain is not 1, for which the fit warns.
+    assert half.standard_errors["gain"] / half.widened == pytest.approx(
         free.standard_errors["gain"] / np.sqrt(2), rel=0.02
     )
     without = quiet_fit(louder, known, case)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,15 +11,25 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import least_squares
 
 from thud.base._schema import Ball, Compression
-from thud.base.checks import refuse, require_array, require_real
+from thud.base.checks import refuse, refuse_value, require_array, require_number, require_real
 from thud.base.errors import FitWarning, NumericalError
 from thud.base.extras import require_extra
 from thud.base.key import check_keywords
 from thud.impact.compression import CompressionCurve, compress
 from thud.studies.fitting.estimates import Estimates
-from thud.studies.fitting.inference import require_confidence, runs_warning
+from thud.studies.fitting.inference import (
+    MIN_TESTED,
+    misfit_ratio,
+    require_confidence,
+    residual_warnings,
+    runs_warning,
+)
+from thud.studies.fitting.marginal import Marginal, estimate_marginal
+from thud.studies.fitting.unknowns import PRESS_UNKNOWNS, require_unknowns
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import pandas as pd
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
@@ -32,6 +42,21 @@ if TYPE_CHECKING:
 _POINTS = 81
 _PARAMETERS = 2
 _MIN_DATA = 5
+# Limits of the search: the plates may touch the ball a little before the first point.
+_BOUNDS = ([-np.inf, -0.04], [np.inf, 0.9])
+# Deflection over the span at which friction slides: it rises without a jump.
+_SLIP = 0.01
+# Step of the differences, of the logarithm of the modulus and of the touch over the span; maximum
+# number of steps, and their size over the standard errors at which they end.
+_STEP = 1e-3
+_MAX_STEPS = 20
+_CONVERGED = 0.05
+# Minimum noise over the maximum force: errors of the interpolated curve.
+NUMERICAL = 1e-5
+# Standard deviations above which an unknown is larger than expected, at 0.1 %.
+EXPECTED = 3.3
+# Units of the unknowns.
+_UNITS = {"offset": "N", "drift": "N", "friction": "N", "softening": "", "gain": ""}
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +74,18 @@ class CompressionFit(Estimates):
         The measured curve, m and N.
     curve : CompressionCurve
         The curve of the model, with deflections from first touch.
+    nuisances : dict of str to tuple of float
+        Unknowns of the press and of the rubber and their standard errors, by name: offset, drift
+        over the whole curve and friction, N; softening at the last point, fraction of the force.
+    effects : ndarray, shape (n,)
+        What they add to the force of the model, N.
     """
 
     deflection: Array
     force: Array
     curve: CompressionCurve
+    nuisances: dict[str, tuple[float, float]]
+    effects: Array
 
     def __repr__(self) -> str:
         """Return the modulus and its standard error."""
@@ -65,10 +97,24 @@ class CompressionFit(Estimates):
         with require_extra("studies"):
             import pandas as pd
 
-        model = self.force + self.residuals
         return pd.DataFrame(
-            {"deflection_m": self.deflection, "force_N": self.force, "model_N": model}
+            {
+                "deflection_m": self.deflection,
+                "force_N": self.force,
+                "model_N": self.force + self.residuals - self.effects,
+                "effects_N": self.effects,
+                "residual_N": self.residuals,
+            }
         )
+
+    def table(self) -> str:
+        """Return the fit as text."""
+        lines = [
+            f"{name} {value:.2g} ± {error:.2g} {_UNITS[name]}".rstrip()
+            for name, (value, error) in self.nuisances.items()
+        ]
+        noise = f"{len(self.force)} points; noise of {self.noise:.3g} N"
+        return "\n".join([super().table(), "", ", ".join([noise, *lines]), *self.trust])
 
     def plot(self) -> Figure:
         """Draw the measured curve from first touch on, and that of the model."""
@@ -91,13 +137,15 @@ def fit_compression(  # noqa: PLR0913 - as in `compress`
     model: ModelName | ModelOptions = "finite_element",
     *,
     gas: CompressionGas = Compression.gas,
+    gain: float = 0.0,
+    unknowns: Sequence[str] = tuple(PRESS_UNKNOWNS),
     confidence: float = 0.95,
 ) -> CompressionFit:
     """Estimate the modulus of elasticity of a ball from a compression between two plates.
 
-    Squared residuals of the force are minimized; the deflection at first touch is estimated too.
-    Residuals are assumed to be independent and of equal variance. A warning reports if their signs
-    are not random: the model then does not explain the curve.
+    The deflection at first touch is estimated too. Unknowns of press and rubber, and the color of
+    the noise, are estimated as far as the curve shows them; the intervals include the rest.
+    Warnings report residuals that are not noise, and unknowns that are larger than expected.
 
     Parameters
     ----------
@@ -109,6 +157,11 @@ def fit_compression(  # noqa: PLR0913 - as in `compress`
         The ball, whose modulus starts the search; by default the ball of the paper.
     model, gas
         As in `compress`.
+    gain
+        Relative standard uncertainty of the calibration of the force.
+    unknowns
+        Names of what is not known of press and rubber; none: the curve is that of the model, and
+        noise.
     confidence
         Confidence of the intervals.
 
@@ -127,55 +180,161 @@ def fit_compression(  # noqa: PLR0913 - as in `compress`
     start = Ball() if ball is None else ball
     measured, measured_force = _data(deflection, force)
     require_confidence(confidence)
-    span = float(measured[-1] - measured[0])
-    curves: dict[float, CompressionCurve] = {}
-
-    def curve(modulus: float) -> CompressionCurve:
-        """Return the curve of the model for a modulus, computed once."""
-        if modulus not in curves:
-            curves[modulus] = compress(
-                replace(start, youngs_modulus=modulus), model, max_deflection=1.05 * span,
-                points=_POINTS, gas=gas,
-            )  # fmt: skip
-        return curves[modulus]
-
-    def residuals(x: Array) -> Array:
-        result = curve(float(np.exp(x[0])) * start.youngs_modulus)
-        depth = measured - measured[0] - x[1] * span
-        model_force = PchipInterpolator(result.deflection, result.force)(np.maximum(depth, 0))
-        return np.asarray(model_force - measured_force)
-
-    # The plates may touch the ball a little before the first point.
-    bounds = ([-np.inf, -0.04], [np.inf, 0.9])
-    first = np.array(
-        [np.log(_work_ratio(curve(start.youngs_modulus), measured, measured_force)), 0.0]
-    )
-    best = least_squares(residuals, first, bounds=bounds, x_scale=(1.0, 0.1), xtol=1e-10)
-    if np.linalg.matrix_rank(best.jac) < _PARAMETERS:
-        message = "youngs_modulus has no effect on the force of this model; allowed: another model"
-        raise NumericalError(message)
-    modulus = float(np.exp(best.x[0])) * start.youngs_modulus
-    touch = float(measured[0] + best.x[1] * span)
-    deviation = float(np.sqrt(best.fun @ best.fun / (len(measured_force) - _PARAMETERS)))
-    scale = np.array([modulus, span])
-    covariance = deviation**2 * np.linalg.inv(best.jac.T @ best.jac) * np.outer(scale, scale)
-    result = tuple(_warnings(best.fun, best.x[1], bounds))
-    for text in result:
+    require_unknowns(unknowns, PRESS_UNKNOWNS)
+    _require_gain(gain)
+    problem = _Problem(start, model, gas, measured, measured_force, tuple(unknowns), gain)
+    first = problem.curve(start.youngs_modulus)
+    x = np.array([np.log(_work_ratio(first, measured, measured_force)), 0.0])
+    x = least_squares(
+        problem.residual, x, bounds=_BOUNDS, x_scale=(1.0, 0.1), diff_step=_STEP, xtol=1e-6
+    ).x
+    x, best, converged = _refine(problem, x)
+    added = problem.effects(x) @ best.effect
+    residual = problem.residual(x) + added
+    texts, ratio = _warnings(best.whiten(residual), measured, x[1])
+    if not converged:
+        texts.append("the search has not converged: give another modulus of the ball to start from")
+    for name, value in zip(problem.names, np.abs(best.effect).tolist(), strict=True):
+        if value > EXPECTED:
+            ratio = max(ratio, value)
+            texts.append(f"the {name} is {value:.2g} times as large as expected")
+    for text in texts:
         warnings.warn(text, FitWarning, stacklevel=3)
+    scale = np.array([float(np.exp(x[0])) * start.youngs_modulus, problem.span])
+    errors = np.sqrt(np.diag(best.effect_covariance))
+    nuisances = (problem.sizes * np.array([best.effect, errors])).T.tolist()
     return CompressionFit(
         names=("youngs_modulus", "touch"),
         units=("Pa", "m"),
-        estimate=np.array([modulus, touch]),
-        covariance=covariance,
+        estimate=np.array([scale[0], measured[0] + x[1] * problem.span]),
+        covariance=ratio**2 * best.covariance * np.outer(scale, scale),
         limits=np.array([[-np.inf, np.inf]] * _PARAMETERS),
         confidence=confidence,
-        noise=deviation,
-        residuals=best.fun,
-        warnings=result,
+        noise=best.deviation,
+        residuals=residual,
+        warnings=tuple(texts),
+        assumptions=tuple(problem.assumptions()),
+        widened=ratio,
         deflection=measured,
         force=measured_force,
-        curve=curve(modulus),
+        curve=problem.curve(scale[0]),
+        nuisances=dict(zip(problem.names, map(tuple, nuisances), strict=True)),
+        effects=added,
     )
+
+
+def _refine(problem: _Problem, x: Array) -> tuple[Array, Marginal, bool]:
+    """Return the best x with unknowns and colored noise, and whether the steps have converged."""
+    minimum = NUMERICAL * float(problem.force.max())
+    last, fraction = np.zeros(_PARAMETERS), 1.0
+    for _ in range(_MAX_STEPS):
+        jacobian = problem.jacobian(x)
+        if np.linalg.matrix_rank(jacobian) < _PARAMETERS:
+            message = (
+                "youngs_modulus has no effect on the force of this model; allowed: another model"
+            )
+            raise NumericalError(message)
+        best = estimate_marginal(jacobian, problem.effects(x), problem.residual(x), minimum)
+        # Steps that reverse cross the kink at first touch: shorter ones end there.
+        fraction *= 0.5 if best.shift @ last < 0 else 1.0
+        last = best.shift
+        step = np.clip(x + fraction * best.shift, *_BOUNDS) - x
+        x = x + step
+        if np.all(np.abs(step) < _CONVERGED * np.sqrt(np.diag(best.covariance))):
+            return x, best, True
+    return x, best, False
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """The curve of a model and the effects of unknowns, at x.
+
+    x are the logarithm of the modulus over that of the ball, and the first touch over the span.
+    """
+
+    ball: Ball
+    model: ModelName | ModelOptions
+    gas: CompressionGas
+    deflection: Array
+    force: Array
+    unknowns: tuple[str, ...]
+    gain: float
+    curves: dict[float, CompressionCurve] = field(default_factory=dict)
+
+    @property
+    def span(self) -> float:
+        """Span of the measured deflections, m."""
+        return float(self.deflection[-1] - self.deflection[0])
+
+    def curve(self, modulus: float) -> CompressionCurve:
+        """Return the curve of the model for a modulus, computed once."""
+        if modulus not in self.curves:
+            self.curves[modulus] = compress(
+                replace(self.ball, youngs_modulus=modulus), self.model,
+                max_deflection=1.05 * self.span, points=_POINTS, gas=self.gas,
+            )  # fmt: skip
+        return self.curves[modulus]
+
+    def depth(self, x: Array) -> Array:
+        """Return the compression of the ball, m: [n]."""
+        result: Array = np.maximum(self.deflection - self.deflection[0] - x[1] * self.span, 0)
+        return result
+
+    def residual(self, x: Array) -> Array:
+        """Return model − measured, N: [n]."""
+        curve = self.curve(float(np.exp(x[0])) * self.ball.youngs_modulus)
+        force = PchipInterpolator(curve.deflection, curve.force)(self.depth(x))
+        return np.asarray(force - self.force, dtype=np.float64)
+
+    def jacobian(self, x: Array) -> Array:
+        """Return the derivatives of the residual: [n, 2]."""
+        here = self.residual(x)
+        steps = np.diag([_STEP, _STEP])
+        columns = [(self.residual(x + step) - here) / step.sum() for step in steps]
+        return np.column_stack(columns)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the unknowns, and of the gain if its uncertainty is stated."""
+        chosen = [name for name in PRESS_UNKNOWNS if name in self.unknowns]
+        return (*chosen, *(["gain"] if self.gain else []))
+
+    @property
+    def sizes(self) -> Array:
+        """Standard deviations expected of the unknowns, N, or 1 for softening and gain."""
+        width = {**PRESS_UNKNOWNS, "gain": self.gain}
+        top = float(self.force.max())
+        return np.array([width[name] * (top if _UNITS[name] else 1.0) for name in self.names])
+
+    def effects(self, x: Array) -> Array:
+        """Return the forces that unknowns of their expected sizes add, N: [n, n_unknown]."""
+        depth, model = self.depth(x), self.residual(x) + self.force
+        position = (self.deflection - self.deflection[0]) / self.span
+        shapes = {
+            "offset": np.ones_like(depth),
+            "drift": position,
+            "friction": np.tanh(depth / (_SLIP * self.span)),
+            "softening": -model * depth / max(float(depth[-1]), np.finfo(float).tiny),
+            "gain": model,
+        }
+        columns = [shapes[name] * size for name, size in zip(self.names, self.sizes, strict=True)]
+        return np.column_stack([np.empty((len(depth), 0)), *columns])
+
+    def assumptions(self) -> list[str]:
+        """Return what the intervals include, and what the curve cannot show."""
+        expected = [
+            f"{name} ± {size:.2g} {_UNITS[name]}".rstrip()
+            for name, size in zip(self.names, self.sizes, strict=True)
+        ]
+        result = [
+            f"unknown, in the intervals as far as the curve does not show it: {', '.join(expected)}"
+        ]
+        if not self.gain:
+            result.append(
+                "not in the intervals, and not visible: calibration 1 % high changes "
+                "youngs_modulus +1 %"
+            )
+        return result if expected else result[1:]
 
 
 def _data(deflection: ArrayLike, force: ArrayLike) -> tuple[Array, Array]:
@@ -212,14 +371,22 @@ def _work_ratio(curve: CompressionCurve, measured: Array, measured_force: Array)
     return max(work, 0.01 * float(measured_force[-1] * np.ptp(measured))) / model_work
 
 
-def _warnings(
-    residuals: Array, relative_touch: float, bounds: tuple[list[float], list[float]]
-) -> list[str]:
+def _require_gain(gain: object) -> None:
+    require_number("gain", gain)
+    if not 0 <= gain < 1:  # type: ignore[operator]
+        refuse_value("gain", gain, "0 <= gain < 1")
+
+
+def _warnings(residual: Array, deflection: Array, relative_touch: float) -> tuple[list[str], float]:
+    """Return warnings, and by how much residuals of unit variance that are not noise exceed it."""
     result = []
-    if min(relative_touch - bounds[0][1], bounds[1][1] - relative_touch) < 1e-6:  # noqa: PLR2004 - of the span
+    if min(relative_touch - _BOUNDS[0][1], _BOUNDS[1][1] - relative_touch) < 1e-6:  # noqa: PLR2004 - of the span
         result.append(
             "the first touch lies at the limit of the search: give data from first touch on"
         )
-    if runs := runs_warning(residuals):
-        result.append(f"{runs}: the model does not explain the curve")
-    return result
+    if len(residual) >= MIN_TESTED:
+        doubts = residual_warnings(residual, deflection, "mm")
+    else:
+        doubts = [text for text in [runs_warning(residual)] if text]
+    ratio = misfit_ratio(residual) if doubts else 1.0
+    return [*result, *(f"{text}; the model does not explain the curve" for text in doubts)], ratio

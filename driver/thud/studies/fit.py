@@ -21,6 +21,7 @@ from thud.studies.fitting.inference import require_confidence
 from thud.studies.fitting.ranges import bound_parameters, fitted_parameter, get_ranges
 from thud.studies.fitting.read_target import Target, read_target
 from thud.studies.fitting.search import search
+from thud.studies.fitting.unknowns import UNKNOWNS, require_unknowns
 from thud.studies.kind import Kind
 from thud.studies.study import Study, fix_keys, table_of, with_density
 from thud.studies.surrogate_levels import recompute, surrogate_misfit, within_region
@@ -42,7 +43,13 @@ if TYPE_CHECKING:
     from thud.studies.parameter import Parameter
 
 # Options of a search, and their defaults.
-OPTIONS = {"confidence": 0.95, "starts": 1, "seed": 0, "max_steps": 100}
+OPTIONS: dict[str, Any] = {
+    "confidence": 0.95,
+    "starts": 1,
+    "seed": 0,
+    "max_steps": 100,
+    "unknowns": tuple(UNKNOWNS),
+}
 # Maximum number of starts, and of steps of a search.
 _MAXIMUM = 100_000
 
@@ -57,6 +64,7 @@ def fit(  # noqa: PLR0913 - options of a search
     starts: int = 1,
     seed: int = 0,
     max_steps: int = 100,
+    unknowns: Sequence[str] = tuple(UNKNOWNS),
     surrogate: Surrogate | str | os.PathLike[str] | None = None,
     progress: bool = False,
 ) -> Fit:
@@ -84,6 +92,9 @@ def fit(  # noqa: PLR0913 - options of a search
         Seed of the other starting points.
     max_steps
         Maximum number of steps from each starting point.
+    unknowns
+        What is not known of the ball or the floor of a force: intervals include what the force does
+        not exclude; none: the case is trusted.
     surrogate
         A surrogate, or the path of its file, that predicts the levels of the search instead of the
         model. Its errors add to the uncertainties of the target; the model computes the result.
@@ -111,7 +122,13 @@ def fit(  # noqa: PLR0913 - options of a search
     """
     case = Case() if case is None else case
     require_kind("case", case, Case)
-    options = {"confidence": confidence, "starts": starts, "seed": seed, "max_steps": max_steps}
+    options = {
+        "confidence": confidence,
+        "starts": starts,
+        "seed": seed,
+        "max_steps": max_steps,
+        "unknowns": unknowns,
+    }
     _require_options(options)
     bound = bound_parameters(case, parameters)
     pairs = _pairs(case, _targets(target), {parameter.name for parameter in bound})
@@ -185,6 +202,7 @@ def _require_options(options: Mapping[str, Any]) -> None:
     require_whole("starts", options["starts"], 1, _MAXIMUM)
     require_whole("max_steps", options["max_steps"], 1, _MAXIMUM)
     require_whole("seed", options["seed"], 0, MAX_SEED)
+    require_unknowns(options["unknowns"], UNKNOWNS)
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,11 @@ class Estimates(StudyResult):
         Model minus measured values.
     warnings : tuple of str
         Why estimates or intervals may be wrong.
+    assumptions : tuple of str
+        Which unknowns the intervals include, and the effect of errors that no data can show.
+    widened : float
+        Factor of the standard errors due to noise and unknowns, because residuals, or unknowns of a
+        press, are larger than expected; 1 without a warning.
     """
 
     names: tuple[str, ...]
@@ -51,6 +56,8 @@ class Estimates(StudyResult):
     noise: float
     residuals: Array
     warnings: tuple[str, ...]
+    assumptions: tuple[str, ...]
+    widened: float
 
     @property
     def values(self) -> dict[str, float]:
@@ -99,6 +106,14 @@ class Estimates(StudyResult):
         """Name of the unit in tables and figures, and how many SI units it is, by parameter."""
         pairs = zip(self.values.items(), self.units, strict=True)
         return {name: display_unit(unit, value) for (name, value), unit in pairs}
+
+    @property
+    def trust(self) -> tuple[str, ...]:
+        """Lines of text on what the intervals include."""
+        if self.widened == 1:
+            return self.assumptions
+        text = f"intervals widened {self.widened:.3g} times, see the warnings"
+        return (*self.assumptions, text)
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""

@@ -197,7 +197,7 @@ class Fit(Estimates):
             ]
             label = f"target {number}: " if len(deviations) > 1 else ""
             lines += [f"{label}{', '.join(parts)}"] if parts else []
-        lines += self.identifiability
+        lines += [*self.identifiability, *self.trust]
         return [*lines, f"{self.evaluations} impacts computed{failures}"]
 
     def deviation_of(self, target: FittedTarget) -> float:
@@ -248,6 +248,8 @@ class Fit(Estimates):
                 for target in self.targets
             ],
             "identifiability": list(self.identifiability),
+            "assumptions": list(self.assumptions),
+            "widened": self.widened,
             "evaluations": self.evaluations,
             "failures": self.failures,
             "converged": self.converged,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ from scipy.signal import ZoomFFT
 from thud.base.checks import refuse
 from thud.base.immutable import freeze
 from thud.impact.impact import Impact
-from thud.studies.fitting.inference import UNLIKELY, residual_warnings
+from thud.studies.fitting.inference import UNLIKELY, misfit_ratio, residual_warnings
 from thud.studies.fitting.misfit import GAIN, SHIFT, Misfit
 from thud.studies.fitting.record_noise import (
     MIN_BACKGROUND,
@@ -40,6 +41,8 @@ MIN_FREEDOM = 5
 NUMERICAL = 1e-4
 # Standard errors above which hum is reported; noise exceeds them with the probability UNLIKELY.
 NOTABLE = float(np.sqrt(-2 * np.log(UNLIKELY)))
+# Relative errors of clock and calibration whose effect a fit states.
+CLOCK, CALIBRATION = 1e-3, 1e-2
 # Scale of a shift in time, s.
 SHIFT_SCALE = 1e-3
 
@@ -48,6 +51,7 @@ class ForceMisfit(Misfit):
     """How far the force of an impact is from a record, by frequency."""
 
     deviation_unit = "N"
+    has_unknowns = True
     deviation_source = "noise, or 50 independent values of background,"
 
     def __init__(self, target: ForceTarget, record: Record, pulse: tuple[int, int]) -> None:
@@ -228,25 +232,65 @@ class ForceMisfit(Misfit):
 
         Weighted noise is stationary and independent; errors of the model occur during contact only.
         """
-        difference = self._grid(self.spectrum - self.model_spectrum(impact, own))
-        unexplained = difference - self.weights.background(difference)
-        if np.sqrt(np.mean(unexplained**2)) < NUMERICAL * self.force.max():
+        if self.is_exact(impact, own):
             return []
+        difference = self._grid(self.spectrum - self.model_spectrum(impact, own))
         weighted = self.weights.matrix @ difference / deviation
-        time = self.time[0] + np.arange(self.count) * self.period / self.count
-        begin = self.value(SHIFT, own)
-        inside = (time >= begin) & (time <= begin + impact.contact_time)
+        time, inside = self._grid_time, self._inside(impact, own)
+        begin, end = self._contact(impact, own)
         unit = deviation * self.unit_deviation
         result = _contact_warning(weighted, inside, count, unit)
         if not result:
             result = residual_warnings(weighted, time)
-            result += _change_warning(weighted, time < begin, time > begin + impact.contact_time)
+            result += _change_warning(weighted, time < begin, time > end)
         if not (self.background_record.known or self.target.offset is not None or self.exact):
             result.append(
                 f"the background lasts {1e3 * self.background_record.seconds:.3g} ms: offset, hum "
                 "and color of the noise are not known, and the intervals hold for white noise alone"
             )
         return result
+
+    def effect(self, impact: Impact, other: Impact, own: Array) -> Array:
+        """Return the change of the residual by another impact; on a mobile floor by its force."""
+        return super().effect(impact, other.on_floor or other, own)
+
+    def assumed(self, impact: Impact, own: Array) -> dict[str, Array]:
+        """Return the changes of the residual by errors of clock and calibration."""
+        slow = 1 + CLOCK
+        stretched = replace(impact, time=impact.time * slow, sample_rate=impact.sample_rate / slow)
+        result = {f"clock {100 * CLOCK:g} % fast": self.effect(impact, stretched, own)}
+        if GAIN not in self.own:
+            model = self._grid(self.model_spectrum(impact, own))
+            change = self._with_prior(self.weights.matrix @ (CALIBRATION * model), 0.0)
+            result[f"calibration {100 * CALIBRATION:g} % high"] = change
+        return result
+
+    def is_exact(self, impact: Impact, own: Array) -> bool:
+        """Return whether residuals are too small to be tested: numerical errors."""
+        difference = self._grid(self.spectrum - self.model_spectrum(impact, own))
+        unexplained = difference - self.weights.background(difference)
+        return bool(np.sqrt(np.mean(unexplained**2)) < NUMERICAL * self.force.max())
+
+    def excess(self, impact: Impact, own: Array, residual: Array) -> float:
+        """Return by how much residuals exceed noise, of the whole record or during contact."""
+        inside = residual[: self.count][self._inside(impact, own)]
+        return max(misfit_ratio(part) for part in (residual, inside) if len(part) > MIN_FREEDOM)
+
+    @cached_property
+    def _grid_time(self) -> Array:
+        """Times of the residuals, s."""
+        result: Array = self.time[0] + np.arange(self.count) * self.period / self.count
+        return result
+
+    def _inside(self, impact: Impact, own: Array) -> NDArray[np.bool_]:
+        """Return which residuals lie in the contact."""
+        begin, end = self._contact(impact, own)
+        return (self._grid_time >= begin) & (self._grid_time <= end)
+
+    def _contact(self, impact: Impact, own: Array) -> tuple[float, float]:
+        """Return begin and end of the contact, s."""
+        begin = self.value(SHIFT, own)
+        return begin, begin + impact.contact_time
 
     def history(self, spectrum: NDArray[np.complex128]) -> Array:
         """Return the history of a transform, N, shape (n_sample,)."""
@@ -273,7 +317,7 @@ def _contact_warning(
     text = (
         f"the residual is {unit * np.sqrt(square):.3g} N during the contact and "
         f"{unit * np.sqrt(outside):.3g} N otherwise: the model differs from the force by more than "
-        "the noise, and the intervals are too narrow"
+        "the noise"
     )
     return [text]
 
@@ -291,6 +335,6 @@ def _change_warning(
         return []
     text = (
         f"the residuals are {np.sqrt(ratio):.3g} times as large after the contact as before it: "
-        "the noise is not the same throughout, and the intervals do not hold"
+        "the noise is not the same throughout"
     )
     return [text]

@@ -36,6 +36,8 @@ INSEPARABLE = 0.998
 UNLIKELY = 1e-3
 # Fewer residuals are not tested.
 MIN_TESTED = 20
+# Number of bands of frequency in which the size of residuals is determined.
+N_BAND = 4
 # Fraction of the maximum entry below which a message omits a parameter.
 SMALL = 0.05
 
@@ -52,11 +54,14 @@ class Inference:
         Of the Jacobian with columns of unit length, in descending order.
     null : ndarray, shape (n_null, n)
         Changes that leave the residuals as they are, of the fewest parameters.
+    inverse : ndarray, shape (n, m)
+        Pseudoinverse of the Jacobian.
     """
 
     covariance: Array
     singular_values: Array
     null: Array
+    inverse: Array
 
 
 def infer(jacobian: Array, finer: Array, size: float) -> Inference:
@@ -71,15 +76,71 @@ def infer(jacobian: Array, finer: Array, size: float) -> Inference:
     dead = (length <= NO_EFFECT * size) | (change > UNRESOLVED * length)
     length[dead] = 1.0
     error = np.max(change / length, where=~dead, initial=0.0)
-    _, values, turned = np.linalg.svd(np.where(dead, 0.0, jacobian / length), full_matrices=True)
-    values = np.concatenate([values, np.zeros(count - len(values))])
+    rows = len(jacobian)
+    relative = np.pad(np.where(dead, 0.0, jacobian / length), ((0, max(0, count - rows)), (0, 0)))
+    left, values, turned = np.linalg.svd(relative, full_matrices=False)
     lost = values <= max(MIN_RATIO, ERRORS * error) * values[0]
     known = turned[~lost] / values[~lost, np.newaxis]
     covariance = known.T @ known / np.outer(length, length)
     unknown = (np.abs(turned[lost]) > NEGLIGIBLE).any(axis=0)
     covariance[unknown] = covariance[:, unknown] = np.nan
     covariance[unknown, unknown] = np.inf
-    return Inference(covariance, values, _sparse(turned[lost] / length))
+    inverse = known.T @ left[:rows, ~lost].T / length[:, np.newaxis]
+    return Inference(covariance, values, _sparse(turned[lost] / length), inverse)
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Sizes of effects that a model leaves out, each with a normal prior of mean 0 and variance 1.
+
+    Attributes
+    ----------
+    visible : ndarray, shape (m, n_effect)
+        Effects on the residuals of unit variance that no change of the parameters makes.
+    mean : ndarray, shape (n_effect,)
+        Posterior means.
+    covariance : ndarray, shape (n_effect, n_effect)
+        Posterior covariance.
+    response : ndarray, shape (n, n_effect)
+        Change of the best parameters by a unit of each effect.
+    evidence : float
+        Logarithm of the likelihood of the residuals, up to a constant.
+    """
+
+    visible: Array
+    mean: Array
+    covariance: Array
+    response: Array
+    evidence: float
+
+    @property
+    def shift(self) -> Array:
+        """Change of the best parameters by the effects, (n,)."""
+        return np.asarray(self.response @ self.mean)
+
+    @property
+    def spread(self) -> Array:
+        """Covariance of the parameters due to what is not known of the effects, (n, n)."""
+        return np.asarray(self.response @ self.covariance @ self.response.T)
+
+
+def posterior(jacobian: Array, inverse: Array, effects: Array, residual: Array) -> Posterior:
+    """Return the sizes of effects in residuals, model minus target, of unit variance.
+
+    `inverse` is the pseudoinverse of the Jacobian, shape (m, n), of the parameters.
+    """
+    response = -inverse @ effects
+    visible = effects + jacobian @ response
+    # Rows of zeros make the axes complete.
+    extra = max(0, effects.shape[1] - len(residual))
+    left, size, axes = np.linalg.svd(np.pad(visible, ((0, extra), (0, 0))), full_matrices=False)
+    seen = left[: len(residual)].T @ residual
+    mean = -axes.T @ (size / (1 + size**2) * seen)
+    covariance = axes.T / (1 + size**2) @ axes
+    rest = residual - jacobian @ (inverse @ residual)
+    square = rest @ rest - seen**2 @ (size**2 / (1 + size**2))
+    evidence = -0.5 * float(square + np.log1p(size**2).sum())
+    return Posterior(visible, mean, covariance, response, evidence)
 
 
 def _sparse(rows: Array) -> Array:
@@ -211,11 +272,28 @@ def require_confidence(confidence: object) -> None:
         refuse_value("confidence", confidence, "0 < confidence < 1")
 
 
-def residual_warnings(residual: Array, time: Array) -> list[str]:
-    """Return warnings if residuals at equally spaced times, s, are not independent noise."""
+def misfit_ratio(residual: Array) -> float:
+    """Return the root mean square of residuals of unit variance; at least 1.
+
+    Of four bands of frequency that with the largest residuals counts: a model is wrong in one.
+    """
+    power = np.abs(np.fft.rfft(residual)[1:]) ** 2 / len(residual)
+    bands = [band.mean() for band in np.array_split(power, N_BAND) if len(band)]
+    return float(np.sqrt(max(1.0, np.mean(residual**2), *bands)))
+
+
+def residual_warnings(residual: Array, position: Array, unit: str = "ms") -> list[str]:
+    """Return warnings if residuals at uniform times, s, or positions, m, are not independent noise.
+
+    `unit` is a thousandth of that of the position.
+    """
     if len(residual) < MIN_TESTED:
         return []
-    result = (_color_warning(residual), _outlier_warning(residual, time), runs_warning(residual))
+    result = (
+        _color_warning(residual),
+        _outlier_warning(residual, position, unit),
+        runs_warning(residual),
+    )
     return [text for text in result if text]
 
 
@@ -231,19 +309,19 @@ def _color_warning(residual: Array) -> str:
     return (
         f"the residuals are colored: half of their power lies in the {side}est "
         f"{min(fraction, 1 - fraction):.0%} of the compared frequencies: the noise is not as "
-        "assumed or the model is wrong, and the intervals do not hold"
+        "assumed or the model is wrong"
     )
 
 
-def _outlier_warning(residual: Array, time: Array) -> str:
+def _outlier_warning(residual: Array, position: Array, unit: str) -> str:
     """Test the largest of n normal residuals by n times its probability (Bonferroni)."""
     index = int(np.argmax(np.abs(residual)))
     size = abs(float(residual[index]))
     if 2 * len(residual) * stats.norm.sf(size) > UNLIKELY:
         return ""
     return (
-        f"the largest residual, at {1e3 * time[index]:.4g} ms, is {size:.3g} standard deviations: "
-        "it is not noise, and the intervals do not hold"
+        f"the largest residual, at {1e3 * position[index]:.4g} {unit}, is {size:.3g} standard "
+        "deviations: it is not noise"
     )
 
 
@@ -262,5 +340,5 @@ def runs_warning(residual: Array) -> str:
         return ""
     return (
         f"the residuals change their sign {runs - 1} times where {expected - 1:.0f} are expected: "
-        "they are not independent, and the intervals do not hold"
+        "they are not independent"
     )

@@ -49,6 +49,8 @@ class Misfit(ABC):
         Unit and scale of each parameter of its own, by name.
     step : float
         Relative step of the differences that are the derivatives of the residuals.
+    has_unknowns : bool
+        The unknowns of a source count; else the standard deviations include them.
     """
 
     size: int
@@ -58,6 +60,7 @@ class Misfit(ABC):
     deviation_source: ClassVar[str]
     own: Mapping[str, tuple[str, float]]
     step: float = STEP
+    has_unknowns: ClassVar[bool] = False
 
     @property
     def unit_deviation(self) -> float:
@@ -97,6 +100,22 @@ class Misfit(ABC):
     def own_start(self, impact: Impact) -> Array:  # noqa: ARG002
         """Return its own parameters to start from."""
         return np.empty(0)
+
+    def effect(self, impact: Impact, other: Impact, own: Array) -> Array:
+        """Return the change of the residual if the impact was another one, shape (size,)."""
+        return self.residual(other, own) - self.residual(impact, own)
+
+    def assumed(self, impact: Impact, own: Array) -> dict[str, Array]:  # noqa: ARG002
+        """Return the changes of the residual by errors that no data can show, by their names."""
+        return {}
+
+    def is_exact(self, impact: Impact, own: Array) -> bool:  # noqa: ARG002
+        """Return whether residuals are too small to be tested: numerical errors."""
+        return False
+
+    def excess(self, impact: Impact, own: Array, residual: Array) -> float:  # noqa: ARG002
+        """Return by how much residuals exceed noise of unit variance; at least 1."""
+        return max(1.0, float(np.sqrt(np.mean(residual**2))))
 
     def nuisances(self, impact: Impact, own: Array) -> dict[str, tuple[float, float]]:  # noqa: ARG002
         """Return nuisance parameters and their standard errors, N, by name."""

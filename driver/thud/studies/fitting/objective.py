@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from thud.base.errors import NumericalError, ThudError
 from thud.case.keys import with_values
+from thud.studies.fitting.unknowns import alternatives
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from numpy.typing import NDArray
     from tqdm import tqdm
 
@@ -37,6 +41,25 @@ def new_terms(targets: list[tuple[Case, Misfit]], count: int) -> list[Term]:
         terms.append(Term(case, misfit, slice(count, stop)))
         count = stop
     return terms
+
+
+class Effects(NamedTuple):
+    """What the alternatives to a case change, as effects with a standard deviation of 1.
+
+    Attributes
+    ----------
+    labels : tuple of (str, str)
+        Unknown and alternative.
+    columns : ndarray, shape (n_residual, n)
+        Changes of the residuals; divided by the root of the number of alternatives to an unknown,
+        so that the variance of an unknown is their mean square.
+    failures : tuple of str
+        Alternatives that cannot be computed.
+    """
+
+    labels: tuple[tuple[str, str], ...]
+    columns: Array
+    failures: tuple[str, ...]
 
 
 class Objective:
@@ -106,6 +129,36 @@ class Objective:
         for i in range(self.count):
             jacobian[:, i] = self._column(x, i, step, here)
         return jacobian
+
+    def effects(self, x: Array, unknowns: Collection[str]) -> Effects:
+        """Return the changes of the residuals by the alternatives to a case."""
+        impacts = self.impacts(x)
+        fitted = [entry.name for entry in self.ranges]
+        columns: dict[tuple[str, str], Array] = {}
+        failures: list[str] = []
+        first, size = 0, sum(term.misfit.size for term in self.terms)
+        for term, impact in zip(self.terms, impacts, strict=True):
+            rows = slice(first, first + term.misfit.size)
+            first = rows.stop
+            if not term.misfit.has_unknowns:
+                continue
+            for unknown, label, case in alternatives(self.case_at(term, x), unknowns, fitted):
+                column = columns.setdefault((unknown, label), np.zeros(size))
+                self.evaluations += 1
+                self.bar.update()
+                try:
+                    other = term.misfit.solve(case)
+                except ThudError as error:
+                    failures.append(
+                        f"{label} cannot be computed: the {unknown} counts as known ({error})"
+                    )
+                    continue
+                column[rows] = term.misfit.effect(impact, other, self.own_values(term, x))
+        count = Counter(unknown for unknown, _ in columns)
+        weighted = [column / np.sqrt(count[key[0]]) for key, column in columns.items()]
+        return Effects(
+            tuple(columns), np.column_stack([np.empty((size, 0)), *weighted]), tuple(failures)
+        )
 
     def _column(self, x: Array, i: int, step: float, here: Array) -> Array:
         """Return the derivative by one parameter; one-sided if the other side fails."""

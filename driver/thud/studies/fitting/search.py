@@ -18,18 +18,20 @@ from thud.studies.fitting.inference import (
     INSEPARABLE,
     UNLIKELY,
     Inference,
+    Posterior,
     coverage_factor,
     identifiability,
     infer,
     null_message,
     pair_messages,
+    posterior,
     weak_message,
     worst_directions,
 )
-from thud.studies.fitting.objective import Objective, new_terms
+from thud.studies.fitting.objective import Effects, Objective, new_terms
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Collection, Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -44,6 +46,8 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-8
 # A parameter closer to a limit than this, relative, lies at it.
 AT_LIMIT = 1e-4
+# Minimum effect of an alternative, in standard deviations of a residual, that is tested.
+VISIBLE = 1e-3
 # Relative half interval above which a parameter is hardly identifiable.
 WIDE = 0.5
 
@@ -57,7 +61,7 @@ def search(
 ) -> Fit:
     """Return the best fit of the parameters of cases to their targets.
 
-    `options` are confidence, starts, seed and max_steps of `thud.fit`.
+    `options` are confidence, starts, seed, max_steps and unknowns of `thud.fit`.
     """
     terms = new_terms(targets, len(ranges))
     _require_data(terms, len(ranges))
@@ -65,7 +69,9 @@ def search(
         objective = Objective(terms, ranges, bar)
         starts = _starts(ranges, int(options["starts"]), options["seed"])
         x, converged = _search(objective, starts, int(options["max_steps"]))
-        return _new_fit(objective, x, options["confidence"], converged=converged)
+        return _new_fit(
+            objective, x, options["confidence"], options["unknowns"], converged=converged
+        )
 
 
 def _require_data(terms: list[Term], count: int) -> None:
@@ -138,7 +144,9 @@ def _minimize(objective: Objective, start: Array, max_steps: int) -> OptimizeRes
     )
 
 
-def _new_fit(objective: Objective, x: Array, confidence: float, *, converged: bool) -> Fit:
+def _new_fit(
+    objective: Objective, x: Array, confidence: float, unknowns: Collection[str], *, converged: bool
+) -> Fit:
     residual = objective.residual(x)
     impacts = objective.impacts(x)
     if not impacts:
@@ -157,7 +165,15 @@ def _new_fit(objective: Objective, x: Array, confidence: float, *, converged: bo
     if not all(misfit.known_noise for misfit in misfits):
         minimum = np.finfo(float).eps * target_size / np.sqrt(len(residual))
         deviation = max(float(np.sqrt(residual @ residual / freedom)), minimum)
-    size = deviation * relative * objective.scale
+    effects = objective.effects(x, unknowns)
+    wrong = posterior(
+        jacobian * relative / deviation,
+        inferred.inverse * deviation,
+        effects.columns / deviation,
+        residual / deviation,
+    )
+    noise = inferred.covariance * deviation**2
+    size = relative * objective.scale
     own = {
         name if len(terms) == 1 else f"{name}({number})": unit
         for number, misfit in enumerate(misfits, start=1)
@@ -167,7 +183,7 @@ def _new_fit(objective: Objective, x: Array, confidence: float, *, converged: bo
         names=(*(entry.name for entry in objective.ranges), *own),
         units=(*(entry.unit for entry in objective.ranges), *own.values()),
         estimate=x * objective.scale,
-        covariance=inferred.covariance * np.outer(size, size),
+        covariance=noise * np.outer(size, size),
         limits=np.column_stack([objective.low, objective.high]) * objective.scale[:, np.newaxis],
         singular_values=inferred.singular_values,
         confidence=float(confidence),
@@ -178,6 +194,8 @@ def _new_fit(objective: Objective, x: Array, confidence: float, *, converged: bo
         failures=objective.failures,
         converged=converged,
         warnings=(),
+        assumptions=(),
+        widened=1.0,
         given_units={r.name: r.given_unit for r in objective.ranges if r.given_unit},
         identifiability=(),
         targets=tuple(
@@ -187,10 +205,69 @@ def _new_fit(objective: Objective, x: Array, confidence: float, *, converged: bo
             for term, impact in zip(terms, impacts, strict=True)
         ),
     )
-    spread = inferred.covariance * deviation**2
-    texts = _warnings(objective, fit, x, inferred, spread)
-    text = identifiability(fit.names, spread, fit.correlation, count)
-    return replace(fit, warnings=tuple(texts), identifiability=tuple(text))
+    texts = _warnings(objective, fit, x, inferred, noise)
+    residual_texts, ratio = _residual_warnings(fit, fit.residuals + wrong.visible @ wrong.mean)
+    texts += residual_texts
+    texts += effects.failures
+    if not all(target.misfit.is_exact(target.impact, target.own) for target in fit.targets):
+        texts += _effect_warning(effects, wrong, fit)
+    text = identifiability(fit.names, noise, fit.correlation, count)
+    # The second moment of the posterior about the estimate, for which the case is as assumed.
+    spread = ratio**2 * (noise + wrong.spread) + np.outer(wrong.shift, wrong.shift)
+    return replace(
+        fit,
+        covariance=spread * np.outer(size, size),
+        widened=ratio,
+        warnings=tuple(texts),
+        identifiability=tuple(text),
+        assumptions=tuple(_assumptions(objective, fit, inferred, noise, effects)),
+    )
+
+
+def _effect_warning(effects: Effects, wrong: Posterior, fit: Fit) -> list[str]:
+    """Return a warning if residuals contain the effect of an alternative to the case."""
+    length = np.linalg.norm(wrong.visible, axis=0)
+    seen = length > VISIBLE
+    if not seen.any():
+        return []
+    size = np.abs(fit.residuals @ wrong.visible[:, seen]) / length[seen]
+    freedom = fit.interval_freedom
+    tail = 2 * (stats.norm.sf(size) if freedom is None else stats.t.sf(size, freedom))
+    index = int(np.argmax(size))
+    if tail[index] * len(size) > UNLIKELY:
+        return []
+    unknown, label = np.array(effects.labels)[seen][index]
+    text = (
+        f"the residuals contain the effect of {label} ({size[index]:.3g} standard errors): the "
+        f"{unknown} is not as assumed, and the intervals include the difference"
+    )
+    return [text]
+
+
+def _assumptions(
+    objective: Objective, fit: Fit, inferred: Inference, noise: Array, effects: Effects
+) -> list[str]:
+    """Return what the intervals include, and what no data can show, with its effect."""
+    count = objective.count
+    names = fit.names[:count]
+    result = []
+    if effects.labels:
+        errors = np.sqrt(np.diag(noise)[:count])
+        listed = ", ".join(f"{n} {100 * e:.2g} %" for n, e in zip(names, errors, strict=True))
+        unknowns = ", ".join(dict.fromkeys(unknown for unknown, _ in effects.labels))
+        result.append(f"unknown, in the intervals: {unknowns}; noise alone: {listed}")
+    changes: dict[str, Array] = {}
+    first = 0
+    for target in fit.targets:
+        rows = slice(first, first + target.misfit.size)
+        first = rows.stop
+        for name, change in target.misfit.assumed(target.impact, target.own).items():
+            changes.setdefault(name, np.zeros(len(fit.residuals)))[rows] = change
+    for name, change in changes.items():
+        shifts = (inferred.inverse @ change)[:count]
+        listed = ", ".join(f"{n} {100 * v:+.2g} %" for n, v in zip(names, shifts, strict=True))
+        result.append(f"not in the intervals, and not visible: {name} changes {listed}")
+    return result
 
 
 def _warnings(
@@ -221,18 +298,30 @@ def _warnings(
                 f"{entry.name} ended at its limit, {limit / factor:g} {unit}".rstrip()
                 + ": its interval is cut there, and all intervals hold inside the limits only"
             )
+    return result
+
+
+def _residual_warnings(fit: Fit, unexplained: Array) -> tuple[list[str], float]:
+    """Return warnings of residuals that are not noise, and by how much the latter exceed it.
+
+    `unexplained` are the residuals without the effects of unknowns.
+    """
+    result, ratio = [], 1.0
     first = 0
     deviation = fit.noise / fit.targets[0].misfit.unit_deviation
     for number, target in enumerate(fit.targets, start=1):
         misfit = target.misfit
-        residuals = fit.residuals[first : first + misfit.size]
-        first += misfit.size
-        shared = len(fit.names) / len(fit.targets)
-        own = _size_warning(misfit, residuals, misfit.size - misfit.absorbed - shared)
+        rows = slice(first, first + misfit.size)
+        first = rows.stop
+        freedom = misfit.size - misfit.absorbed - len(fit.names) / len(fit.targets)
+        own = _size_warning(misfit, fit.residuals[rows], freedom)
         own += misfit.warnings(target.impact, target.own, deviation, len(fit.names))
+        if own:
+            excess = misfit.excess(target.impact, target.own, unexplained[rows])
+            ratio = max(ratio, excess * float(np.sqrt(misfit.size / max(freedom, 1.0))))
         prefix = "" if len(fit.targets) == 1 else f"target {number}: "
         result += [f"{prefix}{text}" for text in own]
-    return result
+    return result, ratio
 
 
 def _size_warning(misfit: Misfit, residuals: Array, freedom: float) -> list[str]:

@@ -1,0 +1,109 @@
+"""Unknowns of a source: assumptions of a case that its force history cannot confirm.
+
+Each unknown is a list of alternatives to the case. The differences of force that they make are
+directions in which the model may be wrong, by about as much as the alternatives are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+from thud.base._schema import FiniteElement, InfinitePlate, ModalBall
+from thud.base.checks import refuse_unknown, refuse_value, shown
+from thud.case.keys import with_values
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Mapping
+
+    from thud.case.case import Case
+
+# Orders of the damping laws of rubber; 1: Kelvin–Voigt.
+ORDERS = (0.2, 0.6, 1.0)
+# Driving-point resistance of a slab, N s/m: concrete of 75 mm. A force plate stands on more.
+RESISTANCE = 1e5
+
+
+class Alternative(NamedTuple):
+    """A case with another assumption about one of its unknowns, in words."""
+
+    unknown: str
+    label: str
+    case: Case
+
+
+def _damping_law(case: Case) -> list[dict[str, object]]:
+    name = ""
+    if isinstance(case.model, ModalBall):
+        name = "damping_law"
+    elif isinstance(case.model, FiniteElement) and case.model.viscosity not in {"none", "prony"}:
+        name = "viscosity"
+    return [{name: "fractional", "fractional_order": order} for order in ORDERS if name]
+
+
+def _friction(case: Case) -> list[dict[str, object]]:
+    if isinstance(case.model, ModalBall):
+        return [{"floor_friction": "stick" if case.model.floor_friction == "none" else "none"}]
+    if isinstance(case.model, FiniteElement):
+        return [{"friction": 0.0 if case.model.friction else 1.0}]
+    return []
+
+
+def _gravity(case: Case) -> list[dict[str, object]]:
+    if isinstance(case.model, ModalBall):
+        return [{"contact_gravity": not case.model.contact_gravity}]
+    return []
+
+
+def _floor(case: Case) -> list[dict[str, object]]:
+    if isinstance(case.model, ModalBall | FiniteElement):
+        return [{"resistance": RESISTANCE}]
+    return []
+
+
+# Values of keys that a case may have instead of its own, by unknown. Shell and lumped models have
+# none: they are farther from a force than these alternatives are from each other.
+UNKNOWNS: Mapping[str, Callable[[Case], list[dict[str, object]]]] = {
+    "damping law": _damping_law,
+    "friction": _friction,
+    "gravity": _gravity,
+    "floor": _floor,
+}
+# Keys that, if they are fitted, take the place of an unknown.
+_FITTED = {"fractional_order": "damping law", "friction": "friction"}
+
+
+# Standard deviations of the unknowns of a press and of rubber in it: of offset, drift over the
+# curve and friction over the maximum force, of the relative softening at the last point.
+PRESS_UNKNOWNS: Mapping[str, float] = {
+    "offset": 0.01,
+    "drift": 0.01,
+    "friction": 0.005,
+    "softening": 0.05,
+}
+
+
+def require_unknowns(unknowns: object, known: Collection[str]) -> None:
+    """Raise InputError where unknowns are not a list of known names."""
+    if not isinstance(unknowns, list | tuple):
+        refuse_value("unknowns", unknowns, f"a list of {', '.join(known)}")
+    refuse_unknown("unknowns", unknowns, known)
+
+
+def alternatives(
+    case: Case, unknowns: Collection[str], fitted: Collection[str]
+) -> list[Alternative]:
+    """Return the alternatives to a case that its unknowns allow, if some keys are fitted."""
+    known = {_FITTED[name] for name in fitted if name in _FITTED}
+    rigid = replace(case, floor=None, room=None)
+    on_plate = replace(rigid, floor=InfinitePlate())
+    return [
+        Alternative(
+            name,
+            " and ".join(f"{key} {shown(value)}" for key, value in values.items()),
+            with_values(on_plate if name == "floor" else rigid, values),
+        )
+        for name in UNKNOWNS
+        if name in unknowns and name not in known
+        for values in UNKNOWNS[name](case)
+    ]

@@ -1,0 +1,206 @@
+"""Fits whose case may be wrong: intervals include what the force does not exclude, or a warning."""
+
+from __future__ import annotations
+
+import json
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import naming, quiet_fit
+
+import thud
+from thud.case.keys import with_values
+from thud.studies.fitting import misfit
+from thud.studies.fitting.inference import misfit_ratio, posterior
+from thud.studies.fitting.unknowns import ORDERS, UNKNOWNS, alternatives
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "validation"))
+from fit_assumptions import ASSUMED, BACKGROUND, RATE, START, TRUTH, record
+
+
+def miss(fit: thud.Fit) -> float:
+    """Return the largest error over its standard error."""
+    return max(abs(fit.values[name] - TRUTH[name]) / fit.standard_errors[name] for name in TRUTH)
+
+
+def test_effects_are_those_of_a_regression_with_their_priors() -> None:
+    """Parameters and effects of normal priors in one least-squares problem, a row per prior."""
+    rng = np.random.default_rng(1)
+    jacobian, effects = rng.normal(size=(12, 2)), rng.normal(size=(12, 3))
+    residual = rng.normal(size=12)
+    inverse = np.linalg.pinv(jacobian)
+    found = posterior(jacobian, inverse, effects, residual)
+    rows = np.vstack([np.hstack([jacobian, effects]), np.hstack([np.zeros((3, 2)), np.eye(3)])])
+    best, (square,), *_ = np.linalg.lstsq(rows, -np.append(residual, np.zeros(3)))
+    covariance = np.linalg.inv(rows.T @ rows)
+    np.testing.assert_allclose(found.mean, best[2:])
+    np.testing.assert_allclose(found.shift - inverse @ residual, best[:2])
+    np.testing.assert_allclose(found.covariance, covariance[2:, 2:])
+    noise = np.linalg.inv(jacobian.T @ jacobian)
+    np.testing.assert_allclose(noise + found.spread, covariance[:2, :2])
+    # What is left of the data, and the volume of the posterior over that of the prior.
+    volume = np.linalg.slogdet(found.covariance)[1]
+    assert found.evidence == pytest.approx(-0.5 * (square - volume))
+
+
+def test_more_effects_than_residuals_have_their_priors() -> None:
+    effects = np.array([[1.0, 2.0, 0.0]])
+    found = posterior(np.zeros((1, 1)), np.zeros((1, 1)), effects, np.array([6.0]))
+    np.testing.assert_allclose(found.mean, [-1, -2, 0])
+    expected = np.eye(3) - effects.T @ effects / 6
+    np.testing.assert_allclose(found.covariance, expected, atol=1e-12)
+
+
+def test_alternatives_differ_from_the_case_in_one_unknown() -> None:
+    found = alternatives(ASSUMED, UNKNOWNS, ())
+    assert [entry.unknown for entry in found] == [
+        *["damping law"] * len(ORDERS), "friction", "gravity", "floor"
+    ]  # fmt: skip
+    assert [entry.case.model.fractional_order for entry in found[:3]] == list(ORDERS)  # type: ignore[union-attr]
+    assert found[-1].case.floor is not None
+    # A parameter that is fitted is none of them.
+    assert len(alternatives(ASSUMED, UNKNOWNS, ["fractional_order"])) == 3
+    assert [entry.unknown for entry in alternatives(ASSUMED, ["gravity"], ())] == ["gravity"]
+    elastic = thud.Case(model=thud.FiniteElement(viscosity="none"))
+    found = alternatives(elastic, UNKNOWNS, ())
+    assert [entry.label for entry in found] == ["friction 1.0", "resistance 100000.0"]
+    assert not alternatives(thud.Case(), UNKNOWNS, ())
+
+
+@pytest.mark.parametrize("name", ["order 0.7", "gravity"])
+def test_wrong_assumption_does_not_pass_in_silence(name: str) -> None:
+    """Of 5 % of noise; the trusting fit misses without a word."""
+    drop = record(name, np.random.default_rng(3), 0.05)
+    trusting = thud.fit(drop, START, ASSUMED, unknowns=())
+    assert not trusting.warnings
+    assert miss(trusting) > 3
+    fit = thud.fit(drop, START, ASSUMED)
+    assert miss(fit) < 3
+    # The estimate is that of the case.
+    assert fit.values == pytest.approx(trusting.values)
+
+
+def test_clear_effect_of_an_alternative_warns_and_widens() -> None:
+    drop = record("order 0.7", np.random.default_rng(1), 0.005)
+    with warnings.catch_warnings(record=True):
+        warnings.simplefilter("always")
+        fit = thud.fit(drop, START, ASSUMED)
+    assert any("fractional_order" in text and "damping law" in text for text in fit.warnings)
+    assert miss(fit) < 3 < miss(quiet_fit(drop, START, ASSUMED, unknowns=()))
+
+
+def test_fit_that_warns_widens_its_intervals() -> None:
+    time, force = record("as assumed", np.random.default_rng(1), 0.005)
+    plain = thud.fit((time, force), START, ASSUMED)
+    assert plain.widened == 1
+    ringing = np.sin(2 * np.pi * 300 * time) * np.exp(-time / 0.02)
+    ringing = np.roll(np.where(time < 0.04, ringing, 0), int(BACKGROUND * RATE))
+    fit = quiet_fit((time, force + 40 * ringing), START, ASSUMED)
+    assert fit.warnings
+    assert fit.widened > 2
+    assert f"widened {fit.widened:.3g} times" in str(fit)
+    assert fit.summary()["widened"] == fit.widened
+    low, high = fit.intervals()["youngs_modulus"]
+    factor = (high - low) / 2 / fit.standard_errors["youngs_modulus"]
+    assert factor > 1.9
+    assert fit.standard_errors["youngs_modulus"] > 2 * plain.standard_errors["youngs_modulus"]
+
+
+def test_misfit_is_that_of_the_worst_band() -> None:
+    noise = np.random.default_rng(2).normal(size=400)
+    # Means of 50 exponential values.
+    assert 1 <= misfit_ratio(noise) < 1.3
+    tone = 10 * np.sin(np.arange(400))
+    # Its power is that of a quarter of the frequencies.
+    assert misfit_ratio(noise + tone) == pytest.approx(np.sqrt(4 * 100 / 2), rel=0.05)
+    assert misfit_ratio(0.1 * noise) == 1
+
+
+def test_effect_of_clock_and_calibration_is_stated() -> None:
+    drop = record("as assumed", np.random.default_rng(4), 0.001)
+    fit = quiet_fit(drop, START, ASSUMED)
+    others = {
+        "clock": quiet_fit((1.001 * drop[0], drop[1]), START, ASSUMED),
+        "calibration": quiet_fit((drop[0], 1.01 * drop[1]), START, ASSUMED),
+    }
+    for name, other in others.items():
+        (text,) = (line for line in fit.assumptions if name in line)
+        for key in TRUTH:
+            change = 100 * (other.values[key] / fit.values[key] - 1)
+            stated = float(text.split(f"{key} ")[1].split(" %")[0])
+            assert stated == pytest.approx(change, rel=0.1, abs=0.01), (name, key)
+    content = json.loads(fit.files()["fit.json"])
+    assert content["assumptions"] == list(fit.assumptions)
+    known = quiet_fit(thud.ForceTarget(drop, gain=0.01), START, ASSUMED)
+    assert not any("calibration" in line for line in known.assumptions)
+
+
+def test_alternative_that_cannot_be_computed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    compute = misfit.compute
+
+    def fails(case: thud.Case) -> thud.Impact:
+        if case.floor is not None:
+            message = "out of the model"
+            raise thud.NumericalError(message)
+        return compute(case)
+
+    drop = record("as assumed", np.random.default_rng(1), 0.01)
+    monkeypatch.setattr(misfit, "compute", fails)
+    with pytest.warns(thud.FitWarning, match=naming("resistance", "out of the model")):
+        thud.fit(drop, START, ASSUMED)
+
+
+@pytest.mark.parametrize("unknowns", ["friction", ["fricton"], 3])
+def test_unknowns_are_a_list_of_their_names(unknowns: object) -> None:
+    with pytest.raises(thud.InputError, match=naming("unknowns", "friction")):
+        thud.fit(thud.solve(), ["youngs_modulus"], unknowns=unknowns)  # type: ignore[arg-type]
+
+
+def test_records_share_their_unknowns() -> None:
+    """Of two records of one ball the effects are the same, of one each they are more freely so."""
+    drops = [record("as assumed", np.random.default_rng(seed), 0.02) for seed in (1, 2)]
+    one = thud.fit(drops[0], START, ASSUMED)
+    both = thud.fit([thud.ForceTarget(drop) for drop in drops], START, ASSUMED)
+    for name in TRUTH:
+        assert both.standard_errors[name] < one.standard_errors[name]
+
+
+@pytest.mark.slow
+def test_false_warnings_of_effects_are_rare() -> None:
+    impact = thud.solve(with_values(ASSUMED, TRUTH))
+    force = np.pad(impact.floor_force[: int(impact.contact_time * RATE) + 2], 1764)
+    warned = 0
+    for seed in range(8):
+        noise = np.random.default_rng(seed).normal(scale=20, size=len(force))
+        warned += bool(
+            quiet_fit((np.arange(len(force)) / RATE, force + noise), START, ASSUMED).warnings
+        )
+    assert warned <= 1
+
+
+def test_files_state_unknowns(tmp_path: Path) -> None:
+    impact = thud.solve()
+    table = np.column_stack([impact.time, impact.floor_force])
+    np.savetxt(tmp_path / "record.csv", table, delimiter=",")
+    text = "unknowns = {}\n[target]\nfile = 'record.csv'\n[parameters]\nyoungs_modulus = {{}}\n"
+    path = tmp_path / "study.toml"
+    path.write_text(text.format("['friction']"))
+    assert thud.read_study(path, "fit").options["unknowns"] == ["friction"]  # type: ignore[attr-defined]
+    path.write_text(text.format("['frictoin']"))
+    with pytest.raises(thud.InputError, match=naming("unknowns", "friction")):
+        thud.read_study(path, "fit")
+
+
+def test_levels_that_do_not_fit_have_wider_intervals() -> None:
+    """By the root of the reduced chi-square."""
+    levels = thud.solve().levels(force="floor") + 3 * np.array([1, -1, 1, -1, 1])
+    fit = quiet_fit(thud.LevelTarget(levels, 0.5, force="floor"), ["youngs_modulus"])
+    assert fit.warnings
+    assert fit.widened == pytest.approx(np.sqrt(fit.reduced_chi_square))
+    double = quiet_fit(thud.LevelTarget(levels, 100.0, force="floor"), ["youngs_modulus"])
+    assert double.widened == 1
+    ratio = double.standard_errors["youngs_modulus"] / fit.standard_errors["youngs_modulus"]
+    assert ratio == pytest.approx(200 / fit.widened, rel=1e-3)

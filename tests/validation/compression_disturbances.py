@@ -1,0 +1,156 @@
+"""Fits to curves of a press with disturbances: errors, coverage, and misses in silence.
+
+    python tests/validation/compression_disturbances.py [CURVES]
+
+fits the modulus of the modal ball to curves of 41 points from first touch to 30 mm, to which noise
+and one disturbance are added. A miss is a modulus that is more than 3 standard errors from the
+truth; it is silent if the fit does not warn.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+import thud
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from thud.studies.compression_fit import CompressionFit
+
+    Array = NDArray[np.float64]
+    # What is added to the force, N, at relative positions.
+    Disturbance = Callable[[Array, Array, np.random.Generator], Array]
+
+TRUE = thud.Ball(youngs_modulus=1.83e6)
+START = thud.Ball(youngs_modulus=3e6)
+# Coarse, and its own truth.
+MODEL = thud.ModalBall(harmonics=20, static_harmonics=60, rings=20)
+TOUCH = 1.2e-3
+CONFIDENCE = 0.9
+ERRORS = 3.0
+
+
+def noise(size: float, correlation: float = 0.0) -> Disturbance:
+    """Return noise of a standard deviation, N, with a correlation of neighbors."""
+
+    def make(position: Array, _: Array, random: np.random.Generator) -> Array:
+        result = random.normal(size=len(position))
+        for i in range(1, len(result)):
+            innovation = np.sqrt(1 - correlation**2) * result[i]
+            result[i] = correlation * result[i - 1] + innovation
+        return np.asarray(size * result)
+
+    return make
+
+
+def expected(position: Array, force: Array, random: np.random.Generator) -> Array:
+    """Return all unknowns, of normal sizes with their expected standard deviations."""
+    offset, drift, friction, softening = random.normal(size=4)
+    top = force.max()
+    added = top * (0.01 * offset + 0.01 * drift * position + 0.005 * friction)
+    return np.asarray(added - 0.05 * softening * position * force)
+
+
+# Disturbances by name, with the standard deviation of their white noise, N.
+DISTURBANCES: dict[str, tuple[float, Disturbance]] = {
+    "noise of 1 N": (1.0, lambda p, *_: 0 * p),
+    "noise of 3 N": (3.0, lambda p, *_: 0 * p),
+    "colored noise of 3 N, correlation 0.6": (0.0, noise(3, 0.6)),
+    "colored noise of 3 N, correlation 0.9": (0.0, noise(3, 0.9)),
+    "softening of 5 %": (1.0, lambda p, force, _: -0.05 * force * p),
+    "offset of 3 N": (1.0, lambda p, *_: 3 + 0 * p),
+    "drift of 5 N": (1.0, lambda p, *_: 5 * p),
+    "friction of 2 N": (1.0, lambda _, force, __: 2.0 * (force > 0)),
+    "all, as large as expected": (3.0, expected),
+}
+
+
+@lru_cache
+def clean() -> tuple[Array, Array]:
+    """Return deflection, m, and force, N, of the truth."""
+    curve = thud.compress(TRUE, MODEL, max_deflection=0.03, points=41)
+    return curve.deflection + TOUCH, curve.force
+
+
+def curve_of(name: str, seed: int, white: float | None = None) -> tuple[Array, Array]:
+    """Return a curve with a disturbance and white noise of a size, N."""
+    deflection, force = clean()
+    random = np.random.default_rng([seed, *name.encode()])
+    size, disturbance = DISTURBANCES[name]
+    added = disturbance((deflection - TOUCH) / np.ptp(deflection), force, random)
+    size = size if white is None else white
+    return deflection, force + added + random.normal(size=len(force)) * size
+
+
+def quiet(curve: tuple[Array, Array], unknowns: Sequence[str] | None = None) -> CompressionFit:
+    """Return a fit whose warnings do not matter."""
+    options = {} if unknowns is None else {"unknowns": unknowns}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", thud.FitWarning)
+        return thud.fit_compression(*curve, START, MODEL, confidence=CONFIDENCE, **options)
+
+
+class Tally(NamedTuple):
+    """Fits of one disturbance, and of them: covering, missed, warned, silent; relative errors."""
+
+    fits: int
+    covered: int
+    missed: int
+    warned: int
+    silent: int
+    errors: Array
+    widths: Array
+
+
+def miss(fit: CompressionFit) -> float:
+    """Return the error of the modulus over its standard error."""
+    error = fit.values["youngs_modulus"] - TRUE.youngs_modulus
+    return abs(error) / fit.standard_errors["youngs_modulus"]
+
+
+def tally(name: str, curves: int, unknowns: Sequence[str] | None = None) -> Tally:
+    """Return what fits to curves with a disturbance give."""
+    fits = [quiet(curve_of(name, seed), unknowns) for seed in range(curves)]
+    ends = [fit.intervals()["youngs_modulus"] for fit in fits]
+    far = [miss(fit) > ERRORS for fit in fits]
+    return Tally(
+        curves,
+        sum(low < TRUE.youngs_modulus < high for low, high in ends),
+        sum(far),
+        sum(bool(fit.warnings) for fit in fits),
+        sum(missed and not fit.warnings for missed, fit in zip(far, fits, strict=True)),
+        np.array([fit.values["youngs_modulus"] / TRUE.youngs_modulus - 1 for fit in fits]),
+        np.array([fit.standard_errors["youngs_modulus"] / TRUE.youngs_modulus for fit in fits]),
+    )
+
+
+def main() -> None:
+    """Print the table of all disturbances, with and without unknowns."""
+    curves = int(sys.argv[1]) if len(sys.argv) > 1 else 40
+    sys.stdout.write(
+        f"{curves} curves each; of E, %\n"
+        "| disturbance | unknowns | covered | warned | silent misses | mean error | scatter | "
+        "standard error |\n|---|---|---|---|---|---|---|---|\n"
+    )
+    for name in DISTURBANCES:
+        for unknowns in (None, ()):
+            found = tally(name, curves, unknowns)
+            numbers = 100 * np.array([found.errors.mean(), found.errors.std(), found.widths.mean()])
+            cells = [
+                name, "all" if unknowns is None else "none", str(found.covered),
+                str(found.warned), str(found.silent), *(f"{number:.2g}" for number in numbers),
+            ]  # fmt: skip
+            sys.stdout.write(f"| {' | '.join(cells)} |\n")
+            sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()
