@@ -15,6 +15,7 @@ module thud_compute
    use thud_plate, only: plate_type
    use thud_progress, only: let_first_thread_report
    use thud_receiver, only: is_rigid, receiver_type
+   use thud_resolved_drop, only: solve_drop
    use thud_room, only: check_below, get_room_bands, get_room_level, room_level_type
    use thud_sampling, only: get_sample_count
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
@@ -109,7 +110,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       associate (model => case%models(get_model_number(case))%model)
-         call model%solve(case%ball, case%drop, case%sampling, impact%history, error)
+         call solve_drop(model, case%ball, case%drop, case%sampling, impact%history, error)
       end associate
       if (scope%levels .and. .not. allocated(error)) call assess(case, impact%history, impact%assessment, error)
    end subroutine compute_impact
@@ -183,7 +184,7 @@ contains
          if (allocated(error)) return
          if (is_rigid(receiver)) return
          allocate (on_floor)
-         call model%solve(case%ball, case%drop, case%sampling, on_floor, error, receiver)
+         call solve_drop(model, case%ball, case%drop, case%sampling, on_floor, error, receiver)
       end associate
       ! `couples` is true by default: a model that ignores the receiver has computed the drop on a rigid floor.
       if (.not. allocated(on_floor%floor_velocity)) deallocate (on_floor)

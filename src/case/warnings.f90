@@ -46,7 +46,13 @@ module thud_warnings
    !> An octave level this far below the level over all frequencies is affected by rounding errors, dB.
    real(wp), parameter :: max_decline = 120.0_wp
 
-   !> Numerical error of a coefficient of restitution.
+   !> Numerical error of an octave level above which a warning is raised, dB.
+   real(wp), parameter :: max_error = 0.2_wp
+
+   !> Beginning of this warning.
+   character(len=*), parameter :: error_title = 'the numerical error'
+
+   !> Rounding error of a coefficient of restitution.
    real(wp), parameter :: restitution_error = 1.0e-6_wp
 
    !> Source model whose finite elements also give the free modes.
@@ -78,6 +84,8 @@ contains
       if (case%has_floor) call add_floor_warning(case, warnings)
       call add_limit_warnings(case, history, warnings)
       call add_level_warnings(history, warnings)
+      call add_error_warning(history, warnings)
+      if (present(on_floor)) call add_error_warning(on_floor, warnings)
       if (present(on_floor)) call add_limit_warnings(case, on_floor, warnings)
    end subroutine get_warnings
 
@@ -104,6 +112,27 @@ contains
          call add(warnings, get_limit_message(limits(i)))
       end do
    end subroutine add_limit_warnings
+
+   !> Adds a warning on a large numerical error, once for both floors.
+   subroutine add_error_warning(history, warnings)
+      type(force_history_type), intent(in) :: history
+      !> Messages: [n].
+      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
+      type(band_type) :: bands(octave_count)
+      integer :: worst
+
+      if (any(index(warnings, error_title) > 0)) return
+      bands = get_octaves()
+      associate (error => history%numerical_error)
+         worst = maxloc(error%octave, dim=1)
+         if (.not. error%known) then
+            call add(warnings, error_title//' could not be estimated: no other resolution can be computed')
+         else if (error%octave(worst) > max_error) then
+            call add(warnings, error_title//' of the level at '//trim(get_band_name(bands(worst)))//' Hz is about ' &
+               //fixed(error%octave(worst), 1)//' dB; a finer resolution lowers it')
+         end if
+      end associate
+   end subroutine add_error_warning
 
    !> Adds warnings on forces in wrong units, and on levels dominated by rounding errors.
    subroutine add_level_warnings(history, warnings)

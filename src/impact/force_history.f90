@@ -1,6 +1,7 @@
 !> The result of every source model: the force on a floor, sampled from first touch on. Levels, assessments and files use
 !> only this type and no source model.
 module thud_force_history
+   use thud_band, only: octave_count
    use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
    use thud_motion, only: motion_type
@@ -9,7 +10,7 @@ module thud_force_history
    private
 
    public :: check_samples, clear_flight, continue_to_zero, force_count, force_history_type, force_names, holds_impulse
-   public :: max_residual, new_force_history
+   public :: max_residual, new_force_history, numerical_error_type
 
    !> Residual of the balances of impulse and energy above which all models except the finite elements return an error; it
    !> is below 1e-9 at the default step.
@@ -26,6 +27,16 @@ module thud_force_history
 
    !> Length of the name of a force component.
    integer, parameter :: name_length = 24
+
+   !> Errors due to the resolution.
+   type :: numerical_error_type
+      !> Whether they could be estimated.
+      logical :: known = .false.
+      !> Errors of the octave levels of the force on the floor, dB.
+      real(wp) :: octave(octave_count) = 0.0_wp
+      !> Errors of contact time, s, restitution, and peak force, N.
+      real(wp) :: contact_time = 0.0_wp, restitution = 0.0_wp, peak_force = 0.0_wp
+   end type numerical_error_type
 
    !> Force of one impact, and numbers that describe it.
    type :: force_history_type
@@ -81,6 +92,8 @@ module thud_force_history
       real(wp) :: impulse_residual = 0.0_wp
       !> |energy at release + loss - energy at first touch|, divided by the energy at first touch.
       real(wp) :: energy_residual = 0.0_wp
+      !> Errors due to the resolution.
+      type(numerical_error_type) :: numerical_error
    end type force_history_type
 
 contains

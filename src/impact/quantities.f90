@@ -59,6 +59,22 @@ module thud_quantities
       'relative residual of the momentum balance', of_impact), &
       quantity_type('energy_residual', 'energy residual', '', '', '', 1.0_wp, 6, &
       'relative residual of the energy balance', of_impact), &
+      quantity_type('octave_31_5_error', 'error at 31.5 Hz', '', 'dB', 'dB', 1.0_wp, 2, &
+      'numerical error of the level of the 31.5 Hz octave', of_impact), &
+      quantity_type('octave_63_error', 'error at 63 Hz', '', 'dB', 'dB', 1.0_wp, 2, &
+      'numerical error of the level of the 63 Hz octave', of_impact), &
+      quantity_type('octave_125_error', 'error at 125 Hz', '', 'dB', 'dB', 1.0_wp, 2, &
+      'numerical error of the level of the 125 Hz octave', of_impact), &
+      quantity_type('octave_250_error', 'error at 250 Hz', '', 'dB', 'dB', 1.0_wp, 2, &
+      'numerical error of the level of the 250 Hz octave', of_impact), &
+      quantity_type('octave_500_error', 'error at 500 Hz', '', 'dB', 'dB', 1.0_wp, 2, &
+      'numerical error of the level of the 500 Hz octave', of_impact), &
+      quantity_type('contact_time_error', 'error of contact time', '', 's', 'ms', 1.0e3_wp, 3, &
+      'numerical error of the contact time', of_impact), &
+      quantity_type('restitution_error', 'error of restitution', '', '', '', 1.0_wp, 4, &
+      'numerical error of the coefficient of restitution', of_impact), &
+      quantity_type('peak_force_error', 'error of peak force', '', 'N', 'N', 1.0_wp, 1, &
+      'numerical error of the maximum force on the floor', of_impact), &
       quantity_type('peak_count', 'number of force peaks', '', '', '', 1.0_wp, 0, &
       'number of peaks of the assessed force', of_others), &
       quantity_type('mass', 'mass', 'M', 'kg', 'kg', 1.0_wp, 3, 'mass of the source', of_others), &
@@ -89,7 +105,9 @@ contains
       values = [history%contact_time, history%peak_force, history%peak_elastic_force, history%max_deflection, &
          history%restitution, history%impulse, history%impact_velocity, &
          merge(history%exact_contact_time, history%contact_time, history%exact_contact_time > 0.0_wp), &
-         history%touch_time, history%sample_rate, history%impulse_residual, history%energy_residual]
+         history%touch_time, history%sample_rate, history%impulse_residual, history%energy_residual, &
+         history%numerical_error%octave, history%numerical_error%contact_time, history%numerical_error%restitution, &
+         history%numerical_error%peak_force]
    end function get_quantities
 
    !> A quantity of the table by its name.

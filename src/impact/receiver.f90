@@ -10,7 +10,7 @@ module thud_receiver
    implicit none (type, external)
    private
 
-   public :: add_impulse, advance_receiver, can_strike, get_conductance, get_impulse_response, get_mobility, get_pole_count
+   public :: advance_receiver, can_strike, get_conductance, get_force_response, get_mobility, get_pole_count
    public :: get_receiver_velocity, is_rigid, new_receiver_motion, new_receiver_step, receiver_motion_type
    public :: receiver_step_type, receiver_type
 
@@ -148,28 +148,16 @@ contains
       motion%amplitude = step%decay*motion%amplitude + step%gain*force
    end subroutine advance_receiver
 
-   !> Adds to the motion at the end of a step the effect of an impulse at its beginning.
-   pure subroutine add_impulse(receiver, step, impulse, motion)
+   !> Displacement at the end of a step due to a unit force, constant in the step.
+   pure function get_force_response(receiver, step) result(response)
       type(receiver_type), intent(in) :: receiver
       type(receiver_step_type), intent(in) :: step
-      !> The impulse downwards, N s.
-      real(wp), intent(in) :: impulse
-      type(receiver_motion_type), intent(inout) :: motion
-
-      motion%displacement = motion%displacement + get_impulse_response(receiver, step)*impulse
-      motion%amplitude = motion%amplitude + step%decay*impulse
-   end subroutine add_impulse
-
-   !> Displacement at the end of a step due to a unit impulse at its beginning.
-   pure function get_impulse_response(receiver, step) result(response)
-      type(receiver_type), intent(in) :: receiver
-      type(receiver_step_type), intent(in) :: step
-      !> The displacement downwards, m/(N s).
+      !> The displacement downwards, m/N.
       real(wp) :: response
 
-      response = receiver%direct
-      if (size(step%gain) > 0) response = response + sum(real(receiver%residue*step%gain, wp))
-   end function get_impulse_response
+      response = step%interval*receiver%direct
+      if (size(step%travel) > 0) response = response + sum(real(receiver%residue*step%travel, wp))
+   end function get_force_response
 
    !> Velocity under the source.
    pure function get_receiver_velocity(receiver, force, motion) result(velocity)

@@ -34,6 +34,9 @@ module thud_source_model
       procedure, pass(options) :: get_loss_factors
       procedure, pass(options) :: compress
       procedure, pass(options) :: couples
+      procedure, pass(options) :: set_level
+      procedure, pass(options) :: get_highest_level
+      procedure, pass(options) :: get_error_ratio
    end type source_model_type
 
    abstract interface
@@ -152,6 +155,38 @@ contains
 
       yes = .true.
    end function couples
+
+   !> Sets the resolution. By default level 0 has half the sampling rate of the input, for the error of samples and steps,
+   !> level 1 that of the input, and level 2 twice that.
+   subroutine set_level(ball, options, level, sampling, coarse)
+      type(ball_type), intent(in) :: ball
+      class(source_model_type), intent(inout) :: options
+      !> The level, from 0 up.
+      integer, intent(in) :: level
+      !> Sampling of the input, to be changed as the level needs it.
+      type(sampling_type), intent(inout) :: sampling
+      !> The drop at the next coarser level; without samples if there is none.
+      type(force_history_type), intent(in) :: coarse
+
+      sampling%sample_rate = sampling%sample_rate*2.0_wp**(level - 1)
+   end subroutine set_level
+
+   !> Highest level of resolution; by default 1: the resolution is that of the input.
+   function get_highest_level(options) result(level)
+      class(source_model_type), intent(in) :: options
+      integer :: level
+
+      level = 1
+   end function get_highest_level
+
+   !> Estimated error of a result divided by its difference from the next coarser level. By default that of an error which is
+   !> proportional to the square of the step, as that of a force that begins with a jump.
+   function get_error_ratio(options) result(ratio)
+      class(source_model_type), intent(in) :: options
+      real(wp) :: ratio
+
+      ratio = 1.0_wp/3.0_wp
+   end function get_error_ratio
 
    !> Force on each of two plates in a quasi-static compression; models without one return an error.
    subroutine compress(ball, options, deflection, force, error)

@@ -5,7 +5,7 @@ module thud_lapack
    private
 
    public :: dgbsv, dgeev, dgels, dgemm, dgemv, dgetf2, dgetrs, dpbtrf, dpbtrs, dposv, dpotf2, dpotrf, dsbmv, dstevr
-   public :: dsygv, dsyrk, dtrsm, dtrsv
+   public :: dsygv, dsygvx, dsyrk, dtrsm, dtrsv
 
    interface
       !> Eigenvalues of a general matrix.
@@ -29,6 +29,19 @@ module thud_lapack
          real(wp), intent(out) :: w(*), work(*)
          integer, intent(out) :: info
       end subroutine dsygv
+
+      !> Eigenvalues in a range and their vectors, of the generalized symmetric eigenproblem.
+      pure subroutine dsygvx(itype, jobz, range, uplo, n, a, lda, b, ldb, vl, vu, il, iu, abstol, m, w, z, ldz, work, lwork, &
+                             iwork, ifail, info)
+         import :: wp
+         implicit none (type, external)
+         integer, intent(in) :: itype, n, lda, ldb, il, iu, ldz, lwork
+         character(len=1), intent(in) :: jobz, range, uplo
+         real(wp), intent(inout) :: a(lda, *), b(ldb, *)
+         real(wp), intent(in) :: vl, vu, abstol
+         integer, intent(out) :: m, iwork(*), ifail(*), info
+         real(wp), intent(out) :: w(*), z(ldz, *), work(*)
+      end subroutine dsygvx
 
       !> Solution with a positive definite matrix.
       pure subroutine dposv(uplo, n, nrhs, a, lda, b, ldb, info)

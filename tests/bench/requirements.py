@@ -42,7 +42,7 @@ REQUIRED: dict[tuple[str, str], tuple[Limit, ...]] = {
     ("streamed to disk", ""): (Limit(256, "MiB"),),
     ("free modes, Poisson's ratio 1/2", ""): (Limit(50, "ms"),),
     ("free modes, 0.4999", ""): (Limit(50, "ms"),),
-    ("flagship", ""): (Limit(500, "ms"),),
+    ("flagship", ""): (Limit(250, "ms"),),
     ("impact, elastic, an element and a ms", ""): (Limit(100, "times", lower=True),),
     ("impact, an element and a ms", ""): (Limit(100, "times", lower=True),),
 }

@@ -44,7 +44,7 @@ HEIGHTS = {"parameters": {"height": {"values": [50, 100], "unit": "cm"}}}
 # Several blocks of the modal ball, some seconds.
 LONG = """
 name = "long"
-fixed = { model = "modal_ball", harmonics = 16, static_harmonics = 60, rings = 20 }
+fixed = { model = "modal_ball", highest_frequency = 700, rings = 20 }
 design = { kind = "random", size = 500, seed = 4 }
 parameters = { height = { low = 0.9, high = 1.1 } }
 """

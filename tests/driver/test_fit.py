@@ -367,8 +367,8 @@ def test_levels_and_what_else_is_known(bands: str) -> None:
 
 
 def test_contact_time_is_reported_between_samples() -> None:
-    # The modal ball tells it in whole samples; its force, continued to zero, moves smoothly.
-    moduli = 1.7e6 * (1 + 1e-3 * np.arange(12))
+    # The modal ball tells it in whole steps; its force, continued to zero, moves smoothly.
+    moduli = 1.7e6 * (1 + 2e-4 * np.arange(12))
     impacts = [thud.solve(thud.Ball(youngs_modulus=e), model="modal_ball") for e in moduli]
     between = np.array([impact.exact_contact_time for impact in impacts])
     whole = np.array([impact.contact_time for impact in impacts])

@@ -166,11 +166,12 @@ def _mesh(options: Group, _: thud.Ball, chance: random.Random) -> Group:
 
 
 def _rings(options: Group, _: thud.Ball, chance: random.Random) -> Group:
-    """Return harmonics and rings that suit each other, as a rule."""
-    most = options.static_harmonics // 3
-    if most > 2 and chance.random() < 0.8:
-        rings = chance.randint(2, min(most, 130))
-        options = replace(options, rings=rings, harmonics=chance.randint(2, min(3 * rings, 96)))
+    """Return rings and modes that a drop can have in little time, as a rule."""
+    if chance.random() < 0.8:
+        options = replace(
+            options, rings=chance.choice([0, chance.randint(2, 130)]),
+            highest_frequency=chance.choice([0.0, log_uniform(chance, 50, 4000)]),
+        )  # fmt: skip
     return options
 
 

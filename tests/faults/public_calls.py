@@ -49,7 +49,7 @@ def fast_calls(folder: Path) -> Calls:
 
     return {
         "solve": lambda: thud.solve().floor_force,
-        "modal ball": lambda: thud.solve(model="modal_ball", rings=10, harmonics=4).floor_force,
+        "modal ball": lambda: thud.solve(model="modal_ball", rings=10).floor_force,
         "lumped": lambda: (
             thud.solve(model=thud.HuntCrossley(contact_time=0.02, restitution=0.8)).floor_force
         ),
@@ -149,7 +149,7 @@ def changing_calls(folder: Path) -> dict[str, Callable[[random.Random], object]]
             thud.Oscillator(mass=chance.uniform(20, 60)),
             thud.Plate(thickness=chance.uniform(0.15, 0.25)),
         ])  # fmt: skip
-        model = chance.choice([thud.HollowSphere(), thud.ModalBall(rings=10, harmonics=4)])
+        model = chance.choice([thud.HollowSphere(), thud.ModalBall(rings=10)])
         sampling = rates(chance)
         return thud.Case("changing", ball, drop, sampling=sampling, model=model, floor=floor)
 

@@ -43,7 +43,7 @@ KEYS = [
     "gravity", "loss_factor", "density", "temperature", "stiffness", "contact_time",
     "restitution", "belt_mass", "frequency(1)", "frequency", "damping_ratio(2)", "sample_rate",
     "substeps", "momentum_flux", "method", "thickness", "room.volume", "plate.thickness",
-    "effective_mass(1)", "heigth", "frequency(0)", "frequency(99)", "harmonics",
+    "effective_mass(1)", "heigth", "frequency(0)", "frequency(99)", "rings",
 ]  # fmt: skip
 ODD: list[Any] = [
     0, -1, 1e300, 1e-300, float("nan"), float("inf"), "text", "", True, [], [1, 2], {}, [[1]],

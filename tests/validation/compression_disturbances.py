@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 TRUE = thud.Ball(youngs_modulus=1.83e6)
 START = thud.Ball(youngs_modulus=3e6)
 # Coarse, and its own truth.
-MODEL = thud.ModalBall(harmonics=20, static_harmonics=60, rings=20)
+MODEL = thud.ModalBall(rings=20)
 TOUCH = 1.2e-3
 CONFIDENCE = 0.9
 ERRORS = 3.0

@@ -32,7 +32,7 @@ TRUTH = {"youngs_modulus": 1.8e6, "loss_factor": 0.2}
 START = {"youngs_modulus": 1.6e6, "loss_factor": 0.15}
 ASSUMED = thud.Case(
     # Coarse, and its own truth.
-    model=thud.ModalBall(16, static_harmonics=60, rings=20, damping_law="fractional"),
+    model=thud.ModalBall(700.0, rings=20, damping_law="fractional"),
     sampling=thud.Sampling(duration=0.03),
 )
 

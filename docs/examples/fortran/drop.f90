@@ -1,7 +1,7 @@
 ! Drops the standard rubber ball by its modes and prints the octave levels of its force.
 program drop
    use thud, only: ball_type, band_type, drop_type, error_type, force_history_type, get_force_exposure_levels, &
-      get_octaves, modal_ball_type, sampling_type, wp
+      get_octaves, modal_ball_type, sampling_type, solve_drop, wp
    implicit none
    type(modal_ball_type) :: model
    type(force_history_type) :: history
@@ -10,7 +10,7 @@ program drop
    real(wp), allocatable :: level(:)
    integer :: i
 
-   call model%solve(ball_type(), drop_type(height=1.0_wp), sampling_type(), history, error)
+   call solve_drop(model, ball_type(), drop_type(height=1.0_wp), sampling_type(), history, error)
    if (allocated(error)) error stop error%message
    bands = get_octaves()
    allocate (level(size(bands)))

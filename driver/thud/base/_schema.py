@@ -314,15 +314,12 @@ class ModalBall(Group):
 
     Attributes
     ----------
-    harmonics : int
-        Highest harmonic with oscillating modes; 2 <= harmonics <= 200.
-    radial_modes : int
-        Number of oscillating modes per harmonic; 1 <= radial_modes <= 20.
-    static_harmonics : int
-        Highest harmonic whose static flexibility is included; 4 <= static_harmonics <= 400.
+    highest_frequency : float
+        Highest frequency of oscillating modes; faster ones follow without inertia; 0: automatic,
+        Hz; 0 <= highest_frequency <= 20000.
     rings : int
-        Number of rings on the surface, from the lowest point to 60 degrees; 2 <= rings <=
-        static_harmonics/3.
+        Number of rings on the surface, from the lowest point to 60 degrees; 0: automatic; 0 <=
+        rings <= 400.
     damping_law : str
         Damping law: loss factor as a function of frequency; "constant", "rising", "fractional".
     loss_factor : float
@@ -339,14 +336,12 @@ class ModalBall(Group):
     floor_friction : str
         Friction of the floor: none or infinite (sticking); "none", "stick".
     static_families : sequence of int
-        Harmonics treated as quasi-static; 0 <= static_families <= harmonics.
+        Harmonics treated as quasi-static; 0 <= static_families <= 400.
     """
 
     name: ClassVar[ModelName] = "modal_ball"
-    harmonics: int = 48
-    radial_modes: int = 5
-    static_harmonics: int = 180
-    rings: int = 60
+    highest_frequency: float = 0.0
+    rings: int = 0
     damping_law: ModalBallDampingLaw = "constant"
     loss_factor: float = 0.1
     loss_frequency: float = 74.0
@@ -860,6 +855,22 @@ class ImpactQuantities:
         Relative residual of the momentum balance.
     energy_residual : float
         Relative residual of the energy balance.
+    octave_31_5_error : float
+        Numerical error of the level of the 31.5 Hz octave, dB.
+    octave_63_error : float
+        Numerical error of the level of the 63 Hz octave, dB.
+    octave_125_error : float
+        Numerical error of the level of the 125 Hz octave, dB.
+    octave_250_error : float
+        Numerical error of the level of the 250 Hz octave, dB.
+    octave_500_error : float
+        Numerical error of the level of the 500 Hz octave, dB.
+    contact_time_error : float
+        Numerical error of the contact time, s.
+    restitution_error : float
+        Numerical error of the coefficient of restitution.
+    peak_force_error : float
+        Numerical error of the maximum force on the floor, N.
     """
 
     contact_time: float
@@ -874,6 +885,14 @@ class ImpactQuantities:
     sample_rate: float
     impulse_residual: float
     energy_residual: float
+    octave_31_5_error: float
+    octave_63_error: float
+    octave_125_error: float
+    octave_250_error: float
+    octave_500_error: float
+    contact_time_error: float
+    restitution_error: float
+    peak_force_error: float
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -917,6 +936,14 @@ QUANTITIES = {
     "sample_rate": Quantity("sample_rate", "sample rate", "f_s", "Hz", "kHz", 0.001, 3, "samples per second"),
     "impulse_residual": Quantity("impulse_residual", "impulse residual", "", "", "", 1.0, 6, "relative residual of the momentum balance"),
     "energy_residual": Quantity("energy_residual", "energy residual", "", "", "", 1.0, 6, "relative residual of the energy balance"),
+    "octave_31_5_error": Quantity("octave_31_5_error", "error at 31.5 Hz", "", "dB", "dB", 1.0, 2, "numerical error of the level of the 31.5 Hz octave"),
+    "octave_63_error": Quantity("octave_63_error", "error at 63 Hz", "", "dB", "dB", 1.0, 2, "numerical error of the level of the 63 Hz octave"),
+    "octave_125_error": Quantity("octave_125_error", "error at 125 Hz", "", "dB", "dB", 1.0, 2, "numerical error of the level of the 125 Hz octave"),
+    "octave_250_error": Quantity("octave_250_error", "error at 250 Hz", "", "dB", "dB", 1.0, 2, "numerical error of the level of the 250 Hz octave"),
+    "octave_500_error": Quantity("octave_500_error", "error at 500 Hz", "", "dB", "dB", 1.0, 2, "numerical error of the level of the 500 Hz octave"),
+    "contact_time_error": Quantity("contact_time_error", "error of contact time", "", "s", "ms", 1000.0, 3, "numerical error of the contact time"),
+    "restitution_error": Quantity("restitution_error", "error of restitution", "", "", "", 1.0, 4, "numerical error of the coefficient of restitution"),
+    "peak_force_error": Quantity("peak_force_error", "error of peak force", "", "N", "N", 1.0, 1, "numerical error of the maximum force on the floor"),
     "peak_count": Quantity("peak_count", "number of force peaks", "", "", "", 1.0, 0, "number of peaks of the assessed force"),
     "mass": Quantity("mass", "mass", "M", "kg", "kg", 1.0, 3, "mass of the source"),
     "drop_height": Quantity("drop_height", "drop height", "h", "m", "m", 1.0, 3, "drop height"),
@@ -928,7 +955,7 @@ QUANTITIES = {
 }
 
 # Those of them that describe a single impact, and each of many samples.
-IMPACT_QUANTITIES = tuple(QUANTITIES)[:12]
+IMPACT_QUANTITIES = tuple(QUANTITIES)[:20]
 SAMPLE_QUANTITIES = tuple(QUANTITIES)[:6]
 
 # Nominal and exact mid frequencies, and edges of the bands of each set, Hz.
@@ -973,10 +1000,8 @@ KEYS = (
     Key("", "drop", "gravity", "real", "m/s2", "acceleration of free fall", (), 1e-12, 1000.0),
     Key("", "model", "name", "choice", "", "source model", ('hollow_sphere', 'modal_ball', 'finite_element', 'measured_modes', 'hunt_crossley', 'two_mass')),
     Key("hollow_sphere", "hollow_sphere", "momentum_flux", "choice", "", "term for the momentum of wall that enters or leaves the flat cap", ('momentum_balance', 'retarding', 'conservative', 'none')),
-    Key("modal_ball", "modal_ball", "harmonics", "whole", "", "highest harmonic with oscillating modes", (), 2.0, 200.0, True),
-    Key("modal_ball", "modal_ball", "radial_modes", "whole", "", "number of oscillating modes per harmonic", (), 1.0, 20.0, True),
-    Key("modal_ball", "modal_ball", "static_harmonics", "whole", "", "highest harmonic whose static flexibility is included", (), 4.0, 400.0, True),
-    Key("modal_ball", "modal_ball", "rings", "whole", "", "number of rings on the surface, from the lowest point to 60 degrees", (), 2.0, "static_harmonics/3", True),
+    Key("modal_ball", "modal_ball", "highest_frequency", "real", "Hz", "highest frequency of oscillating modes; faster ones follow without inertia; 0: automatic", (), 0.0, 20000.0),
+    Key("modal_ball", "modal_ball", "rings", "whole", "", "number of rings on the surface, from the lowest point to 60 degrees; 0: automatic", (), 0.0, 400.0, True),
     Key("modal_ball", "modal_ball", "damping_law", "choice", "", "damping law: loss factor as a function of frequency", ('constant', 'rising', 'fractional')),
     Key("modal_ball", "modal_ball", "loss_factor", "real", "", "loss factor, twice the damping ratio", (), 0.0, 1.9),
     Key("modal_ball", "modal_ball", "loss_frequency", "real", "Hz", "frequency at which loss_factor (rising, fractional) and the modulus (fractional) apply", (), 0.1, 100000.0),
@@ -984,7 +1009,7 @@ KEYS = (
     Key("modal_ball", "modal_ball", "cavity_gas", "flag", "", "the gas in the cavity resists volume changes"),
     Key("modal_ball", "modal_ball", "contact_gravity", "flag", "", "gravity acts also during the contact"),
     Key("modal_ball", "modal_ball", "floor_friction", "choice", "", "friction of the floor: none or infinite (sticking)", ('none', 'stick')),
-    Key("modal_ball", "modal_ball", "static_families", "list", "", "harmonics treated as quasi-static", (), 0.0, "harmonics", True),
+    Key("modal_ball", "modal_ball", "static_families", "list", "", "harmonics treated as quasi-static", (), 0.0, 400.0, True),
     Key("finite_element", "finite_element", "bounces", "whole", "", "number of contacts to compute", (), 1.0, 100.0, True),
     Key("finite_element", "finite_element", "flight_before", "real", "s", "duration of free flight before first touch", (), 0.0, 1.0),
     Key("finite_element", "finite_element", "flight_after", "real", "s", "duration of free flight after the last contact", (), 0.0, 10.0),

@@ -34,6 +34,27 @@ if TYPE_CHECKING:
     from thud.level.assessment import Verdict
 
 
+OCTAVE_NAMES = ("octave_31_5", "octave_63", "octave_125", "octave_250", "octave_500")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NumericalError:
+    """Estimated errors of an impact due to its resolution, by comparison with a coarser one.
+
+    Attributes
+    ----------
+    level : ndarray, shape (5,)
+        Errors of the levels of the octaves 31.5 to 500 Hz of the force on the floor, dB.
+    contact_time, restitution, peak_force : float
+        Errors of the contact time, s, the coefficient of restitution, and the peak force, N.
+    """
+
+    level: NDArray[np.float64]
+    contact_time: float
+    restitution: float
+    peak_force: float
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Impact(ImpactQuantities, Displayed):
     """Force and motion of an impact, sampled at a constant rate.
@@ -103,6 +124,16 @@ class Impact(ImpactQuantities, Displayed):
     def limits_source(self) -> LimitsSource:
         """Source whose limits apply."""
         return self.case.limits.source
+
+    @property
+    def numerical_error(self) -> NumericalError:
+        """Errors due to the resolution: modes, rings, elements, time steps and samples."""
+        return NumericalError(
+            level=np.array([getattr(self, f"{name}_error") for name in OCTAVE_NAMES]),
+            contact_time=self.contact_time_error,
+            restitution=self.restitution_error,
+            peak_force=self.peak_force_error,
+        )
 
     @property
     def contact_time_as_recorded(self) -> float:

@@ -31,9 +31,7 @@ class HollowSphereOptions(SamplingOptions, total=False):
     momentum_flux: HollowSphereMomentumFlux
 
 class ModalBallOptions(SamplingOptions, total=False):
-    harmonics: int
-    radial_modes: int
-    static_harmonics: int
+    highest_frequency: float
     rings: int
     damping_law: ModalBallDampingLaw
     loss_factor: float

@@ -18,6 +18,9 @@ module thud_table
    public :: get_compression_table, get_defaults_line, get_force_title, get_modes_table, get_span_row, get_table
    public :: is_peak_of_other
 
+   !> Numerical error of a level above which it is shown, dB.
+   real(wp), parameter :: shown_error = 0.1_wp
+
 contains
 
    !> The table that a run shows on the screen.
@@ -55,7 +58,14 @@ contains
             if (is_peak_of_other(quantities(i), case)) cycle
             text = text//quantity_row(quantities(i), values(i))
          end do
-         text = text//model_quantity_rows(history)//newline
+         text = text//model_quantity_rows(history)
+         do i = 1, octave_count
+            associate (error => history%numerical_error%octave(i))
+               if (error > shown_error) text = text//row('numerical error at ' &
+                  //get_band_name(assessment%bands(i))//' Hz', error, 2, 'dB')
+            end associate
+         end do
+         text = text//newline
          text = text//'  The source '//trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
             //' to the limits of the '//replaced(trim(case%source), '_', ' ')//': it meets ' &
             //to_text(count(conforms(criteria)))//' of '//to_text(size(criteria))//' criteria.'//newline &

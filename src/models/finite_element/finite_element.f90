@@ -105,7 +105,8 @@ contains
       time = typical_contact + options%flight_before + options%flight_after
       if (options%bounces > 1) time = sampling%duration
       n_step = max(get_step_count(sampling, time), min(time, sampling%duration)/interval)
-      cost = 5.0e-3_wp + n_step*element_cost
+      ! With the drop of elements of twice the size.
+      cost = 5.0e-3_wp + 1.125_wp*n_step*element_cost
       if (present(receiver)) cost = cost + n_step*3.0e-9_wp*get_pole_count(receiver)
    end function get_cost
 

@@ -4,6 +4,7 @@ module thud_finite_element_options
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type
    use thud_floor_contact, only: contact_options_type, get_contact_fields
+   use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_material, only: check_material, get_material_fields, material_options_type
    use thud_mesh, only: get_mesh_fields, mesh_options_type
@@ -44,6 +45,7 @@ module thud_finite_element_options
       procedure, pass(options) :: get_fields
       procedure, pass(options) :: check
       procedure, pass(options) :: get_snapshot_shape
+      procedure, pass(options) :: set_level
    end type finite_element_options_type
 
 contains
@@ -93,6 +95,20 @@ contains
          //to_text(options%snapshot_interval)//' s makes '//to_text(get_frame_count(options, sampling)) &
          //' snapshots, more than the memory is meant to hold; allowed: a longer interval, or 0 for none')
    end subroutine check
+
+   !> Sets the resolution: at level 0 elements of twice the size, without snapshots.
+   subroutine set_level(ball, options, level, sampling, coarse)
+      type(ball_type), intent(in) :: ball
+      class(finite_element_options_type), intent(inout) :: options
+      integer, intent(in) :: level
+      type(sampling_type), intent(inout) :: sampling
+      type(force_history_type), intent(in) :: coarse
+
+      if (level > 0) return
+      options%mesh%radial_elements = max(min_radial, options%mesh%radial_elements/2)
+      options%mesh%polar_elements = options%mesh%polar_elements/2
+      options%snapshot_interval = 0.0_wp
+   end subroutine set_level
 
    !> Size of the snapshots.
    function get_snapshot_shape(options, sampling) result(extents)

@@ -3,27 +3,34 @@ module thud_modal_ball_options
    use thud_ball, only: ball_type
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type, name_length
+   use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, integer_field, list_field, logical_field, real_field
    use thud_prony, only: check_fractional_loss
    use thud_sampling, only: sampling_type
    use thud_source_model, only: source_model_type
+   use thud_surface_rings, only: greatest_angle
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
    public :: modal_ball_options_type
 
+   !> Rings and highest frequency of the modes, Hz, of level 0, and their ratios from one level to the next.
+   real(wp), parameter :: coarse_rings = 30.0_wp, coarse_frequency = 1000.0_wp, ratio = 1.4_wp
+
+   !> Highest level of resolution.
+   integer, parameter :: highest_level = 3
+
+   !> Angle of the outermost ring divided by that of the cap that the deflection of a coarser drop would cut off.
+   real(wp), parameter :: margin = 1.15_wp
+
    !> Options of the model.
    type, abstract, extends(source_model_type) :: modal_ball_options_type
-      !> Highest harmonic n whose modes oscillate.
-      integer :: harmonics = 48
-      !> Number of modes of each harmonic that oscillate.
-      integer :: radial_modes = 5
-      !> Highest harmonic whose static flexibility is included.
-      integer :: static_harmonics = 180
-      !> Number of rings of the surface that carry the pressure.
-      integer :: rings = 60
+      !> Highest frequency of modes that oscillate, Hz; 0: chosen with the resolution.
+      real(wp) :: highest_frequency = 0.0_wp
+      !> Number of rings of the surface that carry the pressure; 0: chosen with the resolution.
+      integer :: rings = 0
       !> Loss factor: `constant`, `rising` in proportion to frequency, or of a `fractional` law.
       character(len=name_length) :: damping_law = 'constant'
       !> Loss factor, twice the damping ratio.
@@ -41,9 +48,18 @@ module thud_modal_ball_options
       character(len=name_length) :: floor_friction = 'none'
       !> Harmonics treated as quasi-static instead of oscillating.
       type(list_type) :: static_families
+      !> Level of the resolution where the user leaves it open; no key.
+      integer :: level = 1
+      !> Angle of the outermost ring from the lowest point, rad; no key.
+      real(wp) :: outermost_angle = greatest_angle
    contains
       procedure, pass(options) :: get_fields
       procedure, pass(options) :: check
+      procedure, pass(options) :: get_highest_frequency
+      procedure, pass(options) :: get_ring_count
+      procedure, pass(options) :: set_level
+      procedure, pass(options) :: get_highest_level
+      procedure, pass(options) :: get_error_ratio
    end type modal_ball_options_type
 
 contains
@@ -54,12 +70,10 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         integer_field('harmonics', options%harmonics, 'highest harmonic with oscillating modes', '[2, 200]'), &
-         integer_field('radial_modes', options%radial_modes, 'number of oscillating modes per harmonic', '[1, 20]'), &
-         integer_field('static_harmonics', options%static_harmonics, &
-         'highest harmonic whose static flexibility is included', '[4, 400]'), &
-         integer_field('rings', options%rings, 'number of rings on the surface, from the lowest point to 60 degrees', &
-         '[2, static_harmonics/3]'), &
+         real_field('highest_frequency', options%highest_frequency, 'Hz', &
+         'highest frequency of oscillating modes; faster ones follow without inertia; 0: automatic', '[0, 20000]'), &
+         integer_field('rings', options%rings, &
+         'number of rings on the surface, from the lowest point to 60 degrees; 0: automatic', '[0, 400]'), &
          choice_field('damping_law', options%damping_law, 'damping law: loss factor as a function of frequency', &
          [character(len=10) :: 'constant', 'rising', 'fractional']), &
          real_field('loss_factor', options%loss_factor, '', 'loss factor, twice the damping ratio', &
@@ -73,23 +87,76 @@ contains
          choice_field('floor_friction', options%floor_friction, 'friction of the floor: none or infinite (sticking)', &
          [character(len=5) :: 'none', 'stick']), &
          list_field('static_families', options%static_families, '', 'harmonics treated as quasi-static', &
-         '[0, harmonics]', whole=.true.)]
+         '[0, 400]', whole=.true.)]
    end function get_fields
 
-   !> Returns an error if the rings are too few for the harmonics, or if no fractional law has this loss factor.
+   !> Returns an error if no fractional law has this loss factor, or if there is a single ring.
    subroutine check(ball, options, sampling, error)
       type(ball_type), intent(in) :: ball
       class(modal_ball_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(error_type), allocatable, intent(out) :: error
 
-      if (3*options%rings < options%harmonics) then
-         error = input_error('&modal_ball: harmonics = '//to_text(options%harmonics)//' is too high for rings = ' &
-            //to_text(options%rings)//'; allowed: up to three times the rings')
+      if (options%rings == 1) then
+         error = input_error('&modal_ball: rings = 1 cannot carry a pressure; allowed: from 2, or 0 for automatic')
       else if (options%damping_law == 'fractional') then
          call check_fractional_loss('modal_ball', options%fractional_order, options%loss_factor, options%loss_frequency, &
             error)
       end if
    end subroutine check
+
+   !> Sets the resolution: modes, rings around the contact of the coarser drop, and time steps.
+   subroutine set_level(ball, options, level, sampling, coarse)
+      type(ball_type), intent(in) :: ball
+      class(modal_ball_options_type), intent(inout) :: options
+      integer, intent(in) :: level
+      type(sampling_type), intent(inout) :: sampling
+      type(force_history_type), intent(in) :: coarse
+
+      options%level = level
+      sampling%substeps = sampling%substeps*2**level
+      if (options%rings > 0 .or. .not. coarse%max_deflection > 0.0_wp) return
+      ! The undeformed sphere, lowered by the deflection, would meet the floor at this angle; the contact is smaller.
+      options%outermost_angle = min(greatest_angle, &
+         margin*acos(1 - min(1.0_wp, coarse%max_deflection/ball%outer_radius)) + greatest_angle/coarse_rings)
+   end subroutine set_level
+
+   !> Highest level of resolution.
+   function get_highest_level(options) result(level)
+      class(modal_ball_options_type), intent(in) :: options
+      integer :: level
+
+      level = highest_level
+   end function get_highest_level
+
+   !> Estimated error of a result divided by its difference from the next coarser level: it is found from random balls
+   !> (docs/modal_ball.md).
+   function get_error_ratio(options) result(ratio)
+      class(modal_ball_options_type), intent(in) :: options
+      real(wp) :: ratio
+
+      ratio = 1.3_wp
+   end function get_error_ratio
+
+   !> Number of rings: that of the user, or that of the level of resolution.
+   pure function get_ring_count(options) result(n_ring)
+      class(modal_ball_options_type), intent(in) :: options
+      integer :: n_ring
+
+      n_ring = options%rings
+      if (n_ring == 0) n_ring = nint(coarse_rings*ratio**options%level)
+   end function get_ring_count
+
+   !> Highest frequency of oscillating modes, Hz: that of the user, or that of the level of resolution.
+   pure function get_highest_frequency(options) result(frequency)
+      class(modal_ball_options_type), intent(in) :: options
+      real(wp) :: frequency
+
+      frequency = options%highest_frequency
+      if (frequency > 0.0_wp) return
+      frequency = coarse_frequency*ratio**options%level
+      ! Rings that are released lose the energy of modes without inertia.
+      if (options%floor_friction == 'stick') frequency = 2*frequency
+   end function get_highest_frequency
 
 end module thud_modal_ball_options

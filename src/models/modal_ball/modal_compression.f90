@@ -10,7 +10,7 @@ module thud_modal_compression
    use thud_mode_step, only: mode_step_type
    use thud_ring_contact, only: new_ring_contact, ring_contact_type, solve_contact, update_sticking
    use thud_sphere_modes, only: basis_type, family_type, get_static_family, new_basis
-   use thud_surface_rings, only: new_surface_rings, surface_rings_type
+   use thud_surface_rings, only: greatest_angle, new_surface_rings, surface_rings_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -40,10 +40,10 @@ contains
       integer :: i, k, n_step
 
       force = 0.0_wp
-      rings = new_surface_rings(options%rings, options%static_harmonics, options%floor_friction == 'stick')
+      rings = new_surface_rings(options%get_ring_count(), greatest_angle, options%floor_friction == 'stick')
       call new_press(ball, options, rings, contact, error)
       if (allocated(error)) return
-      allocate (reference_gap(size(contact%impulse)), gap(size(contact%impulse)), source=0.0_wp)
+      allocate (reference_gap(size(contact%force)), gap(size(contact%force)), source=0.0_wp)
       reference_gap(::rings%n_dof) = ball%outer_radius*(1 - rings%height)
       before = 0.0_wp
       do i = 1, size(deflection)
@@ -61,28 +61,28 @@ contains
             call update_sticking(contact, reference_gap)
          end do
          before = deflection(i)
-         if (contact%outermost == options%rings) then
+         if (contact%outermost == size(rings%radius)) then
             error = numerical_error('&compression: max_deflection: at '//to_text(deflection(i)) &
                //' m the ball lies on its outermost ring; allowed: less')
             return
          end if
-         force(i) = sum(contact%impulse(::rings%n_dof))
+         force(i) = sum(contact%force(::rings%n_dof))
       end do
    end subroutine compress_modal_ball
 
-   !> Contact of the rings, with forces in place of the impulses of a time step.
+   !> Contact of the rings.
    subroutine new_press(ball, options, rings, contact, error)
       type(ball_type), intent(in) :: ball
       !> Harmonics and rings.
       class(modal_ball_options_type), intent(in) :: options
       type(surface_rings_type), intent(in) :: rings
-      !> The contact; its response is the gap due to unit force, m/N.
+      !> The contact.
       type(ring_contact_type), intent(out) :: contact
       !> Set if the rings cannot be distinguished.
       type(error_type), allocatable, intent(out) :: error
       type(basis_type) :: basis
       type(family_type) :: family
-      real(wp) :: response(rings%n_dof*options%rings, rings%n_dof*options%rings)
+      real(wp) :: response(size(rings%shape_at_ring, 1), size(rings%shape_at_ring, 1))
       type(ball_type) :: relaxed
       type(mode_step_type) :: no_modes
       real(wp) :: no_damping(0)
@@ -94,10 +94,10 @@ contains
       call set_damping(options, no_modes, no_damping)
       relaxed = ball
       relaxed%youngs_modulus = no_modes%equilibrium_ratio*ball%youngs_modulus
-      basis = new_basis(relaxed, options%static_harmonics, options%cavity_gas)
+      basis = new_basis(relaxed, ubound(rings%shape_at_ring, 3), options%cavity_gas)
       response = 0.0_wp
       ! Equal forces on both poles double the response of even harmonics and cancel that of odd ones.
-      do n = 0, options%static_harmonics, 2
+      do n = 0, ubound(rings%shape_at_ring, 3), 2
          call get_static_family(basis, n, family, failed)
          if (failed) exit
          associate (shape_at_ring => rings%shape_at_ring(:, :, n))
@@ -105,8 +105,8 @@ contains
          end associate
       end do
       if (.not. failed) call new_ring_contact(response, rings%n_dof, contact, failed)
-      if (failed) error = numerical_error('&modal_ball: rings = '//to_text(options%rings) &
-         //' cannot be distinguished; allowed: fewer rings, or more static_harmonics')
+      if (failed) error = numerical_error('&modal_ball: rings = '//to_text(size(rings%radius)) &
+         //' cannot be distinguished; allowed: fewer rings')
    end subroutine new_press
 
 end module thud_modal_compression

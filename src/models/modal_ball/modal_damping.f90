@@ -11,6 +11,10 @@ module thud_modal_damping
 
    public :: set_damping
 
+   !> Damping ratio that modes get in addition towards the highest frequency, and fraction of this frequency from which on:
+   !> where modes end, an impact would ring.
+   real(wp), parameter :: end_damping = 0.5_wp, start_of_damping = 0.6_wp
+
 contains
 
    !> Sets the Maxwell branches and the damping ratios of the modes.
@@ -25,16 +29,22 @@ contains
       allocate (modes%relative_modulus(0), modes%time(0))
       select case (options%damping_law)
       case ('rising')
-         damping_ratio = options%loss_factor/2*modes%omega/(2*pi*options%loss_frequency)
+         modes%retardation_time = options%loss_factor/(2*pi*options%loss_frequency)
+         damping_ratio = modes%retardation_time*modes%omega/2
       case ('fractional')
          call fit_fractional_loss(new_fractional_loss(options%fractional_order, options%loss_factor, &
             options%loss_frequency), modes%relative_modulus, modes%time, viscosity)
          modes%equilibrium_ratio = 1/get_storage_ratio(modes%relative_modulus, modes%time, 2*pi*options%loss_frequency)
          modes%relative_modulus = modes%relative_modulus*modes%equilibrium_ratio
-         damping_ratio = modes%omega*viscosity*modes%equilibrium_ratio/2
+         modes%retardation_time = viscosity*modes%equilibrium_ratio
+         damping_ratio = modes%retardation_time*modes%omega/2
       case default
          damping_ratio = options%loss_factor/2
+         modes%retardation_time = options%loss_factor/(2*pi*options%get_highest_frequency())
       end select
+      associate (relative => modes%omega/(2*pi*options%get_highest_frequency()))
+         damping_ratio = damping_ratio + end_damping*max(0.0_wp, (relative - start_of_damping)/(1 - start_of_damping))**2
+      end associate
    end subroutine set_damping
 
 end module thud_modal_damping

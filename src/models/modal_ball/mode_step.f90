@@ -24,8 +24,12 @@ module thud_mode_step
       real(wp) :: equilibrium_ratio = 1.0_wp
       !> Moduli of the branches divided by the storage modulus, and their relaxation times, s: [n_branch].
       real(wp), allocatable :: relative_modulus(:), time(:)
+      !> Viscosity divided by the storage modulus, s; 0 for a loss factor that no material has at all frequencies.
+      real(wp) :: retardation_time = 0.0_wp
       !> Factors of one step: [n_mode, 2 + n_branch, 2 + n_branch].
       real(wp), allocatable :: factor(:, :, :)
+      !> Motion after one step from rest due to a unit force on the mode, constant in the step: [n_mode, 2 + n_branch].
+      real(wp), allocatable :: gain(:, :)
       !> Mode shapes at the rings, downwards, per unit amplitude: [n_mode, n_gap].
       real(wp), allocatable :: shape_at_ring(:, :)
    end type mode_step_type
@@ -40,11 +44,11 @@ contains
       real(wp), intent(in) :: damping_ratio(:)
       !> Length of a step, s.
       real(wp), intent(in) :: interval
-      real(wp) :: matrix(2 + size(modes%time), 2 + size(modes%time))
+      real(wp) :: matrix(3 + size(modes%time), 3 + size(modes%time))
       integer :: i, k, n
 
-      n = size(matrix, 1)
-      allocate (modes%factor(size(modes%omega), n, n))
+      n = size(matrix, 1) - 1
+      allocate (modes%factor(size(modes%omega), n, n), modes%gain(size(modes%omega), n))
       do i = 1, size(modes%omega)
          ! With the rate divided by the frequency, the elements are of similar size.
          associate (omega => modes%omega(i))
@@ -52,15 +56,18 @@ contains
             matrix(index_amplitude, index_rate) = omega
             matrix(index_rate, index_amplitude) = -omega*(modes%equilibrium_ratio + sum(modes%relative_modulus))
             matrix(index_rate, index_rate) = -2*damping_ratio(i)*omega
-            matrix(index_rate, 3:) = omega*modes%relative_modulus
+            matrix(index_rate, 3:n) = omega*modes%relative_modulus
             do k = 3, n
                matrix(k, [index_amplitude, k]) = [1, -1]/modes%time(k - 2)
             end do
+            ! The force, as a further variable that is constant in the step.
+            matrix(index_rate, n + 1) = 1/omega
             matrix = get_exponential(interval*matrix)
             matrix(:, index_rate) = matrix(:, index_rate)/omega
             matrix(index_rate, :) = matrix(index_rate, :)*omega
          end associate
-         modes%factor(i, :, :) = matrix
+         modes%factor(i, :, :) = matrix(:n, :n)
+         modes%gain(i, :) = matrix(:n, n + 1)
       end do
    end subroutine set_factors
 

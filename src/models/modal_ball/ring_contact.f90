@@ -1,8 +1,8 @@
-!> Unilateral contact of surface rings with a plane: impulses p >= 0 and gaps g + A p >= 0, one of which is zero for every
+!> Unilateral contact of surface rings with a plane: forces f >= 0 and gaps g + A f >= 0, one of which is zero for every
 !> ring, a linear complementarity problem.
 !>
-!> Sticking rings have a tangential gap, to the position where the ring began to stick, and a tangential impulse of any sign.
-!> This impulse closes the tangential gap of the rings that touched in the previous step: this set does not depend on the
+!> Sticking rings have a tangential gap, to the position where the ring began to stick, and a tangential force of any sign.
+!> This force closes the tangential gap of the rings that touched in the previous step: this set does not depend on the
 !> unknowns, so the solution is unique, and the error of a ring that begins or ceases to stick one step late is proportional
 !> to the step.
 module thud_ring_contact
@@ -25,16 +25,16 @@ module thud_ring_contact
    type :: ring_contact_type
       !> Degrees of freedom of a ring: 1, or 2 if it sticks; the gaps of a ring are adjacent, the normal one first.
       integer :: n_dof = 1
-      !> Gaps due to unit impulses, m/(N s): [n_gap, n_gap].
+      !> Gaps due to unit forces, m/N: [n_gap, n_gap].
       real(wp), allocatable :: response(:, :)
       !> Cholesky factor of the response: [n_gap, n_gap]. The touching rings are nearly always the first ones, and the factor
       !> of a leading block is the leading block of the factor.
       real(wp), allocatable :: factor(:, :)
-      !> Impulses in the last step, N s, and gaps after it, m: [n_gap].
-      real(wp), allocatable :: impulse(:), gap_after(:)
+      !> Forces in the last step, N, and gaps after it, m: [n_gap].
+      real(wp), allocatable :: force(:), gap(:)
       !> Rings that touched in the last step, and rings that stick: [n_ring].
       logical, allocatable :: touches(:), sticks(:)
-      !> Index of the outermost ring that touches, and of the last gap that an impulse closed; 0 for none.
+      !> Index of the outermost ring that touches, and of the last gap that a force closed; 0 for none.
       integer :: outermost = 0, last_closed_gap = 0
    end type ring_contact_type
 
@@ -42,7 +42,7 @@ contains
 
    !> Prepares the contact.
    subroutine new_ring_contact(response, n_dof, contact, failed)
-      !> Gaps due to unit impulses, symmetric, m/(N s): [n_gap, n_gap].
+      !> Gaps due to unit forces, symmetric, m/N: [n_gap, n_gap].
       real(wp), intent(in) :: response(:, :)
       !> Degrees of freedom of a ring.
       integer, intent(in) :: n_dof
@@ -56,15 +56,15 @@ contains
       allocate (contact%response, source=response)
       allocate (contact%factor, source=response)
       contact%n_dof = n_dof
-      allocate (contact%impulse(n), contact%gap_after(n), source=0.0_wp)
+      allocate (contact%force(n), contact%gap(n), source=0.0_wp)
       allocate (contact%touches(n/n_dof), contact%sticks(n/n_dof), source=.false.)
       call dpotrf('L', n, contact%factor, n, info)
       failed = info /= 0
    end subroutine new_ring_contact
 
-   !> Impulses of one step, by an active set that starts from the previous step.
+   !> Forces of one step, by an active set that starts from the previous step.
    subroutine solve_contact(contact, gap, error)
-      !> The contact; impulses and touching rings of this step are set here.
+      !> The contact; forces and touching rings of this step are set here.
       type(ring_contact_type), intent(inout) :: contact
       !> Gaps without contact, m: [n_gap].
       real(wp), intent(in) :: gap(:)
@@ -79,9 +79,9 @@ contains
          call close_gaps(contact, gap, failed)
          if (failed) exit
          associate (n => contact%last_closed_gap, n_dof => contact%n_dof)
-            contact%gap_after = gap
-            if (n > 0) contact%gap_after = gap + matmul(contact%response(:, :n), contact%impulse(:n))
-            wrong = merge(contact%impulse(::n_dof) < 0.0_wp, contact%gap_after(::n_dof) < -penetration_tolerance, &
+            contact%gap = gap
+            if (n > 0) contact%gap = gap + matmul(contact%response(:, :n), contact%force(:n))
+            wrong = merge(contact%force(::n_dof) < 0.0_wp, contact%gap(::n_dof) < -penetration_tolerance, &
                contact%touches)
          end associate
          if (.not. any(wrong)) return
@@ -105,11 +105,14 @@ contains
       real(wp), intent(inout) :: reference_gap(:)
 
       if (contact%n_dof == 1) return
-      where (.not. contact%sticks) reference_gap(2::2) = reference_gap(2::2) - contact%gap_after(2::2)
+      where (.not. contact%sticks)
+         reference_gap(2::2) = reference_gap(2::2) - contact%gap(2::2)
+         contact%gap(2::2) = 0.0_wp
+      end where
       contact%sticks = contact%touches
    end subroutine update_sticking
 
-   !> Impulses that close the normal gaps of touching rings and the tangential gaps of sticking rings.
+   !> Forces that close the normal gaps of touching rings and the tangential gaps of sticking rings.
    subroutine close_gaps(contact, gap, failed)
       type(ring_contact_type), intent(inout) :: contact
       real(wp), intent(in) :: gap(:)
@@ -125,13 +128,13 @@ contains
       n = count(closes)
       contact%last_closed_gap = findloc(closes, .true., dim=1, back=.true.)
       contact%outermost = findloc(contact%touches, .true., dim=1, back=.true.)
-      contact%impulse = 0.0_wp
+      contact%force = 0.0_wp
       failed = .false.
       if (n == 0) return
       if (contact%last_closed_gap == n) then
-         contact%impulse(:n) = -gap(:n)
-         call dtrsv('L', 'N', 'N', n, contact%factor, size(gap), contact%impulse, 1)
-         call dtrsv('L', 'T', 'N', n, contact%factor, size(gap), contact%impulse, 1)
+         contact%force(:n) = -gap(:n)
+         call dtrsv('L', 'N', 'N', n, contact%factor, size(gap), contact%force, 1)
+         call dtrsv('L', 'T', 'N', n, contact%factor, size(gap), contact%force, 1)
       else
          allocate (indices(n), matrix(n, n), solution(n, 1))
          indices = pack([(i, i=1, size(gap))], closes)
@@ -139,7 +142,7 @@ contains
          solution(:, 1) = -gap(indices)
          call dposv('L', n, 1, matrix, n, solution, n, info)
          failed = info /= 0
-         if (.not. failed) contact%impulse(indices) = solution(:, 1)
+         if (.not. failed) contact%force(indices) = solution(:, 1)
       end if
    end subroutine close_gaps
 

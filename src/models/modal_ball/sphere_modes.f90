@@ -9,7 +9,7 @@ module thud_sphere_modes
    use thud_ball, only: ball_type, get_density
    use thud_constants, only: pi
    use thud_kinds, only: wp
-   use thud_lapack, only: dposv, dsygv
+   use thud_lapack, only: dgetf2, dgetrs, dposv, dsygvx
    use thud_legendre, only: get_gauss_legendre, get_legendre
    implicit none (type, external)
    private
@@ -20,6 +20,9 @@ module thud_sphere_modes
    !> energy of compression would exceed the other energies. The modes differ from those of incompressible material by about
    !> this distance.
    real(wp), parameter :: incompressible_distance = 1.0e-7_wp
+
+   !> Minimum degree of the polynomials, and the part of the degree that resolves the ends of waves across the wall.
+   integer, parameter :: min_degree = 10, end_degree = 4
 
    !> Gram matrices of the basis, the same for every harmonic.
    type :: basis_type
@@ -45,6 +48,8 @@ module thud_sphere_modes
       real(wp), allocatable :: polynomial(:, :, :)
       !> Polynomials and two derivatives at the outer and at the inner radius: [2, degree + 1, 3].
       real(wp), allocatable :: at_end(:, :, :)
+      !> Degree that resolves the harmonic 0.
+      integer :: degree = 0
       !> Terms of the energies by their power of n (n + 1), see `set_gram`: [n_unknown, n_unknown, 5].
       real(wp), allocatable :: gram(:, :, :)
    end type basis_type
@@ -65,12 +70,14 @@ module thud_sphere_modes
 contains
 
    !> Basis for all harmonics up to a highest one.
-   function new_basis(ball, highest_harmonic, with_gas) result(basis)
+   function new_basis(ball, highest_harmonic, with_gas, highest_omega) result(basis)
       type(ball_type), intent(in) :: ball
       !> Highest harmonic that will be used.
       integer, intent(in) :: highest_harmonic
       !> Whether the enclosed gas resists changes of its volume.
       logical, intent(in) :: with_gas
+      !> Highest angular frequency of modes that will be used, rad/s (default: no modes).
+      real(wp), intent(in), optional :: highest_omega
       type(basis_type) :: basis
       real(wp), allocatable :: node(:)
       integer :: degree, n, i
@@ -87,6 +94,10 @@ contains
       if (with_gas) basis%gas_stiffness = ball%heat_capacity_ratio*(ball%ambient_pressure + ball%gauge_pressure) &
          /(4.0_wp/3.0_wp*pi*basis%inner_radius**3)
 
+      basis%degree = min_degree
+      ! Half a polynomial degree for each radian of a shear wave across the wall, and some for its ends.
+      if (present(highest_omega)) basis%degree = max(min_degree, &
+         end_degree + ceiling(highest_omega*sqrt(basis%density/basis%shear_modulus)*ball%wall_thickness/2))
       degree = get_degree(basis, highest_harmonic)
       n = degree + 1
       allocate (node(degree + 6), basis%weight(degree + 6))
@@ -175,65 +186,134 @@ contains
       integer, intent(in) :: harmonic
       integer :: degree
 
-      degree = 10 + ceiling(2.4_wp*sqrt(harmonic*log(basis%outer_radius/basis%inner_radius)))
+      degree = basis%degree + ceiling(2.4_wp*sqrt(harmonic*log(basis%outer_radius/basis%inner_radius)))
    end function get_degree
 
-   !> The lowest modes of one harmonic, and the flexibility of all other modes.
-   subroutine get_family(basis, harmonic, max_modes, highest_omega, family, failed)
+   !> The modes of one harmonic up to a frequency, and the flexibility of all other modes.
+   subroutine get_family(basis, harmonic, highest_omega, family, failed)
       type(basis_type), intent(in) :: basis
       !> Harmonic n.
       integer, intent(in) :: harmonic
-      !> Maximum number of modes to keep.
-      integer, intent(in) :: max_modes
       !> Highest angular frequency to keep, rad/s.
       real(wp), intent(in) :: highest_omega
       type(family_type), intent(out) :: family
       !> Whether the eigenproblem could not be solved.
       logical, intent(out) :: failed
-      real(wp), allocatable :: stiffness(:, :), mass(:, :), surface(:, :), square(:), work(:)
-      integer :: n, info, first, last, k
+      real(wp), allocatable :: stiffness(:, :), mass(:, :), surface(:, :), square(:), shape(:, :), work(:)
+      integer, allocatable :: iwork(:), unconverged(:)
+      integer :: n, n_mode, info, k
+      logical :: rigid
 
-      family%harmonic = harmonic
+      call get_static_family(basis, harmonic, family, failed)
+      if (failed) return
       call assemble(basis, harmonic, stiffness, mass, surface)
       n = size(stiffness, 1)
-      allocate (square(n), work(34*n))
-      call dsygv(1, 'V', 'L', n, stiffness, n, mass, n, square, work, size(work), info)
+      allocate (square(n), shape(n, n), work(34*n), iwork(5*n), unconverged(n))
+      call dsygvx(1, 'V', 'V', 'L', n, stiffness, n, mass, n, -highest_omega**2, highest_omega**2, 0, 0, 0.0_wp, n_mode, &
+         square, shape, n, work, size(work), iwork, unconverged, info)
       failed = info /= 0
       if (failed) return
       ! The lowest mode of n = 1 is the rigid one.
-      first = merge(2, 1, harmonic == 1)
-      failed = .not. all(square(first:) > 0.0_wp)
-      if (failed) return
-      last = min(first - 1 + min(max_modes, count(square(first:) <= highest_omega**2)), n)
-      family%omega = sqrt(square(first:last))
-      surface = matmul(surface, stiffness)
-      family%surface = surface(:, first:last)
-      do k = last + 1, n
-         family%flexibility = family%flexibility + outer(surface(:, k))/square(k)
+      rigid = harmonic == 1
+      k = merge(2, 1, rigid)
+      family%omega = sqrt(square(k:n_mode))
+      family%surface = matmul(surface, shape(:, k:n_mode))
+      do k = 1, size(family%omega)
+         family%flexibility = family%flexibility - outer(family%surface(:, k))/family%omega(k)**2
       end do
    end subroutine get_family
 
-   !> Flexibility of a harmonic, without its modes.
+   !> Flexibility of a harmonic, without its modes; for n = 1 without the rigid mode.
    subroutine get_static_family(basis, harmonic, family, failed)
       type(basis_type), intent(in) :: basis
-      !> Harmonic n, any but 1.
+      !> Harmonic n.
       integer, intent(in) :: harmonic
       !> The flexibility; no modes.
       type(family_type), intent(out) :: family
       !> Whether the stiffness is singular.
       logical, intent(out) :: failed
-      real(wp), allocatable :: stiffness(:, :), mass(:, :), surface(:, :), solution(:, :)
-      integer :: n, info
 
       family%harmonic = harmonic
       allocate (family%omega(0), family%surface(2, 0))
+      if (harmonic < 2) then
+         call get_low_flexibility(basis, harmonic, family%flexibility, failed)
+      else
+         call get_flexibility(basis, harmonic, family%flexibility, failed)
+      end if
+   end subroutine get_static_family
+
+   !> Flexibility of a harmonic from n = 2 up, in closed form (Lur'e, Theory of Elasticity, Springer 2005, section 5.1): four
+   !> solutions of the static equations with U = a r^m, V = b r^m, and the tractions 2 mu c r^(m-1), 2 mu d r^(m-1).
+   pure subroutine get_flexibility(basis, harmonic, flexibility, failed)
+      type(basis_type), intent(in) :: basis
+      integer, intent(in) :: harmonic
+      !> U and V at the outer surface due to unit generalized forces on U and V, m/N: [2, 2].
+      real(wp), intent(out) :: flexibility(2, 2)
+      !> Whether the solutions cannot be distinguished.
+      logical, intent(out) :: failed
+      real(wp), dimension(4) :: a, b, c, d, inner, at_outer
+      real(wp) :: matrix(4, 4), right(4, 2)
+      real(wp) :: n, nu
+      integer :: pivot(4), info
+
+      n = real(harmonic, wp)
+      nu = 0.5_wp
+      if (.not. basis%incompressible) nu = basis%lame/(2*(basis%lame + basis%shear_modulus))
+      ! Solutions with r^(n+1), r^(n-1), r^(-n), r^(-n-2); radii relative to the outer one, the last two to the inner one.
+      a = [(n + 1)*(n - 2 + 4*nu), n, n*(n + 3 - 4*nu), -(n + 1)]
+      b = [n + 5 - 4*nu, 1.0_wp, 4 - 4*nu - n, 1.0_wp]
+      c = [(n + 1)*(n**2 - n - 2 - 2*nu), n*(n - 1), -n*(n**2 + 3*n - 2*nu), (n + 1)*(n + 2)]
+      d = [n**2 + 2*n - 1 + 2*nu, n - 1, n**2 - 2 + 2*nu, -(n + 2)]
+      associate (ratio => basis%inner_radius/basis%outer_radius)
+         ! Values at the inner radius of the first two, at the outer radius of the last two.
+         inner = [ratio**(harmonic + 1), ratio**(harmonic - 1), ratio**harmonic, ratio**(harmonic + 2)]
+         matrix(1, :) = [c(:2), c(3:)*inner(3:)]
+         matrix(2, :) = [d(:2), d(3:)*inner(3:)]
+         matrix(3, :) = [c(:2)*inner(:2), c(3:)]/ratio
+         matrix(4, :) = [d(:2)*inner(:2), d(3:)]/ratio
+      end associate
+      ! Unit generalized forces, which belong to the tractions over the sphere.
+      right = 0.0_wp
+      associate (area => 4*pi/(2*n + 1)*basis%outer_radius**2, scale => 2*basis%shear_modulus/basis%outer_radius)
+         right(1, 1) = 1/(area*scale)
+         right(2, 2) = 1/(area*n*(n + 1)*scale)
+      end associate
+      call dgetf2(4, 4, matrix, 4, pivot, info)
+      failed = info /= 0
+      if (failed) return
+      call dgetrs('N', 4, 2, matrix, 4, pivot, right, 4, info)
+      at_outer = [1.0_wp, 1.0_wp, inner(3), inner(4)]
+      flexibility(1, :) = matmul(a*at_outer, right)
+      flexibility(2, :) = matmul(b*at_outer, right)
+   end subroutine get_flexibility
+
+   !> Flexibility of the harmonics 0 and 1, by the basis.
+   subroutine get_low_flexibility(basis, harmonic, flexibility, failed)
+      type(basis_type), intent(in) :: basis
+      integer, intent(in) :: harmonic
+      !> U and V at the outer surface due to unit generalized forces on U and V, m/N: [2, 2].
+      real(wp), intent(out) :: flexibility(2, 2)
+      !> Whether the stiffness is singular.
+      logical, intent(out) :: failed
+      real(wp), allocatable :: stiffness(:, :), mass(:, :), surface(:, :), solution(:, :), momentum(:)
+      real(wp) :: raised
+      integer :: n, info
+
       call assemble(basis, harmonic, stiffness, mass, surface)
       n = size(stiffness, 1)
+      raised = 0.0_wp
+      if (harmonic == 1) then
+         ! Raises the frequency of the rigid mode, U = 1 and W = 0, from zero; its flexibility is subtracted below.
+         momentum = mass(:, 1)/sqrt(mass(1, 1))
+         raised = basis%shear_modulus/(basis%density*basis%outer_radius**2)
+         stiffness = stiffness + raised*outer(momentum)
+      end if
       solution = transpose(surface)
       call dposv('L', n, 2, stiffness, n, solution, n, info)
       failed = info /= 0
-      family%flexibility = matmul(surface, solution)
-   end subroutine get_static_family
+      flexibility = matmul(surface, solution)
+      if (harmonic == 1) flexibility = flexibility - outer(surface(:, 1))/(mass(1, 1)*raised)
+   end subroutine get_low_flexibility
 
    !> Stiffness, mass and surface displacements of one harmonic in the basis.
    subroutine assemble(basis, harmonic, stiffness, mass, surface)

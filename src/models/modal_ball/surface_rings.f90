@@ -12,10 +12,10 @@ module thud_surface_rings
    implicit none (type, external)
    private
 
-   public :: new_surface_rings, outermost_angle, surface_rings_type
+   public :: greatest_angle, new_surface_rings, surface_rings_type
 
-   !> Angle of the outermost ring from the lowest point, rad.
-   real(wp), parameter :: outermost_angle = pi/3
+   !> Greatest angle of the outermost ring from the lowest point, rad.
+   real(wp), parameter :: greatest_angle = pi/3
 
    !> The rings of a sphere of radius 1.
    type :: surface_rings_type
@@ -32,20 +32,22 @@ module thud_surface_rings
 contains
 
    !> Rings with equal spacing.
-   pure function new_surface_rings(n_ring, highest, sticks) result(rings)
+   pure function new_surface_rings(n_ring, outermost_angle, sticks) result(rings)
       !> Number of rings, at least 2.
       integer, intent(in) :: n_ring
-      !> Highest harmonic.
-      integer, intent(in) :: highest
+      !> Angle of the outermost ring from the lowest point, rad.
+      real(wp), intent(in) :: outermost_angle
       !> Whether the rings stick.
       logical, intent(in) :: sticks
       type(surface_rings_type) :: rings
-      real(wp), dimension(0:highest) :: value, first, second
-      real(wp), allocatable :: node(:), weight(:)
+      real(wp), allocatable :: value(:), first(:), second(:), node(:), weight(:)
       real(wp) :: area(n_ring)
       real(wp) :: width, angle, area_fraction
-      integer :: i, j, k, n_node, row
+      integer :: i, j, k, n_node, row, highest
 
+      ! The wavelength of the highest harmonic is the spacing of the rings.
+      highest = nint(2*n_ring*pi/outermost_angle)
+      allocate (value(0:highest), first(0:highest), second(0:highest))
       width = outermost_angle/(n_ring - 1)
       rings%radius = sin([((i - 1)*width, i=1, n_ring)])
       rings%n_dof = merge(2, 1, sticks)

@@ -330,13 +330,14 @@ def runs_warning(residual: Array) -> str:
     positive = residual > 0
     n, m = int(positive.sum()), int((~positive).sum())
     if not min(n, m):
-        expected, deviation = 1.0, 0.0
-    else:
-        product = 2 * n * m
-        expected = 1 + product / (n + m)
-        deviation = np.sqrt(product * (product - n - m) / (n + m - 1)) / (n + m)
+        if 2 * 0.5 ** (n + m) > UNLIKELY:
+            return ""
+        return f"all {n + m} residuals have the same sign: they are not independent"
+    product = 2 * n * m
+    expected = 1 + product / (n + m)
+    deviation = np.sqrt(product * (product - n - m) / (n + m - 1)) / (n + m)
     runs = 1 + int(np.count_nonzero(positive[1:] != positive[:-1]))
-    if min(n, m) and 2 * stats.norm.sf(abs(runs - expected) / deviation) > UNLIKELY:
+    if 2 * stats.norm.sf(abs(runs - expected) / deviation) > UNLIKELY:
         return ""
     return (
         f"the residuals change their sign {runs - 1} times where {expected - 1:.0f} are expected: "

@@ -1,0 +1,65 @@
+!> Error of an impact due to its resolution: modes left out, rings, elements, time steps and samples. It is estimated by the
+!> change from a coarser resolution.
+module thud_numerical_error
+   use thud_band, only: get_octaves, octave_count
+   use thud_error, only: error_type
+   use thud_force_exposure, only: get_force_exposure_levels
+   use thud_force_history, only: force_history_type, numerical_error_type
+   use thud_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: estimate_error, get_largest_error
+
+   !> Part of the difference of two forces in an octave that is taken as in phase with the force, and so changes its level.
+   real(wp), parameter :: in_phase = 0.15_wp
+
+contains
+
+   !> Estimates the error of a force history by its difference from a coarser one.
+   subroutine estimate_error(coarse, ratio, history)
+      !> The same drop at a coarser resolution; its sampling rate may be lower.
+      type(force_history_type), intent(in) :: coarse
+      !> Error of the history divided by the difference.
+      real(wp), intent(in) :: ratio
+      !> The history; its errors are set.
+      type(force_history_type), intent(inout) :: history
+      real(wp) :: level(octave_count, 3), change(octave_count)
+      type(error_type), allocatable :: error
+
+      call get_force_exposure_levels(coarse%floor_force, coarse%sample_rate, get_octaves(), 'exact', level(:, 1), error)
+      if (allocated(error)) return
+      call get_force_exposure_levels(history%floor_force, history%sample_rate, get_octaves(), 'exact', level(:, 2), error)
+      if (allocated(error)) return
+      change = abs(level(:, 2) - level(:, 1))
+      if (size(coarse%floor_force) == size(history%floor_force)) then
+         ! Levels may agree by chance, the forces do not.
+         call get_force_exposure_levels(history%floor_force - coarse%floor_force, history%sample_rate, get_octaves(), &
+            'exact', level(:, 3), error)
+         if (allocated(error)) return
+         change = max(change, in_phase*20/log(10.0_wp)*10**((level(:, 3) - level(:, 2))/20))
+      end if
+      history%numerical_error = numerical_error_type(known=.true., octave=ratio*change, &
+         contact_time=ratio*abs(get_contact_time(history) - get_contact_time(coarse)), &
+         restitution=ratio*abs(history%restitution - coarse%restitution), &
+         peak_force=ratio*abs(history%peak_force - coarse%peak_force))
+   end subroutine estimate_error
+
+   !> The contact time, resolved between steps if possible.
+   pure function get_contact_time(history) result(time)
+      type(force_history_type), intent(in) :: history
+      !> The time, s.
+      real(wp) :: time
+
+      time = merge(history%exact_contact_time, history%contact_time, history%exact_contact_time > 0.0_wp)
+   end function get_contact_time
+
+   !> Largest error of an octave level, dB; 0 if no error is known.
+   pure function get_largest_error(history) result(error)
+      type(force_history_type), intent(in) :: history
+      real(wp) :: error
+
+      error = merge(maxval(history%numerical_error%octave), 0.0_wp, history%numerical_error%known)
+   end function get_largest_error
+
+end module thud_numerical_error

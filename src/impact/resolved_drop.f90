@@ -1,0 +1,72 @@
+!> A drop at a resolution that is fine enough: the model is solved at two levels of resolution, and at higher ones until the
+!> levels of the octaves agree. The difference is the stated numerical error.
+module thud_resolved_drop
+   use thud_ball, only: ball_type
+   use thud_drop, only: drop_type
+   use thud_error, only: error_type
+   use thud_force_history, only: force_history_type
+   use thud_kinds, only: wp
+   use thud_numerical_error, only: estimate_error, get_largest_error
+   use thud_receiver, only: receiver_type
+   use thud_sampling, only: sampling_type
+   use thud_source_model, only: source_model_type
+   implicit none (type, external)
+   private
+
+   public :: solve_drop
+
+   !> Error of an octave level above which a finer resolution is tried, dB.
+   real(wp), parameter :: max_error = 0.2_wp
+
+contains
+
+   !> Force history of one drop, with its numerical error.
+   subroutine solve_drop(model, ball, drop, sampling, history, error, receiver)
+      !> The model with its options, checked.
+      class(source_model_type), intent(in) :: model
+      type(ball_type), intent(in) :: ball
+      type(drop_type), intent(in) :: drop
+      type(sampling_type), intent(in) :: sampling
+      type(force_history_type), intent(out) :: history
+      !> Set if the drop leaves the range of the model, or at every resolution the steps are too coarse.
+      type(error_type), allocatable, intent(out) :: error
+      !> The structure under the source (default: a rigid floor).
+      type(receiver_type), intent(in), optional :: receiver
+      type(force_history_type) :: coarse
+      type(error_type), allocatable :: coarse_error
+      integer :: level
+
+      call solve_at(0, history, coarse_error)
+      if (.not. allocated(coarse_error)) coarse = history
+      do level = 1, model%get_highest_level()
+         call solve_at(level, history, error)
+         if (allocated(error)) return
+         if (.not. allocated(coarse_error)) call estimate_error(coarse, model%get_error_ratio(), history)
+         if (history%numerical_error%known .and. get_largest_error(history) <= max_error) return
+         coarse = history
+         if (allocated(coarse_error)) deallocate (coarse_error)
+      end do
+      if (history%numerical_error%known) return
+      ! The coarsest resolution fails and there is one level: a finer one shows the error.
+      call solve_at(level, coarse, coarse_error)
+      if (.not. allocated(coarse_error)) call estimate_error(coarse, 1 + model%get_error_ratio(), history)
+
+   contains
+
+      !> Force history at a level of resolution.
+      subroutine solve_at(level, history, error)
+         integer, intent(in) :: level
+         type(force_history_type), intent(out) :: history
+         type(error_type), allocatable, intent(out) :: error
+         class(source_model_type), allocatable :: resolved
+         type(sampling_type) :: resolved_sampling
+
+         allocate (resolved, source=model)
+         resolved_sampling = sampling
+         call resolved%set_level(ball, level, resolved_sampling, coarse)
+         call resolved%solve(ball, drop, resolved_sampling, history, error, receiver)
+      end subroutine solve_at
+
+   end subroutine solve_drop
+
+end module thud_resolved_drop
