@@ -2,8 +2,8 @@
 !> unilateral contact with the floor. Apart from the numerical resolution, its only input is geometry and material.
 !>
 !> Modes up to a highest frequency oscillate; all others follow the forces without inertia, by their flexibility and the
-!> creep of the material. Time steps are exact for each mode. In every step the forces of the surface rings make gaps and pressures
-!> complementary: no ring penetrates, none pulls, and there is no penalty stiffness.
+!> creep of the material. Time steps are exact for each mode. In every step the forces of the surface rings make gaps and
+!> pressures complementary: no ring penetrates, none pulls, and there is no penalty stiffness.
 module thud_modal_ball
    use thud_ball, only: ball_type
    use thud_ball_motion, only: ball_motion_type, new_ball_motion, take_step
