@@ -3,7 +3,7 @@
 module thud_resolved_drop
    use thud_ball, only: ball_type
    use thud_drop, only: drop_type
-   use thud_error, only: error_type
+   use thud_error, only: error_type, signal_base
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_numerical_error, only: estimate_error, get_largest_error
@@ -37,10 +37,18 @@ contains
       integer :: level
 
       call solve_at(0, history, coarse_error)
+      if (is_interrupt(coarse_error)) call move_alloc(coarse_error, error)
+      if (allocated(error)) return
       if (.not. allocated(coarse_error)) coarse = history
       do level = 1, model%get_highest_level()
          call solve_at(level, history, error)
-         if (allocated(error)) return
+         if (allocated(error)) then
+            if (is_interrupt(error) .or. .not. coarse%numerical_error%known) return
+            ! The next coarser level has a result, with its error.
+            deallocate (error)
+            history = coarse
+            return
+         end if
          if (.not. allocated(coarse_error)) call estimate_error(coarse, model%get_error_ratio(), history)
          if (history%numerical_error%known .and. get_largest_error(history) <= max_error) return
          coarse = history
@@ -49,7 +57,11 @@ contains
       if (history%numerical_error%known) return
       ! The coarsest resolution fails and there is one level: a finer one shows the error.
       call solve_at(level, coarse, coarse_error)
-      if (.not. allocated(coarse_error)) call estimate_error(coarse, 1 + model%get_error_ratio(), history)
+      if (is_interrupt(coarse_error)) then
+         call move_alloc(coarse_error, error)
+      else if (.not. allocated(coarse_error)) then
+         call estimate_error(coarse, 1 + model%get_error_ratio(), history)
+      end if
 
    contains
 
@@ -68,5 +80,14 @@ contains
       end subroutine solve_at
 
    end subroutine solve_drop
+
+   !> Whether an error is an interrupt.
+   pure function is_interrupt(error) result(yes)
+      type(error_type), allocatable, intent(in) :: error
+      logical :: yes
+
+      yes = .false.
+      if (allocated(error)) yes = error%code >= signal_base
+   end function is_interrupt
 
 end module thud_resolved_drop

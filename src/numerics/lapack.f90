@@ -31,8 +31,8 @@ module thud_lapack
       end subroutine dsygv
 
       !> Eigenvalues in a range and their vectors, of the generalized symmetric eigenproblem.
-      pure subroutine dsygvx(itype, jobz, range, uplo, n, a, lda, b, ldb, vl, vu, il, iu, abstol, m, w, z, ldz, work, lwork, &
-                             iwork, ifail, info)
+      pure subroutine dsygvx(itype, jobz, range, uplo, n, a, lda, b, ldb, vl, vu, il, iu, abstol, m, w, z, ldz, work, &
+                             lwork, iwork, ifail, info)
          import :: wp
          implicit none (type, external)
          integer, intent(in) :: itype, n, lda, ldb, il, iu, ldz, lwork

@@ -355,3 +355,11 @@ if __name__ == "__main__":
     ]
     assert [answer.returncode for answer in answers] == [0, 0]
     assert answers[0].stdout == answers[1].stdout != ""
+
+
+def test_run_that_turns_out_to_be_unstable_is_repeated_with_a_smaller_step() -> None:
+    """At the default step this coarse mesh becomes unstable after 2.4 ms."""
+    ball, drop = thud.Ball(youngs_modulus=1.6e6), thud.Drop(height=1.3)
+    with pytest.warns(thud.PlausibilityWarning, match="youngs_modulus"):
+        found = thud.solve(ball, drop, model="finite_element", polar_elements=40)
+    assert found.energy_residual < 1e-3

@@ -74,7 +74,7 @@ def test_finite_elements_find_modulus_and_loss_of_a_recording(
     found = thud.fit(record[0], {"youngs_modulus": None, "loss_factor": 0.15}, start)
     for name, truth in (("youngs_modulus", 2.08e6), ("loss_factor", 0.2)):
         assert abs(found.values[name] - truth) < FAR * found.standard_errors[name]
-        assert found.standard_errors[name] < 5e-3 * truth
+        assert found.standard_errors[name] < 1e-2 * truth
     # First touch at 0.2 s of the file.
     touch = record[0].drops[0].onset + found.time_shift
     assert abs(touch - 0.2) < FAR * found.standard_errors["time_shift"] + 0.5 / 44100
@@ -95,6 +95,7 @@ def test_residuals_tell_the_law_of_the_loss(tmp_path: Path) -> None:
     with (
         pytest.warns(thud.FitWarning, match=naming("model", "data")),
         pytest.warns(thud.FitWarning, match=naming("model", "force")),
+        pytest.warns(thud.FitWarning, match="damping_law"),
     ):
         other = thud.fit(recording, names, thud.Case(model=laws["constant"]))
     assert other.reduced_chi_square > 2 * found.reduced_chi_square

@@ -11,7 +11,7 @@ module thud_finite_element
    use thud_error, only: error_type, input_error, numerical_error
    use thud_finite_element_options, only: finite_element_options_type, get_frame_count, get_stride
    use thud_force_history, only: force_history_type
-   use thud_impact_record, only: continue_flight, finish_record, new_impact_record, record_sample
+   use thud_impact_record, only: continue_flight, finish_record, max_energy_residual, new_impact_record, record_sample
    use thud_impact_run, only: choose_step, get_energy, get_mean_height, get_mean_velocity, impact_run_type, max_steps, &
       new_impact_run, update_position, update_velocity
    use thud_interrupt, only: check_interrupt
@@ -34,6 +34,10 @@ module thud_finite_element
 
    !> Energy residual at which a run is stopped as unstable.
    real(wp), parameter :: unstable_residual = 0.05_wp
+
+   !> Maximum number of runs of a drop, and the fraction of `step_safety` that each next one keeps.
+   integer, parameter :: max_attempts = 3
+   real(wp), parameter :: next_safety = 0.75_wp
 
    !> Maximum penetration into the layer on the floor, as a fraction of the wall thickness: the layer is thin.
    real(wp), parameter :: max_penetration = 0.1_wp
@@ -176,13 +180,34 @@ contains
       end do
    end subroutine compress
 
-   !> Force history of one drop.
+   !> Force history of one drop. A run that turns out to be unstable is repeated with a smaller step.
    subroutine solve(ball, drop, options, sampling, history, error, receiver)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
       class(finite_element_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(force_history_type), intent(out) :: history
+      type(error_type), allocatable, intent(out) :: error
+      type(receiver_type), intent(in), optional :: receiver
+      class(finite_element_type), allocatable :: attempted
+      integer :: attempt
+
+      allocate (attempted, source=options)
+      do attempt = 1, max_attempts
+         call solve_once(ball, drop, attempted, sampling, history, error, receiver)
+         if (history%energy_residual <= max_energy_residual) return
+         attempted%step_safety = next_safety*attempted%step_safety
+      end do
+   end subroutine solve
+
+   !> Force history of one drop with the step as it is.
+   subroutine solve_once(ball, drop, options, sampling, history, error, receiver)
+      type(ball_type), intent(in) :: ball
+      type(drop_type), intent(in) :: drop
+      class(finite_element_options_type), intent(in) :: options
+      type(sampling_type), intent(in) :: sampling
+      type(force_history_type), intent(out) :: history
+      !> Set if the drop cannot be computed; if the run is unstable, the residual of energy in `history` is too large.
       type(error_type), allocatable, intent(out) :: error
       type(receiver_type), intent(in), optional :: receiver
       type(impact_run_type) :: run
@@ -217,7 +242,7 @@ contains
       history%motion = new_motion(run%position, get_frame_count(options, sampling))
       call march(run, get_mean_height(run) - gap, contacts, options, sampling, history, error)
       if (.not. allocated(error)) call finish_record(ball, run, sampling, speed, history, error)
-   end subroutine solve
+   end subroutine solve_once
 
    !> Integrates in time until the ball has left for good.
    subroutine march(run, touch_height, contacts, options, sampling, history, error)
@@ -409,11 +434,11 @@ contains
             //to_text(max_penetration)//' of the wall, by a higher layer_stiffness')
       else
          residual = abs(get_energy(run) - first_energy)/(run%total_mass/2*history%impact_velocity**2)
+         history%energy_residual = max(history%energy_residual, residual)
          if (.not. residual < unstable_residual) then
+            history%energy_residual = huge(residual)
             error = numerical_error(trim(event_prefix(time))//' the run is unstable (energy off by '//to_text(residual) &
                //' of that at first touch); allowed: a smaller step_safety')
-         else
-            history%energy_residual = max(history%energy_residual, residual)
          end if
       end if
    end subroutine check_run

@@ -14,7 +14,7 @@ module thud_impact_record
    implicit none (type, external)
    private
 
-   public :: continue_flight, finish_record, new_impact_record, record_sample
+   public :: continue_flight, finish_record, max_energy_residual, new_impact_record, record_sample
 
    !> Maximum error of the balance of energy, relative to the energy at first touch.
    real(wp), parameter :: max_energy_residual = 0.005_wp

@@ -121,12 +121,12 @@ contains
          margin*acos(1 - min(1.0_wp, coarse%max_deflection/ball%outer_radius)) + greatest_angle/coarse_rings)
    end subroutine set_level
 
-   !> Highest level of resolution.
+   !> Highest level of resolution: the user's keys do not grow.
    function get_highest_level(options) result(level)
       class(modal_ball_options_type), intent(in) :: options
       integer :: level
 
-      level = highest_level
+      level = merge(1, highest_level, options%rings > 0 .and. options%highest_frequency > 0.0_wp)
    end function get_highest_level
 
    !> Estimated error of a result divided by its difference from the next coarser level: it is found from random balls
@@ -138,21 +138,21 @@ contains
       ratio = 1.3_wp
    end function get_error_ratio
 
-   !> Number of rings: that of the user, or that of the level of resolution.
+   !> Number of rings: that of the user, fewer at level 0, or that of the level of resolution.
    pure function get_ring_count(options) result(n_ring)
       class(modal_ball_options_type), intent(in) :: options
       integer :: n_ring
 
-      n_ring = options%rings
-      if (n_ring == 0) n_ring = nint(coarse_rings*ratio**options%level)
+      n_ring = nint(coarse_rings*ratio**options%level)
+      if (options%rings > 0) n_ring = max(2, nint(options%rings*ratio**min(0, options%level - 1)))
    end function get_ring_count
 
-   !> Highest frequency of oscillating modes, Hz: that of the user, or that of the level of resolution.
+   !> Highest frequency of oscillating modes, Hz: that of the user, lower at level 0, or that of the level of resolution.
    pure function get_highest_frequency(options) result(frequency)
       class(modal_ball_options_type), intent(in) :: options
       real(wp) :: frequency
 
-      frequency = options%highest_frequency
+      frequency = options%highest_frequency*ratio**min(0, options%level - 1)
       if (frequency > 0.0_wp) return
       frequency = coarse_frequency*ratio**options%level
       ! Rings that are released lose the energy of modes without inertia.

@@ -254,7 +254,8 @@ contains
       real(wp), dimension(4) :: a, b, c, d, inner, at_outer
       real(wp) :: matrix(4, 4), right(4, 2)
       real(wp) :: n, nu
-      integer :: pivot(4), info
+      integer :: pivot(4)
+      integer :: info
 
       n = real(harmonic, wp)
       nu = 0.5_wp
