@@ -39,7 +39,8 @@ module thud_lapack
          character(len=1), intent(in) :: jobz, range, uplo
          real(wp), intent(inout) :: a(lda, *), b(ldb, *)
          real(wp), intent(in) :: vl, vu, abstol
-         integer, intent(out) :: m, iwork(*), ifail(*), info
+         integer, intent(out) :: m, info
+         integer, intent(out) :: iwork(*), ifail(*)
          real(wp), intent(out) :: w(*), z(ldz, *), work(*)
       end subroutine dsygvx
 
