@@ -81,10 +81,11 @@ EXTRAS = {"ball": STANDARD_BALL}
 OPTIONAL = {
     "modes": "Free modes that are requested.",
     "compression": "Quasi-static compression that is requested.",
+    "unknowns": "What is not known of the source: keys, and the distributions of their values.",
     "room": "Room below the floor.",
 }
 # What uses the keys of such an owner.
-USERS = {"modes": "free modes", "compression": "a quasi-static compression"}
+USERS = {"modes": "free modes", "compression": "a quasi-static compression", "unknowns": "`thud-driver assess`"}
 USERS["floor"] = "drops on a floor"
 USERS["room"] = "the level in the room below"
 INDENT = " " * 8
@@ -132,6 +133,8 @@ def python_type(key: Entry) -> str:
     """Return the type of a key's value."""
     if key["kind"] == "choice":
         return choice_name(key)
+    if key["kind"] == "texts":
+        return "Sequence[str]"
     if key["kind"] == "list":
         return f"Sequence[{'int' if key['whole'] else 'float'}]"
     return TYPES[key["kind"]]
@@ -139,7 +142,7 @@ def python_type(key: Entry) -> str:
 
 def python_default(key: Entry) -> str:
     """Return the default of a key as Python writes it."""
-    default = tuple(key["default"]) if key["kind"] == "list" else key["default"]
+    default = tuple(key["default"]) if key["kind"] in {"list", "texts"} else key["default"]
     return json.dumps(default) if isinstance(default, str) else repr(default)
 
 

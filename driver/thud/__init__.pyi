@@ -72,7 +72,7 @@ from .impact.solve import solve as solve
 from .level.assessment import (
     Criterion as Criterion,
     Verdict as Verdict,
-    assess as assess,
+    assess_levels as assess_levels,
 )
 from .level.estimate import Estimate as Estimate
 from .level.levels import (
@@ -101,6 +101,11 @@ from .studies.fitting.fit_result import Fit as Fit
 from .studies.fitting.force_target import ForceTarget as ForceTarget
 from .studies.fitting.level_target import LevelTarget as LevelTarget
 from .studies.kinds import read_study as read_study
+from .studies.model_verdict import (
+    ModelCriterion as ModelCriterion,
+    ModelVerdict as ModelVerdict,
+    assess as assess,
+)
 from .studies.parameter import Parameter as Parameter
 from .studies.sensitivity import (
     Sensitivity as Sensitivity,
@@ -151,4 +156,5 @@ from .base._schema import (
     Room as Room,
     Sampling as Sampling,
     TwoMass as TwoMass,
+    Unknowns as Unknowns,
 )

@@ -9,7 +9,7 @@ module thud_field
    implicit none (type, external)
    private
 
-   public :: check_fields, field_type, key_length, list_type, name_length
+   public :: check_fields, field_type, get_interval, key_length, list_type, name_length, text_list_type
 
    !> Maximum number of entries of a list.
    integer, parameter :: list_length = 64
@@ -24,6 +24,17 @@ module thud_field
 
    !> Length of text values such as the name of a model or a case.
    integer, parameter :: name_length = 128
+
+   !> Maximum number of entries of a list of texts.
+   integer, parameter :: text_list_length = 16
+
+   !> A list of texts of any length up to `text_list_length`.
+   type :: text_list_type
+      !> Number of entries.
+      integer :: count = 0
+      !> The entries; the first `count` are used: [text_list_length].
+      character(len=name_length) :: values(text_list_length) = ''
+   end type text_list_type
 
    !> Length of the name of a key or a group.
    integer, parameter :: key_length = 24
@@ -44,8 +55,8 @@ module thud_field
       character(len=key_length) :: group = ''
       !> Key within the group.
       character(len=key_length) :: key = ''
-      !> What uses the key: the name of a source model or of a floor, or `modes`, `compression`, `floor` or `room`; blank if
-      !> every impact uses it.
+      !> What uses the key: the name of a source model or of a floor, or `modes`, `compression`, `unknowns`, `floor` or
+      !> `room`; blank if every impact uses it.
       character(len=key_length) :: owner = ''
       !> SI unit, empty for pure numbers and text.
       character(len=8) :: unit = ''
@@ -61,6 +72,8 @@ module thud_field
       type(list_type), pointer :: list_value => null()
       !> The variable of a text key, else null.
       character(len=name_length), pointer :: text_value => null()
+      !> The variable of a key with a list of texts, else null.
+      type(text_list_type), pointer :: text_list_value => null()
       !> Allowed range of numbers, see `thud_interval`.
       character(len=72) :: range = ''
       !> The entries of the list must be whole numbers.
@@ -160,6 +173,9 @@ contains
          list = unset
          if (are_numbers(text)) read (line, nml=list_group, iostat=status, iomsg=message)
          if (status == 0) call set_list(list, self%list_value, status)
+      else if (associated(self%text_list_value)) then
+         wanted = 'a list of up to '//to_text(text_list_length)//' short texts in quotes'
+         call set_text_list(text, self%text_list_value, status)
       else if (associated(self%integer_value)) then
          wanted = 'a whole number'
          if (is_number(text)) read (text, *, iostat=status, iomsg=message) whole
@@ -217,6 +233,57 @@ contains
       list%values(:list%count) = entries(:list%count)
    end subroutine set_list
 
+   !> Sets a list of texts from texts in quotes, separated by commas or blanks.
+   subroutine set_text_list(text, list, status)
+      character(len=*), intent(in) :: text
+      type(text_list_type), intent(inout) :: list
+      !> Nonzero if there are too many texts, one is too long, or something else stands between them.
+      integer, intent(out) :: status
+      type(text_list_type) :: entries
+      character(len=:), allocatable :: entry
+      integer :: first, last
+
+      status = 1
+      first = verify(text, ' ,')
+      do while (first > 0)
+         if (scan(text(first:first), '''"') == 0 .or. entries%count == text_list_length) return
+         call read_quoted(text, first, entry, last)
+         if (last == 0 .or. len_trim(entry) > name_length) return
+         entries%count = entries%count + 1
+         entries%values(entries%count) = entry
+         first = verify(text(last + 1:), ' ,')
+         if (first > 0) first = last + first
+      end do
+      list = entries
+      status = 0
+   end subroutine set_text_list
+
+   !> Reads a text in quotes; a doubled quote stands for one.
+   pure subroutine read_quoted(text, first, entry, last)
+      character(len=*), intent(in) :: text
+      !> Position of the opening quote.
+      integer, intent(in) :: first
+      !> The text between the quotes.
+      character(len=:), allocatable, intent(out) :: entry
+      !> Position of the closing quote; 0 if there is none.
+      integer, intent(out) :: last
+      logical :: is_doubled
+
+      entry = ''
+      last = first + 1
+      do while (last <= len(text))
+         if (text(last:last) == text(first:first)) then
+            is_doubled = last < len(text)
+            if (is_doubled) is_doubled = text(last + 1:last + 1) == text(first:first)
+            if (.not. is_doubled) return
+            last = last + 1
+         end if
+         entry = entry//text(last:last)
+         last = last + 1
+      end do
+      last = 0
+   end subroutine read_quoted
+
    !> Value as a number: the index of a choice, 0 or 1 for a flag.
    function get_number(self) result(number)
       class(field_type), intent(in) :: self
@@ -259,7 +326,7 @@ contains
       end if
    end subroutine set_number
 
-   !> Kind of the value: `real`, `whole`, `flag`, `choice`, `text`, `list`.
+   !> Kind of the value: `real`, `whole`, `flag`, `choice`, `text`, `list`, `texts`.
    pure function get_kind(self) result(kind)
       class(field_type), intent(in) :: self
       character(len=6) :: kind
@@ -269,6 +336,7 @@ contains
       if (associated(self%integer_value)) kind = 'whole'
       if (associated(self%logical_value)) kind = 'flag'
       if (associated(self%list_value)) kind = 'list'
+      if (associated(self%text_list_value)) kind = 'texts'
       if (self%n_choice > 0) kind = 'choice'
    end function get_kind
 
@@ -296,6 +364,8 @@ contains
          text = to_text(self%real_value)
       else if (associated(self%list_value)) then
          text = join(self%list_value%values(:self%list_value%count))
+      else if (associated(self%text_list_value)) then
+         text = join_quoted(self%text_list_value%values(:self%text_list_value%count))
       else if (associated(self%integer_value)) then
          text = to_text(self%integer_value)
       else if (associated(self%logical_value)) then
@@ -317,6 +387,8 @@ contains
          text = join_quoted(self%choices(:self%n_choice))
       else if (associated(self%text_value)) then
          text = 'text in quotes, up to '//to_text(name_length)//' characters'
+      else if (associated(self%text_list_value)) then
+         text = 'up to '//to_text(text_list_length)//' texts in quotes, each up to '//to_text(name_length)//' characters'
       else if (associated(self%logical_value)) then
          text = '.true., .false.'
       else
@@ -337,6 +409,7 @@ contains
 
       empty = .false.
       if (associated(self%list_value)) empty = self%list_value%count == 0
+      if (associated(self%text_list_value)) empty = self%text_list_value%count == 0
    end function is_empty
 
 end module thud_field

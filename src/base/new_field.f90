@@ -1,12 +1,13 @@
 !> Constructors of key descriptions, one per kind of value. Ranges are intervals such as `(0, 10]`, see
 !> `thud_interval`; `in_group` and `owned_by` set the group and the owner of keys.
 module thud_new_field
-   use thud_field, only: field_type, list_type, name_length
+   use thud_field, only: field_type, list_type, name_length, text_list_type
    use thud_kinds, only: wp
    implicit none (type, external)
    private
 
-   public :: choice_field, in_group, integer_field, list_field, logical_field, owned_by, real_field, text_field
+   public :: choice_field, in_group, integer_field, list_field, logical_field, owned_by, real_field, text_field, &
+      text_list_field
 
 contains
 
@@ -71,6 +72,17 @@ contains
       field%text_value => variable
    end function text_field
 
+   !> Describes a key with a list of free texts.
+   function text_list_field(key, variable, meaning) result(field)
+      character(len=*), intent(in) :: key
+      type(text_list_type), intent(in), target :: variable
+      character(len=*), intent(in) :: meaning
+      type(field_type) :: field
+
+      field = field_type(key=key, meaning=meaning)
+      field%text_list_value => variable
+   end function text_list_field
+
    !> Describes a key that takes one of several words.
    function choice_field(key, variable, meaning, choices) result(field)
       character(len=*), intent(in) :: key
@@ -98,7 +110,7 @@ contains
 
    !> Sets the owner of keys: [n_field].
    function owned_by(owner, fields) result(owned)
-      !> A source model, a floor, `modes`, `compression`, `floor` or `room`.
+      !> A source model, a floor, `modes`, `compression`, `unknowns`, `floor` or `room`.
       character(len=*), intent(in) :: owner
       !> The keys: [n_field].
       type(field_type), intent(in) :: fields(:)

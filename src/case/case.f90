@@ -16,6 +16,7 @@ module thud_case
    use thud_sampling, only: check_sampling, get_sampling_fields, sampling_type
    use thud_source_limits, only: source_names
    use thud_text, only: is_utf8, quoted, to_text
+   use thud_unknowns, only: check_unknowns, get_unknowns_fields, unknowns_type
    implicit none (type, external)
    private
 
@@ -42,6 +43,10 @@ module thud_case
       logical :: has_compression = .false.
       !> Options of the compression.
       type(compression_options_type) :: compression
+      !> The case states what is not known of its source: it has the group `&unknowns`.
+      logical :: has_unknowns = .false.
+      !> What is not known of the source.
+      type(unknowns_type) :: unknowns
       type(ball_type) :: ball
       type(drop_type) :: drop
       !> Source model, one of `model_names`.
@@ -119,6 +124,7 @@ contains
          choice_field('force', case%level_force, 'assessed force, for which levels, peak force and verdict are reported', &
          [character(len=8) :: 'floor', 'elastic'])]), &
          in_group('limits', [choice_field('source', case%source, 'source whose limits apply', source_names)]), &
+         owned_by('unknowns', in_group('unknowns', get_unknowns_fields(case%unknowns))), &
          owned_by('floor', in_group('floor', [choice_field('name', case%floor, 'floor under the source', floor_names)]))]
       do i = 1, size(case%floors)
          fields = [fields, owned_by(floor_names(i), in_group(floor_names(i), case%floors(i)%model%get_fields()))]
@@ -126,7 +132,8 @@ contains
       fields = [fields, owned_by('room', in_group('room', get_room_fields(case%room)))]
    end function get_fields
 
-   !> Whether a case uses a key, for the impact, its model, the free modes, the compression, the floor or the room.
+   !> Whether a case uses a key, for the impact, its model, the free modes, the compression, the unknowns, the floor or the
+   !> room.
    pure elemental function is_used(case, field) result(used)
       type(case_type), intent(in) :: case
       type(field_type), intent(in) :: field
@@ -141,6 +148,8 @@ contains
             case%floor])
       else if (field%owner == 'compression') then
          used = case%has_compression .and. case%has_impact
+      else if (field%owner == 'unknowns') then
+         used = case%has_unknowns .and. case%has_impact
       else if (case%has_impact) then
          used = field%owner == '' .or. field%owner == case%model
       else
@@ -159,6 +168,18 @@ contains
       fields = pack(fields, [(is_used(case, fields(i)) .and. .not. fields(i)%is_empty(), i=1, size(fields))])
    end function get_active_fields
 
+   !> The keys of ball, drop and source model that are real numbers: [n_field].
+   function get_source_fields(case) result(fields)
+      !> The case that the fields read.
+      type(case_type), intent(in), target :: case
+      type(field_type), allocatable :: fields(:)
+      integer :: i
+
+      allocate (fields, source=get_active_fields(case))
+      fields = pack(fields, [(fields(i)%get_kind() == 'real' .and. fields(i)%group /= 'output' &
+         .and. (fields(i)%owner == case%model .or. any(fields(i)%group == ['ball', 'drop'])), i=1, size(fields))])
+   end function get_source_fields
+
    !> Returns an error if values of a case are out of range or contradict each other.
    subroutine check_case(case, error)
       type(case_type), intent(in), target :: case
@@ -171,6 +192,7 @@ contains
       if (case%has_modes) call check_modes(case%modes, error)
       if (allocated(error) .or. .not. case%has_impact) return
       if (case%has_compression) call check_compression(case%compression, case%ball, error)
+      if (case%has_unknowns .and. .not. allocated(error)) call check_unknowns(case%unknowns, get_source_fields(case), error)
       if (case%has_floor .and. .not. allocated(error)) call check_floor(case, error)
       if (case%has_room .and. .not. allocated(error)) call check_room(case%room, error)
       if (allocated(error)) return

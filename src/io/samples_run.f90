@@ -62,9 +62,10 @@ contains
 
       call load_case(path, case, error, unchecked=.true.)
       if (allocated(error)) return
-      ! Samples have no free modes and no compression.
+      ! Samples have no free modes, no compression and no unknowns.
       case%has_modes = .false.
       case%has_compression = .false.
+      case%has_unknowns = .false.
       if (.not. case%has_impact) error = input_error(path//': &model is missing; allowed: samples of a case ' &
          //'with a source model')
       if (allocated(error)) return

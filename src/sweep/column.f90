@@ -12,7 +12,7 @@ module thud_column
 
    !> Groups whose keys must be the same for all samples.
    character(len=key_length), parameter :: common_groups(*) = [character(len=key_length) :: &
-      'case', 'model', 'modes', 'compression', 'output', 'floor']
+      'case', 'model', 'modes', 'compression', 'unknowns', 'output', 'floor']
 
    !> A key in which samples differ.
    type :: column_type

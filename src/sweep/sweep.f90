@@ -177,9 +177,10 @@ contains
 
          thread_case = case
          allocate (fields, source=get_active_fields(thread_case))
-         ! Samples have no free modes and no compression.
+         ! Samples have no free modes, no compression and no unknowns.
          thread_case%has_modes = .false.
          thread_case%has_compression = .false.
+         thread_case%has_unknowns = .false.
          blocked = sweep%blocked
          !$omp do schedule(dynamic)
          do i = 1, size(remaining)

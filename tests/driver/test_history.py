@@ -16,7 +16,7 @@ from scipy.stats import binom
 
 import thud
 from thud.cli.recording_commands import run_history
-from thud.level.assessment import VERDICTS, assess
+from thud.level.assessment import VERDICTS, assess_levels
 from thud.level.estimate import Contribution, Estimate
 from thud.level.levels import get_bands
 from thud.report.ball_history import YEAR, History, _trend, read_history
@@ -33,7 +33,7 @@ LIMITS = (29.5, 32.5)
 def report(day: str, levels: Any = LEVELS, deviation: float = 0.1, **keys: Any) -> dict[str, Any]:  # noqa: ANN401
     """Return what a report says that a chart needs, the verdicts by the library."""
     part = Contribution("repeatability", deviation)
-    decisions = assess(
+    decisions = assess_levels(
         [Estimate.from_budget(float(level), part) for level in levels],
         contact_time=Estimate.from_budget(0.02, Contribution("repeatability", 1e-4)),
         restitution=0.8,

@@ -212,7 +212,7 @@ def test_unlocked_array_of_a_result_is_copied() -> None:
 
 def test_nan_equals_nan() -> None:
     criteria = [
-        thud.assess([39, 31, 23, 17, 12], 0.02, float("nan"), 1, 2.5, 1.0) for _ in range(2)
+        thud.assess_levels([39, 31, 23, 17, 12], 0.02, float("nan"), 1, 2.5, 1.0) for _ in range(2)
     ]
     assert criteria[0] == criteria[1]
     assert hash(criteria[0]) == hash(criteria[1])

@@ -147,7 +147,7 @@ def test_each_question_is_answered_for_the_force_that_is_asked() -> None:
             levels = thud.force_exposure_levels(forces[judged], rate, "third", method or "fft")  # type: ignore[arg-type]
             assert (impact.levels("third", method, asked) == levels).all()  # type: ignore[arg-type]
         for source in (None, "rubber_ball", "tyre"):
-            expected = thud.assess(
+            expected = thud.assess_levels(
                 impact.levels(force=asked), impact.contact_time, impact.restitution,  # type: ignore[arg-type]
                 peak_count(forces[judged], rate), 2.4, 0.9, source or "tyre",  # type: ignore[arg-type]
             )  # fmt: skip

@@ -141,28 +141,28 @@ def test_silence_between_bands_has_the_level_of_rounding() -> None:
 
 def test_verdict_needs_five_levels() -> None:
     with pytest.raises(thud.InputError, match=naming("levels", 4, 5)):
-        thud.assess([1, 2, 3, 4], 0.02, 0.8, 1, 2.5, 1.0)
+        thud.assess_levels([1, 2, 3, 4], 0.02, 0.8, 1, 2.5, 1.0)
     with pytest.raises(
         thud.InputError, match=naming("source", "'hammer'", "'rubber_ball'", "'tyre'")
     ):
-        thud.assess([1, 2, 3, 4, 5], 0.02, 0.8, 1, 2.5, 1.0, source="hammer")
+        thud.assess_levels([1, 2, 3, 4, 5], 0.02, 0.8, 1, 2.5, 1.0, source="hammer")
 
 
 @pytest.mark.parametrize("peaks", [1.9, -1, np.inf, 2**32 + 1], ids=repr)
 def test_peaks_are_counted_in_whole_numbers(peaks: object) -> None:
     with pytest.raises(thud.InputError, match=naming("peaks", repr(peaks), 0, 2147483648)):
-        thud.assess([39, 31, 23, 17, 12.5], 0.02, 0.8, peaks, 2.5, 1.0)  # type: ignore[arg-type]
+        thud.assess_levels([39, 31, 23, 17, 12.5], 0.02, 0.8, peaks, 2.5, 1.0)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("value", [[0.02, 3], 1j, "soon", None, 10**400], ids=type)
 def test_criteria_are_single_numbers(value: object) -> None:
     with pytest.raises(thud.InputError, match=naming("contact_time", "number")):
-        thud.assess([39, 31, 23, 17, 12.5], value, 0.8, 1, 2.5, 1.0)  # type: ignore[arg-type]
+        thud.assess_levels([39, 31, 23, 17, 12.5], value, 0.8, 1, 2.5, 1.0)  # type: ignore[arg-type]
 
 
 def test_nominal_tyre_conforms() -> None:
-    assert thud.assess([47, 40, 22, 11.5, 5.5], 0.02, 0.8, 1, 7.3, 0.85, source="tyre")
-    assert not thud.assess([47, 40, 22, 11.5, 5.5], 0.02, 0.8, 2, 7.3, 0.85, source="tyre")
+    assert thud.assess_levels([47, 40, 22, 11.5, 5.5], 0.02, 0.8, 1, 7.3, 0.85, source="tyre")
+    assert not thud.assess_levels([47, 40, 22, 11.5, 5.5], 0.02, 0.8, 2, 7.3, 0.85, source="tyre")
 
 
 def criteria_of(source: LimitsSource, **changes: float) -> thud.Verdict:
@@ -170,7 +170,7 @@ def criteria_of(source: LimitsSource, **changes: float) -> thud.Verdict:
     value = {one.name: (one.lower + one.upper) / 2 for one in get_criteria(source)} | changes
     values = [*value.values()]
     values[7] = int(values[7])
-    return thud.assess(values[:5], *values[5:], source)
+    return thud.assess_levels(values[:5], *values[5:], source)
 
 
 @pytest.mark.parametrize("source", SOURCES)
@@ -238,9 +238,9 @@ def test_recorded_force_has_what_lies_below_1250_hz() -> None:
 
 def test_most_peaks_are_those_of_a_whole_number_of_four_bytes() -> None:
     levels = [39, 31, 23, 17, 12.5]
-    assert not thud.assess(levels, 0.02, 0.8, 2**31 - 1, 2.5, 1.0)
-    assert thud.assess(levels, 0.02, 0.8, np.int64(1), 2.5, 1.0)
+    assert not thud.assess_levels(levels, 0.02, 0.8, 2**31 - 1, 2.5, 1.0)
+    assert thud.assess_levels(levels, 0.02, 0.8, np.int64(1), 2.5, 1.0)
     with pytest.raises(thud.InputError, match=naming("peaks", 2**31)):
-        thud.assess(levels, 0.02, 0.8, 2**31, 2.5, 1.0)
+        thud.assess_levels(levels, 0.02, 0.8, 2**31, 2.5, 1.0)
     with pytest.raises(thud.InputError, match=naming("sample_rate", "inf")):
         peak_count(PULSE, np.inf)

@@ -17,7 +17,7 @@ from scipy.stats import binom, t as student
 from synthetic import make_drop
 
 import thud
-from thud.level.assessment import assess
+from thud.level.assessment import assess_levels
 from thud.level.estimate import Contribution, Estimate
 from thud.level.levels import RECORDED_BAND
 from thud.recordings.band_noise import band_noise
@@ -670,7 +670,7 @@ def with_levels(level: Estimate, band: int = 0, **others: Any) -> str:  # noqa: 
         "contact_time": 0.02, "restitution": 0.8, "peaks": 1, "mass": 2.5, "drop_height": 1.0,
         **others,
     }  # fmt: skip
-    verdict = assess(levels, **options)
+    verdict = assess_levels(levels, **options)
     return verdict.result
 
 
@@ -694,8 +694,8 @@ def test_verdict_has_a_guard_band_on_both_sides() -> None:
 
 
 def test_verdict_names_each_criterion_of_the_library() -> None:
-    verdict = assess(NOMINAL, contact_time=Estimate(0.02, 1e-4), restitution=0.8, peaks=2)
-    expected = assess(NOMINAL, 0.02, 0.8, 2)
+    verdict = assess_levels(NOMINAL, contact_time=Estimate(0.02, 1e-4), restitution=0.8, peaks=2)
+    expected = assess_levels(NOMINAL, 0.02, 0.8, 2)
     assert [d.name for d in verdict.criteria] == [c.name for c in expected.criteria]
     assert [(d.lower, d.upper) for d in verdict.criteria] == [
         (c.lower, c.upper) for c in expected.criteria
@@ -712,23 +712,23 @@ def test_verdict_names_each_criterion_of_the_library() -> None:
     assert with_levels(Estimate(39.0), mass=math.nan) == "inconclusive"
     assert with_levels(Estimate(39.0), restitution=0.95, mass=math.nan) == "does not conform"
     with pytest.raises(thud.InputError, match=naming("levels", 4, 5)):
-        assess(NOMINAL[:4])
+        assess_levels(NOMINAL[:4])
     with pytest.raises(thud.InputError, match=naming("'bowling_ball'", "'rubber_ball'")):
-        assess(NOMINAL, source="bowling_ball")
+        assess_levels(NOMINAL, source="bowling_ball")
 
 
 def test_probability_of_conformity_counts_both_limits() -> None:
     half = Estimate(40.0, 0.1)
     wide = Estimate(39.0, 1.0)
-    decisions = [assess([q, *NOMINAL[1:]]).criteria[0] for q in (half, wide)]
+    decisions = [assess_levels([q, *NOMINAL[1:]]).criteria[0] for q in (half, wide)]
     assert decisions[0].probability == pytest.approx(0.5)
     assert decisions[1].probability == pytest.approx(0.6827, abs=1e-4)
     # Of four drops, Student's t; what is not known or an upper bound has no probability.
     few = Estimate(39.5, 0.4, freedom=3)
     expected = student.cdf(0.5 / 0.4, 3) - student.cdf(-1.5 / 0.4, 3)
-    assert assess([few, *NOMINAL[1:]]).criteria[0].probability == pytest.approx(expected)
+    assert assess_levels([few, *NOMINAL[1:]]).criteria[0].probability == pytest.approx(expected)
     bound = replace(few, upper_bound=True)
-    assert math.isnan(assess([bound, *NOMINAL[1:]]).criteria[0].probability)
+    assert math.isnan(assess_levels([bound, *NOMINAL[1:]]).criteria[0].probability)
 
 
 @pytest.mark.parametrize(("scatter", "calibration"), [(0.5, 0.0), (0.5, 0.1), (0.3, 0.5)])
@@ -763,7 +763,7 @@ def test_coverage_and_errors_of_the_verdict_by_monte_carlo(
 
 
 def _assess_level(quantity: Estimate) -> str:
-    return assess([quantity, *NOMINAL[1:]]).criteria[0].result
+    return assess_levels([quantity, *NOMINAL[1:]]).criteria[0].result
 
 
 def test_energy_of_bands_adds_up_to_neighbours() -> None:

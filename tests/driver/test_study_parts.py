@@ -269,7 +269,7 @@ def test_fewest_drops_are_those_of_the_order_statistic() -> None:
 
 
 def test_verdict_is_undecided_where_errors_reach_a_limit() -> None:
-    criteria = thud.assess(np.zeros(5), 0, 0, 0, 0, 0).criteria
+    criteria = thud.assess_levels(np.zeros(5), 0, 0, 0, 0, 0).criteria
     middle = np.array([(one.lower + one.upper) / 2 for one in criteria])
     half = np.array([(one.upper - one.lower) / 2 for one in criteria])
 
@@ -308,7 +308,7 @@ def test_range_of_a_surrogate_counts_undecided_samples_twice() -> None:
 
 
 def test_table_of_the_uncertainty_has_the_shares_within_the_limits() -> None:
-    criteria = thud.assess(np.zeros(5), 0, 0, 0, 0, 0).criteria[:5]
+    criteria = thud.assess_levels(np.zeros(5), 0, 0, 0, 0, 0).criteria[:5]
     draw = np.random.default_rng(3)
     levels = np.array([(c.lower + c.upper) / 2 for c in criteria]) + draw.normal(0, 2, (200, 5))
     # Limits are allowed values.
@@ -527,7 +527,7 @@ def test_answers_are_the_verdict_of_what_is_predicted() -> None:
     worst = judged[int(np.argmax(surrogate.errors[judged]))]
     assert surrogate.worst == (surrogate.labels[worst], surrogate.errors[worst])
     # A level at its limit within the error is undecided, and so is a time by its ratio.
-    limit = thud.assess(np.zeros(5), 0, 0, 0, 0, 0).criteria[5].upper
+    limit = thud.assess_levels(np.zeros(5), 0, 0, 0, 0, 0).criteria[5].upper
     for decibels, is_undecided in ((0.5, True), (1.5, False)):
         mean = surrogate.mean.copy()
         mean[10] = 20 * np.log10(limit) - decibels * surrogate.errors[10]

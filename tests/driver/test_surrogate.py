@@ -361,7 +361,7 @@ def test_map_shows_undecided_verdicts(trained: thud.Surrogate) -> None:
     residuals = np.full_like(trained.residuals, error) * level
     found = thud.design(study, surrogate=replace(trained, residuals=residuals, bound=error))
     undecided = found.dataset["undecided"]
-    limits = {one.name: one for one in thud.assess([0] * 5, 0, 0, 1, 0, 0).criteria}
+    limits = {one.name: one for one in thud.assess_levels([0] * 5, 0, 0, 1, 0, 0).criteria}
     rest = [
         (found.dataset[name] >= limits[name].lower) & (found.dataset[name] <= limits[name].upper)
         for name in ("contact_time", "restitution")

@@ -30,7 +30,7 @@ again = (
     thud.solve(thud.read_case(folder / "mine.nml")),
     thud.read_results(folder / "outputs/mine"),
 )
-verdict: thud.Verdict = thud.assess([39, 31, 23, 17, 12], 0.02, 0.8, 1, 2.5, 1.0, "tyre")
+verdict: thud.Verdict = thud.assess_levels([39, 31, 23, 17, 12], 0.02, 0.8, 1, 2.5, 1.0, "tyre")
 missed: list[thud.Criterion] = [one for one in verdict.criteria if not one.conforms]
 modes: thud.FreeModes = thud.free_modes(ball, thud.Modes(count=2).count, polar_elements=16)
 press = thud.Compression(gas="isothermal")

@@ -42,6 +42,7 @@ __all__ = [
     "Room",
     "Sampling",
     "TwoMass",
+    "Unknowns",
 ]
 
 # Choices of keys.
@@ -229,6 +230,32 @@ class Compression(Group):
     max_deflection: float = 0.04
     points: int = 41
     gas: CompressionGas = "vented"
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns(Group):
+    """What is not known of the source: keys, and the distributions of their values.
+
+    Attributes
+    ----------
+    key : sequence of str
+        Keys of ball, drop and model whose values are not known.
+    low : sequence of float
+        Their minima, in the units of the keys; -1e+30 <= low <= 1e+30.
+    high : sequence of float
+        Their maxima; -1e+30 <= high <= 1e+30.
+    standard_deviation : sequence of float
+        Standard deviations around the values of the case, truncated by low and high; 0: uniform; 0
+        <= standard_deviation <= 1e+30.
+    reason : sequence of str
+        Reasons of the ranges, with their sources.
+    """
+
+    key: Sequence[str] = ()
+    low: Sequence[float] = ()
+    high: Sequence[float] = ()
+    standard_deviation: Sequence[float] = ()
+    reason: Sequence[str] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -1052,6 +1079,11 @@ KEYS = (
     Key("", "levels", "bands", "choice", "", "bands of levels.csv", ('octave', 'third', 'both')),
     Key("", "levels", "force", "choice", "", "assessed force, for which levels, peak force and verdict are reported", ('floor', 'elastic')),
     Key("", "limits", "source", "choice", "", "source whose limits apply", ('rubber_ball', 'tyre')),
+    Key("unknowns", "unknowns", "key", "texts", "", "keys of ball, drop and model whose values are not known"),
+    Key("unknowns", "unknowns", "low", "list", "", "their minima, in the units of the keys", (), -1e+30, 1e+30),
+    Key("unknowns", "unknowns", "high", "list", "", "their maxima", (), -1e+30, 1e+30),
+    Key("unknowns", "unknowns", "standard_deviation", "list", "", "standard deviations around the values of the case, truncated by low and high; 0: uniform", (), 0.0, 1e+30),
+    Key("unknowns", "unknowns", "reason", "texts", "", "reasons of the ranges, with their sources"),
     Key("floor", "floor", "name", "choice", "", "floor under the source", ('rigid', 'infinite_plate', 'oscillator', 'plate', 'floating_floor', 'joist_floor', 'measured_mobility')),
     Key("infinite_plate", "infinite_plate", "resistance", "real", "N s/m", "driving-point resistance: force divided by velocity", (), 1.0, 1000000000000000.0),
     Key("oscillator", "oscillator", "mass", "real", "kg", "moving mass under the source", (), 0.001, 1000000000000.0),

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 P = ParamSpec("P")
 R = TypeVar("R")
 
-Kind = Literal["real", "whole", "choice", "flag", "list", "text"]
+Kind = Literal["real", "whole", "choice", "flag", "list", "text", "texts"]
 
 
 @dataclass(frozen=True)
@@ -27,12 +27,13 @@ class Key:
     Attributes
     ----------
     owner : str
-        What uses the key: a source model, a floor, ``"modes"``, ``"compression"``, ``"floor"`` or
-        ``"room"``; empty if every impact uses it.
+        What uses the key: a source model, a floor, ``"modes"``, ``"compression"``, ``"unknowns"``,
+        ``"floor"`` or ``"room"``; empty if every impact uses it.
     group, name : str
         Namelist group and name.
     kind : str
-        ``"real"``, ``"whole"``, ``"choice"``, ``"flag"``, ``"list"`` (of numbers) or ``"text"``.
+        ``"real"``, ``"whole"``, ``"choice"``, ``"flag"``, ``"list"`` (of numbers), ``"text"`` or
+        ``"texts"`` (a list).
     unit : str
         SI unit; empty for pure numbers.
     meaning : str

@@ -26,6 +26,7 @@ from thud.base._schema import (
     Modes,
     Room,
     Sampling,
+    Unknowns,
 )
 from thud.base.bridge import ask, text
 from thud.base.checks import (
@@ -47,10 +48,14 @@ if TYPE_CHECKING:
 
 # Values by group and key, as f90nml has them.
 Namelist: TypeAlias = "Mapping[str, Mapping[str, object]]"
-# Names of the keys that take lists of numbers.
-LISTS = {key.name for key in KEYS if key.kind == "list"}
+# Names of the keys that take lists of numbers or texts.
+LISTS = {key.name for key in KEYS if key.kind in {"list", "texts"}}
 # Optional groups of an impact, and all optional groups of a case.
-IMPACT_GROUPS: dict[str, type[Group]] = {"compression": Compression, "room": Room}
+IMPACT_GROUPS: dict[str, type[Group]] = {
+    "compression": Compression,
+    "unknowns": Unknowns,
+    "room": Room,
+}
 OPTIONAL_GROUPS: dict[str, type[Group]] = {"modes": Modes, **IMPACT_GROUPS}
 # Keys of the mesh, which is the same for free modes and finite elements.
 _MESH = tuple(option.name for option in fields(Modes) if "group" in option.metadata)
@@ -92,6 +97,8 @@ class Case(Group, Displayed):
         Room below the floor; None: no level in a room.
     compression : Compression or None
         Options of the quasi-static compression by the source model; None: no compression.
+    unknowns : Unknowns or None
+        What is not known of the source; None: the defaults of the model, see `assess`.
     ball, drop, sampling, levels, limits
         The other namelist groups.
     """
@@ -107,6 +114,7 @@ class Case(Group, Displayed):
     floor: FloorOptions | None = None
     room: Room | None = None
     compression: Compression | None = None
+    unknowns: Unknowns | None = None
 
     def __repr__(self) -> str:
         """Return what is computed."""

@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING, NoReturn
 from thud.base.bridge import version
 from thud.base.checks import suggestion
 from thud.base.errors import InputError, NumericalError, ThudError
-from thud.cli.case_commands import EXAMPLES, EXPORT, compare_cases, draw_figures, run_cases
+from thud.cli.case_commands import (
+    ASSESS,
+    EXAMPLES,
+    EXPORT,
+    compare_cases,
+    draw_figures,
+    run_cases,
+)
 from thud.cli.command import (
     FORMAT,
     NO_FIGURES,
@@ -64,6 +71,7 @@ COMMANDS = {
         ),
         run_cases,
     ),
+    "assess": ASSESS,
     "compare": Command(
         "compare models and recordings of the same drop on one page",
         (

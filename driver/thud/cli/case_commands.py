@@ -35,6 +35,7 @@ from thud.cli.command import (
 from thud.impact.compression import new_curve
 from thud.impact.compute import compute, new_impact
 from thud.impact.free_modes import new_modes
+from thud.level.assessment import VERDICTS
 
 if TYPE_CHECKING:
     import argparse
@@ -89,8 +90,59 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
         results = Results(folder, inputs=(path,), replace=options.replace)
         results.write(figures, marker=answer["case"])
     if not options.quiet:
-        tqdm.write(f"{text(answer['table'])}\n  Results: {folder}\n")
+        tqdm.write(f"{text(answer['table'])}\n{_model_verdict(answer)}  Results: {folder}\n")
     return bool(answer["conforms"])
+
+
+def _model_verdict(answer: Bundle) -> str:
+    """Return the verdict over what is not known of a case in one line, or an empty text."""
+    if "samples" not in answer:
+        return ""
+    from thud.studies.model_verdict import assess_impact
+
+    case = Case.from_text(text(answer["case"]))
+    verdict = assess_impact(new_impact(case, answer))
+    if verdict:
+        return f"  {verdict.sentence}\n"
+    if case.unknowns:
+        return "  Verdict over what is not known: by thud-driver assess\n"
+    return ""
+
+
+def assess_case(options: argparse.Namespace) -> int:
+    """Assess a case over what is not known of its source; return the exit code."""
+    from thud.studies.model_verdict import assess
+
+    case = read_case(options.case)
+    folder = options.output or Path("outputs", f"{case.name}_unknowns")
+    verdict = assess(
+        case,
+        folder,
+        progress=not options.quiet and sys.stderr.isatty(),
+        replace_files=options.replace,
+    )
+    if not options.quiet:
+        print(format_rows(verdict.unknown_rows()))
+        print()
+        print(format_rows(verdict.rows()))
+        print(f"by {verdict.method}")
+    print(verdict.sentence)
+    return NOT_CONFORMING if options.check and verdict.result != VERDICTS[0] else 0
+
+
+ASSESS = Command(
+    "assess a case over what is not known of its source",
+    (
+        argument("case", metavar="CASE.nml", help="namelist file"),
+        *output(
+            "the drops that train a surrogate, where an interrupted training resumes "
+            "(default: outputs/<case name>_unknowns)"
+        ),
+        argument("--check", action="store_true", help="exit with 3 unless the source conforms"),
+        QUIET,
+    ),
+    assess_case,
+)
 
 
 def _figures(answer: Bundle, options: argparse.Namespace) -> dict[str, bytes]:
@@ -139,6 +191,8 @@ def compare_cases(options: argparse.Namespace) -> int:
     paths = results.write(page.files())
     if not options.quiet:
         print(format_rows(page.rows()))
+        for reason in page.reasons:
+            print(reason)
         print(f"Page: {paths[-1]}")
     return 0
 

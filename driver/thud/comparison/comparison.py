@@ -7,7 +7,7 @@ import os
 import time
 import warnings
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import chain, combinations, count
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
@@ -23,17 +23,20 @@ from thud.base.files import Page
 from thud.base.quantity import Quantity
 from thud.case.case import Case, read_case
 from thud.impact.compute import compute
+from thud.impact.impact import Impact
 from thud.level.impact_result import ImpactResult
 from thud.level.levels import FORCES, SOURCES
 from thud.plot.impact_figures import common_source
 from thud.plot.pages import comparison_html, comparison_page
 from thud.plot.save_figures import page_files
+from thud.studies.model_verdict import assess_impact, same_source
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from thud.base._schema import LevelsForce, LimitsSource
     from thud.level.assessment import Criterion
+    from thud.studies.model_verdict import ModelVerdict
 
 # Endings of namelist files; all other files are read as recordings.
 NAMELISTS = (".nml", ".namelist", "")
@@ -53,12 +56,16 @@ class Comparison(Displayed, Page):
         The compared force, ``"floor"`` or ``"elastic"``; None: the assessed force of each case.
     source : str
         Impact source whose limits apply.
+    model_verdicts : dict of str to ModelVerdict
+        Verdicts over what is not known, by the names of impacts that have one; impacts that differ
+        in nothing else share one.
     """
 
     impacts: dict[str, ImpactResult]
     run_times: dict[str, float]
     force: LevelsForce | None = None
     source: LimitsSource = "rubber_ball"
+    model_verdicts: dict[str, ModelVerdict] = field(default_factory=dict)
     _command = "compare"
 
     @property
@@ -73,31 +80,61 @@ class Comparison(Displayed, Page):
     def rows(self) -> list[tuple[str, ...]]:
         """Return rows of text: names, force, method, criteria, quantities, times, verdicts.
 
-        Each impact has a column; the last column has the limits.
+        Each impact has a column; then each verdict over what is not known has one with the ranges;
+        the last column has the limits.
         """
         impacts = self.impacts.values()
         verdicts = [impact.assess(self.source, self.force) for impact in impacts]
+        criteria = list(zip(*(verdict.criteria for verdict in verdicts), strict=True))
         times = [self.run_times.get(name) for name in self.impacts]
         peak = QUANTITIES["peak_force"]
         rows = [
-            ("", *self.impacts, f"limits, {self.source.replace('_', ' ')}"),
-            ("assessed force", *(impact.assessed_force(self.force) for impact in impacts), ""),
-            ("method of the levels", *(impact.level_method for impact in impacts), ""),
-            *(_criterion_row(row) for row in zip(*(v.criteria for v in verdicts), strict=True)),
-            (peak.label, *(peak.show(impact.peak(self.force)) for impact in impacts), ""),
+            ("", *self.impacts),
+            ("assessed force", *(impact.assessed_force(self.force) for impact in impacts)),
+            ("method of the levels", *(impact.level_method for impact in impacts)),
+            *(_criterion_row(row) for row in criteria),
+            (peak.label, *(peak.show(impact.peak(self.force)) for impact in impacts)),
             *_quantity_rows(impacts),
         ]
         if any(times):
-            rows.append(("computing time, ms", *(f"{1e3 * t:.1f}" if t else "" for t in times), ""))
-        return [*rows, ("verdict", *(verdict.result for verdict in verdicts), "")]
+            rows.append(("computing time, ms", *(f"{1e3 * t:.1f}" if t else "" for t in times)))
+        results = [
+            (self.model_verdicts.get(name) or verdict).result
+            for name, verdict in zip(self.impacts, verdicts, strict=True)
+        ]
+        rows.append(("verdict", *results))
+        columns = [
+            ["range (95 %)", "", "", *(c.range for c in verdict.criteria)]
+            for verdict in self._shared_verdicts()
+        ]
+        name = self.source.replace("_", " ")
+        columns.append([f"limits, {name}", "", "", *(_limits(row[0]) for row in criteria)])
+        for column in columns:
+            column += [""] * (len(rows) - len(column))
+        for column, verdict in zip(columns, self._shared_verdicts(), strict=False):
+            column[-1] = f"{verdict.share} conforms"
+        return [(*row, *cells) for row, *cells in zip(rows, *columns, strict=True)]
+
+    def _shared_verdicts(self) -> list[ModelVerdict]:
+        """Return the different verdicts over what is not known."""
+        return list({id(verdict): verdict for verdict in self.model_verdicts.values()}.values())
+
+    @property
+    def reasons(self) -> list[str]:
+        """Verdicts over what is not known, each after the names of its impacts."""
+        result = []
+        for verdict in self._shared_verdicts():
+            names = [name for name, own in self.model_verdicts.items() if own is verdict]
+            result.append(f"{' and '.join(names)}, over what is not known: {verdict.reason}")
+        return result
 
     def figure(self) -> Figure:
         """Return the page as a matplotlib figure."""
-        return comparison_page(self.impacts, self.force, self.source, self.rows())
+        return comparison_page(self.impacts, self.force, self.source, self.rows(), self.reasons)
 
     def html(self) -> str:
         """Return the page as self-contained HTML with interactive plots."""
-        return comparison_html(self.impacts, self.force, self.source, self.rows())
+        return comparison_html(self.impacts, self.force, self.source, self.rows(), self.reasons)
 
     def files(self) -> dict[str, bytes]:
         """Return ``comparison.svg`` and ``comparison.html`` by name."""
@@ -109,9 +146,14 @@ def _criterion_row(criteria: tuple[Criterion, ...]) -> tuple[str, ...]:
     band = name.removeprefix("octave_").replace("_", ".")
     level = Quantity(name, f"{band} Hz", "", "dB", "dB", 1.0, 2, "")
     quantity = QUANTITIES.get(name, level)
-    limits = [f"{end * quantity.display_scale:g}" for end in (criteria[0].lower, criteria[0].upper)]
-    cells = [_cell(criterion, quantity) for criterion in criteria]
-    return (quantity.label, *cells, " to ".join(dict.fromkeys(limits)))
+    return (quantity.label, *(_cell(criterion, quantity) for criterion in criteria))
+
+
+def _limits(criterion: Criterion) -> str:
+    """Return the limits of a criterion in its display unit."""
+    scale = QUANTITIES[criterion.name].display_scale if criterion.name in QUANTITIES else 1.0
+    ends = [f"{end * scale:g}" for end in (criterion.lower, criterion.upper)]
+    return " to ".join(dict.fromkeys(ends))
 
 
 def _cell(criterion: Criterion, quantity: Quantity) -> str:
@@ -134,7 +176,7 @@ def _quantity_rows(impacts: Iterable[ImpactResult]) -> list[tuple[str, ...]]:
     for name in SAMPLE_QUANTITIES:
         values = [impact.quantity(name) for impact in impacts]
         if name not in other_rows and not np.isnan(values).all():
-            rows.append((QUANTITIES[name].label, *map(QUANTITIES[name].show, values), ""))
+            rows.append((QUANTITIES[name].label, *map(QUANTITIES[name].show, values)))
     return rows
 
 
@@ -212,9 +254,29 @@ def compare(
         else:
             solved[name] = item
     _require_same_drop(solved)
-    result = Comparison(solved, run_times, force, common_source(solved, source))
+    limits = common_source(solved, source)
+    verdicts = _model_verdicts(solved, force, limits)
+    result = Comparison(solved, run_times, force, limits, verdicts)
     for warning in result.warnings:
         warnings.warn(warning, PlausibilityWarning, stacklevel=2)
+    return result
+
+
+def _model_verdicts(
+    impacts: Mapping[str, ImpactResult], force: LevelsForce | None, source: LimitsSource
+) -> dict[str, ModelVerdict]:
+    """Return the verdicts over what is not known, by name; the same for the same source."""
+    result: dict[str, ModelVerdict] = {}
+    for name, impact in impacts.items():
+        if not isinstance(impact, Impact):
+            continue
+        case = impact.case
+        if case.limits.source != source or force not in {None, case.levels.force}:
+            continue
+        verdict = assess_impact(impact)
+        if verdict:
+            others = (n for n in result if same_source(impacts[n].case, case))  # type: ignore[attr-defined]
+            result[name] = next((result[n] for n in others), verdict)
     return result
 
 

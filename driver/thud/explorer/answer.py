@@ -23,6 +23,7 @@ from thud.level.levels import get_bands
 from thud.plot.impact_figures import contact_force
 from thud.plot.style import FORCE_NAMES
 from thud.recordings.read_recording import read_recording
+from thud.studies.model_verdict import assess_impact
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -81,6 +82,11 @@ def answer_case(case: Case) -> Answer:
     answer = _answer(impact, *contact_force(impact, force))
     answer["force"]["title"] = FORCE_NAMES[force]
     answer["warnings"] += impact.warnings
+    verdict = assess_impact(impact)
+    if verdict:
+        answer["model_verdict"] = {"result": verdict.result, "reason": verdict.reason}
+        for entry, criterion in zip(answer["criteria"], verdict.criteria, strict=True):
+            entry["range"] = criterion.range
     on_floor = impact.on_floor
     answer["motion"] = _motion(on_floor or impact)
     answer["floor"] = None if on_floor is None else _floor(impact, on_floor)

@@ -58,7 +58,9 @@ def report(values: Values) -> bytes:
     impact = compute(new_case(values))
     comparison = compare({impact.case.name: impact})
     source = impact.case.limits.source
-    return comparison_html(comparison.impacts, None, source, comparison.rows()).encode()
+    return comparison_html(
+        comparison.impacts, None, source, comparison.rows(), comparison.reasons
+    ).encode()
 
 
 def study(values: Values) -> bytes:

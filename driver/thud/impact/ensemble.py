@@ -127,6 +127,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         base,
         modes=None,
         compression=None,
+        unknowns=None,
         sampling=replace(base.sampling, **keywords),  # type: ignore[arg-type]
         levels=replace(base.levels, bands=bands or base.levels.bands),
         limits=Limits(source) if source is not None else base.limits,

@@ -16,7 +16,7 @@ from thud.base.extras import data_frame, require_extra
 from thud.case.case import case_text
 from thud.impact.contact_time import contact_span
 from thud.impact.motion import Motion, new_motion
-from thud.level.assessment import assess
+from thud.level.assessment import assess_levels
 from thud.level.impact_result import DropForce
 from thud.level.levels import FORCES, force_exposure_levels, peak_count
 
@@ -234,7 +234,7 @@ class Impact(ImpactQuantities, Displayed):
         force
             ``"floor"`` or ``"elastic"``; by default the assessed force.
         """
-        return assess(
+        return assess_levels(
             self.levels(force=force),
             self.contact_time,
             self.restitution,

@@ -165,7 +165,7 @@ class Verdict(Displayed):
         return [header, *rows, ("all criteria", "", "", "", self.result)]
 
 
-def assess(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
+def assess_levels(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     levels: Iterable[Estimate | float],
     contact_time: Estimate | float = math.nan,
     restitution: Estimate | float = math.nan,

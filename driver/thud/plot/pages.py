@@ -183,6 +183,8 @@ document.getElementById("plot0").on("plotly_restyle", ([change, curves]) => {
 
 # Maximum number of characters of a name in one line of a table.
 _MAX_NAME_LENGTH = 20
+# Maximum number of characters in a line below the table.
+_MAX_LINE_LENGTH = 120
 # Space around the text of a cell, and to the left of all axes, inch.
 _CELL_MARGIN = (0.12, 0.08)
 _LEFT_MARGIN = 0.8
@@ -194,10 +196,12 @@ def comparison_page(
     force: LevelsForce | None,
     source: LimitsSource,
     table: Sequence[Sequence[str]],
+    reasons: Sequence[str] = (),
 ) -> Figure:
     """Draw forces, octave and one-third-octave levels of impacts, and a table, on one page.
 
-    The table is rows of text, header row first; the tolerance band is that of the source. Other
+    The table is rows of text, header row first; the tolerance band is that of the source. The
+    reasons are verdicts over what is not known, one sentence each. Other
     arguments are those of `thud.compare`.
     """
     figure = new_figure(5.8, 2 * WIDTH)
@@ -210,7 +214,14 @@ def comparison_page(
     legend_above(octaves)
     head, *body = table
     _add_table(figure, grid, [[fill(name, _MAX_NAME_LENGTH) for name in head], *body])
+    if reasons:
+        text = "\n".join(escape_label(fill(_sentence(r), _MAX_LINE_LENGTH)) for r in reasons)
+        figure.supxlabel(text, x=0.01, ha="left", fontsize=mpl.rcParams["legend.fontsize"])
     return figure
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}."
 
 
 def _add_table(figure: Figure, grid: GridSpec, rows: Sequence[Sequence[str]]) -> None:
@@ -239,6 +250,7 @@ def comparison_html(
     force: LevelsForce | None,
     source: LimitsSource,
     table: Sequence[Sequence[str]],
+    reasons: Sequence[str] = (),
 ) -> str:
     """Return the page of `comparison_page` with interactive plots, readable on any screen."""
     forces: list[dict[str, Any]] = []
@@ -262,7 +274,8 @@ def comparison_html(
     return html_page(
         "Comparison of models and recordings",
         "Forces as force plates record them, low-passed at 1.25 kHz, and their levels; gray boxes "
-        "are the tolerances of the standards, which one-third-octave bands do not have.",
+        "are the tolerances of the standards, which one-third-octave bands do not have."
+        + "".join(f" {_sentence(reason)}" for reason in reasons),
         table,
         plots,
     )

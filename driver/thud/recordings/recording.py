@@ -14,7 +14,7 @@ from thud.base.checks import require_whole
 from thud.base.display import Displayed
 from thud.base.extras import data_frame, require_extra
 from thud.case.case import Case
-from thud.level.assessment import assess
+from thud.level.assessment import assess_levels
 from thud.level.impact_result import DropForce
 from thud.recordings.budgets import check_restitution, drop_estimates, find_deviant, level_estimates
 from thud.recordings.config import Config, checked_config
@@ -346,7 +346,7 @@ class Recording(Displayed):
         force: LevelsForce | None = None,  # noqa: ARG002 - of the protocol
     ) -> Verdict:
         """Assess the recording by the limits of a source, by default that of the configuration."""
-        return assess(
+        return assess_levels(
             self.level_estimates(),
             source=source or self.config.source,
             limits=self.config.limits,

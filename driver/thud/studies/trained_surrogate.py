@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import io
 import json
+import math
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import binom
 
 from thud.base.bridge import version
 from thud.base.checks import (
@@ -44,11 +44,11 @@ if TYPE_CHECKING:
 
 # Fraction of held-out drops within the stated error, and the confidence of that statement.
 COVERAGE = 0.95
-# Samples that are computed together: their kernel stays in the cache.
+# Samples that are predicted together: their kernel stays in the cache.
 _CHUNK_SIZE = 250
 # Values this fraction of the width outside the region are rounding errors.
 _ROUNDING = 1e-9
-# Smoothness of the Matern kernel: functions that are twice differentiable.
+# Smoothness of the Matern kernel: functions that are twice differentiable (see `_kernel`).
 SMOOTHNESS = 2.5
 # Fewer drops have no order statistic that bounds 95 % of all with a confidence of 95 %.
 MIN_DROPS = 64
@@ -158,9 +158,7 @@ class Surrogate(StudyResult):
     def errors(self) -> Values:
         """Error of each number, dB, shape (n_number,); NaN if the model has no such result."""
         count = len(self.points)
-        # There is no such order statistic for 58 drops or fewer.
-        rank = int(binom.ppf(COVERAGE, count, COVERAGE))
-        result: Values = np.sort(np.abs(self.residuals), axis=0)[rank]
+        result: Values = np.sort(np.abs(self.residuals), axis=0)[_rank(count)]
         return result
 
     @property
@@ -192,6 +190,10 @@ class Surrogate(StudyResult):
         """Return the errors of a quantity, dB, shape (count,)."""
         result: Values = self._split(self.errors[np.newaxis])[name][0]
         return result
+
+    def residuals_of(self, name: str) -> Values:
+        """Return the leave-one-out residuals of a quantity, dB, shape (n_drop, count)."""
+        return self._split(self.residuals)[name]
 
     def mean_square(self, name: str) -> Values:
         """Return the mean squares of the held-out errors of a quantity, dB2, shape (count,)."""
@@ -231,9 +233,6 @@ class Surrogate(StudyResult):
         Raises InputError like `require`.
         """
         self.require(case, columns)
-        with require_extra("surrogate"):
-            from sklearn.gaussian_process.kernels import Matern
-
         count = len(next(iter(columns.values())))
         samples = {n: np.asarray(columns.get(n, value_in(case, n))) for n in self.keys}
         values = np.column_stack([np.broadcast_to(v, count) for v in samples.values()]).astype(
@@ -244,16 +243,24 @@ class Surrogate(StudyResult):
         tolerance = _ROUNDING * np.maximum(width, np.abs(high))
         outside = ~((values >= low - tolerance) & (values <= high + tolerance))
         points = (values - low) / np.where(width > 0, width, 1.0)
-        kernel = Matern(self.length, nu=SMOOTHNESS)
         numbers = np.empty((count, len(self.mean)))
         for start in range(0, count, _CHUNK_SIZE):
             chunk = slice(start, start + _CHUNK_SIZE)
-            numbers[chunk] = kernel(points[chunk], self.points) @ self.weights
+            numbers[chunk] = self._kernel(points[chunk]) @ self.weights
         numbers = numbers * self.scale + self.mean
         numbers[:, ~(self.errors <= self.bound)] = np.nan
         failed = outside.any(axis=1)
         numbers[failed] = np.nan
         return self._results(case, numbers, samples, self._reasons(values, outside))
+
+    def _kernel(self, points: Values) -> Values:
+        """Return the Matern kernel of smoothness 5/2 of points and drops, shape (n, n_drop)."""
+        # scikit-learn is slow to import, and needed for the training only.
+        scaled, drops = points / self.length, self.points / self.length
+        squares = (scaled**2).sum(axis=1)[:, np.newaxis] + (drops**2).sum(axis=1)
+        distance = np.sqrt(5 * np.maximum(squares - 2 * scaled @ drops.T, 0.0))
+        result: Values = (1 + distance + distance**2 / 3) * np.exp(-distance)
+        return result
 
     def _reasons(self, values: Values, outside: NDArray[np.bool_]) -> NDArray[np.object_]:
         reasons = np.full(len(values), "", dtype=object)
@@ -353,13 +360,25 @@ class Surrogate(StudyResult):
         replace_file(path, self.to_bytes())
 
 
+def _rank(count: int) -> int:
+    """Return the index of the order statistic of `count` numbers that bounds 95 % of others.
+
+    It is the quantile of the binomial distribution at the confidence of 95 %; there is no such
+    index for 58 numbers or fewer.
+    """
+    index = np.arange(1, count + 1)
+    steps = np.log((count - index + 1) / index) + math.log(COVERAGE / (1 - COVERAGE))
+    logarithms = count * math.log(1 - COVERAGE) + np.cumsum([0.0, *steps])
+    return int(np.searchsorted(np.cumsum(np.exp(logarithms)), COVERAGE))
+
+
 def assess_many(
     values: tuple[Values, ...], errors: tuple[Values, ...], source: LimitsSource
 ) -> dict[str, NDArray[Any]]:
     """Return margin and verdict of many drops, and whether errors could change the verdict.
 
     The values are octave levels, dB, shape (n, 5); contact time, s; restitution; number of peaks;
-    mass, kg; height, m, as in `thud.assess`, shape (n,) or (1,). Errors have the same order and
+    mass, kg; height, m, as in `thud.assess_levels`, shape (n,) or (1,). Errors have the same order and
     units. The limits are those of the source.
     """
     count, bands = values[0].shape

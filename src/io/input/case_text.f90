@@ -40,6 +40,7 @@ contains
       case%has_floor = any([(groups(i)%name == 'floor', i=1, size(groups))])
       case%has_room = any([(groups(i)%name == 'room', i=1, size(groups))])
       case%has_compression = any([(groups(i)%name == 'compression', i=1, size(groups))])
+      case%has_unknowns = any([(groups(i)%name == 'unknowns', i=1, size(groups))])
       case%has_impact = any([(groups(i)%name == 'model', i=1, size(groups))]) .or. .not. case%has_modes
       call check_groups(groups, fields, error)
       if (case%has_room .and. .not. (case%has_floor .or. allocated(error))) error = input_error( &

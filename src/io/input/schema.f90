@@ -115,6 +115,8 @@ contains
          value = trim(merge('true ', 'false', value == '.true.'))
       case ('list')
          value = '['//value//']'
+      case ('texts')
+         value = list_of(field%text_list_value%values(:field%text_list_value%count))
       case ('choice', 'text')
          value = text_value(field%text_value)
       case default

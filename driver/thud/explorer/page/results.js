@@ -63,12 +63,13 @@ function missedSide(criterion) {
 
 function summarize({ name, answer }) {
   const failed = answer.criteria.filter((criterion) => criterion.verdict !== "conforms");
+  const model = answer.model_verdict;
   const reasons = failed.map((criterion) => {
     const by = criterion.value !== null && margin(criterion) < 0 ? `${Number((-margin(criterion)).toPrecision(2))} ${criterion.unit} `.replace("  ", " ") : "";
     return `${criterion.name} ${by}${missedSide(criterion)}`;
   });
-  byId("verdict").textContent = `${name} ${answer.verdict}${reasons.length ? `: ${reasons.join(", ")}` : ""}`;
-  byId("verdict").className = answer.conforms ? "conforms" : "fails";
+  byId("verdict").textContent = model ? `${name}: ${model.reason}` : `${name} ${answer.verdict}${reasons.length ? `: ${reasons.join(", ")}` : ""}`;
+  byId("verdict").className = (model ? model.result === "conforms" : answer.conforms) ? "conforms" : "fails";
   const numbers = answer.numbers.map(([title, value, unit]) => `${title} ${rounded(value, unit)}`);
   const time = `computed in ${Number((1e3 * answer.seconds).toPrecision(2))} ms`;
   byId("numbers").replaceChildren(numbers.join(" · "), element("span", { class: "extra" }, ` · ${time}`));
@@ -78,6 +79,7 @@ function showCriteria(variants) {
   const cell = (criterion) => {
     const value = element("td", { class: criterion.verdict === "conforms" ? "conforms" : "fails" }, rounded(criterion.value, criterion.unit).replace(criterion.unit && ` ${criterion.unit}`, ""));
     if (criterion.uncertainty) value.append(` ± ${Number(criterion.uncertainty.toPrecision(2))}`);
+    if (criterion.range) value.append(element("small", {}, ` (${criterion.range})`));
     const exact = criterion.lower === criterion.upper || criterion.value === null;
     return [value, element("td", { class: "margin" }, exact ? "" : signed(margin(criterion), criterion.unit), " ", missedSide(criterion))];
   };
@@ -86,7 +88,7 @@ function showCriteria(variants) {
     element("td", {}, criterion.lower === criterion.upper ? `${criterion.lower}` : `${criterion.lower} to ${criterion.upper}`),
     ...variants.flatMap((variant) => cell(variant.answer.criteria[i]))));
   const heads = variants.flatMap((variant, i) => [
-    element("th", { scope: "col" }, ...(variants.length > 1 ? [swatch(i), ` ${variant.short}`] : ["Value"])),
+    element("th", { scope: "col" }, ...(variants.length > 1 ? [swatch(i), ` ${variant.short}`] : ["Value"]), variant.answer.model_verdict ? element("small", {}, " (range 95 %)") : ""),
     element("th", { scope: "col", class: "margin" }, "Margin"),
   ]);
   byId("cards").classList.toggle("many", variants.length > 1);

@@ -12,14 +12,15 @@ from typing import TYPE_CHECKING, NamedTuple
 from thud.base._schema import FiniteElement, InfinitePlate, ModalBall
 from thud.base.checks import refuse_unknown, refuse_value, shown
 from thud.case.keys import with_values
+from thud.studies.unknowns import ORDER_RANGE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping
 
     from thud.case.case import Case
 
-# Orders of the damping laws of rubber; 1: Kelvin–Voigt.
-ORDERS = (0.2, 0.6, 1.0)
+# Orders of the damping laws of rubber, and one between them.
+ORDERS = (ORDER_RANGE[0], sum(ORDER_RANGE) / 2, ORDER_RANGE[1])
 # Driving-point resistance of a slab, N s/m: concrete of 75 mm. A force plate stands on more.
 RESISTANCE = 1e5
 

@@ -1,0 +1,73 @@
+"""The surrogate of the standard ball that the package holds, and the cases that it covers."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from functools import cache
+from importlib import resources
+from typing import TYPE_CHECKING
+
+from thud.base.errors import InputError
+from thud.case.keys import value_in
+from thud.studies.trained_surrogate import Surrogate, read_surrogate
+from thud.studies.unknowns import STANDARD_BALL, Unknown, blocked_case, stated_unknowns
+
+if TYPE_CHECKING:
+    from thud.case.case import Case
+
+# File of the package, made by `./bootstrap surrogate` from inputs/studies/standard_ball.toml.
+FILE = "standard_ball.npz"
+
+
+@cache
+def held_surrogate() -> Surrogate:
+    """Return the surrogate of the standard ball by finite elements."""
+    with resources.as_file(resources.files("thud.studies") / FILE) as path:
+        return read_surrogate(path)
+
+
+def get_unknowns(case: Case) -> tuple[Unknown, ...]:
+    """Return the unknowns that a case states; if none, those of the standard ball if it is one."""
+    if case.unknowns:
+        return stated_unknowns(case)
+    return STANDARD_BALL if is_covered(case, STANDARD_BALL) else ()
+
+
+def covered_case(case: Case, unknowns: tuple[Unknown, ...]) -> Case:
+    """Return the drop of a case on a rigid floor as the held surrogate predicts it.
+
+    The mesh and the bands of the held surrogate replace those of the case: the mesh affects the
+    numerical error only. Raises InputError if a key differs from that of the surrogate, or is
+    outside its region.
+    """
+    held = held_surrogate()
+    result = blocked_case(case, unknowns)
+    if result.model is None or held.case.model is None:
+        message = "the case has no source model"
+        raise InputError(message)
+    if result.model.name == held.case.model.name:
+        mesh = {
+            option.name: getattr(held.case.model, option.name)
+            for option in fields(held.case.model)
+            if option.metadata.get("group") == "mesh"
+        }
+        result = replace(result, model=replace(result.model, **mesh))  # type: ignore[arg-type]
+    result = replace(result, levels=replace(result.levels, bands=held.case.levels.bands))
+    held.require(result, [entry.key for entry in unknowns])
+    ranges = {u.key: (u.low, u.high) for u in unknowns}
+    for name, region in zip(held.keys, held.region.tolist(), strict=True):
+        value = value_in(result, name)
+        low, high = ranges.get(name, region)
+        if not (isinstance(value, float | int) and region[0] <= low <= value <= high <= region[1]):
+            message = f"{name} is outside the region of the surrogate; allowed: {low:g} to {high:g}"
+            raise InputError(message)
+    return result
+
+
+def is_covered(case: Case, unknowns: tuple[Unknown, ...]) -> bool:
+    """Return whether the held surrogate predicts a case with all values of its unknowns."""
+    try:
+        covered_case(case, unknowns)
+    except InputError:
+        return False
+    return True

@@ -1,0 +1,105 @@
+"""What is not known of a source: keys of its case, and the distributions of their values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.base._schema import FiniteElement
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from thud.case.case import Case
+
+# Minimum and maximum order of the damping laws of rubber; 1: Kelvin–Voigt.
+ORDER_RANGE = (0.2, 1.0)
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A key of a case whose value is not known.
+
+    Attributes
+    ----------
+    key : str
+        Name of the key.
+    low, high : float
+        Minimum and maximum, in the unit of the key.
+    standard_deviation : float
+        Of a normal distribution around the value of the case, truncated at minimum and maximum;
+        0: uniform.
+    reason : str
+        Reason of the range, with its source.
+    """
+
+    key: str
+    low: float
+    high: float
+    standard_deviation: float
+    reason: str
+
+    def quantiles(self, fraction: NDArray[np.float64], value: float) -> NDArray[np.float64]:
+        """Return the values below which fractions of all values lie; `value` is of the case."""
+        if not self.standard_deviation:
+            return self.low + fraction * (self.high - self.low)
+        # SciPy is slow to import.
+        from scipy.special import ndtr, ndtri
+
+        ends = (np.array([self.low, self.high]) - value) / self.standard_deviation
+        low, high = ndtr(ends)
+        result: NDArray[np.float64] = value + self.standard_deviation * ndtri(
+            low + fraction * (high - low)
+        )
+        return np.clip(result, self.low, self.high)
+
+
+# What is not known of the standard rubber ball, for finite elements. docs/verdict.md shows it.
+STANDARD_BALL = (
+    Unknown(
+        "fractional_order", *ORDER_RANGE, 0.0,
+        "filled rubbers 0.2 to 0.5, Kelvin-Voigt 1 (docs/finite_elements.md); no measurement known",
+    ),
+    Unknown(
+        "friction", 0.0, 1.0, 0.0,
+        "frictionless to rubber on a dry floor; no measurement with this ball known",
+    ),
+    Unknown(
+        "youngs_modulus", 1.87e6, 2.29e6, 0.0,
+        "2.08 MPa inferred from published free modes, 10 % for hardness; no measurement known",
+    ),
+    Unknown(
+        "loss_factor", 0.075, 0.21, 0.0,
+        "restitution within the limits of the standards, 0.7 to 0.9, for every order and friction",
+    ),
+    Unknown(
+        "poisson_ratio", 0.49, 0.5, 0.0,
+        "nearly incompressible rubber; 0.49 allows for fillers and pores; no measurement known",
+    ),
+)  # fmt: skip
+
+
+def stated_unknowns(case: Case) -> tuple[Unknown, ...]:
+    """Return the unknowns that a case states."""
+    stated = case.unknowns
+    if not stated:
+        return ()
+    deviations = stated.standard_deviation or (0.0,) * len(stated.key)
+    columns = (stated.key, stated.low, stated.high, deviations, stated.reason)
+    return tuple(Unknown(*entries) for entries in zip(*columns, strict=True))
+
+
+def blocked_case(case: Case, unknowns: tuple[Unknown, ...]) -> Case:
+    """Return the drop of a case on a rigid floor alone, with a damping law of any order.
+
+    The Kelvin–Voigt law is the fractional law of order 1.
+    """
+    model = case.model
+    is_viscous = isinstance(model, FiniteElement) and model.viscosity == "kelvin_voigt"
+    if is_viscous and any(entry.key == "fractional_order" for entry in unknowns):
+        model = replace(model, viscosity="fractional", fractional_order=ORDER_RANGE[1])  # type: ignore[type-var]
+    return replace(
+        case, model=model, floor=None, room=None, modes=None, compression=None, unknowns=None
+    )
