@@ -85,7 +85,11 @@ OPTIONAL = {
     "room": "Room below the floor.",
 }
 # What uses the keys of such an owner.
-USERS = {"modes": "free modes", "compression": "a quasi-static compression", "unknowns": "`thud-driver assess`"}
+USERS = {
+    "modes": "free modes",
+    "compression": "a quasi-static compression",
+    "unknowns": "`thud-driver assess`",
+}
 USERS["floor"] = "drops on a floor"
 USERS["room"] = "the level in the room below"
 INDENT = " " * 8

@@ -31,7 +31,7 @@ contains
       !> The unknowns that the fields read and set.
       type(unknowns_type), intent(in), target :: unknowns
       !> One field per component: [5].
-      type(field_type) :: fields(5)
+      type(field_type), allocatable :: fields(:)
 
       fields = [ &
          text_list_field('key', unknowns%key, 'keys of ball, drop and model whose values are not known'), &
@@ -62,11 +62,12 @@ contains
       type(unknowns_type), intent(in) :: unknowns
       type(error_type), allocatable, intent(out) :: error
       character(len=*), parameter :: names(*) = [character(len=18) :: 'low', 'high', 'reason', 'standard_deviation']
-      integer :: counts(size(names)), i
+      integer :: counts(size(names))
+      integer :: i
 
       if (unknowns%key%count == 0) then
          error = input_error('&unknowns: key is missing; allowed: names of keys of ball, drop and model, such as ' &
-            //'''youngs_modulus''')
+            //"'youngs_modulus'")
          return
       end if
       counts = [unknowns%low%count, unknowns%high%count, unknowns%reason%count, unknowns%standard_deviation%count]

@@ -59,7 +59,9 @@ def fast_calls(folder: Path) -> Calls:
         "levels": lambda: impact.levels("third"),
         "force_exposure_levels": lambda: thud.force_exposure_levels(impact.floor_force, rate),
         "verdict": lambda: [one.value for one in impact.assess().criteria],
-        "assess_levels": lambda: str(thud.assess_levels([39, 31, 23, 17, 12], 0.02, 0.8, 1, 2.5, 1.0)),
+        "assess_levels": lambda: str(
+            thud.assess_levels([39, 31, 23, 17, 12], 0.02, 0.8, 1, 2.5, 1.0)
+        ),
         "get_bands": lambda: thud.get_bands("third").nominal,
         "quantity": lambda: thud.quantity("8.9 cm"),
         "loss_factors": lambda: thud.loss_factors(thud.FiniteElement(), [50.0, 100.0]),

@@ -103,16 +103,14 @@ class Comparison(Displayed, Page):
             for name, verdict in zip(self.impacts, verdicts, strict=True)
         ]
         rows.append(("verdict", *results))
+        # The criteria are the rows after the first three; the verdict is the last row.
+        blank = [""] * (len(rows) - 4 - len(criteria))
+        limits = (_limits(row[0]) for row in criteria)
         columns = [
-            ["range (95 %)", "", "", *(c.range for c in verdict.criteria)]
-            for verdict in self._shared_verdicts()
+            ["range (95 %)", "", "", *(c.range for c in v.criteria), *blank, f"{v.share} conforms"]
+            for v in self._shared_verdicts()
         ]
-        name = self.source.replace("_", " ")
-        columns.append([f"limits, {name}", "", "", *(_limits(row[0]) for row in criteria)])
-        for column in columns:
-            column += [""] * (len(rows) - len(column))
-        for column, verdict in zip(columns, self._shared_verdicts(), strict=False):
-            column[-1] = f"{verdict.share} conforms"
+        columns.append([f"limits, {self.source.replace('_', ' ')}", "", "", *limits, *blank, ""])
         return [(*row, *cells) for row, *cells in zip(rows, *columns, strict=True)]
 
     def _shared_verdicts(self) -> list[ModelVerdict]:
@@ -275,7 +273,7 @@ def _model_verdicts(
             continue
         verdict = assess_impact(impact)
         if verdict:
-            others = (n for n in result if same_source(impacts[n].case, case))  # type: ignore[attr-defined]
+            others = (n for n in result if same_source(impacts[n].case, case))
             result[name] = next((result[n] for n in others), verdict)
     return result
 

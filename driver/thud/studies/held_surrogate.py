@@ -51,7 +51,7 @@ def covered_case(case: Case, unknowns: tuple[Unknown, ...]) -> Case:
             for option in fields(held.case.model)
             if option.metadata.get("group") == "mesh"
         }
-        result = replace(result, model=replace(result.model, **mesh))  # type: ignore[arg-type]
+        result = replace(result, model=replace(result.model, **mesh))
     result = replace(result, levels=replace(result.levels, bands=held.case.levels.bands))
     held.require(result, [entry.key for entry in unknowns])
     ranges = {u.key: (u.low, u.high) for u in unknowns}

@@ -18,7 +18,6 @@ from thud.case.case import Case, check_case
 from thud.case.keys import value_in, with_values
 from thud.impact.compute import compute
 from thud.impact.ensemble import get_cost, solve_many
-from thud.level.assessment import Criterion
 from thud.level.levels import peak_count
 from thud.studies.held_surrogate import covered_case, get_unknowns, held_surrogate, is_covered
 from thud.studies.trained_surrogate import keys_of
@@ -32,6 +31,7 @@ if TYPE_CHECKING:
 
     from thud.base._schema import LimitsSource
     from thud.impact.impact import Impact
+    from thud.level.assessment import Criterion
     from thud.studies.trained_surrogate import Surrogate
     from thud.studies.unknowns import Unknown
 
@@ -202,7 +202,7 @@ class ModelVerdict(Displayed):
 
     def unknown_rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text: the unknowns."""
-        rows = [("not known", "low", "high", "standard deviation", "reason")]
+        rows: list[tuple[str, ...]] = [("not known", "low", "high", "standard deviation", "reason")]
         for entry in self.unknowns:
             deviation = f"{entry.standard_deviation:g}" if entry.standard_deviation else ""
             rows.append((entry.key, f"{entry.low:g}", f"{entry.high:g}", deviation, entry.reason))
@@ -293,7 +293,7 @@ class _Source:
                 )
                 for i, criterion in enumerate(criteria)
             ),
-            *_probability(*(part.all(axis=1) for part in (inside, adverse, favorable))),
+            *_probability(*(np.asarray(p.all(axis=1)) for p in (inside, adverse, favorable))),
             self.method,
         )
 
@@ -475,8 +475,9 @@ def _direct_source(impact: Impact, unknowns: tuple[Unknown, ...], *, progress: b
         result = solve_many(columns, case, forces=True, progress=progress)
         failed = result.status != 0
         if failed.any():
+            reason = result.reason[failed][0]
             refuse(
-                f"{failed.sum()} of {failed.size} drops have no result ({result.reason[failed][0]})",
+                f"{failed.sum()} of {failed.size} drops have no result ({reason})",
                 "ranges of &unknowns in which all drops have results",
             )
         force = case.levels.force
@@ -512,4 +513,3 @@ def _train(
         "parameters": {u.key: {"low": u.low, "high": u.high} for u in unknowns},
     }
     return surrogate(study, output, progress=progress, replace=replace_files)
-

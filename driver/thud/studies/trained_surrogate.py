@@ -378,8 +378,8 @@ def assess_many(
     """Return margin and verdict of many drops, and whether errors could change the verdict.
 
     The values are octave levels, dB, shape (n, 5); contact time, s; restitution; number of peaks;
-    mass, kg; height, m, as in `thud.assess_levels`, shape (n,) or (1,). Errors have the same order and
-    units. The limits are those of the source.
+    mass, kg; height, m, as in `thud.assess_levels`, shape (n,) or (1,). Errors have the same order
+    and units. The limits are those of the source.
     """
     count, bands = values[0].shape
     assessed, deviation = (_columns(columns, count) for columns in (values, errors))

@@ -1,0 +1,268 @@
+"""The verdict over what is not known of a source."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from scipy.stats import truncnorm
+
+import thud
+from thud.cli import main
+from thud.comparison import comparison
+from thud.studies import held_surrogate, model_verdict
+from thud.studies.held_surrogate import FILE, covered_case, get_unknowns, is_covered
+from thud.studies.unknowns import STANDARD_BALL, Unknown
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+ROOT = Path(__file__).parents[2]
+FLAGSHIP = ROOT / "inputs/rubber_ball_fe.nml"
+VISCOUS = ROOT / "inputs/rubber_ball_fe_viscous.nml"
+EXAMPLE = ROOT / "inputs/rubber_ball_unknowns.nml"
+UNKNOWNS = thud.Unknowns(
+    key=("friction", "fractional_order"),
+    low=(0.0, 0.2),
+    high=(0.5, 1.0),
+    reason=("it's dry", "no measurement"),
+)
+
+BULK_RATIO = thud.Unknowns(key=("bulk_ratio",), low=(100,), high=(300,), reason=("fillers",))
+
+
+def with_unknowns(**changes: object) -> thud.Case:
+    return replace(thud.read_case(FLAGSHIP), unknowns=replace(UNKNOWNS, **changes))  # type: ignore[arg-type]
+
+
+def test_unknowns_survive_files(tmp_path: Path) -> None:
+    case = with_unknowns(standard_deviation=(0.1, 0.0))
+    thud.write_case(case, tmp_path / "case.nml")
+    assert thud.read_case(tmp_path / "case.nml").unknowns == case.unknowns
+
+
+def test_executable_accepts_and_echoes_unknowns(tmp_path: Path, executable: str) -> None:
+    coarse = thud.FiniteElement(radial_elements=2, polar_elements=16)
+    thud.write_case(replace(with_unknowns(), model=coarse), tmp_path / "case.nml")
+    subprocess.run([executable, "case.nml"], cwd=tmp_path, check=True, capture_output=True)
+    (echo,) = tmp_path.glob("outputs/*/effective.nml")
+    assert thud.read_case(echo).unknowns == UNKNOWNS
+    assert "key = 'friction', 'fractional_order'" in echo.read_text()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"key": ("frction", "fractional_order")}, "key = 'frction' is not allowed (did you mean 'friction'?)"),
+        ({"key": ("friction", "friction")}, "key = 'friction' is given twice"),
+        ({"key": ("sample_rate", "friction")}, "key = 'sample_rate' is not allowed"),
+        ({"low": (0.0,)}, "low has 1 entries; allowed: 2, one for each key"),
+        ({"reason": ()}, "reason has 0 entries; allowed: 2, one for each key"),
+        ({"key": ()}, "key is missing; allowed: names of keys"),
+        ({"standard_deviation": (0.1,)}, "standard_deviation has 1 entries; allowed: 2"),
+        ({"low": (-0.1, 0.2)}, "low = -0.1 of friction is not allowed; allowed: 0 <= friction"),
+        ({"high": (0.5, 1.5)}, "high = 1.5 of fractional_order is not allowed; allowed: 0 <"),
+        ({"low": (0.5, 0.2)}, "low = 0.5 and high = 0.5 of friction are not allowed"),
+        ({"low": (0.1, 0.2)}, "friction = 0.0, is outside low = 0.1 and high = 0.5"),
+    ],
+)
+def test_message_names_what_is_wrong_with_unknowns(
+    changes: dict[str, object], message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(thud.InputError, match=re.escape(message)):
+        thud.write_case(with_unknowns(**changes), tmp_path / "case.nml")
+
+
+@pytest.mark.parametrize("text", ["it is", "'a', b", "'a' 'b", "1, 2", f"'{'x' * 129}'"])
+def test_list_of_texts_needs_quotes(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "case.nml"
+    path.write_text(f"&unknowns key = {text} / &model name = 'finite_element' /")
+    with pytest.raises(thud.InputError, match=r"is not a list of up to 16|a quote is not closed"):
+        thud.read_case(path)
+
+
+def test_normal_distribution_is_truncated() -> None:
+    unknown = Unknown("youngs_modulus", 1.95, 2.3, 0.1, "")
+    fractions = np.linspace(0, 1, 11)
+    expected = truncnorm.ppf(fractions, (1.95 - 2.1) / 0.1, (2.3 - 2.1) / 0.1, 2.1, 0.1)
+    np.testing.assert_allclose(unknown.quantiles(fractions, 2.1), expected, rtol=1e-9)
+
+
+def test_default_unknowns_have_reasons_and_stand_on_their_page() -> None:
+    page = (ROOT / "docs/verdict.md").read_text()
+    for unknown in STANDARD_BALL:
+        row = f"| `{unknown.key}` | {unknown.low:.4g} | {unknown.high:.4g} | {unknown.reason} |"
+        assert row in page
+
+
+def test_own_unknowns_replace_the_defaults() -> None:
+    assert [unknown.key for unknown in get_unknowns(with_unknowns())] == list(UNKNOWNS.key)
+    assert get_unknowns(thud.read_case(FLAGSHIP)) == STANDARD_BALL
+
+
+def test_nothing_is_known_to_vary_elsewhere() -> None:
+    message = "nothing is known to vary in this case; allowed: &unknowns with key"
+    with pytest.raises(thud.InputError, match=message):
+        thud.assess(thud.Case())
+
+
+# Held surrogate: drops at random points, in units of the stated 95 % errors.
+
+
+def errors_at_random_points(
+    count: int, seed: int
+) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    held = held_surrogate.held_surrogate()
+    low, high = held.region.T
+    points = low + np.random.default_rng(seed).random((count, len(low))) * (high - low)
+    columns = dict(zip(held.keys, points.T, strict=True))
+    drops = thud.solve_many(columns, held.case)
+    predicted = held.predict(held.case, columns)
+    assert not drops.status.any()
+    assert not predicted["status"].any()
+    differences = [(predicted["floor_level"] - drops.floor_octaves) / held.error_of("floor_level")]
+    for name in ("contact_time", "restitution"):
+        ratio = 20 * np.log10(predicted[name] / getattr(drops, name))
+        differences.append((ratio / held.error_of(name))[:, np.newaxis])
+    return np.abs(np.concatenate(differences, axis=1))
+
+
+def test_held_surrogate_has_its_stated_error() -> None:
+    relative = errors_at_random_points(6, 1)
+    # Of 42 numbers, 2 are expected beyond 1; 8 or more have a probability of 0.1 %.
+    assert (relative > 1).sum() < 8
+    assert relative.max() < 5
+
+
+@pytest.mark.slow
+def test_held_surrogate_has_its_stated_error_at_many_points() -> None:
+    relative = errors_at_random_points(200, 2)
+    # 95 % less three standard deviations of a fraction of 200.
+    assert ((relative <= 1).mean(axis=0) >= 0.95 - 3 * np.sqrt(0.95 * 0.05 / 200)).all()
+
+
+def test_held_surrogate_is_small_and_belongs_to_its_study() -> None:
+    path = Path(held_surrogate.__file__).with_name(FILE)
+    assert path.stat().st_size <= 1e6
+    study = thud.read_study(ROOT / "inputs/studies/standard_ball.toml", "surrogate")
+    held = held_surrogate.held_surrogate()
+    assert held.keys == tuple(parameter.name for parameter in study.parameters)
+    np.testing.assert_allclose(held.region, [(p.low, p.high) for p in study.parameters])
+    assert is_covered(study.case, STANDARD_BALL)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda case: replace(case, drop=replace(case.drop, height=0.5)),
+        lambda case: replace(case, ball=replace(case.ball, ambient_pressure=9e4)),
+        lambda case: replace(case, ball=replace(case.ball, youngs_modulus=1.6e6)),
+        lambda case: replace(case, model=replace(case.model, layer_stiffness=1e9)),
+        lambda case: replace(case, model=replace(case.model, viscosity="none")),
+        lambda case: replace(case, model=thud.HollowSphere()),
+        lambda case: replace(case, unknowns=replace(UNKNOWNS, high=(1.5, 1.0))),
+        lambda case: replace(case, unknowns=BULK_RATIO),
+    ],
+)  # fmt: skip
+def test_held_surrogate_is_not_used_for_other_cases(
+    change: Callable[[thud.Case], thud.Case],
+) -> None:
+    case = change(thud.read_case(FLAGSHIP))
+    assert not is_covered(case, get_unknowns(case) or STANDARD_BALL)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda case: replace(case, name="other", floor=thud.InfinitePlate(), modes=thud.Modes()),
+        lambda case: replace(case, model=replace(case.model, radial_elements=6, polar_elements=48)),
+        lambda case: replace(case, levels=replace(case.levels, bands="both")),
+        lambda case: replace(case, ball=replace(case.ball, mass=2.45)),
+        lambda case: replace(case, model=replace(case.model, snapshot_interval=1e-3)),
+    ],
+)
+def test_held_surrogate_covers_the_neighborhood(
+    change: Callable[[thud.Case], thud.Case],
+) -> None:
+    assert is_covered(change(thud.read_case(FLAGSHIP)), STANDARD_BALL)
+
+
+def test_changed_model_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    impact = thud.solve(thud.read_case(FLAGSHIP))
+    assert model_verdict.assess_impact(impact)
+    held = held_surrogate.held_surrogate()
+    other = replace(held, mean=held.mean + 1.0)
+    monkeypatch.setattr(model_verdict, "held_surrogate", lambda: other)
+    assert model_verdict.assess_impact(impact) is None
+
+
+def test_two_damping_laws_of_the_same_ball_have_one_verdict() -> None:
+    cases = [thud.read_case(path) for path in (FLAGSHIP, VISCOUS)]
+    plain = [thud.solve(case).assess().result for case in cases]
+    assert plain == ["does not conform", "conforms"]
+    first, second = (thud.assess(case) for case in cases)
+    assert first.result == second.result == "undecided by the model"
+    assert abs(first.probability - second.probability) < first.error
+    page = comparison.compare(cases)
+    assert page.rows()[-1][1:3] == ("undecided by the model",) * 2
+    assert len({id(verdict) for verdict in page.model_verdicts.values()}) == 1
+    (reason,) = page.reasons
+    assert reason.startswith("rubber_ball_fe and rubber_ball_fe_viscous, over what is not known")
+    assert reason in page.html().replace("R", "r", 1) or reason[1:] in page.html()
+
+
+def test_verdict_of_direct_drops_is_that_of_a_closed_form() -> None:
+    # A linear spring: the contact time is half a period, pi sqrt(mass / stiffness).
+    model = thud.HuntCrossley(stiffness=61685.0, exponent=1.0, restitution=1.0)
+    unknowns = thud.Unknowns(key=("stiffness",), low=(5e4,), high=(8e4,), reason=("an example",))
+    verdict = thud.assess(thud.Case(model=model, unknowns=unknowns))
+    (contact,) = (c for c in verdict.criteria if c.name == "contact_time")
+    ends = np.pi**2 * 2.5 / np.array([0.022, 0.018]) ** 2
+    expected = (min(ends[1], 8e4) - max(ends[0], 5e4)) / 3e4
+    assert contact.probability == pytest.approx(expected, abs=contact.error + 0.01)
+    quantiles = 5e4 + np.array([0.975, 0.025]) * 3e4
+    np.testing.assert_allclose(
+        [contact.low, contact.high], np.pi * np.sqrt(2.5 / quantiles), atol=5e-5
+    )
+    assert contact.indices["stiffness"] == pytest.approx(1.0, abs=0.1)
+    assert contact.hangs_on == "stiffness"
+    # Without losses the restitution is 1, for every stiffness.
+    (restitution,) = (c for c in verdict.criteria if c.name == "restitution")
+    assert restitution.probability == 0
+    assert verdict.result == "does not conform"
+
+
+@pytest.mark.parametrize(
+    ("probability", "result"),
+    [(0.96, "conforms"), (0.95, "conforms"), (0.94, "undecided by the model"),
+     (0.06, "undecided by the model"), (0.04, "does not conform")],
+)  # fmt: skip
+def test_outcome_needs_95_percent(probability: float, result: str) -> None:
+    verdict = thud.assess(thud.read_case(EXAMPLE))
+    assert replace(verdict, probability=probability).result == result
+    assert replace(verdict.criteria[0], probability=probability).result == result
+
+
+def test_run_prints_the_verdict(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "--no-figures", str(FLAGSHIP)]) == 0
+    printed = capsys.readouterr().out
+    verdict = thud.assess(thud.read_case(FLAGSHIP))
+    assert f"  {verdict.sentence}\n" in printed
+    assert main(["assess", str(FLAGSHIP)]) == 0
+    assert verdict.sentence in capsys.readouterr().out.splitlines()
+    assert main(["assess", "-q", "--check", str(FLAGSHIP)]) == 3
+
+
+def test_case_that_the_surrogate_covers_keeps_its_drop() -> None:
+    case = thud.read_case(VISCOUS)
+    covered = covered_case(case, STANDARD_BALL)
+    viscous, fractional = (thud.solve(one) for one in (case, covered))
+    np.testing.assert_allclose(viscous.levels(), fractional.levels(), atol=0.02)
