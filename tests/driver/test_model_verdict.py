@@ -52,7 +52,7 @@ def test_executable_accepts_and_echoes_unknowns(tmp_path: Path, executable: str)
     subprocess.run([executable, "case.nml"], cwd=tmp_path, check=True, capture_output=True)
     (echo,) = tmp_path.glob("outputs/*/effective.nml")
     assert thud.read_case(echo).unknowns == UNKNOWNS
-    assert "key = 'friction', 'fractional_order'" in echo.read_text()
+    assert "= 'it''s dry', 'no measurement'" in echo.read_text()
 
 
 @pytest.mark.parametrize(

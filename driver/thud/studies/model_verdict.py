@@ -279,7 +279,9 @@ class _Source:
         inside = (actual >= lower) & (actual <= upper)
         adverse, favorable = margins >= spread, margins >= -spread
         indices = self._indices(fractions, values)
-        low, high = np.quantile(actual, [(1 - COVERAGE) / 2, (1 + COVERAGE) / 2], axis=0)
+        # The range holds the stated fraction in spite of the finite number of samples.
+        coverage = COVERAGE + _FACTOR * math.sqrt(COVERAGE * (1 - COVERAGE) / SAMPLES)
+        low, high = np.quantile(actual, [(1 - coverage) / 2, (1 + coverage) / 2], axis=0)
         return ModelVerdict(
             self.verdict.source,
             self.unknowns,
