@@ -182,6 +182,22 @@ def test_floor_and_room_are_answered(client: TestClient) -> None:
     assert solved(client, {"model": {"name": "modal_ball"}})["motion"] is None
 
 
+def test_ranges_over_what_is_not_known_stand_beside_the_values(client: TestClient) -> None:
+    path = REPOSITORY / "inputs/rubber_ball_fe.nml"
+    verdict = thud.assess(thud.read_case(path))
+    values = f90nml.read(path).todict()
+    answer = solved(client, values)
+    assert answer["model_verdict"]["result"] == verdict.result == "undecided by the model"
+    assert answer["model_verdict"]["reason"] == verdict.reason
+    ranges = [criterion["range"] for criterion in answer["criteria"]]
+    assert ranges == [criterion.range for criterion in verdict.criteria]
+    low, high = map(float, ranges[4].split(" to "))
+    assert low < answer["criteria"][4]["value"] < high
+    # Outside of the neighborhood of the standard ball nothing is known to vary.
+    values["drop"]["height"] = 0.5
+    assert "model_verdict" not in solved(client, values)
+
+
 def test_recording_is_assessed(client: TestClient) -> None:
     path = REPOSITORY / "inputs/recordings/drop_1.wav"
     query = {"name": "drop_1.wav", "height": 1, "mass": 2.5, "calibration": CALIBRATION}

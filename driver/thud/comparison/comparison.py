@@ -119,11 +119,11 @@ class Comparison(Displayed, Page):
 
     @property
     def reasons(self) -> list[str]:
-        """Verdicts over what is not known, each after the names of its impacts."""
+        """Verdicts over what is not known, with the names of their impacts."""
         result = []
         for verdict in self._shared_verdicts():
             names = [name for name, own in self.model_verdicts.items() if own is verdict]
-            result.append(f"{' and '.join(names)}, over what is not known: {verdict.reason}")
+            result.append(f"Over what is not known of {' and '.join(names)}: {verdict.reason}")
         return result
 
     def figure(self) -> Figure:

@@ -215,13 +215,9 @@ def comparison_page(
     head, *body = table
     _add_table(figure, grid, [[fill(name, _MAX_NAME_LENGTH) for name in head], *body])
     if reasons:
-        text = "\n".join(escape_label(fill(_sentence(r), _MAX_LINE_LENGTH)) for r in reasons)
+        text = "\n".join(escape_label(fill(f"{r}.", _MAX_LINE_LENGTH)) for r in reasons)
         figure.supxlabel(text, x=0.01, ha="left", fontsize=mpl.rcParams["legend.fontsize"])
     return figure
-
-
-def _sentence(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:]}."
 
 
 def _add_table(figure: Figure, grid: GridSpec, rows: Sequence[Sequence[str]]) -> None:
@@ -275,7 +271,7 @@ def comparison_html(
         "Comparison of models and recordings",
         "Forces as force plates record them, low-passed at 1.25 kHz, and their levels; gray boxes "
         "are the tolerances of the standards, which one-third-octave bands do not have."
-        + "".join(f" {_sentence(reason)}" for reason in reasons),
+        + "".join(f" {reason}." for reason in reasons),
         table,
         plots,
     )
