@@ -58,7 +58,10 @@ def test_executable_accepts_and_echoes_unknowns(tmp_path: Path, executable: str)
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"key": ("frction", "fractional_order")}, "key = 'frction' is not allowed (did you mean 'friction'?)"),
+        (
+            {"key": ("frction", "fractional_order")},
+            "key = 'frction' is not allowed (did you mean 'friction'?)",
+        ),
         ({"key": ("friction", "friction")}, "key = 'friction' is given twice"),
         ({"key": ("sample_rate", "friction")}, "key = 'sample_rate' is not allowed"),
         ({"low": (0.0,)}, "low has 1 entries; allowed: 2, one for each key"),
@@ -266,3 +269,11 @@ def test_case_that_the_surrogate_covers_keeps_its_drop() -> None:
     covered = covered_case(case, STANDARD_BALL)
     viscous, fractional = (thud.solve(one) for one in (case, covered))
     np.testing.assert_allclose(viscous.levels(), fractional.levels(), atol=0.02)
+
+
+def test_page_shows_the_verdict() -> None:
+    page = (ROOT / "docs/verdict.md").read_text()
+    verdict = thud.assess(thud.read_case(FLAGSHIP))
+    shown = [" ".join(line.split()) for line in page.splitlines()]
+    for row in [*verdict.rows(), (verdict.sentence,)]:
+        assert " ".join(" ".join(row).split()) in shown

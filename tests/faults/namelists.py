@@ -184,6 +184,7 @@ def _text(chance: random.Random) -> str:
         owners += [floor] + ["room"] * (chance.random() < (0.5 if floor in RADIATORS else 0.01))
         text += f"&floor name = '{floor}' /\n"
     owners += ["modes"] * (chance.random() < 0.05) + ["compression"] * (chance.random() < 0.08)
+    owners += ["unknowns"] * (chance.random() < 0.08)
     steady = chance.random()
     length = chance.choice([1, 1, 2, 3, 12])
     for group in groups:
@@ -231,6 +232,8 @@ def _value(key: Key, length: int, steady: float, chance: random.Random) -> str:
         return chance.choice([".true.", ".false."])
     if key.kind == "text":
         return chance.choice(["'text'", "'a.b-c_d'", "'é'", "'a/b'", "' '", "'..'"])
+    if key.kind == "texts":
+        return ", ".join(chance.choices(TEXTS, k=length))
     count = 1 if key.kind != "list" else length if chance.random() < 0.97 else chance.randrange(20)
     return ", ".join(_number(key, steady, chance) for _ in range(count))
 
@@ -252,6 +255,10 @@ def _number(key: Key, steady: float, chance: random.Random) -> str:
     if chance.random() < 0.9 + 0.1 * steady:
         value = min(max(value, low), high)
     return str(round(value)) if key.whole and math.isfinite(value) else repr(float(value))
+
+
+# Entries of lists of texts: keys of all models and of one, and other texts.
+TEXTS = ("'mass'", "'height'", '"friction"', "'youngs_modulus'", "'it''s'", "'é'", "''", "'mass")
 
 
 def _usual() -> dict[tuple[str, str, str], float]:

@@ -64,7 +64,7 @@ class ModelCriterion(Displayed):
     criterion : Criterion
         Value of the case, and the limits.
     low, high : float
-        Range that holds 95 % of the distribution, errors of surrogate and model included.
+        Range that holds at least 95 % of the distribution, with the errors of surrogate and drops.
     probability : float
         Probability that the source meets the criterion.
     error : float
@@ -279,9 +279,10 @@ class _Source:
         inside = (actual >= lower) & (actual <= upper)
         adverse, favorable = margins >= spread, margins >= -spread
         indices = self._indices(fractions, values)
-        # The range holds the stated fraction in spite of the finite number of samples.
+        # The range holds at least the stated fraction in spite of the finite number of samples.
         coverage = COVERAGE + _FACTOR * math.sqrt(COVERAGE * (1 - COVERAGE) / SAMPLES)
         low, high = np.quantile(actual, [(1 - coverage) / 2, (1 + coverage) / 2], axis=0)
+        low, high = low - spread, high + spread
         return ModelVerdict(
             self.verdict.source,
             self.unknowns,
