@@ -191,9 +191,9 @@ def compare_cases(options: argparse.Namespace) -> int:
     paths = results.write(page.files())
     if not options.quiet:
         print(format_rows(page.rows()))
+        print(f"Page: {paths[-1]}")
         for reason in page.reasons:
             print(reason)
-        print(f"Page: {paths[-1]}")
     return 0
 
 

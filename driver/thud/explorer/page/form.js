@@ -1,8 +1,8 @@
 // Form of the case, with fields from the declarations of the keys.
 import { byId, capitalize, element, scaled } from "./page.js";
 
-/** State of the case: values that differ from their defaults, and ranges of moved sliders. */
-export const state = { form: [], values: {}, model: "", floor: "", room: false, moved: {} };
+/** State of the case: values that differ from their defaults, ranges of moved sliders, and what is not known, by model. */
+export const state = { form: [], values: {}, model: "", floor: "", room: false, moved: {}, unknowns: {} };
 
 const groupsOf = (part) => state.form.filter((group) => group.part === part);
 const commonGroups = () => state.form.filter((group) => group.part === group.name && group.part !== "room");
@@ -29,6 +29,7 @@ export function caseValues() {
   for (const { fields } of usedGroups())
     for (const { group } of fields) if (state.values[group]) values[group] = state.values[group];
   if (state.room) values.room ??= {};
+  if (state.unknowns[state.model]) values.unknowns = state.unknowns[state.model];
   return structuredClone(values);
 }
 
@@ -59,6 +60,7 @@ export function isCase(values) {
 export function startWith(values, onChange) {
   const { model, floor, ...rest } = values;
   Object.assign(state, { model: model?.name ?? groupsOf("model")[0].name, floor: floor?.name ?? "", room: Boolean(rest.room), values: {}, moved: {} });
+  state.unknowns = rest.unknowns ? { [state.model]: rest.unknowns } : {};
   for (const { fields } of usedGroups()) {
     for (const field of fields) {
       let value = rest[field.group]?.[field.name];
