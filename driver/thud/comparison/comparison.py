@@ -271,10 +271,10 @@ def _model_verdicts(
         case = impact.case
         if case.limits.source != source or force not in {None, case.levels.force}:
             continue
-        verdict = assess_impact(impact)
+        others = (verdict for n, verdict in result.items() if same_source(impacts[n].case, case))
+        verdict = next(others, None) or assess_impact(impact)
         if verdict:
-            others = (n for n in result if same_source(impacts[n].case, case))
-            result[name] = next((result[n] for n in others), verdict)
+            result[name] = verdict
     return result
 
 

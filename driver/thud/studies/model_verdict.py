@@ -402,14 +402,16 @@ def assess_impact(impact: Impact) -> ModelVerdict | None:
 
 
 def same_source(first: Case, second: Case) -> bool:
-    """Return whether two cases that the held surrogate covers differ in unknowns only."""
-    return _source_key(first) == _source_key(second)
-
-
-def _source_key(case: Case) -> object:
-    unknowns = get_unknowns(case)
-    same = with_values(covered_case(case, unknowns), {u.key: u.low for u in unknowns})
-    return unknowns, keys_of(same), case.limits.source
+    """Return whether the held surrogate covers two cases, and they differ in unknowns only."""
+    unknowns = get_unknowns(first)
+    if not unknowns or unknowns != get_unknowns(second) or first.limits != second.limits:
+        return False
+    low = {u.key: u.low for u in unknowns}
+    try:
+        keys = [keys_of(with_values(covered_case(c, unknowns), low)) for c in (first, second)]
+    except InputError:
+        return False
+    return keys[0] == keys[1]
 
 
 def _by_held_surrogate(impact: Impact, unknowns: tuple[Unknown, ...]) -> _Source:
