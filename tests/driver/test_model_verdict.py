@@ -157,6 +157,11 @@ def test_held_surrogate_is_small_and_belongs_to_its_study() -> None:
     assert held.keys == tuple(parameter.name for parameter in study.parameters)
     np.testing.assert_allclose(held.region, [(p.low, p.high) for p in study.parameters])
     assert is_covered(study.case, STANDARD_BALL)
+    # Otherwise: ./bootstrap surrogate
+    found, expected = dict(held.identity), dict(study.identity)
+    for identity in (found, expected):
+        identity.pop("scikit-learn_version")
+    assert found == expected
 
 
 @pytest.mark.parametrize(
