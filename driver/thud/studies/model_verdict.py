@@ -301,7 +301,10 @@ class _Source:
         )
 
     def _indices(self, fractions: Values, values: Values) -> list[dict[str, float]]:
-        """Return the total Sobol indices of each criterion (Jansen's estimator)."""
+        """Return the total Sobol indices of each criterion (Jansen's estimator).
+
+        `thud.studies.sensitivity` needs SALib, which a plain installation does not have.
+        """
         half = SAMPLES // 2
         first, second = fractions[:INDEX_SAMPLES], fractions[half : half + INDEX_SAMPLES]
         variance = values.var(axis=0)
