@@ -20,7 +20,6 @@ from thud.base.checks import refuse, refuse_value, require_choice, require_kind
 from thud.base.display import Displayed
 from thud.base.errors import InputError, PlausibilityWarning, ThudError
 from thud.base.files import Page
-from thud.base.quantity import Quantity
 from thud.case.case import Case, read_case
 from thud.impact.compute import compute
 from thud.impact.impact import Impact
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from thud.base._schema import LevelsForce, LimitsSource
+    from thud.base.quantity import Quantity
     from thud.level.assessment import Criterion
     from thud.studies.model_verdict import ModelVerdict
 
@@ -105,7 +105,7 @@ class Comparison(Displayed, Page):
         rows.append(("verdict", *results))
         # The criteria are the rows after the first three; the verdict is the last row.
         blank = [""] * (len(rows) - 4 - len(criteria))
-        limits = (_limits(row[0]) for row in criteria)
+        limits = (row[0].shown_limits for row in criteria)
         columns = [
             ["range (95 %)", "", "", *(c.range for c in v.criteria), *blank, f"{v.share} conforms"]
             for v in self._shared_verdicts()
@@ -140,18 +140,8 @@ class Comparison(Displayed, Page):
 
 
 def _criterion_row(criteria: tuple[Criterion, ...]) -> tuple[str, ...]:
-    name = criteria[0].name
-    band = name.removeprefix("octave_").replace("_", ".")
-    level = Quantity(name, f"{band} Hz", "", "dB", "dB", 1.0, 2, "")
-    quantity = QUANTITIES.get(name, level)
+    quantity = criteria[0].quantity
     return (quantity.label, *(_cell(criterion, quantity) for criterion in criteria))
-
-
-def _limits(criterion: Criterion) -> str:
-    """Return the limits of a criterion in its display unit."""
-    scale = QUANTITIES[criterion.name].display_scale if criterion.name in QUANTITIES else 1.0
-    ends = [f"{end * scale:g}" for end in (criterion.lower, criterion.upper)]
-    return " to ".join(dict.fromkeys(ends))
 
 
 def _cell(criterion: Criterion, quantity: Quantity) -> str:

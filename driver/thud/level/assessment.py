@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import LIMITS
+from thud.base._schema import LIMITS, QUANTITIES
 from thud.base.checks import refuse, refuse_value, require_choice
 from thud.base.display import Displayed
+from thud.base.quantity import Quantity
 from thud.level.estimate import Estimate
 from thud.level.levels import BANDWIDTHS, SOURCES, get_bands, to_float
 
@@ -55,6 +56,20 @@ class Criterion(Displayed):
     def unit(self) -> str:
         """Unit of value and limits."""
         return self.estimate.unit
+
+    @property
+    def quantity(self) -> Quantity:
+        """Declaration of the quantity, with title, display unit and decimals."""
+        band = self.name.removeprefix("octave_").replace("_", ".")
+        level = Quantity(self.name, f"{band} Hz", "", "dB", "dB", 1.0, 2, "")
+        return QUANTITIES.get(self.name, level)
+
+    @property
+    def shown_limits(self) -> str:
+        """Limits in the display unit."""
+        scale = self.quantity.display_scale
+        ends = (f"{end * scale:g}" for end in (self.lower, self.upper))
+        return " to ".join(dict.fromkeys(ends))
 
     @property
     def result(self) -> str:

@@ -9,11 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import QUANTITIES
 from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
 from thud.base.errors import InputError
-from thud.base.quantity import Quantity
 from thud.case.case import Case, check_case
 from thud.case.keys import value_in, with_values
 from thud.impact.compute import compute
@@ -41,7 +39,7 @@ OUTCOMES = ("conforms", "does not conform", "undecided by the model")
 # Fraction of the distribution within the limits from which a criterion is met, and fraction of the
 # distribution within the stated range.
 COVERAGE = 0.95
-# Samples of the distribution, half of them base samples of the indices of the unknowns.
+# Number of samples of the distribution, and number of base samples of the Sobol indices.
 SAMPLES = 4096
 INDEX_SAMPLES = 512
 _SEED = 0
@@ -100,7 +98,7 @@ class ModelCriterion(Displayed):
         """Range in the display unit; empty if the value does not vary."""
         if not self.indices:
             return ""
-        quantity = _quantity(self.criterion)
+        quantity = self.criterion.quantity
         digits = max(quantity.decimals - 1, 1)
         ends = (f"{end * quantity.display_scale:z.{digits}f}" for end in (self.low, self.high))
         return " to ".join(ends)
@@ -112,26 +110,19 @@ class ModelCriterion(Displayed):
     @property
     def reason(self) -> str:
         """Range, limits and unknown."""
-        quantity = _quantity(self.criterion)
+        quantity = self.criterion.quantity
         unit = f" {quantity.display_unit}" if quantity.display_unit else ""
         value = self.range or quantity.show(self.criterion.value)
         hanging = f", hangs on {self.hangs_on}" if self.hangs_on else ""
-        return f"{quantity.title} {value}{unit}, limits {self.limits}{hanging}"
-
-    @property
-    def limits(self) -> str:
-        """Limits in the display unit."""
-        scale = _quantity(self.criterion).display_scale
-        ends = (f"{end * scale:g}" for end in (self.criterion.lower, self.criterion.upper))
-        return " to ".join(dict.fromkeys(ends))
+        return f"{quantity.title} {value}{unit}, limits {self.criterion.shown_limits}{hanging}"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
-        quantity = _quantity(self.criterion)
+        criterion, quantity = self.criterion, self.criterion.quantity
         return [
             ("criterion", "value", "range (95 %)", "limits", "probability", "hangs on", "result"),
             (
-                quantity.label, quantity.show(self.criterion.value), self.range, self.limits,
+                quantity.label, quantity.show(criterion.value), self.range, criterion.shown_limits,
                 _percent(self.probability, self.error), self.hangs_on, self.result,
             ),
         ]  # fmt: skip
@@ -218,14 +209,6 @@ def _outcome(probability: float) -> str:
 def _percent(probability: float, error: float) -> str:
     half = f" ± {100 * error:.0f}" if 100 * error >= 0.5 else ""  # noqa: PLR2004 - rounds to 0
     return f"{100 * probability:.0f}{half} %"
-
-
-def _quantity(criterion: Criterion) -> Quantity:
-    """Return the declaration of the quantity of a criterion."""
-    name = criterion.name
-    band = name.removeprefix("octave_").replace("_", ".")
-    level = Quantity(name, f"{band} Hz", "", "dB", "dB", 1.0, 2, "")
-    return QUANTITIES.get(name, level)
 
 
 class _Source:
