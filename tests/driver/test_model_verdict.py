@@ -269,6 +269,17 @@ def test_run_prints_the_verdict(
     assert main(["assess", "-q", "--check", str(FLAGSHIP)]) == 3
 
 
+def test_studies_and_fits_may_leave_the_ranges_of_unknowns() -> None:
+    unknowns = thud.Unknowns(key=("mass",), low=(2.4,), high=(2.6,), reason=("scales",))
+    case = thud.Case(unknowns=unknowns)
+    parameters = {"mass": {"values": [1.0, 2.0]}}
+    swept = thud.sweep({"case": case.to_namelist(), "parameters": parameters})
+    assert not swept.dataset["status"].any()
+    light = thud.solve(thud.Ball(mass=2.2))
+    found = thud.fit(light, {"mass": thud.Parameter(low=1.0, high=3.0)}, case, unknowns=[])
+    assert found.values["mass"] == pytest.approx(2.2, rel=1e-3)
+
+
 def test_case_that_the_surrogate_covers_keeps_its_drop() -> None:
     case = thud.read_case(VISCOUS)
     covered = covered_case(case, STANDARD_BALL)

@@ -261,7 +261,8 @@ def _require_valid(study: Study, fixed: Mapping[str, Any]) -> None:
     messages = []
     for quantile in TRIAL_QUANTILES:
         try:
-            check_case(replace(study.trial_case(quantile), modes=None, compression=None))
+            trial = study.trial_case(quantile)
+            check_case(replace(trial, modes=None, compression=None, unknowns=None))
         except InputError as error:
             messages.append(str(error))
     named = [_NAMED_KEY.match(message) for message in messages]
