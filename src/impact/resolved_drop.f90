@@ -32,10 +32,13 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> The structure under the source (default: a rigid floor).
       type(receiver_type), intent(in), optional :: receiver
+      class(source_model_type), allocatable :: prepared
       type(force_history_type) :: coarse
       type(error_type), allocatable :: coarse_error
       integer :: level
 
+      allocate (prepared, source=model)
+      call prepared%share_setup(ball, sampling)
       call solve_at(0, history, coarse_error)
       if (is_interrupt(coarse_error)) call move_alloc(coarse_error, error)
       if (allocated(error)) return
@@ -73,7 +76,7 @@ contains
          class(source_model_type), allocatable :: resolved
          type(sampling_type) :: resolved_sampling
 
-         allocate (resolved, source=model)
+         allocate (resolved, source=prepared)
          resolved_sampling = sampling
          call resolved%set_level(ball, level, resolved_sampling, coarse)
          call resolved%solve(ball, drop, resolved_sampling, history, error, receiver)

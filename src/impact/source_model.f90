@@ -34,6 +34,7 @@ module thud_source_model
       procedure, pass(options) :: get_loss_factors
       procedure, pass(options) :: compress
       procedure, pass(options) :: couples
+      procedure, pass(options) :: share_setup
       procedure, pass(options) :: set_level
       procedure, pass(options) :: get_highest_level
       procedure, pass(options) :: get_error_ratio
@@ -155,6 +156,15 @@ contains
 
       yes = .true.
    end function couples
+
+   !> Computes what the levels of resolution share; by default nothing.
+   subroutine share_setup(ball, options, sampling)
+      type(ball_type), intent(in) :: ball
+      class(source_model_type), intent(inout) :: options
+      !> Sampling of the input.
+      type(sampling_type), intent(in) :: sampling
+
+   end subroutine share_setup
 
    !> Sets the resolution. By default level 0 has half the sampling rate of the input, for the error of samples and steps,
    !> level 1 that of the input, and level 2 twice that.

@@ -3,7 +3,7 @@ module thud_ball_motion
    use thud_error, only: error_type
    use thud_kinds, only: wp
    use thud_lapack, only: dgemv
-   use thud_mode_step, only: advance, mode_step_type, index_amplitude
+   use thud_mode_step, only: advance, get_mode_forces, get_surface, index_amplitude, mode_step_type
    use thud_receiver, only: advance_receiver, is_rigid, new_receiver_motion, new_receiver_step, &
       receiver_motion_type, receiver_step_type, receiver_type
    use thud_ring_contact, only: ring_contact_type, solve_contact, update_sticking
@@ -41,9 +41,10 @@ module thud_ball_motion
       real(wp), allocatable :: static(:, :)
       !> Gaps at the end of the step, m: [n_gap].
       real(wp), allocatable :: last_gap(:)
-      !> Workspace of a step: motion at its beginning; forces of the floor on the modes: [n_mode]; their final displacements
-      !> of the rings: [n_gap].
-      real(wp), allocatable :: before(:, :), mode_force(:), yield(:)
+      !> Workspace of a step: motion at its beginning; forces of the floor on the modes: [n_mode]; displacements of the outer
+      !> surface and forces on it, U and V of each harmonic: [2*n_harmonic]; final displacements of the rings by the modes
+      !> without inertia: [n_gap].
+      real(wp), allocatable :: before(:, :), mode_force(:), surface(:), load(:), yield(:)
       !> Gaps between rings and floor; for sticking rings also the tangential displacements from the positions where they
       !> began to stick, m: [n_gap].
       real(wp), allocatable :: gap(:)
@@ -66,10 +67,11 @@ contains
       real(wp), intent(in) :: outer_radius, impact_velocity, gravity
       type(ball_motion_type) :: state
 
-      associate (n_mode => size(modes%omega), n_variable => size(modes%factor, 2), n_gap => size(modes%shape_at_ring, 2))
+      associate (n_mode => size(modes%omega), n_variable => size(modes%factor, 2), n_gap => size(modes%shape_at_ring, 1), &
+         n_load => size(modes%shape_at_ring, 2))
          allocate (state%motion(n_mode, n_variable), state%before(n_mode, n_variable), state%mode_force(n_mode), &
             state%static(n_gap, n_variable - 1), state%gap(n_gap), state%last_gap(n_gap), state%yield(n_gap), &
-            state%reference_gap(n_gap), source=0.0_wp)
+            state%reference_gap(n_gap), state%surface(n_load), state%load(n_load), source=0.0_wp)
       end associate
       state%reference_gap(::rings%n_dof) = -outer_radius*rings%height
       state%last_gap(::rings%n_dof) = outer_radius*(1 - rings%height)
@@ -109,10 +111,16 @@ contains
          floor_start = state%floor_motion
          if (state%floor_moves) call advance_receiver(state%floor, state%floor_step, 0.0_wp, state%floor_motion)
          creep = state%static(:, 1)
-         state%static = matmul(state%static, transpose(static%factor))
+         if (size(static%gain) == 1) then
+            state%static = static%factor(1, 1)*state%static
+         else
+            state%static = matmul(state%static, transpose(static%factor))
+         end if
          gap = state%reference_gap + state%static(:, 1)
          gap(::n_dof) = gap(::n_dof) + state%height + state%floor_motion%displacement
-         if (n_mode > 0) call dgemv('T', n_mode, size(gap), -1.0_wp, modes%shape_at_ring, n_mode, motion, 1, 1.0_wp, gap, 1)
+         call get_surface(modes, motion(:, index_amplitude), state%surface)
+         call dgemv('N', size(gap), size(state%surface), -1.0_wp, modes%shape_at_ring, size(gap), state%surface, 1, 1.0_wp, &
+            gap, 1)
          call solve_contact(contact, gap, error)
          if (allocated(error)) return
          n_gap = contact%last_closed_gap
@@ -128,7 +136,9 @@ contains
                end do
                state%loss = state%loss + dot_product(forces, state%static(:n_gap, 1) - creep(:n_gap))
                if (n_mode > 0) then
-                  call dgemv('N', n_mode, n_gap, 1.0_wp, modes%shape_at_ring, n_mode, forces, 1, 0.0_wp, mode_force, 1)
+                  call dgemv('T', n_gap, size(state%load), 1.0_wp, modes%shape_at_ring, size(gap), forces, 1, 0.0_wp, &
+                     state%load, 1)
+                  call get_mode_forces(modes, state%load, mode_force)
                   do i = 1, size(motion, 2)
                      motion(:, i) = motion(:, i) - modes%gain(:, i)*mode_force
                   end do

@@ -15,7 +15,7 @@ module thud_modal_ball
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_lapack, only: dgemm
-   use thud_modal_ball_options, only: modal_ball_options_type
+   use thud_modal_ball_options, only: max_phase, modal_ball_options_type
    use thud_modal_compression, only: compress_modal_ball
    use thud_modal_damping, only: set_damping
    use thud_mode_step, only: get_energies, mode_step_type, index_amplitude, set_factors
@@ -23,7 +23,7 @@ module thud_modal_ball
    use thud_ring_contact, only: new_ring_contact, ring_contact_type
    use thud_sampling, only: check_contact_samples, get_sample_count, get_step_count, sampling_type
    use thud_source_model, only: typical_contact
-   use thud_sphere_modes, only: basis_type, family_type, get_family, get_static_family, new_basis
+   use thud_sphere_modes, only: basis_type, family_type, get_families, get_static_family, limit_family, new_basis
    use thud_static_step, only: new_static_step, static_step_type
    use thud_surface_rings, only: new_surface_rings, surface_rings_type
    use thud_text, only: to_text
@@ -32,9 +32,6 @@ module thud_modal_ball
    private
 
    public :: modal_ball_type
-
-   !> Maximum phase angle of a mode in a step; faster modes respond statically.
-   real(wp), parameter :: max_phase = pi/2
 
    !> Number of harmonics whose energies are recorded separately, from n = 0 on.
    integer, parameter :: n_family = 6
@@ -164,85 +161,147 @@ contains
       type(ring_contact_type), intent(out) :: contact
       !> Set if the modes cannot be computed, or if the rings cannot be distinguished.
       type(error_type), allocatable, intent(out) :: error
+      type(family_type), allocatable :: families(:)
       real(wp), allocatable :: response(:, :), flexibility(:, :)
       real(wp), allocatable :: zeta(:)
+      real(wp) :: highest_omega, own_response
       logical :: failed
 
-      associate (n_gap => rings%n_dof*size(rings%radius))
-         allocate (flexibility(n_gap, n_gap))
-      end associate
-      call add_modes(ball, options, rings, interval, modes, flexibility, error)
-      if (allocated(error)) return
+      highest_omega = min(2*pi*options%get_highest_frequency(), max_phase/interval)
+      if (allocated(options%families)) then
+         families = options%families
+      else
+         call get_families(ball, options%cavity_gas, highest_omega, families, error)
+         if (allocated(error)) return
+      end if
+      call set_modes(options, rings, highest_omega, families, modes)
       allocate (zeta, mold=modes%omega)
       call set_damping(options, modes, zeta)
       call set_factors(modes, zeta, interval)
+      call get_response(ball, options, rings, families, modes, flexibility, response, error)
+      if (allocated(error)) return
       static = new_static_step(modes, interval, flexibility)
-      response = static%gain(1)*flexibility + matmul(transpose(modes%shape_at_ring), &
-         spread(modes%gain(:, index_amplitude), 2, size(flexibility, 1))*modes%shape_at_ring)
       ! Response of the rigid ball and of the floor.
-      response(::rings%n_dof, ::rings%n_dof) = response(::rings%n_dof, ::rings%n_dof) + interval**2/(2*ball%mass) &
-         + get_force_response(floor, new_receiver_step(floor, interval))
+      own_response = interval**2/(2*ball%mass) + get_force_response(floor, new_receiver_step(floor, interval))
+      response = static%gain(1)*flexibility + response
+      response(::rings%n_dof, ::rings%n_dof) = response(::rings%n_dof, ::rings%n_dof) + own_response
       call new_ring_contact(response, rings%n_dof, contact, failed)
       if (failed) error = numerical_error('&modal_ball: rings = '//to_text(size(rings%radius)) &
          //' cannot be distinguished; allowed: fewer rings, or more substeps')
    end subroutine prepare
 
-   !> Sets the modes that oscillate, and the flexibility of all others at the rings.
-   subroutine add_modes(ball, options, rings, interval, modes, flexibility, error)
-      type(ball_type), intent(in) :: ball
-      !> Modes.
+   !> Sets the modes that oscillate.
+   subroutine set_modes(options, rings, highest_omega, families, modes)
+      !> Harmonics treated as quasi-static.
       class(modal_ball_options_type), intent(in) :: options
       type(surface_rings_type), intent(in) :: rings
-      real(wp), intent(in) :: interval
+      !> Highest angular frequency of modes that oscillate, rad/s.
+      real(wp), intent(in) :: highest_omega
+      !> All modes; only those that oscillate remain, and the flexibility of the others: [0:highest].
+      type(family_type), intent(inout) :: families(0:)
       !> The modes; their frequencies, harmonics and shapes are set here.
       type(mode_step_type), intent(inout) :: modes
-      !> Displacement of each ring due to unit force on each by the other modes, m/N: [n_gap, n_gap].
-      real(wp), intent(out) :: flexibility(:, :)
-      !> Set if the modes cannot be computed.
+      integer :: n, n_mode, first, highest
+
+      do n = 0, ubound(families, 1)
+         associate (chosen => options%static_families)
+            call limit_family(merge(0.0_wp, highest_omega, any(nint(chosen%values(:chosen%count)) == n)), families(n))
+         end associate
+      end do
+      highest = min(ubound(families, 1), ubound(rings%shape_at_ring, 3))
+      n_mode = sum([(size(families(n)%omega), n=0, highest)])
+      allocate (modes%omega(n_mode), modes%harmonic(n_mode), modes%surface(n_mode, 2))
+      first = 1
+      do n = 0, highest
+         associate (last => first + size(families(n)%omega) - 1)
+            modes%omega(first:last) = families(n)%omega
+            modes%harmonic(first:last) = n
+            modes%surface(first:last, :) = transpose(families(n)%surface)
+            first = last + 1
+         end associate
+      end do
+      modes%shape_at_ring = reshape(rings%shape_at_ring(:, :, :highest), [size(rings%shape_at_ring, 1), 2*(highest + 1)])
+   end subroutine set_modes
+
+   !> Displacements of the rings due to unit forces on them.
+   subroutine get_response(ball, options, rings, families, modes, flexibility, response, error)
+      type(ball_type), intent(in) :: ball
+      class(modal_ball_options_type), intent(in) :: options
+      type(surface_rings_type), intent(in) :: rings
+      !> Families that have modes: [0:highest].
+      type(family_type), intent(in) :: families(0:)
+      !> The modes and their gains.
+      type(mode_step_type), intent(in) :: modes
+      !> Due to the modes without inertia, m/N: [n_gap, n_gap].
+      real(wp), allocatable, intent(out) :: flexibility(:, :)
+      !> Due to the oscillating modes after one step, m/N: [n_gap, n_gap].
+      real(wp), allocatable, intent(out) :: response(:, :)
+      !> Set if a flexibility cannot be computed.
       type(error_type), allocatable, intent(out) :: error
       type(basis_type) :: basis
       type(family_type) :: family
-      real(wp), allocatable :: static_displacement(:, :, :), shape_at_ring(:, :)
-      real(wp) :: highest_omega
-      logical :: failed, oscillates
-      integer :: n, k, highest
+      real(wp), allocatable :: displacement(:, :, :)
+      real(wp) :: gain(2, 2, 0:ubound(families, 1))
+      logical :: failed
+      integer :: n, i, highest
 
       highest = ubound(rings%shape_at_ring, 3)
-      highest_omega = min(2*pi*options%get_highest_frequency(), max_phase/interval)
-      basis = new_basis(ball, highest, options%cavity_gas, highest_omega)
-      allocate (modes%omega(0), modes%harmonic(0), shape_at_ring(size(flexibility, 1), 0))
-      allocate (static_displacement(size(flexibility, 1), 2, 0:highest))
-      oscillates = .true.
+      basis = new_basis(ball, 0, options%cavity_gas)
+      associate (n_gap => size(rings%shape_at_ring, 1))
+         allocate (displacement(n_gap, 2, 0:highest), flexibility(n_gap, n_gap), response(n_gap, n_gap))
+      end associate
       do n = 0, highest
-         call check_interrupt(error)
-         if (allocated(error)) return
-         associate (chosen => options%static_families)
-            if (oscillates .and. .not. any(nint(chosen%values(:chosen%count)) == n)) then
-               call get_family(basis, n, highest_omega, family, failed)
-               ! From n = 2 on the lowest frequencies of the harmonics increase.
-               oscillates = n < 2 .or. size(family%omega) > 0
-            else
-               call get_static_family(basis, n, family, failed)
-            end if
-         end associate
+         if (n <= ubound(families, 1)) then
+            displacement(:, :, n) = product_of(rings%shape_at_ring(:, :, n), families(n)%flexibility)
+            cycle
+         end if
+         call get_static_family(basis, n, family, failed)
          if (failed) then
-            error = numerical_error('&modal_ball: rings: the modes of harmonic '//to_text(n) &
+            error = numerical_error('&modal_ball: rings: the flexibility of harmonic '//to_text(n) &
                //' cannot be computed; allowed: fewer rings, or a thinner wall')
             return
          end if
-         static_displacement(:, :, n) = matmul(rings%shape_at_ring(:, :, n), family%flexibility)
-         if (size(family%omega) == 0) cycle
-         shape_at_ring = reshape([shape_at_ring, matmul(rings%shape_at_ring(:, :, n), family%surface)], &
-            [size(flexibility, 1), size(modes%omega) + size(family%omega)])
-         modes%omega = [modes%omega, family%omega]
-         modes%harmonic = [modes%harmonic, (n, k=1, size(family%omega))]
+         displacement(:, :, n) = product_of(rings%shape_at_ring(:, :, n), family%flexibility)
       end do
-      modes%shape_at_ring = transpose(shape_at_ring)
-      associate (rows => size(flexibility, 1), columns => 2*(highest + 1))
-         call dgemm('N', 'T', rows, rows, columns, 1.0_wp, static_displacement, rows, rings%shape_at_ring, rows, 0.0_wp, &
-            flexibility, rows)
-      end associate
-   end subroutine add_modes
+      call multiply(displacement, flexibility)
+      gain = 0.0_wp
+      do i = 1, size(modes%omega)
+         associate (g => gain(:, :, modes%harmonic(i)), surface => modes%surface(i, :))
+            g = g + modes%gain(i, index_amplitude)*spread(surface, 1, 2)*spread(surface, 2, 2)
+         end associate
+      end do
+      highest = size(modes%shape_at_ring, 2)/2 - 1
+      do n = 0, highest
+         displacement(:, :, n) = product_of(rings%shape_at_ring(:, :, n), gain(:, :, n))
+      end do
+      call multiply(displacement(:, :, :highest), response)
+
+   contains
+
+      !> The shapes at the rings of one harmonic, times a matrix: [n_gap, 2].
+      pure function product_of(shape_at_ring, matrix) result(product)
+         real(wp), intent(in) :: shape_at_ring(:, :)
+         real(wp), intent(in) :: matrix(2, 2)
+         real(wp) :: product(size(shape_at_ring, 1), 2)
+         integer :: j
+
+         do j = 1, 2
+            product(:, j) = shape_at_ring(:, 1)*matrix(1, j) + shape_at_ring(:, 2)*matrix(2, j)
+         end do
+      end function product_of
+
+      !> Sum over harmonics of displacements times the shapes at the rings.
+      subroutine multiply(displacement, sum_of_products)
+         real(wp), intent(in), contiguous :: displacement(:, :, 0:)
+         real(wp), intent(out), contiguous :: sum_of_products(:, :)
+
+         associate (n_gap => size(displacement, 1), n_column => 2*size(displacement, 3))
+            call dgemm('N', 'T', n_gap, n_gap, n_column, 1.0_wp, displacement, n_gap, rings%shape_at_ring, n_gap, 0.0_wp, &
+               sum_of_products, n_gap)
+         end associate
+      end subroutine multiply
+
+   end subroutine get_response
 
    !> Integrates in time from first touch until the ball has left for good, or on a mobile floor to the end of the record.
    subroutine march(ball, sampling, interval, rings, modes, static, contact, state, history, error)
