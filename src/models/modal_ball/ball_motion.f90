@@ -2,8 +2,8 @@
 module thud_ball_motion
    use thud_error, only: error_type
    use thud_kinds, only: wp
-   use thud_lapack, only: dgemv
-   use thud_mode_step, only: advance, get_mode_forces, get_surface, index_amplitude, mode_step_type
+   use thud_mode_step, only: advance, get_energies, get_mode_forces, get_surface, index_amplitude, mode_step_type
+   use thud_product, only: add_product
    use thud_receiver, only: advance_receiver, is_rigid, new_receiver_motion, new_receiver_step, &
       receiver_motion_type, receiver_step_type, receiver_type
    use thud_ring_contact, only: ring_contact_type, solve_contact, update_sticking
@@ -12,7 +12,7 @@ module thud_ball_motion
    implicit none (type, external)
    private
 
-   public :: ball_motion_type, new_ball_motion, take_step
+   public :: ball_motion_type, new_ball_motion, stays_clear, take_step
 
    !> Motion of the ball.
    type :: ball_motion_type
@@ -42,9 +42,9 @@ module thud_ball_motion
       !> Gaps at the end of the step, m: [n_gap].
       real(wp), allocatable :: last_gap(:)
       !> Workspace of a step: motion at its beginning; forces of the floor on the modes: [n_mode]; displacements of the outer
-      !> surface and forces on it, U and V of each harmonic: [2*n_harmonic]; final displacements of the rings by the modes
-      !> without inertia: [n_gap].
-      real(wp), allocatable :: before(:, :), mode_force(:), surface(:), load(:), yield(:)
+      !> surface and forces on it, U and V of each harmonic: [2*n_harmonic]; displacements of the rings by the modes
+      !> without inertia, final and at the beginning: [n_gap].
+      real(wp), allocatable :: before(:, :), mode_force(:), surface(:), load(:), yield(:), creep(:)
       !> Gaps between rings and floor; for sticking rings also the tangential displacements from the positions where they
       !> began to stick, m: [n_gap].
       real(wp), allocatable :: gap(:)
@@ -70,7 +70,7 @@ contains
       associate (n_mode => size(modes%omega), n_variable => size(modes%factor, 2), n_gap => size(modes%shape_at_ring, 1), &
          n_load => size(modes%shape_at_ring, 2))
          allocate (state%motion(n_mode, n_variable), state%before(n_mode, n_variable), state%mode_force(n_mode), &
-            state%static(n_gap, n_variable - 1), state%gap(n_gap), state%last_gap(n_gap), state%yield(n_gap), &
+            state%static(n_gap, n_variable - 1), state%gap(n_gap), state%last_gap(n_gap), state%yield(n_gap), state%creep(n_gap), &
             state%reference_gap(n_gap), state%surface(n_load), state%load(n_load), source=0.0_wp)
       end associate
       state%reference_gap(::rings%n_dof) = -outer_radius*rings%height
@@ -84,6 +84,31 @@ contains
       state%floor_motion = new_receiver_motion(floor)
    end function new_ball_motion
 
+   !> Whether the ball cannot touch a rigid floor again: it rises without gravity, and no energy of its modes is enough to bring
+   !> a ring down. Without forces this energy decreases.
+   pure function stays_clear(modes, n_dof, state) result(yes)
+      type(mode_step_type), intent(in) :: modes
+      !> Degrees of freedom of a ring.
+      integer, intent(in) :: n_dof
+      type(ball_motion_type), intent(in) :: state
+      logical :: yes
+      real(wp) :: amplitude(size(modes%omega)), surface(size(state%surface)), reach(size(state%static, 1))
+      integer :: i
+
+      yes = .false.
+      if (state%floor_moves .or. abs(state%gravity) > 0.0_wp .or. .not. state%velocity > 0.0_wp) return
+      amplitude = sqrt(2*get_energies(modes, state%motion)/modes%equilibrium_ratio)/modes%omega
+      surface = 0.0_wp
+      do i = 1, size(amplitude)
+         associate (k => 2*modes%harmonic(i) + 1)
+            surface(k:k + 1) = surface(k:k + 1) + abs(modes%surface(i, :))*amplitude(i)
+         end associate
+      end do
+      reach = maxval(abs(state%static), dim=2)
+      call add_product(abs(modes%shape_at_ring), surface, reach)
+      yes = all(state%reference_gap(::n_dof) + state%height > reach(::n_dof))
+   end function stays_clear
+
    !> Advances ball and floor by one step, with forces between them that are constant in the step.
    subroutine take_step(modes, static, interval, mass, state, contact, error)
       type(mode_step_type), intent(in) :: modes
@@ -96,12 +121,12 @@ contains
       type(ring_contact_type), intent(inout) :: contact
       !> Set if the contact cannot be solved.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: creep(size(state%gap))
       type(receiver_motion_type) :: floor_start
       integer :: i, n_mode, n_gap
 
       n_mode = size(modes%omega)
       associate (motion => state%motion, before => state%before, mode_force => state%mode_force, gap => state%gap, &
+         creep => state%creep, &
          n_dof => contact%n_dof)
          ! Motion without contact forces.
          before = motion
@@ -119,8 +144,8 @@ contains
          gap = state%reference_gap + state%static(:, 1)
          gap(::n_dof) = gap(::n_dof) + state%height + state%floor_motion%displacement
          call get_surface(modes, motion(:, index_amplitude), state%surface)
-         call dgemv('N', size(gap), size(state%surface), -1.0_wp, modes%shape_at_ring, size(gap), state%surface, 1, 1.0_wp, &
-            gap, 1)
+         state%surface = -state%surface
+         call add_product(modes%shape_at_ring, state%surface, gap)
          call solve_contact(contact, gap, error)
          if (allocated(error)) return
          n_gap = contact%last_closed_gap
@@ -130,14 +155,15 @@ contains
             state%velocity = state%velocity + interval*state%force/mass
             state%height = state%height + interval**2*state%force/(2*mass)
             associate (forces => contact%force(:n_gap))
-               call dgemv('N', size(gap), n_gap, 1.0_wp, static%flexibility, size(gap), forces, 1, 0.0_wp, state%yield, 1)
+               state%yield = 0.0_wp
+               call add_product(static%flexibility(:, :n_gap), forces, state%yield)
                do i = 1, size(state%static, 2)
                   state%static(:, i) = state%static(:, i) + static%gain(i)*state%yield
                end do
                state%loss = state%loss + dot_product(forces, state%static(:n_gap, 1) - creep(:n_gap))
                if (n_mode > 0) then
-                  call dgemv('T', n_gap, size(state%load), 1.0_wp, modes%shape_at_ring, size(gap), forces, 1, 0.0_wp, &
-                     state%load, 1)
+                  state%load = 0.0_wp
+                  call add_product(modes%ring_load(:, :n_gap), forces, state%load)
                   call get_mode_forces(modes, state%load, mode_force)
                   do i = 1, size(motion, 2)
                      motion(:, i) = motion(:, i) - modes%gain(:, i)*mode_force

@@ -6,7 +6,7 @@
 !> pressures complementary: no ring penetrates, none pulls, and there is no penalty stiffness.
 module thud_modal_ball
    use thud_ball, only: ball_type
-   use thud_ball_motion, only: ball_motion_type, new_ball_motion, take_step
+   use thud_ball_motion, only: ball_motion_type, new_ball_motion, stays_clear, take_step
    use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
@@ -221,6 +221,7 @@ contains
          end associate
       end do
       modes%shape_at_ring = reshape(rings%shape_at_ring(:, :, :highest), [size(rings%shape_at_ring, 1), 2*(highest + 1)])
+      modes%ring_load = transpose(modes%shape_at_ring)
    end subroutine set_modes
 
    !> Displacements of the rings due to unit forces on them.
@@ -349,6 +350,9 @@ contains
             has_separated = state%velocity > 0.0_wp .and. (n_step - last_contact)*interval > settling_time
             if (has_separated .and. .not. state%floor_moves) exit samples
          end do
+         ! Without gravity the end is often certain sooner.
+         if (contact%outermost == 0 .and. .not. state%floor_moves) has_separated = stays_clear(modes, contact%n_dof, state)
+         if (has_separated) exit samples
          if (state%floor_moves) then
             ! The mean over the interval, as for the force.
             history%floor_velocity(i) = (state%floor_motion%displacement - history%floor_displacement(i)) &
@@ -435,18 +439,21 @@ contains
       !> Index of the sample.
       integer, intent(in) :: i
       type(force_history_type), intent(inout) :: history
-      real(wp) :: energy(size(modes%omega))
-      integer :: k, column
+      real(wp) :: energy(size(modes%omega)), sums(0:n_family)
+      integer :: k
 
       energy = get_energies(modes, state%motion)
+      sums = 0.0_wp
+      do k = 1, size(energy)
+         associate (family => min(modes%harmonic(k), n_family))
+            sums(family) = sums(family) + energy(k)
+         end associate
+      end do
       history%deflection(i) = ball%outer_radius - state%height - state%floor_motion%displacement
       history%velocity(i) = -state%velocity
       if (state%floor_moves) history%floor_displacement(i) = state%floor_motion%displacement
       history%max_deflection = max(history%max_deflection, history%deflection(i))
-      do k = 1, size(energy)
-         column = 2 + min(modes%harmonic(k), n_family)
-         history%model_history(i, column) = history%model_history(i, column) + energy(k)
-      end do
+      history%model_history(i, 2:) = sums
    end subroutine record_motion
 
 end module thud_modal_ball

@@ -185,7 +185,7 @@ contains
       class(modal_ball_options_type), intent(in) :: options
       real(wp) :: ratio
 
-      ratio = 1.3_wp
+      ratio = 1.0_wp
    end function get_error_ratio
 
    !> Number of rings: that of the user, fewer at level 0, or that of the level of resolution.

@@ -34,6 +34,8 @@ module thud_mode_step
       real(wp), allocatable :: surface(:, :)
       !> Displacements of the rings due to unit U and V of each harmonic: [n_gap, 2*n_harmonic].
       real(wp), allocatable :: shape_at_ring(:, :)
+      !> The transpose: generalized forces on U and V of each harmonic due to unit forces on the rings.
+      real(wp), allocatable :: ring_load(:, :)
    end type mode_step_type
 
 contains
