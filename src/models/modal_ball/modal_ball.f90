@@ -350,9 +350,11 @@ contains
             has_separated = state%velocity > 0.0_wp .and. (n_step - last_contact)*interval > settling_time
             if (has_separated .and. .not. state%floor_moves) exit samples
          end do
-         ! Without gravity the end is often certain sooner.
-         if (contact%outermost == 0 .and. .not. state%floor_moves) has_separated = stays_clear(modes, contact%n_dof, state)
-         if (has_separated) exit samples
+         if (contact%outermost == 0 .and. .not. state%floor_moves) then
+            ! Without gravity the end is often certain sooner.
+            has_separated = stays_clear(modes, contact%n_dof, state)
+            if (has_separated) exit samples
+         end if
          if (state%floor_moves) then
             ! The mean over the interval, as for the force.
             history%floor_velocity(i) = (state%floor_motion%displacement - history%floor_displacement(i)) &
