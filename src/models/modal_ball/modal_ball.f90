@@ -57,15 +57,15 @@ contains
       real(wp) :: cost
       real(wp) :: n_mode, n_gap, step_cost
 
-      n_mode = 0.09_wp*options%get_highest_frequency()
+      n_mode = 0.08_wp*options%get_highest_frequency()
       n_gap = options%get_ring_count()*merge(2.0_wp, 1.0_wp, options%floor_friction == 'stick')
-      cost = 3.0e-3_wp + 1.0e-9_wp*n_mode*n_gap**2
-      step_cost = 2.4e-7_wp + n_mode*(2.3e-9_wp + 1.05e-10_wp*n_gap)
+      cost = 2.5e-3_wp + 1.0e-9_wp*n_mode*n_gap**2
+      step_cost = 4.0e-7_wp + n_mode*(2.5e-9_wp + 6.0e-11_wp*n_gap)
       ! Maxwell branches.
       if (options%damping_law == 'fractional') step_cost = step_cost + 8.0e-9_wp*n_mode
       if (present(receiver)) step_cost = step_cost + 2.6e-9_wp*get_pole_count(receiver)
-      ! The coarser drop, and that of twice the steps.
-      step_cost = 3*step_cost
+      ! Both levels; sticking rings need twice the steps.
+      step_cost = merge(3, 2, options%floor_friction == 'stick')*step_cost
       if (present(receiver)) then
          cost = cost + get_step_count(sampling)*step_cost
       else
@@ -129,9 +129,10 @@ contains
       interval = 1/(sampling%sample_rate*real(sampling%substeps, wp))
       history = new_force_history(sampling%sample_rate, n_sample, ['contact_force'])
       history%impact_velocity = get_impact_velocity(drop)
-      history%model_history_name = [character(len=24) :: 'contact_radius_m', ('energy_n'//to_text(i)//'_J', &
-         i=0, n_family - 1), 'energy_rest_J']
-      allocate (history%model_history(n_sample, n_family + 2), source=0.0_wp)
+      history%model_history_name = [character(len=24) :: 'contact_radius_m']
+      if (options%level > 0) history%model_history_name = [history%model_history_name, [character(len=24) :: &
+         ('energy_n'//to_text(i)//'_J', i=0, n_family - 1), 'energy_rest_J']]
+      allocate (history%model_history(n_sample, size(history%model_history_name)), source=0.0_wp)
       call use_one_blas_thread()
       rings = new_surface_rings(options%get_ring_count(), options%outermost_angle, options%floor_friction == 'stick')
       call prepare(ball, options, rings, floor, interval, modes, static, contact, error)
@@ -201,7 +202,7 @@ contains
       type(family_type), intent(inout) :: families(0:)
       !> The modes; their frequencies, harmonics and shapes are set here.
       type(mode_step_type), intent(inout) :: modes
-      integer :: n, n_mode, first, highest
+      integer :: n, n_mode, highest
 
       do n = 0, ubound(families, 1)
          associate (chosen => options%static_families)
@@ -211,13 +212,14 @@ contains
       highest = min(ubound(families, 1), ubound(rings%shape_at_ring, 3))
       n_mode = sum([(size(families(n)%omega), n=0, highest)])
       allocate (modes%omega(n_mode), modes%harmonic(n_mode), modes%surface(n_mode, 2))
-      first = 1
+      allocate (modes%first(0:highest + 1))
+      modes%first(0) = 1
       do n = 0, highest
-         associate (last => first + size(families(n)%omega) - 1)
+         modes%first(n + 1) = modes%first(n) + size(families(n)%omega)
+         associate (first => modes%first(n), last => modes%first(n + 1) - 1)
             modes%omega(first:last) = families(n)%omega
             modes%harmonic(first:last) = n
             modes%surface(first:last, :) = transpose(families(n)%surface)
-            first = last + 1
          end associate
       end do
       modes%shape_at_ring = reshape(rings%shape_at_ring(:, :, :highest), [size(rings%shape_at_ring, 1), 2*(highest + 1)])
@@ -441,21 +443,22 @@ contains
       !> Index of the sample.
       integer, intent(in) :: i
       type(force_history_type), intent(inout) :: history
-      real(wp) :: energy(size(modes%omega)), sums(0:n_family)
-      integer :: k
+      real(wp) :: energy(size(modes%omega))
+      integer :: n
 
-      energy = get_energies(modes, state%motion)
-      sums = 0.0_wp
-      do k = 1, size(energy)
-         associate (family => min(modes%harmonic(k), n_family))
-            sums(family) = sums(family) + energy(k)
-         end associate
-      end do
       history%deflection(i) = ball%outer_radius - state%height - state%floor_motion%displacement
       history%velocity(i) = -state%velocity
       if (state%floor_moves) history%floor_displacement(i) = state%floor_motion%displacement
       history%max_deflection = max(history%max_deflection, history%deflection(i))
-      history%model_history(i, 2:) = sums
+      ! A level without an own result has no energies.
+      if (size(history%model_history, 2) == 1) return
+      energy = get_energies(modes, state%motion)
+      associate (n_harmonic => ubound(modes%first, 1))
+         do n = 0, min(n_family, n_harmonic) - 1
+            history%model_history(i, 2 + n) = sum(energy(modes%first(n):modes%first(n + 1) - 1))
+         end do
+         history%model_history(i, 2 + n_family) = sum(energy(modes%first(min(n_family, n_harmonic)):))
+      end associate
    end subroutine record_motion
 
 end module thud_modal_ball

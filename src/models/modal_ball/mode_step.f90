@@ -20,6 +20,8 @@ module thud_mode_step
       real(wp), allocatable :: omega(:)
       !> Harmonic of each mode: [n_mode].
       integer, allocatable :: harmonic(:)
+      !> Index of the first mode of each harmonic, and behind the last mode of all: [0:n_harmonic].
+      integer, allocatable :: first(:)
       !> Long-term modulus divided by storage modulus.
       real(wp) :: equilibrium_ratio = 1.0_wp
       !> Moduli of the branches divided by the storage modulus, and their relaxation times, s: [n_branch].
@@ -97,14 +99,18 @@ contains
       !> Amplitudes, m sqrt(kg): [n_mode].
       real(wp), intent(in) :: amplitude(:)
       real(wp), intent(out) :: displacement(:)
-      integer :: i
+      real(wp) :: u, v
+      integer :: n, i
 
-      displacement = 0.0_wp
-      do i = 1, size(amplitude)
-         associate (k => 2*modes%harmonic(i) + 1)
-            displacement(k) = displacement(k) + modes%surface(i, 1)*amplitude(i)
-            displacement(k + 1) = displacement(k + 1) + modes%surface(i, 2)*amplitude(i)
-         end associate
+      do n = 0, ubound(modes%first, 1) - 1
+         u = 0.0_wp
+         v = 0.0_wp
+         do i = modes%first(n), modes%first(n + 1) - 1
+            u = u + modes%surface(i, 1)*amplitude(i)
+            v = v + modes%surface(i, 2)*amplitude(i)
+         end do
+         displacement(2*n + 1) = u
+         displacement(2*n + 2) = v
       end do
    end subroutine get_surface
 

@@ -163,13 +163,11 @@ contains
       if (n == 0) return
       contact%last_closed_gap = contact%indices(n)
       if (contact%last_closed_gap == n) then
+         ! Whole columns: those of the transpose end at row n.
          contact%right = 0.0_wp
-         do i = 1, n
-            contact%right(i:n) = contact%right(i:n) - contact%inverse(i:n, i)*gap(i)
-         end do
-         do i = 1, n
-            contact%force(:i) = contact%force(:i) + contact%transposed(:i, i)*contact%right(i)
-         end do
+         call add_product(contact%inverse(:, :n), gap, contact%right)
+         contact%right = -contact%right
+         call add_product(contact%transposed(:, :n), contact%right, contact%force)
       else
          associate (indices => contact%indices(:n))
             matrix = contact%response(indices, indices)
