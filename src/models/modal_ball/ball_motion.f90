@@ -70,8 +70,8 @@ contains
       associate (n_mode => size(modes%omega), n_variable => size(modes%factor, 2), n_gap => size(modes%shape_at_ring, 1), &
          n_load => size(modes%shape_at_ring, 2))
          allocate (state%motion(n_mode, n_variable), state%before(n_mode, n_variable), state%mode_force(n_mode), &
-            state%static(n_gap, n_variable - 1), state%gap(n_gap), state%last_gap(n_gap), state%yield(n_gap), state%creep(n_gap), &
-            state%reference_gap(n_gap), state%surface(n_load), state%load(n_load), source=0.0_wp)
+            state%static(n_gap, n_variable - 1), state%gap(n_gap), state%last_gap(n_gap), state%yield(n_gap), &
+            state%creep(n_gap), state%reference_gap(n_gap), state%surface(n_load), state%load(n_load), source=0.0_wp)
       end associate
       state%reference_gap(::rings%n_dof) = -outer_radius*rings%height
       state%last_gap(::rings%n_dof) = outer_radius*(1 - rings%height)
@@ -84,8 +84,8 @@ contains
       state%floor_motion = new_receiver_motion(floor)
    end function new_ball_motion
 
-   !> Whether the ball cannot touch a rigid floor again: it rises without gravity, and no energy of its modes is enough to bring
-   !> a ring down. Without forces this energy decreases.
+   !> Whether the ball cannot touch a rigid floor again: it rises without gravity, and the energy of its modes, which decreases
+   !> without forces, cannot bring any ring down.
    pure function stays_clear(modes, n_dof, state) result(yes)
       type(mode_step_type), intent(in) :: modes
       !> Degrees of freedom of a ring.

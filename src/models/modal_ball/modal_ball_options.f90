@@ -163,8 +163,9 @@ contains
       refinement = 2**level
       contact_steps = coarse%contact_time*sampling%sample_rate*sampling%substeps
       ! Sticking rings converge slowly; without them few steps suffice.
-      if (contact_steps > 0.0_wp .and. options%floor_friction /= 'stick') &
+      if (contact_steps > 0.0_wp .and. options%floor_friction /= 'stick') then
          refinement = min(2*refinement, max(refinement/2, ceiling(min_steps/contact_steps)))
+      end if
       sampling%substeps = sampling%substeps*refinement
       if (options%rings > 0 .or. .not. allocated(coarse%model_history)) return
       options%outermost_angle = min(greatest_angle, margin*asin(maxval(coarse%model_history(:, 1))/ball%outer_radius) &

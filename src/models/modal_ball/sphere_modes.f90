@@ -178,7 +178,8 @@ contains
          real(wp) :: matrix(size(a, 2), size(b, 2))
 
          associate (n_node => size(a, 1), weighted => spread(basis%weight, 2, size(b, 2))*b)
-            call dgemm('T', 'N', n_unknown, n_unknown, n_node, 1.0_wp, a, n_node, weighted, n_node, 0.0_wp, matrix, n_unknown)
+            call dgemm('T', 'N', n_unknown, n_unknown, n_node, 1.0_wp, a, n_node, weighted, n_node, 0.0_wp, matrix, &
+               n_unknown)
          end associate
       end function product_of
 

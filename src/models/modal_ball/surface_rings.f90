@@ -59,8 +59,8 @@ contains
       allocate (node(n_node), weight(n_node))
       call get_gauss_legendre(node, weight)
       do k = 1, n_node
-         call add_nodes(width*[(i - 1 + (1 + node(k))/2, i=1, n_ring - 1)], (1 - node(k))*weight(k), (1 + node(k))*weight(k), &
-            area, rings%height, shapes)
+         call add_nodes(width*[(i - 1 + (1 + node(k))/2, i=1, n_ring - 1)], (1 - node(k))*weight(k), &
+            (1 + node(k))*weight(k), area, rings%height, shapes)
       end do
       rings%height = rings%height/area
       do i = 1, n_ring
