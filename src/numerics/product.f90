@@ -10,7 +10,7 @@ contains
 
    !> Adds the product of a matrix and a vector.
    pure subroutine add_product(matrix, vector, total)
-      !> Matrix: [n_row, n_column].
+      !> Matrix, of which only the first n_row rows are used: [at least n_row, n_column].
       real(wp), intent(in), contiguous :: matrix(:, :)
       !> Vector; only the first n_column values are used: [at least n_column].
       real(wp), intent(in), contiguous :: vector(:)

@@ -84,8 +84,8 @@ contains
       state%floor_motion = new_receiver_motion(floor)
    end function new_ball_motion
 
-   !> Whether the ball cannot touch a rigid floor again: it rises without gravity, and the energy of its modes, which decreases
-   !> without forces, cannot bring any ring down.
+   !> Whether the ball cannot touch a rigid floor again: it rises without gravity, and the energy of its modes, which
+   !> decreases without forces, cannot bring any ring down.
    pure function stays_clear(modes, n_dof, state) result(yes)
       type(mode_step_type), intent(in) :: modes
       !> Degrees of freedom of a ring.

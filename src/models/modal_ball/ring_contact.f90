@@ -163,11 +163,10 @@ contains
       if (n == 0) return
       contact%last_closed_gap = contact%indices(n)
       if (contact%last_closed_gap == n) then
-         ! Whole columns: those of the transpose end at row n.
-         contact%right = 0.0_wp
-         call add_product(contact%inverse(:, :n), gap, contact%right)
-         contact%right = -contact%right
-         call add_product(contact%transposed(:, :n), contact%right, contact%force)
+         contact%right(:n) = 0.0_wp
+         call add_product(contact%inverse(:, :n), gap, contact%right(:n))
+         contact%right(:n) = -contact%right(:n)
+         call add_product(contact%transposed(:, :n), contact%right, contact%force(:n))
       else
          associate (indices => contact%indices(:n))
             matrix = contact%response(indices, indices)
