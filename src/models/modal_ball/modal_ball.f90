@@ -128,6 +128,7 @@ contains
       n_sample = get_sample_count(sampling)
       interval = 1/(sampling%sample_rate*real(sampling%substeps, wp))
       history = new_force_history(sampling%sample_rate, n_sample, ['contact_force'])
+      history%has_means = .true.
       history%impact_velocity = get_impact_velocity(drop)
       history%model_history_name = [character(len=24) :: 'contact_radius_m']
       if (options%level > 0) history%model_history_name = [history%model_history_name, [character(len=24) :: &

@@ -173,8 +173,10 @@ contains
    end subroutine set_level
 
    !> Highest level of resolution: the user's keys do not grow.
-   function get_highest_level(options) result(level)
+   function get_highest_level(ball, options, sampling) result(level)
+      type(ball_type), intent(in) :: ball
       class(modal_ball_options_type), intent(in) :: options
+      type(sampling_type), intent(in) :: sampling
       integer :: level
 
       level = merge(1, highest_level, options%rings > 0 .and. options%highest_frequency > 0.0_wp)
@@ -182,8 +184,9 @@ contains
 
    !> Estimated error of a result divided by its difference from the next coarser level: it is found from random balls
    !> (docs/modal_ball.md).
-   function get_error_ratio(options) result(ratio)
+   function get_error_ratio(options, level) result(ratio)
       class(modal_ball_options_type), intent(in) :: options
+      integer, intent(in) :: level
       real(wp) :: ratio
 
       ratio = 1.0_wp
@@ -195,7 +198,7 @@ contains
       integer :: n_ring
 
       n_ring = nint(merge(coarse_rings, default_rings*ratio**(options%level - 1), options%level == 0))
-      if (options%rings > 0) n_ring = max(2, nint(options%rings*ratio**min(0, options%level - 1)))
+      if (options%rings > 0) n_ring = max(2, nint(options%rings*ratio**(options%level - 1)))
    end function get_ring_count
 
    !> Highest frequency of oscillating modes, Hz: that of the user, lower at level 0, or that of the level of resolution.
@@ -203,7 +206,7 @@ contains
       class(modal_ball_options_type), intent(in) :: options
       real(wp) :: frequency
 
-      frequency = options%highest_frequency*ratio**min(0, options%level - 1)
+      frequency = options%highest_frequency*ratio**(options%level - 1)
       if (frequency > 0.0_wp) return
       frequency = options%coarse_frequency*ratio**options%level
       ! Rings that are released lose the energy of modes without inertia.
