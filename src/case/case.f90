@@ -189,7 +189,7 @@ contains
       if (.not. allocated(error)) call check_sampling(case%sampling, error)
       if (.not. allocated(error)) call check_name(case%name, error)
       if (allocated(error)) return
-      if (case%has_modes) call check_modes(case%modes, error)
+      if (case%has_modes) call check_modes(case%ball, case%modes, error)
       if (allocated(error) .or. .not. case%has_impact) return
       if (case%has_compression) call check_compression(case%compression, case%ball, error)
       if (case%has_unknowns .and. .not. allocated(error)) call check_unknowns(case%unknowns, get_source_fields(case), error)

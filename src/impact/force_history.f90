@@ -42,6 +42,8 @@ module thud_force_history
    type :: force_history_type
       !> Samples per second, Hz; sample i belongs to the time (i - 1)/sample_rate in the record.
       real(wp) :: sample_rate = 0.0_wp
+      !> Whether a sample of the force is the mean over a sampling interval, and not the force at an instant.
+      logical :: has_means = .false.
       !> Deflection of the source, m: [n_sample].
       real(wp), allocatable :: deflection(:)
       !> Rate of the deflection, m/s: [n_sample].

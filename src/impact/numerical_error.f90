@@ -1,7 +1,8 @@
 !> Error of an impact due to its resolution: modes left out, rings, elements, time steps and samples. It is estimated by the
 !> change from a coarser resolution.
 module thud_numerical_error
-   use thud_band, only: get_octaves, octave_count
+   use thud_band, only: band_type, get_octaves, octave_count
+   use thud_constants, only: pi
    use thud_error, only: error_type
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_history_type, numerical_error_type
@@ -9,7 +10,12 @@ module thud_numerical_error
    implicit none (type, external)
    private
 
-   public :: estimate_error, get_largest_error
+   public :: add_verification, estimate_error, finer_quantities, get_largest_error
+
+   !> Names of the quantities of a drop at a finer resolution: levels of the octaves of the force on the floor, and others.
+   character(len=24), parameter :: finer_quantities(*) = [character(len=24) :: 'finer_octave_31_5', 'finer_octave_63', &
+      'finer_octave_125', 'finer_octave_250', 'finer_octave_500', 'finer_contact_time', 'finer_restitution', &
+      'finer_peak_force']
 
    !> Part of the difference of two forces in an octave that is taken as in phase with the force, and so changes its level.
    real(wp), parameter :: in_phase = 0.15_wp
@@ -39,11 +45,43 @@ contains
          if (allocated(error)) return
          change = max(change, in_phase*20/log(10.0_wp)*10**((level(:, 3) - level(:, 2))/20))
       end if
-      history%numerical_error = numerical_error_type(known=.true., octave=ratio*change, &
+      change = ratio*change
+      if (history%has_means) change = change + get_mean_loss(history%sample_rate)
+      history%numerical_error = numerical_error_type(known=.true., octave=change, &
          contact_time=ratio*abs(get_contact_time(history) - get_contact_time(coarse)), &
          restitution=ratio*abs(history%restitution - coarse%restitution), &
          peak_force=ratio*abs(history%peak_force - coarse%peak_force))
    end subroutine estimate_error
+
+   !> Maximum reduction of octave levels by means over a sampling interval, dB: that of the highest frequency of each octave.
+   pure function get_mean_loss(sample_rate) result(loss)
+      !> Samples per second, Hz.
+      real(wp), intent(in) :: sample_rate
+      real(wp) :: loss(octave_count)
+      real(wp) :: phase(octave_count)
+      type(band_type) :: octaves(octave_count)
+
+      octaves = get_octaves()
+      phase = pi*octaves%upper/sample_rate
+      loss = -20*log10(sin(phase)/phase)
+   end function get_mean_loss
+
+   !> Adds the numbers of the same drop at a finer resolution to the quantities of a history.
+   subroutine add_verification(finer, history)
+      type(force_history_type), intent(in) :: finer
+      !> The history; its model quantities get `finer_quantities`.
+      type(force_history_type), intent(inout) :: history
+      real(wp) :: level(octave_count)
+      type(error_type), allocatable :: error
+
+      call get_force_exposure_levels(finer%floor_force, finer%sample_rate, get_octaves(), 'exact', level, error)
+      if (allocated(error)) return
+      history%model_quantity_name = [character(len=len(history%model_quantity_name)) :: history%model_quantity_name, &
+         finer_quantities]
+      history%model_quantity_unit = [character(len=len(history%model_quantity_unit)) :: history%model_quantity_unit, &
+         spread('dB', 1, octave_count), 's', '', 'N']
+      history%model_quantity = [history%model_quantity, level, get_contact_time(finer), finer%restitution, finer%peak_force]
+   end subroutine add_verification
 
    !> The contact time, resolved between steps if possible.
    pure function get_contact_time(history) result(time)

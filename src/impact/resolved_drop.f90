@@ -6,7 +6,7 @@ module thud_resolved_drop
    use thud_error, only: error_type, signal_base
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_numerical_error, only: estimate_error, get_largest_error
+   use thud_numerical_error, only: add_verification, estimate_error, get_largest_error
    use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
    use thud_source_model, only: source_model_type
@@ -32,36 +32,41 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> The structure under the source (default: a rigid floor).
       type(receiver_type), intent(in), optional :: receiver
-      type(force_history_type) :: coarse
+      class(source_model_type), allocatable :: prepared
+      type(force_history_type) :: coarse, finer
       type(error_type), allocatable :: coarse_error
-      integer :: level
+      integer :: level, highest
 
+      highest = model%get_highest_level(ball, sampling)
+      allocate (prepared, source=model)
+      call prepared%share_setup(ball, sampling)
       call solve_at(0, history, coarse_error)
       if (is_interrupt(coarse_error)) call move_alloc(coarse_error, error)
       if (allocated(error)) return
-      if (.not. allocated(coarse_error)) coarse = history
-      do level = 1, model%get_highest_level()
+      do level = 1, highest
+         if (.not. allocated(coarse_error)) coarse = history
          call solve_at(level, history, error)
          if (allocated(error)) then
             if (is_interrupt(error) .or. .not. coarse%numerical_error%known) return
             ! The next coarser level has a result, with its error.
             deallocate (error)
             history = coarse
-            return
+            exit
          end if
-         if (.not. allocated(coarse_error)) call estimate_error(coarse, model%get_error_ratio(), history)
-         if (history%numerical_error%known .and. get_largest_error(history) <= max_error) return
-         coarse = history
+         if (.not. allocated(coarse_error)) call estimate_error(coarse, model%get_error_ratio(level), history)
          if (allocated(coarse_error)) deallocate (coarse_error)
+         if (history%numerical_error%known .and. get_largest_error(history) <= max_error) exit
       end do
-      if (history%numerical_error%known) return
-      ! The coarsest resolution fails and there is one level: a finer one shows the error.
-      call solve_at(level, coarse, coarse_error)
-      if (is_interrupt(coarse_error)) then
-         call move_alloc(coarse_error, error)
-      else if (.not. allocated(coarse_error)) then
-         call estimate_error(coarse, 1 + model%get_error_ratio(), history)
+      level = min(level, highest)
+      if (history%numerical_error%known .and. .not. sampling%verify) return
+      ! The error is not known if the coarsest resolution fails and there is one level.
+      call solve_at(level + 1, finer, error)
+      if (allocated(error)) then
+         if (.not. (is_interrupt(error) .or. sampling%verify)) deallocate (error)
+         return
       end if
+      if (.not. history%numerical_error%known) call estimate_error(finer, 1 + model%get_error_ratio(level), history)
+      if (sampling%verify) call add_verification(finer, history)
 
    contains
 
@@ -73,7 +78,7 @@ contains
          class(source_model_type), allocatable :: resolved
          type(sampling_type) :: resolved_sampling
 
-         allocate (resolved, source=model)
+         allocate (resolved, source=prepared)
          resolved_sampling = sampling
          call resolved%set_level(ball, level, resolved_sampling, coarse)
          call resolved%solve(ball, drop, resolved_sampling, history, error, receiver)

@@ -3,7 +3,7 @@ module thud_sampling
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type
    use thud_kinds, only: wp
-   use thud_new_field, only: integer_field, real_field
+   use thud_new_field, only: integer_field, logical_field, real_field
    use thud_text, only: to_text
    use thud_validity_limit, only: validity_limit_type
    implicit none (type, external)
@@ -32,6 +32,8 @@ module thud_sampling
       real(wp) :: duration = 0.05_wp
       !> Integration steps per sampling interval.
       integer :: substeps = 1
+      !> Whether to compute again at a finer resolution.
+      logical :: verify = .false.
    end type sampling_type
 
 contains
@@ -40,14 +42,15 @@ contains
    function get_sampling_fields(sampling) result(fields)
       !> The sampling that the fields read and set.
       type(sampling_type), intent(in), target :: sampling
-      !> One field per component: [3].
-      type(field_type) :: fields(3)
+      !> One field per component: [4].
+      type(field_type) :: fields(4)
 
       fields = [ &
          real_field('sample_rate', sampling%sample_rate, 'Hz', 'samples per second', '[2000, 1e7]'), &
          real_field('duration', sampling%duration, 's', 'duration of the record from first touch', &
          '[0.001, 10]'), &
-         integer_field('substeps', sampling%substeps, 'integration steps per sampling interval', '[1, 10000]')]
+         integer_field('substeps', sampling%substeps, 'integration steps per sampling interval', '[1, 10000]'), &
+         logical_field('verify', sampling%verify, 'compute again at a finer resolution, and state the changes')]
    end function get_sampling_fields
 
    !> Checks the numbers of samples and steps of a record.

@@ -34,6 +34,7 @@ module thud_source_model
       procedure, pass(options) :: get_loss_factors
       procedure, pass(options) :: compress
       procedure, pass(options) :: couples
+      procedure, pass(options) :: share_setup
       procedure, pass(options) :: set_level
       procedure, pass(options) :: get_highest_level
       procedure, pass(options) :: get_error_ratio
@@ -82,7 +83,8 @@ contains
    end subroutine check
 
    !> Shape of the snapshots of the deformed ball; by default there are none.
-   function get_snapshot_shape(options, sampling) result(extents)
+   function get_snapshot_shape(ball, options, sampling) result(extents)
+      type(ball_type), intent(in) :: ball
       class(source_model_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       !> Number of nodes from pole to pole, of nodes through the wall, and of snapshots.
@@ -156,6 +158,15 @@ contains
       yes = .true.
    end function couples
 
+   !> Computes what the levels of resolution share; by default nothing.
+   subroutine share_setup(ball, options, sampling)
+      type(ball_type), intent(in) :: ball
+      class(source_model_type), intent(inout) :: options
+      !> Sampling of the input.
+      type(sampling_type), intent(in) :: sampling
+
+   end subroutine share_setup
+
    !> Sets the resolution. By default level 0 has half the sampling rate of the input, for the error of samples and steps,
    !> level 1 that of the input, and level 2 twice that.
    subroutine set_level(ball, options, level, sampling, coarse)
@@ -172,20 +183,24 @@ contains
    end subroutine set_level
 
    !> Highest level of resolution; by default 1: the resolution is that of the input.
-   function get_highest_level(options) result(level)
+   function get_highest_level(ball, options, sampling) result(level)
+      type(ball_type), intent(in) :: ball
       class(source_model_type), intent(in) :: options
+      type(sampling_type), intent(in) :: sampling
       integer :: level
 
       level = 1
    end function get_highest_level
 
-   !> Estimated error of a result divided by its difference from the next coarser level. By default that of an error which is
-   !> proportional to the square of the step, as that of a force that begins with a jump.
-   function get_error_ratio(options) result(ratio)
+   !> Estimated error of a result divided by its difference from the next coarser level. By default somewhat more than the
+   !> 1/3 of an error that is proportional to the square of the step, as that of a force that begins with a jump.
+   function get_error_ratio(options, level) result(ratio)
       class(source_model_type), intent(in) :: options
+      !> Level of the result.
+      integer, intent(in) :: level
       real(wp) :: ratio
 
-      ratio = 1.0_wp/3.0_wp
+      ratio = 0.4_wp
    end function get_error_ratio
 
    !> Force on each of two plates in a quasi-static compression; models without one return an error.

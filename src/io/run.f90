@@ -137,7 +137,7 @@ contains
 
       if (.not. case%has_impact) return
       associate (model => case%models(get_model_number(case))%model)
-         wanted = estimate_motion_bytes(model%get_snapshot_shape(case%sampling))
+         wanted = estimate_motion_bytes(model%get_snapshot_shape(case%ball, case%sampling))
       end associate
       ! The drop on a mobile floor has snapshots, too.
       if (case%has_floor) wanted = 2*wanted

@@ -1,7 +1,7 @@
 !> Impact of a source of a few masses: integrates in time from first touch until the source has left for good, samples the
 !> forces, and checks the balances of impulse and energy.
 module thud_lumped
-   use thud_contact_source, only: coarse_step_error, contact_source_type
+   use thud_contact_source, only: coarse_step_error, contact_source_type, is_coarse_step
    use thud_coupled_impact, only: solve_coupled
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error
@@ -17,12 +17,15 @@ module thud_lumped
 
    public :: solve_lumped
 
+   !> Maximum number of times that the steps are halved.
+   integer, parameter :: max_halvings = 6
+
 contains
 
-   !> Force history of one drop.
+   !> Force history of one drop; the steps are halved until they are not too coarse for the source.
    subroutine solve_lumped(source, drop, sampling, component_name, history, error, receiver, n_step, model_history_name)
       !> The source before first touch.
-      class(contact_source_type), intent(inout) :: source
+      class(contact_source_type), intent(in) :: source
       type(drop_type), intent(in) :: drop
       !> Sampling rate, length of the record, substeps.
       type(sampling_type), intent(in) :: sampling
@@ -38,23 +41,37 @@ contains
       integer, intent(in), optional :: n_step
       !> Names, with units, of additional quantities against time: [n_model_history].
       character(len=*), intent(in), optional :: model_history_name(:)
+      class(contact_source_type), allocatable :: moving
       real(wp) :: state(source%n_state)
-      integer :: steps
+      integer :: steps, halving
 
       steps = sampling%substeps
       if (present(n_step)) steps = n_step
-      history = new_force_history(sampling%sample_rate, get_sample_count(sampling), component_name, model_history_name)
-      history%impact_velocity = get_impact_velocity(drop)
-      if (is_rigid(receiver)) then
-         call march(source, drop, sampling, steps, history, state, error)
-      else
-         call solve_coupled(source, drop, sampling, steps, receiver, history, state, error)
-      end if
-      if (allocated(error)) return
-      ! Contact time and advice on the sampling rate mean nothing if a balance fails.
-      call finish(source, state, history, error)
-      if (.not. allocated(error)) call check_contact_samples(sampling, history%contact_time, error)
+      do halving = 0, max_halvings
+         allocate (moving, source=source)
+         call integrate()
+         if (.not. allocated(error)) exit
+         if (.not. is_coarse_step(error) .or. halving == max_halvings) return
+         deallocate (error, moving)
+         steps = 2*steps
+      end do
+      call check_contact_samples(sampling, history%contact_time, error)
       if (.not. allocated(error)) call check_samples(history, error)
+
+   contains
+
+      !> One attempt.
+      subroutine integrate()
+         history = new_force_history(sampling%sample_rate, get_sample_count(sampling), component_name, model_history_name)
+         history%impact_velocity = get_impact_velocity(drop)
+         if (is_rigid(receiver)) then
+            call march(moving, drop, sampling, steps, history, state, error)
+         else
+            call solve_coupled(moving, drop, sampling, steps, receiver, history, state, error)
+         end if
+         if (.not. allocated(error)) call finish(moving, state, history, error)
+      end subroutine integrate
+
    end subroutine solve_lumped
 
    !> Integrates in time from first touch until the source has left a rigid floor for good.

@@ -132,7 +132,7 @@ def test_modes_and_impact_come_from_one_file(case_file: CaseFile, tmp_path: Path
     assert {"modes.csv", "modes.svg", "force.csv", "force.svg"} < names
     again = thud.read_case(tmp_path / "outputs/case/effective.nml")
     assert again == case
-    with pytest.raises(thud.InputError, match=naming("&mesh: radial_elements", 2, 8)):
+    with pytest.raises(thud.InputError, match=naming("&mesh: radial_elements", 2, 0)):
         dataclasses.replace(case, modes=thud.Modes()).to_namelist()
 
 
@@ -213,7 +213,7 @@ def test_pressure_is_even_at_the_pole() -> None:
 
 
 BAD = {
-    "&mesh radial_elements = 0 /": naming("&mesh: radial_elements", 0),
+    "&mesh radial_elements = -1 /": naming("&mesh: radial_elements", -1),
     "&mesh polar_elements = 7 /": naming("&mesh: polar_elements", 7),
     "&material prony_share = -0.1, prony_time = 1e-3, viscosity = 'prony' /": naming("prony_share"),
     "&material prony_share = 0.1, prony_time = 0, viscosity = 'prony' /": naming("prony_time"),

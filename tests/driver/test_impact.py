@@ -122,7 +122,10 @@ def test_numerical_failures_are_told() -> None:
     with pytest.raises(thud.NumericalError, match=naming("&drop: height", "1000.0 m", "114.00 mm")):
         thud.solve(drop=thud.Drop(1000.0))
     with pytest.raises(thud.NumericalError, match=naming("&sampling: substeps")):
-        thud.solve(thud.Ball(youngs_modulus=1e10))
+        thud.solve(
+            drop=thud.Drop(1e6, 1000.0), model="hunt_crossley", stiffness=1e15, exponent=5.0,
+            restitution=0.5,
+        )  # fmt: skip
 
 
 def test_unknown_force_is_told() -> None:

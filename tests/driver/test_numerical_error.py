@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 import thud
@@ -44,3 +45,77 @@ def test_error_of_the_default_is_small_and_not_shown(case_file: CaseFile, run: R
     assert impact.warnings == ()
     shown = run(case_file("&ball / &drop / &model name = 'modal_ball' /")).stdout
     assert "numerical error" not in shown
+
+
+VERIFIED = {
+    "shell": {"model": "hollow_sphere", "sample_rate": 8000.0},
+    "modes of the user": {"model": "modal_ball", "rings": 20, "highest_frequency": 600.0},
+    "elements of the user": {"model": "finite_element", "polar_elements": 24},
+}
+
+
+@pytest.mark.parametrize("name", VERIFIED)
+@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
+def test_verification_is_a_drop_at_a_finer_resolution(name: str) -> None:
+    impact = thud.solve(**VERIFIED[name], verify=True)  # type: ignore[arg-type]
+    plain = thud.solve(**VERIFIED[name])  # type: ignore[arg-type]
+    assert plain.finer is None
+    assert impact.finer
+    levels = impact.levels(force="floor")
+    assert (levels == plain.levels(force="floor")).all()
+    change, error = impact.finer.level - levels, impact.numerical_error.level
+    assert np.abs(change).max() > 0
+    # The finer drop has errors of its own.
+    assert (np.abs(change) < 1.5 * error + 0.02).all()
+    assert abs(impact.finer.contact_time - impact.exact_contact_time) < 1e-4
+    assert abs(impact.finer.restitution - impact.restitution) < 1e-2
+    assert impact.finer.peak_force == pytest.approx(impact.peak_force, rel=1e-2)
+
+
+def test_verification_is_printed_beside_the_stated_error(case_file: CaseFile, run: Run) -> None:
+    text = "&ball / &drop / &model / &sampling sample_rate = 8000, verify = .true. /"
+    path = case_file(text)
+    impact = thud.solve(thud.read_case(path))
+    shown = run(path).stdout
+    lines = [line.split() for line in shown.splitlines() if "level, 500 Hz octave" in line]
+    assert impact.finer
+    finer, error = impact.finer.level[4], impact.numerical_error.level[4]
+    change = finer - impact.levels(force="floor")[4]
+    numbers = [f"{finer:.2f}", "dB", f"{change:.2f}", f"{error:.2f}"]
+    assert lines[-1] == ["level,", "500", "Hz", "octave", *numbers]
+    assert "finer octave" not in shown
+
+
+AWKWARD = {
+    "thin wall": {"outer_radius": 0.06, "wall_thickness": 0.0075, "youngs_modulus": 6.3e6},
+    "no losses": {
+        "outer_radius": 0.105, "wall_thickness": 0.02625, "youngs_modulus": 0.94e6,
+        "poisson_ratio": 0.47,
+    },
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", AWKWARD)
+@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
+def test_elements_refine_themselves_or_state_the_error(name: str) -> None:
+    """Against elements of half the size of the default."""
+    keys = AWKWARD[name]
+    inner = keys["outer_radius"] - keys["wall_thickness"]
+    mass = 1150 * 4 / 3 * np.pi * (keys["outer_radius"] ** 3 - inner**3)
+    ball, drop = thud.Ball(**keys, mass=mass), thud.Drop(height=0.25)
+    options = {"viscosity": "none"} if name == "no losses" else {}
+    impact = thud.solve(ball, drop, model="finite_element", duration=0.12, **options)
+    finer = thud.solve(
+        ball, drop, model="finite_element", duration=0.12, radial_elements=24, polar_elements=224,
+        **options,
+    )  # fmt: skip
+    coarse = thud.solve(
+        ball, drop, model="finite_element", duration=0.12, radial_elements=8, polar_elements=64,
+        **options,
+    )  # fmt: skip
+    levels = finer.levels(force="floor")
+    error = np.abs(impact.levels(force="floor") - levels)
+    stated = impact.numerical_error.level + finer.numerical_error.level
+    assert (error < stated + 0.02).all()
+    assert error.max() < 0.6 * np.abs(coarse.levels(force="floor") - levels).max()

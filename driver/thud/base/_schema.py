@@ -154,11 +154,14 @@ class Sampling(Group):
         Duration of the record from first touch, s; 0.001 <= duration <= 10.
     substeps : int
         Integration steps per sampling interval; 1 <= substeps <= 10000.
+    verify : bool
+        Compute again at a finer resolution, and state the changes.
     """
 
     sample_rate: float = 44100.0
     duration: float = 0.05
     substeps: int = 1
+    verify: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,14 +205,16 @@ class Modes(Group):
     count : int
         Number of elastic free modes; 1 <= count <= 100.
     radial_elements : int
-        Number of elements through the wall; 1 <= radial_elements <= 64; group ``&mesh``.
+        Number of elements through the wall; 0: automatic; 0 <= radial_elements <= 64; group
+        ``&mesh``.
     polar_elements : int
-        Number of elements from pole to pole; 8 <= polar_elements <= 1024; group ``&mesh``.
+        Number of elements from pole to pole; 0: automatic; 0 <= polar_elements <= 1024; group
+        ``&mesh``.
     """
 
     count: int = 6
-    radial_elements: int = field(default=8, metadata={"group": "mesh"})
-    polar_elements: int = field(default=64, metadata={"group": "mesh"})
+    radial_elements: int = field(default=0, metadata={"group": "mesh"})
+    polar_elements: int = field(default=0, metadata={"group": "mesh"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -394,9 +399,11 @@ class FiniteElement(Group):
     step_safety : float
         Time step divided by the stability limit; 0.01 <= step_safety <= 0.98.
     radial_elements : int
-        Number of elements through the wall; 1 <= radial_elements <= 64; group ``&mesh``.
+        Number of elements through the wall; 0: automatic; 0 <= radial_elements <= 64; group
+        ``&mesh``.
     polar_elements : int
-        Number of elements from pole to pole; 8 <= polar_elements <= 1024; group ``&mesh``.
+        Number of elements from pole to pole; 0: automatic; 0 <= polar_elements <= 1024; group
+        ``&mesh``.
     law : str
         Law of elasticity; "neo_hookean", "mooney_rivlin"; group ``&material``.
     mooney_share : float
@@ -438,8 +445,8 @@ class FiniteElement(Group):
     flight_before: float = 0.0
     flight_after: float = 0.0
     step_safety: float = 0.85
-    radial_elements: int = field(default=8, metadata={"group": "mesh"})
-    polar_elements: int = field(default=64, metadata={"group": "mesh"})
+    radial_elements: int = field(default=0, metadata={"group": "mesh"})
+    polar_elements: int = field(default=0, metadata={"group": "mesh"})
     law: FiniteElementLaw = field(default="neo_hookean", metadata={"group": "material"})
     mooney_share: float = field(default=0.2, metadata={"group": "material"})
     bulk_ratio: float = field(default=200.0, metadata={"group": "material"})
@@ -1018,8 +1025,8 @@ KEYS = (
     Key("", "ball", "ambient_pressure", "real", "Pa", "pressure of the air around the ball", (), 0.0, 100000000.0),
     Key("", "ball", "heat_capacity_ratio", "real", "", "ratio of specific heats of the enclosed gas", (), 1.0, 2.0),
     Key("modes", "modes", "count", "whole", "", "number of elastic free modes", (), 1.0, 100.0, True),
-    Key("modes", "mesh", "radial_elements", "whole", "", "number of elements through the wall", (), 1.0, 64.0, True),
-    Key("modes", "mesh", "polar_elements", "whole", "", "number of elements from pole to pole", (), 8.0, 1024.0, True),
+    Key("modes", "mesh", "radial_elements", "whole", "", "number of elements through the wall; 0: automatic", (), 0.0, 64.0, True),
+    Key("modes", "mesh", "polar_elements", "whole", "", "number of elements from pole to pole; 0: automatic", (), 0.0, 1024.0, True),
     Key("compression", "compression", "max_deflection", "real", "m", "maximum approach of the plates", (), 1e-15, 10.0),
     Key("compression", "compression", "points", "whole", "", "number of points of the curve, including the undeformed ball", (), 2.0, 10000.0, True),
     Key("compression", "compression", "gas", "choice", "", "gas in the ball: leaves through the hole (vented), or is sealed in", ('vented', 'isothermal', 'adiabatic')),
@@ -1041,8 +1048,8 @@ KEYS = (
     Key("finite_element", "finite_element", "flight_before", "real", "s", "duration of free flight before first touch", (), 0.0, 1.0),
     Key("finite_element", "finite_element", "flight_after", "real", "s", "duration of free flight after the last contact", (), 0.0, 10.0),
     Key("finite_element", "finite_element", "step_safety", "real", "", "time step divided by the stability limit", (), 0.01, 0.98),
-    Key("finite_element", "mesh", "radial_elements", "whole", "", "number of elements through the wall", (), 1.0, 64.0, True),
-    Key("finite_element", "mesh", "polar_elements", "whole", "", "number of elements from pole to pole", (), 8.0, 1024.0, True),
+    Key("finite_element", "mesh", "radial_elements", "whole", "", "number of elements through the wall; 0: automatic", (), 0.0, 64.0, True),
+    Key("finite_element", "mesh", "polar_elements", "whole", "", "number of elements from pole to pole; 0: automatic", (), 0.0, 1024.0, True),
     Key("finite_element", "material", "law", "choice", "", "law of elasticity", ('neo_hookean', 'mooney_rivlin')),
     Key("finite_element", "material", "mooney_share", "real", "", "second-invariant fraction of the shear modulus, for mooney_rivlin", (), 0.0, 1.0),
     Key("finite_element", "material", "bulk_ratio", "real", "", "maximum ratio of bulk to shear modulus; lower if Poisson's ratio implies a lower one", (), 2.0, 100000.0),
@@ -1075,6 +1082,7 @@ KEYS = (
     Key("", "sampling", "sample_rate", "real", "Hz", "samples per second", (), 2000.0, 10000000.0),
     Key("", "sampling", "duration", "real", "s", "duration of the record from first touch", (), 0.001, 10.0),
     Key("", "sampling", "substeps", "whole", "", "integration steps per sampling interval", (), 1.0, 10000.0, True),
+    Key("", "sampling", "verify", "flag", "", "compute again at a finer resolution, and state the changes"),
     Key("", "levels", "method", "choice", "", "method of computing the levels", ('exact', 'fft')),
     Key("", "levels", "bands", "choice", "", "bands of levels.csv", ('octave', 'third', 'both')),
     Key("", "levels", "force", "choice", "", "assessed force, for which levels, peak force and verdict are reported", ('floor', 'elastic')),

@@ -38,15 +38,15 @@ OCTAVE_NAMES = ("octave_31_5", "octave_63", "octave_125", "octave_250", "octave_
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class NumericalError:
-    """Estimated errors of an impact due to its resolution, by comparison with a coarser one.
+class ImpactNumbers:
+    """Main numbers of an impact, or their errors.
 
     Attributes
     ----------
     level : ndarray, shape (5,)
-        Errors of the levels of the octaves 31.5 to 500 Hz of the force on the floor, dB.
+        Levels of the octaves 31.5 to 500 Hz of the force on the floor, dB.
     contact_time, restitution, peak_force : float
-        Errors of the contact time, s, the coefficient of restitution, and the peak force, N.
+        Contact time, s, coefficient of restitution, and peak force, N.
     """
 
     level: NDArray[np.float64]
@@ -126,13 +126,26 @@ class Impact(ImpactQuantities, Displayed):
         return self.case.limits.source
 
     @property
-    def numerical_error(self) -> NumericalError:
+    def numerical_error(self) -> ImpactNumbers:
         """Errors due to the resolution: modes, rings, elements, time steps and samples."""
-        return NumericalError(
+        return ImpactNumbers(
             level=np.array([getattr(self, f"{name}_error") for name in OCTAVE_NAMES]),
             contact_time=self.contact_time_error,
             restitution=self.restitution_error,
             peak_force=self.peak_force_error,
+        )
+
+    @property
+    def finer(self) -> ImpactNumbers | None:
+        """Numbers at a finer resolution; None without the key `verify`."""
+        found = self.model_quantities
+        if "finer_contact_time" not in found:
+            return None
+        return ImpactNumbers(
+            level=np.array([found[f"finer_{name}"] for name in OCTAVE_NAMES]),
+            contact_time=found["finer_contact_time"],
+            restitution=found["finer_restitution"],
+            peak_force=found["finer_peak_force"],
         )
 
     @property

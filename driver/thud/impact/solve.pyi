@@ -25,6 +25,7 @@ class SamplingOptions(TypedDict, total=False):
     sample_rate: float
     duration: float
     substeps: int
+    verify: bool
     floor: FloorOptions | None
 
 class HollowSphereOptions(SamplingOptions, total=False):

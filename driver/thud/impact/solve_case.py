@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from thud.base._schema import Ball, Drop, Sampling
@@ -25,6 +26,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     duration: float | None = None,
     substeps: int | None = None,
     floor: FloorOptions | None = None,
+    verify: bool = False,
     **options: object,
 ) -> Impact:
     """Drop a ball on a floor.
@@ -33,7 +35,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     ----------
     ball, drop
         Ball and drop, by default the rubber ball of the paper from 1 m. `ball` may instead be a
-        `Case`, without any other argument.
+        `Case`, without any other argument but `verify`.
     model
         ``"hollow_sphere"`` (the analytical model of the paper, the default), ``"modal_ball"`` (the
         improved model), ``"finite_element"``, ``"measured_modes"``, ``"hunt_crossley"`` or
@@ -48,6 +50,8 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
         Floor on which the ball is dropped in addition to a rigid floor, on which the standards
         assess the force. An object of `Rigid`, `InfinitePlate`, `Oscillator`, `Plate`,
         `FloatingFloor`, `JoistFloor` or `MeasuredMobility`.
+    verify
+        Compute again at a finer resolution, for `Impact.finer`; also with a case.
     **options
         Options of the model, such as ``momentum_flux="retarding"``; see `HollowSphere`,
         `ModalBall`, `FiniteElement`, `MeasuredModes`, `HuntCrossley` and `TwoMass`.
@@ -75,12 +79,14 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
         if settings or options or any(value is not None for value in (drop, model, floor)):
             refuse("solve() has other arguments in addition to a case", "solve(case)")
         case = ball
+        if verify:
+            case = replace(case, sampling=replace(case.sampling, verify=True))
     else:
         case = Case(
             ball=Ball() if ball is None else ball,
             drop=Drop() if drop is None else drop,
             model=new_model("hollow_sphere" if model is None else model, options),
-            sampling=Sampling(**settings),  # type: ignore[arg-type]
+            sampling=Sampling(**settings, verify=verify),  # type: ignore[arg-type]
             floor=floor,
         )
     impact = compute(case)

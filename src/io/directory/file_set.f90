@@ -128,7 +128,7 @@ contains
       logical, intent(in) :: exchangeable
       !> Set if a file cannot be written or moved; the directory is unchanged then.
       type(error_type), allocatable, intent(out) :: error
-      character(len=name_length), allocatable :: replaced(:)
+      character(len=name_length) :: replaced(size(entries) + size(gone))
       logical :: done
 
       replaced = [character(len=name_length) :: entries%name, gone]

@@ -7,6 +7,7 @@ module thud_table
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
+   use thud_numerical_error, only: finer_quantities
    use thud_quantities, only: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
       sample_quantity_count
    use thud_report, only: get_verdict_word
@@ -65,7 +66,7 @@ contains
                   //get_band_name(assessment%bands(i))//' Hz', error, 2, 'dB')
             end associate
          end do
-         text = text//newline
+         text = text//verification_rows(history, assessment)//newline
          text = text//'  The source '//trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
             //' to the limits of the '//replaced(trim(case%source), '_', ' ')//': it meets ' &
             //to_text(count(conforms(criteria)))//' of '//to_text(size(criteria))//' criteria.'//newline &
@@ -217,6 +218,7 @@ contains
 
       rows = ''
       do i = 1, size(history%model_quantity_name)
+         if (any(finer_quantities == history%model_quantity_name(i))) cycle
          power = 0
          if (history%model_quantity_unit(i) /= '') power = floor(log10(max(abs(history%model_quantity(i)), tiny(1.0_wp)))/3)
          if (abs(power) > 3) power = 0
@@ -225,6 +227,55 @@ contains
             trim(adjustl(prefixes(power)//history%model_quantity_unit(i))))
       end do
    end function model_quantity_rows
+
+   !> Rows that compare a result with that at a finer resolution and with the stated error; none if it is not verified.
+   function verification_rows(history, assessment) result(rows)
+      type(force_history_type), intent(in) :: history
+      !> Levels of the history.
+      type(assessment_type), intent(in) :: assessment
+      character(len=:), allocatable :: rows
+      real(wp) :: values(history_quantity_count)
+      real(wp) :: finer
+      integer :: i, first
+
+      rows = ''
+      first = findloc(history%model_quantity_name, finer_quantities(1), dim=1)
+      if (first == 0) return
+      rows = newline//'  at a finer resolution      value          change    stated error'//newline
+      values = get_quantities(history)
+      do i = 1, size(finer_quantities)
+         finer = history%model_quantity(first - 1 + i)
+         if (i <= octave_count) then
+            rows = rows//compared('level, '//get_band_name(assessment%bands(i))//' Hz octave', finer, &
+               assessment%level(i, force_count), history%numerical_error%octave(i), get_quantity('octave_500_error'))
+         else
+            ! The name without `finer_`.
+            associate (name => finer_quantities(i) (7:))
+               rows = rows//compared(name, finer, values(findloc(quantities%name, name, dim=1)), &
+                  values(findloc(quantities%name, trim(name)//'_error', dim=1)), get_quantity(name))
+            end associate
+         end if
+      end do
+
+   contains
+
+      !> Row with a number at the finer resolution, its change, and the stated error.
+      function compared(name, finer, value, error, quantity) result(text)
+         character(len=*), intent(in) :: name
+         !> SI units.
+         real(wp), intent(in) :: finer, value, error
+         !> Unit and decimals on the screen.
+         type(quantity_type), intent(in) :: quantity
+         character(len=:), allocatable :: text
+
+         associate (scale => quantity%display_scale, decimals => quantity%decimals)
+            text = row(replaced(trim(name), '_', ' '), finer*scale, decimals, quantity%display_unit)
+            text = padded(text(:len(text) - 1), 40)//flush_right(fixed((finer - value)*scale, decimals), 8) &
+               //flush_right(fixed(error*scale, decimals), 16)//newline
+         end associate
+      end function compared
+
+   end function verification_rows
 
    !> A limit with up to three decimals, without trailing zeros.
    pure function short(value) result(text)

@@ -17,7 +17,7 @@ module thud_finite_element
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_material, only: get_material_loss_factor, material_type, new_material
-   use thud_mesh, only: new_mesh
+   use thud_mesh, only: get_element_counts, new_mesh
    use thud_motion, only: new_motion, take_snapshot
    use thud_nodal_areas, only: get_nodal_areas
    use thud_pressed_ball, only: new_pressed_ball, press, pressed_ball_type
@@ -84,7 +84,7 @@ contains
 
       ! Pressure waves through the smallest elements, at the inner surface, limit the stable step.
       speed = sqrt((options%material%bulk_ratio + 4/3.0_wp)*ball%youngs_modulus/3/get_density(ball))
-      associate (mesh => options%mesh)
+      associate (mesh => get_element_counts(ball, options%mesh))
          interval = options%step_safety/(speed*hypot(mesh%radial_elements/ball%wall_thickness, &
             mesh%polar_elements/(pi*(ball%outer_radius - ball%wall_thickness))))
          select case (options%material%viscosity)
@@ -122,7 +122,7 @@ contains
       modulus = 2.08e6_wp
    end function get_paper_modulus
 
-   !> Limits of the mesh: beyond them octave levels are off by more than about 0.5 dB (docs/finite_elements.md).
+   !> The limit of the speed of the ball; the error of the mesh is stated by its numerical error.
    function get_validity_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
@@ -130,16 +130,8 @@ contains
       type(sampling_type), intent(in) :: sampling
       type(force_history_type), intent(in) :: history
       type(validity_limit_type), allocatable :: limits(:)
-      real(wp) :: length
 
-      length = pi*ball%outer_radius/options%mesh%polar_elements
-      limits = [get_wave_limit(ball, history, 0.5_wp), &
-         validity_limit_type('mesh', 'sqrt(outer_radius wall_thickness) over the length of an element', &
-         sqrt(ball%outer_radius*ball%wall_thickness)/length, lowest=6.0_wp, &
-         reason='fewer polar_elements do not resolve how a wall so thin bends'), &
-         validity_limit_type('mesh', 'radius of the contact over the length of an element', &
-         maxval(history%model_history(:, 1))/length, lowest=4.0_wp, &
-         reason='fewer polar_elements do not resolve the contact')]
+      limits = [get_wave_limit(ball, history, 0.5_wp)]
    end function get_validity_limits
 
    !> Loss factor of the material in shear as a function of frequency.

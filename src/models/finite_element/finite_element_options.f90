@@ -1,13 +1,14 @@
 !> Options of the finite-element model, group by group; `thud_finite_element` adds the solution.
 module thud_finite_element_options
    use thud_ball, only: ball_type
+   use thud_constants, only: pi
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type
    use thud_floor_contact, only: contact_options_type, get_contact_fields
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_material, only: check_material, get_material_fields, material_options_type
-   use thud_mesh, only: get_mesh_fields, mesh_options_type
+   use thud_mesh, only: check_mesh, get_element_counts, get_mesh_fields, mesh_options_type
    use thud_new_field, only: in_group, integer_field, real_field
    use thud_sampling, only: get_sample_count, sampling_type
    use thud_source_model, only: source_model_type
@@ -25,6 +26,16 @@ module thud_finite_element_options
 
    !> Minimum number of elements through the wall; fewer do not bend as the wall does.
    integer, parameter :: min_radial = 2
+
+   !> Ratio of the numbers of elements of a level of resolution to those of the next coarser one, above level 1.
+   real(wp), parameter :: refinement_ratio = sqrt(2.0_wp)
+
+   !> Number of elements along a contact radius.
+   real(wp), parameter :: contact_elements = 4.5_wp
+
+   !> Highest level of resolution, and maximum time of its drop on one core, s.
+   integer, parameter :: highest_level = 3
+   real(wp), parameter :: max_cost = 4.0_wp
 
    !> Options of the model.
    type, abstract, extends(source_model_type) :: finite_element_options_type
@@ -46,6 +57,8 @@ module thud_finite_element_options
       procedure, pass(options) :: check
       procedure, pass(options) :: get_snapshot_shape
       procedure, pass(options) :: set_level
+      procedure, pass(options) :: get_highest_level
+      procedure, pass(options) :: get_error_ratio
    end type finite_element_options_type
 
 contains
@@ -79,9 +92,11 @@ contains
 
       call check_material(options%material, ball, error)
       if (allocated(error)) return
-      if (options%mesh%radial_elements < min_radial) then
-         error = input_error('&mesh: radial_elements = '//to_text(options%mesh%radial_elements) &
-            //' is not allowed with finite_element; allowed: from '//to_text(min_radial))
+      call check_mesh(options%mesh, error)
+      if (allocated(error)) return
+      if (options%mesh%radial_elements == 1) then
+         error = input_error('&mesh: radial_elements = 1 is not allowed with finite_element; allowed: from ' &
+            //to_text(min_radial)//', or 0 for automatic')
          return
       end if
       if (sampling%sample_rate < min_rate) then
@@ -90,33 +105,80 @@ contains
          return
       end if
       ! Positions and velocities of each node.
-      bytes = 32.0_wp*(options%mesh%radial_elements + 1)*(options%mesh%polar_elements + 1)*get_frame_count(options, sampling)
+      bytes = 32.0_wp*product(real(get_snapshot_shape(ball, options, sampling), wp))
       if (bytes > max_motion_bytes) error = input_error('&output: snapshot_interval = ' &
          //to_text(options%snapshot_interval)//' s makes '//to_text(get_frame_count(options, sampling)) &
          //' snapshots, more than the memory is meant to hold; allowed: a longer interval, or 0 for none')
    end subroutine check
 
-   !> Sets the resolution: at level 0 elements of twice the size, without snapshots.
+   !> Sets the resolution: at level 0 elements of twice the size, without snapshots; above level 1 smaller ones. Automatic
+   !> elements are short enough for the contact radius of the coarser drop.
    subroutine set_level(ball, options, level, sampling, coarse)
       type(ball_type), intent(in) :: ball
       class(finite_element_options_type), intent(inout) :: options
       integer, intent(in) :: level
       type(sampling_type), intent(inout) :: sampling
       type(force_history_type), intent(in) :: coarse
+      real(wp) :: refinement
+      logical :: resolves_contact
 
-      if (level > 0) return
-      options%mesh%radial_elements = max(min_radial, options%mesh%radial_elements/2)
-      options%mesh%polar_elements = options%mesh%polar_elements/2
-      options%snapshot_interval = 0.0_wp
+      refinement = merge(0.5_wp, refinement_ratio**(level - 1), level == 0)
+      resolves_contact = is_automatic(options) .and. allocated(coarse%model_history)
+      associate (mesh => options%mesh)
+         mesh = get_element_counts(ball, mesh)
+         if (resolves_contact) mesh%polar_elements = nint(mesh%polar_elements*max(1.0_wp, min(2.0_wp, &
+            contact_elements*pi*ball%outer_radius/mesh%polar_elements/maxval(coarse%model_history(:, 1)))))
+         mesh%radial_elements = max(min_radial, nint(mesh%radial_elements*refinement))
+         mesh%polar_elements = nint(mesh%polar_elements*refinement)
+      end associate
+      if (level == 0) options%snapshot_interval = 0.0_wp
    end subroutine set_level
 
-   !> Size of the snapshots.
-   function get_snapshot_shape(options, sampling) result(extents)
+   !> Highest level of resolution, such that its drop does not take too long.
+   function get_highest_level(ball, options, sampling) result(level)
+      type(ball_type), intent(in) :: ball
+      class(finite_element_options_type), intent(in) :: options
+      type(sampling_type), intent(in) :: sampling
+      integer :: level
+
+      level = 1
+      if (.not. is_automatic(options)) return
+      do while (level < highest_level .and. options%get_cost(ball, sampling)*refinement_ratio**(3*level) < max_cost)
+         level = level + 1
+      end do
+   end function get_highest_level
+
+   !> Whether the resolution may be chosen: the user's keys do not grow.
+   pure function is_automatic(options) result(yes)
+      class(finite_element_options_type), intent(in) :: options
+      logical :: yes
+
+      yes = options%mesh%radial_elements == 0 .and. options%mesh%polar_elements == 0
+   end function is_automatic
+
+   !> Estimated error of a result divided by its difference from the next coarser level, for errors proportional to the
+   !> square of the element size; at level 1 more, since the elements of level 0 are often outside of that order.
+   function get_error_ratio(options, level) result(ratio)
+      class(finite_element_options_type), intent(in) :: options
+      integer, intent(in) :: level
+      real(wp) :: ratio
+
+      ratio = merge(0.5_wp, 1/(refinement_ratio**2 - 1), level == 1)
+   end function get_error_ratio
+
+   !> Size of the snapshots; of automatic elements at the highest level of resolution.
+   function get_snapshot_shape(ball, options, sampling) result(extents)
+      type(ball_type), intent(in) :: ball
       class(finite_element_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       integer :: extents(3)
 
-      extents = [options%mesh%polar_elements + 1, options%mesh%radial_elements + 1, get_frame_count(options, sampling)]
+      integer :: factor
+
+      factor = merge(nint(refinement_ratio**(highest_level - 1)), 1, is_automatic(options))
+      associate (counts => get_element_counts(ball, options%mesh))
+         extents = [factor*counts%polar_elements + 1, factor*counts%radial_elements + 1, get_frame_count(options, sampling)]
+      end associate
    end function get_snapshot_shape
 
    !> Maximum number of snapshots of a run.

@@ -9,7 +9,7 @@ module thud_free_modes
    use thud_interrupt, only: check_interrupt, is_interrupted
    use thud_kinds, only: wp
    use thud_legendre, only: get_legendre
-   use thud_mesh, only: get_mesh_fields, mesh_options_type, mesh_type, new_mesh
+   use thud_mesh, only: check_mesh, get_element_counts, get_mesh_fields, mesh_options_type, mesh_type, new_mesh
    use thud_mode_matrices, only: apply_inverse, apply_mass, mode_matrices_type, new_mode_matrices
    use thud_new_field, only: in_group, integer_field
    use thud_text, only: to_text
@@ -65,14 +65,19 @@ contains
    end function get_modes_fields
 
    !> Returns an error if the mesh does not resolve the requested number of modes.
-   subroutine check_modes(options, error)
+   subroutine check_modes(ball, options, error)
+      type(ball_type), intent(in) :: ball
       !> Number of modes, and the mesh.
       type(modes_options_type), intent(in) :: options
       !> Error that names the count and its maximum.
       type(error_type), allocatable, intent(out) :: error
       integer :: max_count
 
-      max_count = options%mesh%polar_elements*options%mesh%radial_elements/4
+      call check_mesh(options%mesh, error)
+      if (allocated(error)) return
+      associate (counts => get_element_counts(ball, options%mesh))
+         max_count = counts%polar_elements*counts%radial_elements/4
+      end associate
       if (options%count > max_count) error = input_error('&modes: count = '//to_text(options%count) &
          //' is not allowed with so few elements; allowed: 1 to '//to_text(max_count)//', a quarter of their number')
    end subroutine check_modes

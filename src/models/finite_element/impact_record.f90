@@ -37,6 +37,7 @@ contains
       type(force_history_type) :: history
 
       history = new_force_history(sampling%sample_rate, get_sample_count(sampling), ['contact_force'])
+      history%has_means = .true.
       history%impact_velocity = impact_velocity
       history%model_history_name = [character(len=24) :: 'contact_radius_m', 'cavity_pressure_Pa', 'kinetic_energy_J', &
          'strain_energy_J', 'gas_energy_J', 'gravity_energy_J', 'contact_energy_J', 'friction_energy_J', &

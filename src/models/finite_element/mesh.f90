@@ -3,24 +3,36 @@
 module thud_mesh
    use thud_ball, only: ball_type
    use thud_constants, only: pi
+   use thud_error, only: error_type, input_error
    use thud_field, only: field_type
    use thud_kinds, only: wp
    use thud_new_field, only: integer_field
+   use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: get_mesh_fields, mesh_options_type, mesh_type, new_mesh
+   public :: check_mesh, get_element_counts, get_mesh_fields, mesh_options_type, mesh_type, new_mesh
 
    !> Relative reduction of the element size around the lowest point, where the contact is, at the inner and at the outer
    !> surface. Elements are larger at the outer surface and reduced more there, since the smallest ones limit the step.
    real(wp), parameter :: grading(2) = [0.15_wp, 0.45_wp]
 
+   !> Automatic numbers of elements through and along a wall with this ratio of thickness to outer radius or a larger one.
+   integer, parameter :: typical_radial = 8
+   real(wp), parameter :: typical_polar = 64, typical_wall = 0.36_wp
+
+   !> Maximum ratio of the automatic number of elements along a thinner wall to that number.
+   real(wp), parameter :: max_factor = 8.0_wp
+
+   !> Minimum number of elements from pole to pole.
+   integer, parameter :: min_polar = 8
+
    !> Numbers of elements.
    type :: mesh_options_type
-      !> Elements through the wall.
-      integer :: radial_elements = 8
-      !> Elements from pole to pole.
-      integer :: polar_elements = 64
+      !> Elements through the wall; 0 for automatic.
+      integer :: radial_elements = 0
+      !> Elements from pole to pole; 0 for automatic.
+      integer :: polar_elements = 0
    end type mesh_options_type
 
    !> Nodes of quadrilaterals. Node (j, i) lies on polar line j, counted from the lowest point, and on ring i, counted from
@@ -48,9 +60,33 @@ contains
       type(field_type) :: fields(2)
 
       fields = [ &
-         integer_field('radial_elements', options%radial_elements, 'number of elements through the wall', '[1, 64]'), &
-         integer_field('polar_elements', options%polar_elements, 'number of elements from pole to pole', '[8, 1024]')]
+         integer_field('radial_elements', options%radial_elements, 'number of elements through the wall; 0: automatic', &
+         '[0, 64]'), &
+         integer_field('polar_elements', options%polar_elements, 'number of elements from pole to pole; 0: automatic', &
+         '[0, 1024]')]
    end function get_mesh_fields
+
+   !> Returns an error if there are too few elements.
+   subroutine check_mesh(options, error)
+      type(mesh_options_type), intent(in) :: options
+      type(error_type), allocatable, intent(out) :: error
+
+      if (options%polar_elements > 0 .and. options%polar_elements < min_polar) error = input_error( &
+         '&mesh: polar_elements = '//to_text(options%polar_elements)//' is not allowed; allowed: from ' &
+         //to_text(min_polar)//', or 0 for automatic')
+   end subroutine check_mesh
+
+   !> Numbers of elements with those that are automatic: of a thinner wall the elements are shorter, since it bends.
+   pure function get_element_counts(ball, options) result(counts)
+      type(ball_type), intent(in) :: ball
+      type(mesh_options_type), intent(in) :: options
+      type(mesh_options_type) :: counts
+
+      counts = options
+      if (counts%radial_elements == 0) counts%radial_elements = typical_radial
+      if (counts%polar_elements == 0) counts%polar_elements = nint(typical_polar &
+         *min(max_factor, sqrt(max(1.0_wp, typical_wall*ball%outer_radius/ball%wall_thickness))))
+   end function get_element_counts
 
    !> Mesh of the undeformed ball around the origin. Elements of order 1 are graded, for the contact; those of order 2,
    !> for the free modes, are not.
@@ -65,8 +101,10 @@ contains
       integer :: i, j, n_ring, n_line
 
       mesh%order = order
-      mesh%n_radial = options%radial_elements
-      mesh%n_polar = options%polar_elements
+      associate (counts => get_element_counts(ball, options))
+         mesh%n_radial = counts%radial_elements
+         mesh%n_polar = counts%polar_elements
+      end associate
       n_ring = order*mesh%n_radial
       n_line = order*mesh%n_polar
       allocate (mesh%r(0:n_line, 0:n_ring), mesh%z(0:n_line, 0:n_ring))

@@ -29,6 +29,7 @@ module thud_hollow_sphere
       !> Treatment of the momentum of wall that enters or leaves the flat cap, one of `flux_choices`.
       character(len=name_length) :: momentum_flux = 'momentum_balance'
    contains
+      procedure, pass(options) :: get_error_ratio
       procedure, pass(options) :: get_fields
       procedure, pass(options) :: solve => solve_hollow_sphere
       procedure, pass(options) :: get_paper_modulus
@@ -273,6 +274,16 @@ contains
          //fixed(1.0e3_wp*time, 3)//' ms after first touch its deflection is '//fixed(1.0e3_wp*state(at_deflection), 2) &
          //' mm; allowed: less than its height, '//fixed(1.0e3_wp*self%closing_deflection, 2)//' mm')
    end function get_failure
+
+   !> Estimated error of a result divided by its difference from the next coarser level. Only with the balance of momentum
+   !> does the force end without a jump: another force has an error that is proportional to the sampling interval.
+   function get_error_ratio(options, level) result(ratio)
+      class(hollow_sphere_type), intent(in) :: options
+      integer, intent(in) :: level
+      real(wp) :: ratio
+
+      ratio = merge(0.4_wp, 1.0_wp, options%momentum_flux == 'momentum_balance')
+   end function get_error_ratio
 
    !> Force history of one drop.
    subroutine solve_hollow_sphere(ball, drop, options, sampling, history, error, receiver)

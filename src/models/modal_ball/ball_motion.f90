@@ -2,8 +2,8 @@
 module thud_ball_motion
    use thud_error, only: error_type
    use thud_kinds, only: wp
-   use thud_lapack, only: dgemv
-   use thud_mode_step, only: advance, mode_step_type, index_amplitude
+   use thud_mode_step, only: advance, get_energies, get_mode_forces, get_surface, index_amplitude, mode_step_type
+   use thud_product, only: add_product
    use thud_receiver, only: advance_receiver, is_rigid, new_receiver_motion, new_receiver_step, &
       receiver_motion_type, receiver_step_type, receiver_type
    use thud_ring_contact, only: ring_contact_type, solve_contact, update_sticking
@@ -12,7 +12,7 @@ module thud_ball_motion
    implicit none (type, external)
    private
 
-   public :: ball_motion_type, new_ball_motion, take_step
+   public :: ball_motion_type, new_ball_motion, stays_clear, take_step
 
    !> Motion of the ball.
    type :: ball_motion_type
@@ -41,9 +41,10 @@ module thud_ball_motion
       real(wp), allocatable :: static(:, :)
       !> Gaps at the end of the step, m: [n_gap].
       real(wp), allocatable :: last_gap(:)
-      !> Workspace of a step: motion at its beginning; forces of the floor on the modes: [n_mode]; their final displacements
-      !> of the rings: [n_gap].
-      real(wp), allocatable :: before(:, :), mode_force(:), yield(:)
+      !> Workspace of a step: motion at its beginning; forces of the floor on the modes: [n_mode]; displacements of the outer
+      !> surface and forces on it, U and V of each harmonic: [2*n_harmonic]; displacements of the rings by the modes
+      !> without inertia, final and at the beginning: [n_gap].
+      real(wp), allocatable :: before(:, :), mode_force(:), surface(:), load(:), yield(:), creep(:)
       !> Gaps between rings and floor; for sticking rings also the tangential displacements from the positions where they
       !> began to stick, m: [n_gap].
       real(wp), allocatable :: gap(:)
@@ -66,10 +67,11 @@ contains
       real(wp), intent(in) :: outer_radius, impact_velocity, gravity
       type(ball_motion_type) :: state
 
-      associate (n_mode => size(modes%omega), n_variable => size(modes%factor, 2), n_gap => size(modes%shape_at_ring, 2))
+      associate (n_mode => size(modes%omega), n_variable => size(modes%factor, 2), n_gap => size(modes%shape_at_ring, 1), &
+         n_load => size(modes%shape_at_ring, 2))
          allocate (state%motion(n_mode, n_variable), state%before(n_mode, n_variable), state%mode_force(n_mode), &
             state%static(n_gap, n_variable - 1), state%gap(n_gap), state%last_gap(n_gap), state%yield(n_gap), &
-            state%reference_gap(n_gap), source=0.0_wp)
+            state%creep(n_gap), state%reference_gap(n_gap), state%surface(n_load), state%load(n_load), source=0.0_wp)
       end associate
       state%reference_gap(::rings%n_dof) = -outer_radius*rings%height
       state%last_gap(::rings%n_dof) = outer_radius*(1 - rings%height)
@@ -81,6 +83,31 @@ contains
       state%floor_step = new_receiver_step(floor, interval)
       state%floor_motion = new_receiver_motion(floor)
    end function new_ball_motion
+
+   !> Whether the ball cannot touch a rigid floor again: it rises without gravity, and the energy of its modes, which
+   !> decreases without forces, cannot bring any ring down.
+   pure function stays_clear(modes, n_dof, state) result(yes)
+      type(mode_step_type), intent(in) :: modes
+      !> Degrees of freedom of a ring.
+      integer, intent(in) :: n_dof
+      type(ball_motion_type), intent(in) :: state
+      logical :: yes
+      real(wp) :: amplitude(size(modes%omega)), surface(size(state%surface)), reach(size(state%static, 1))
+      integer :: i
+
+      yes = .false.
+      if (state%floor_moves .or. abs(state%gravity) > 0.0_wp .or. .not. state%velocity > 0.0_wp) return
+      amplitude = sqrt(2*get_energies(modes, state%motion)/modes%equilibrium_ratio)/modes%omega
+      surface = 0.0_wp
+      do i = 1, size(amplitude)
+         associate (k => 2*modes%harmonic(i) + 1)
+            surface(k:k + 1) = surface(k:k + 1) + abs(modes%surface(i, :))*amplitude(i)
+         end associate
+      end do
+      reach = maxval(abs(state%static), dim=2)
+      call add_product(abs(modes%shape_at_ring), surface, reach)
+      yes = all(state%reference_gap(::n_dof) + state%height > reach(::n_dof))
+   end function stays_clear
 
    !> Advances ball and floor by one step, with forces between them that are constant in the step.
    subroutine take_step(modes, static, interval, mass, state, contact, error)
@@ -94,12 +121,12 @@ contains
       type(ring_contact_type), intent(inout) :: contact
       !> Set if the contact cannot be solved.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: creep(size(state%gap))
       type(receiver_motion_type) :: floor_start
       integer :: i, n_mode, n_gap
 
       n_mode = size(modes%omega)
       associate (motion => state%motion, before => state%before, mode_force => state%mode_force, gap => state%gap, &
+         creep => state%creep, &
          n_dof => contact%n_dof)
          ! Motion without contact forces.
          before = motion
@@ -109,10 +136,16 @@ contains
          floor_start = state%floor_motion
          if (state%floor_moves) call advance_receiver(state%floor, state%floor_step, 0.0_wp, state%floor_motion)
          creep = state%static(:, 1)
-         state%static = matmul(state%static, transpose(static%factor))
+         if (size(static%gain) == 1) then
+            state%static = static%factor(1, 1)*state%static
+         else
+            state%static = matmul(state%static, transpose(static%factor))
+         end if
          gap = state%reference_gap + state%static(:, 1)
          gap(::n_dof) = gap(::n_dof) + state%height + state%floor_motion%displacement
-         if (n_mode > 0) call dgemv('T', n_mode, size(gap), -1.0_wp, modes%shape_at_ring, n_mode, motion, 1, 1.0_wp, gap, 1)
+         call get_surface(modes, motion(:, index_amplitude), state%surface)
+         state%surface = -state%surface
+         call add_product(modes%shape_at_ring, state%surface, gap)
          call solve_contact(contact, gap, error)
          if (allocated(error)) return
          n_gap = contact%last_closed_gap
@@ -122,13 +155,16 @@ contains
             state%velocity = state%velocity + interval*state%force/mass
             state%height = state%height + interval**2*state%force/(2*mass)
             associate (forces => contact%force(:n_gap))
-               call dgemv('N', size(gap), n_gap, 1.0_wp, static%flexibility, size(gap), forces, 1, 0.0_wp, state%yield, 1)
+               state%yield = 0.0_wp
+               call add_product(static%flexibility(:, :n_gap), forces, state%yield)
                do i = 1, size(state%static, 2)
                   state%static(:, i) = state%static(:, i) + static%gain(i)*state%yield
                end do
                state%loss = state%loss + dot_product(forces, state%static(:n_gap, 1) - creep(:n_gap))
                if (n_mode > 0) then
-                  call dgemv('N', n_mode, n_gap, 1.0_wp, modes%shape_at_ring, n_mode, forces, 1, 0.0_wp, mode_force, 1)
+                  state%load = 0.0_wp
+                  call add_product(modes%ring_load(:, :n_gap), forces, state%load)
+                  call get_mode_forces(modes, state%load, mode_force)
                   do i = 1, size(motion, 2)
                      motion(:, i) = motion(:, i) - modes%gain(:, i)*mode_force
                   end do

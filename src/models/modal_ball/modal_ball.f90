@@ -6,7 +6,7 @@
 !> pressures complementary: no ring penetrates, none pulls, and there is no penalty stiffness.
 module thud_modal_ball
    use thud_ball, only: ball_type
-   use thud_ball_motion, only: ball_motion_type, new_ball_motion, take_step
+   use thud_ball_motion, only: ball_motion_type, new_ball_motion, stays_clear, take_step
    use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
@@ -15,7 +15,7 @@ module thud_modal_ball
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_lapack, only: dgemm
-   use thud_modal_ball_options, only: modal_ball_options_type
+   use thud_modal_ball_options, only: max_phase, modal_ball_options_type
    use thud_modal_compression, only: compress_modal_ball
    use thud_modal_damping, only: set_damping
    use thud_mode_step, only: get_energies, mode_step_type, index_amplitude, set_factors
@@ -23,7 +23,7 @@ module thud_modal_ball
    use thud_ring_contact, only: new_ring_contact, ring_contact_type
    use thud_sampling, only: check_contact_samples, get_sample_count, get_step_count, sampling_type
    use thud_source_model, only: typical_contact
-   use thud_sphere_modes, only: basis_type, family_type, get_family, get_static_family, new_basis
+   use thud_sphere_modes, only: basis_type, family_type, get_families, get_static_family, limit_family, new_basis
    use thud_static_step, only: new_static_step, static_step_type
    use thud_surface_rings, only: new_surface_rings, surface_rings_type
    use thud_text, only: to_text
@@ -32,9 +32,6 @@ module thud_modal_ball
    private
 
    public :: modal_ball_type
-
-   !> Maximum phase angle of a mode in a step; faster modes respond statically.
-   real(wp), parameter :: max_phase = pi/2
 
    !> Number of harmonics whose energies are recorded separately, from n = 0 on.
    integer, parameter :: n_family = 6
@@ -60,15 +57,15 @@ contains
       real(wp) :: cost
       real(wp) :: n_mode, n_gap, step_cost
 
-      n_mode = 0.09_wp*options%get_highest_frequency()
+      n_mode = 0.08_wp*options%get_highest_frequency()
       n_gap = options%get_ring_count()*merge(2.0_wp, 1.0_wp, options%floor_friction == 'stick')
-      cost = 3.0e-3_wp + 1.0e-9_wp*n_mode*n_gap**2
-      step_cost = 2.4e-7_wp + n_mode*(2.3e-9_wp + 1.05e-10_wp*n_gap)
+      cost = 2.5e-3_wp + 1.0e-9_wp*n_mode*n_gap**2
+      step_cost = 4.0e-7_wp + n_mode*(2.5e-9_wp + 6.0e-11_wp*n_gap)
       ! Maxwell branches.
       if (options%damping_law == 'fractional') step_cost = step_cost + 8.0e-9_wp*n_mode
       if (present(receiver)) step_cost = step_cost + 2.6e-9_wp*get_pole_count(receiver)
-      ! The coarser drop, and that of twice the steps.
-      step_cost = 3*step_cost
+      ! Both levels; sticking rings need twice the steps.
+      step_cost = merge(3, 2, options%floor_friction == 'stick')*step_cost
       if (present(receiver)) then
          cost = cost + get_step_count(sampling)*step_cost
       else
@@ -131,10 +128,12 @@ contains
       n_sample = get_sample_count(sampling)
       interval = 1/(sampling%sample_rate*real(sampling%substeps, wp))
       history = new_force_history(sampling%sample_rate, n_sample, ['contact_force'])
+      history%has_means = .true.
       history%impact_velocity = get_impact_velocity(drop)
-      history%model_history_name = [character(len=24) :: 'contact_radius_m', ('energy_n'//to_text(i)//'_J', &
-         i=0, n_family - 1), 'energy_rest_J']
-      allocate (history%model_history(n_sample, n_family + 2), source=0.0_wp)
+      history%model_history_name = [character(len=24) :: 'contact_radius_m']
+      if (options%level > 0) history%model_history_name = [history%model_history_name, [character(len=24) :: &
+         ('energy_n'//to_text(i)//'_J', i=0, n_family - 1), 'energy_rest_J']]
+      allocate (history%model_history(n_sample, size(history%model_history_name)), source=0.0_wp)
       call use_one_blas_thread()
       rings = new_surface_rings(options%get_ring_count(), options%outermost_angle, options%floor_friction == 'stick')
       call prepare(ball, options, rings, floor, interval, modes, static, contact, error)
@@ -164,85 +163,149 @@ contains
       type(ring_contact_type), intent(out) :: contact
       !> Set if the modes cannot be computed, or if the rings cannot be distinguished.
       type(error_type), allocatable, intent(out) :: error
+      type(family_type), allocatable :: families(:)
       real(wp), allocatable :: response(:, :), flexibility(:, :)
       real(wp), allocatable :: zeta(:)
+      real(wp) :: highest_omega, own_response
       logical :: failed
 
-      associate (n_gap => rings%n_dof*size(rings%radius))
-         allocate (flexibility(n_gap, n_gap))
-      end associate
-      call add_modes(ball, options, rings, interval, modes, flexibility, error)
-      if (allocated(error)) return
+      highest_omega = min(2*pi*options%get_highest_frequency(), max_phase/interval)
+      if (allocated(options%families)) then
+         families = options%families
+      else
+         call get_families(ball, options%cavity_gas, highest_omega, families, error)
+         if (allocated(error)) return
+      end if
+      call set_modes(options, rings, highest_omega, families, modes)
       allocate (zeta, mold=modes%omega)
       call set_damping(options, modes, zeta)
       call set_factors(modes, zeta, interval)
+      call get_response(ball, options, rings, families, modes, flexibility, response, error)
+      if (allocated(error)) return
       static = new_static_step(modes, interval, flexibility)
-      response = static%gain(1)*flexibility + matmul(transpose(modes%shape_at_ring), &
-         spread(modes%gain(:, index_amplitude), 2, size(flexibility, 1))*modes%shape_at_ring)
       ! Response of the rigid ball and of the floor.
-      response(::rings%n_dof, ::rings%n_dof) = response(::rings%n_dof, ::rings%n_dof) + interval**2/(2*ball%mass) &
-         + get_force_response(floor, new_receiver_step(floor, interval))
+      own_response = interval**2/(2*ball%mass) + get_force_response(floor, new_receiver_step(floor, interval))
+      response = static%gain(1)*flexibility + response
+      response(::rings%n_dof, ::rings%n_dof) = response(::rings%n_dof, ::rings%n_dof) + own_response
       call new_ring_contact(response, rings%n_dof, contact, failed)
       if (failed) error = numerical_error('&modal_ball: rings = '//to_text(size(rings%radius)) &
          //' cannot be distinguished; allowed: fewer rings, or more substeps')
    end subroutine prepare
 
-   !> Sets the modes that oscillate, and the flexibility of all others at the rings.
-   subroutine add_modes(ball, options, rings, interval, modes, flexibility, error)
-      type(ball_type), intent(in) :: ball
-      !> Modes.
+   !> Sets the modes that oscillate.
+   subroutine set_modes(options, rings, highest_omega, families, modes)
+      !> Harmonics treated as quasi-static.
       class(modal_ball_options_type), intent(in) :: options
       type(surface_rings_type), intent(in) :: rings
-      real(wp), intent(in) :: interval
+      !> Highest angular frequency of modes that oscillate, rad/s.
+      real(wp), intent(in) :: highest_omega
+      !> All modes; only those that oscillate remain, and the flexibility of the others: [0:highest].
+      type(family_type), intent(inout) :: families(0:)
       !> The modes; their frequencies, harmonics and shapes are set here.
       type(mode_step_type), intent(inout) :: modes
-      !> Displacement of each ring due to unit force on each by the other modes, m/N: [n_gap, n_gap].
-      real(wp), intent(out) :: flexibility(:, :)
-      !> Set if the modes cannot be computed.
+      integer :: n, n_mode, highest
+
+      do n = 0, ubound(families, 1)
+         associate (chosen => options%static_families)
+            call limit_family(merge(0.0_wp, highest_omega, any(nint(chosen%values(:chosen%count)) == n)), families(n))
+         end associate
+      end do
+      highest = min(ubound(families, 1), ubound(rings%shape_at_ring, 3))
+      n_mode = sum([(size(families(n)%omega), n=0, highest)])
+      allocate (modes%omega(n_mode), modes%harmonic(n_mode), modes%surface(n_mode, 2))
+      allocate (modes%first(0:highest + 1))
+      modes%first(0) = 1
+      do n = 0, highest
+         modes%first(n + 1) = modes%first(n) + size(families(n)%omega)
+         associate (first => modes%first(n), last => modes%first(n + 1) - 1)
+            modes%omega(first:last) = families(n)%omega
+            modes%harmonic(first:last) = n
+            modes%surface(first:last, :) = transpose(families(n)%surface)
+         end associate
+      end do
+      modes%shape_at_ring = reshape(rings%shape_at_ring(:, :, :highest), [size(rings%shape_at_ring, 1), 2*(highest + 1)])
+      modes%ring_load = transpose(modes%shape_at_ring)
+   end subroutine set_modes
+
+   !> Displacements of the rings due to unit forces on them.
+   subroutine get_response(ball, options, rings, families, modes, flexibility, response, error)
+      type(ball_type), intent(in) :: ball
+      class(modal_ball_options_type), intent(in) :: options
+      type(surface_rings_type), intent(in) :: rings
+      !> Families that have modes: [0:highest].
+      type(family_type), intent(in) :: families(0:)
+      !> The modes and their gains.
+      type(mode_step_type), intent(in) :: modes
+      !> Due to the modes without inertia, m/N: [n_gap, n_gap].
+      real(wp), allocatable, intent(out) :: flexibility(:, :)
+      !> Due to the oscillating modes after one step, m/N: [n_gap, n_gap].
+      real(wp), allocatable, intent(out) :: response(:, :)
+      !> Set if a flexibility cannot be computed.
       type(error_type), allocatable, intent(out) :: error
       type(basis_type) :: basis
       type(family_type) :: family
-      real(wp), allocatable :: static_displacement(:, :, :), shape_at_ring(:, :)
-      real(wp) :: highest_omega
-      logical :: failed, oscillates
-      integer :: n, k, highest
+      real(wp), allocatable :: displacement(:, :, :)
+      real(wp) :: gain(2, 2, 0:ubound(families, 1))
+      logical :: failed
+      integer :: n, i, highest
 
       highest = ubound(rings%shape_at_ring, 3)
-      highest_omega = min(2*pi*options%get_highest_frequency(), max_phase/interval)
-      basis = new_basis(ball, highest, options%cavity_gas, highest_omega)
-      allocate (modes%omega(0), modes%harmonic(0), shape_at_ring(size(flexibility, 1), 0))
-      allocate (static_displacement(size(flexibility, 1), 2, 0:highest))
-      oscillates = .true.
+      basis = new_basis(ball, 0, options%cavity_gas)
+      associate (n_gap => size(rings%shape_at_ring, 1))
+         allocate (displacement(n_gap, 2, 0:highest), flexibility(n_gap, n_gap), response(n_gap, n_gap))
+      end associate
       do n = 0, highest
-         call check_interrupt(error)
-         if (allocated(error)) return
-         associate (chosen => options%static_families)
-            if (oscillates .and. .not. any(nint(chosen%values(:chosen%count)) == n)) then
-               call get_family(basis, n, highest_omega, family, failed)
-               ! From n = 2 on the lowest frequencies of the harmonics increase.
-               oscillates = n < 2 .or. size(family%omega) > 0
-            else
-               call get_static_family(basis, n, family, failed)
-            end if
-         end associate
+         if (n <= ubound(families, 1)) then
+            displacement(:, :, n) = product_of(rings%shape_at_ring(:, :, n), families(n)%flexibility)
+            cycle
+         end if
+         call get_static_family(basis, n, family, failed)
          if (failed) then
-            error = numerical_error('&modal_ball: rings: the modes of harmonic '//to_text(n) &
+            error = numerical_error('&modal_ball: rings: the flexibility of harmonic '//to_text(n) &
                //' cannot be computed; allowed: fewer rings, or a thinner wall')
             return
          end if
-         static_displacement(:, :, n) = matmul(rings%shape_at_ring(:, :, n), family%flexibility)
-         if (size(family%omega) == 0) cycle
-         shape_at_ring = reshape([shape_at_ring, matmul(rings%shape_at_ring(:, :, n), family%surface)], &
-            [size(flexibility, 1), size(modes%omega) + size(family%omega)])
-         modes%omega = [modes%omega, family%omega]
-         modes%harmonic = [modes%harmonic, (n, k=1, size(family%omega))]
+         displacement(:, :, n) = product_of(rings%shape_at_ring(:, :, n), family%flexibility)
       end do
-      modes%shape_at_ring = transpose(shape_at_ring)
-      associate (rows => size(flexibility, 1), columns => 2*(highest + 1))
-         call dgemm('N', 'T', rows, rows, columns, 1.0_wp, static_displacement, rows, rings%shape_at_ring, rows, 0.0_wp, &
-            flexibility, rows)
-      end associate
-   end subroutine add_modes
+      call multiply(displacement, flexibility)
+      gain = 0.0_wp
+      do i = 1, size(modes%omega)
+         associate (g => gain(:, :, modes%harmonic(i)), surface => modes%surface(i, :))
+            g = g + modes%gain(i, index_amplitude)*spread(surface, 1, 2)*spread(surface, 2, 2)
+         end associate
+      end do
+      highest = size(modes%shape_at_ring, 2)/2 - 1
+      do n = 0, highest
+         displacement(:, :, n) = product_of(rings%shape_at_ring(:, :, n), gain(:, :, n))
+      end do
+      call multiply(displacement(:, :, :highest), response)
+
+   contains
+
+      !> The shapes at the rings of one harmonic, times a matrix: [n_gap, 2].
+      pure function product_of(shape_at_ring, matrix) result(product)
+         real(wp), intent(in) :: shape_at_ring(:, :)
+         real(wp), intent(in) :: matrix(2, 2)
+         real(wp) :: product(size(shape_at_ring, 1), 2)
+         integer :: j
+
+         do j = 1, 2
+            product(:, j) = shape_at_ring(:, 1)*matrix(1, j) + shape_at_ring(:, 2)*matrix(2, j)
+         end do
+      end function product_of
+
+      !> Sum over harmonics of displacements times the shapes at the rings.
+      subroutine multiply(displacement, sum_of_products)
+         real(wp), intent(in), contiguous :: displacement(:, :, 0:)
+         real(wp), intent(out), contiguous :: sum_of_products(:, :)
+
+         associate (n_gap => size(displacement, 1), n_column => 2*size(displacement, 3))
+            call dgemm('N', 'T', n_gap, n_gap, n_column, 1.0_wp, displacement, n_gap, rings%shape_at_ring, n_gap, 0.0_wp, &
+               sum_of_products, n_gap)
+         end associate
+      end subroutine multiply
+
+   end subroutine get_response
 
    !> Integrates in time from first touch until the ball has left for good, or on a mobile floor to the end of the record.
    subroutine march(ball, sampling, interval, rings, modes, static, contact, state, history, error)
@@ -290,6 +353,11 @@ contains
             has_separated = state%velocity > 0.0_wp .and. (n_step - last_contact)*interval > settling_time
             if (has_separated .and. .not. state%floor_moves) exit samples
          end do
+         if (contact%outermost == 0 .and. .not. state%floor_moves) then
+            ! Without gravity the end is often certain sooner.
+            has_separated = stays_clear(modes, contact%n_dof, state)
+            if (has_separated) exit samples
+         end if
          if (state%floor_moves) then
             ! The mean over the interval, as for the force.
             history%floor_velocity(i) = (state%floor_motion%displacement - history%floor_displacement(i)) &
@@ -377,17 +445,21 @@ contains
       integer, intent(in) :: i
       type(force_history_type), intent(inout) :: history
       real(wp) :: energy(size(modes%omega))
-      integer :: k, column
+      integer :: n
 
-      energy = get_energies(modes, state%motion)
       history%deflection(i) = ball%outer_radius - state%height - state%floor_motion%displacement
       history%velocity(i) = -state%velocity
       if (state%floor_moves) history%floor_displacement(i) = state%floor_motion%displacement
       history%max_deflection = max(history%max_deflection, history%deflection(i))
-      do k = 1, size(energy)
-         column = 2 + min(modes%harmonic(k), n_family)
-         history%model_history(i, column) = history%model_history(i, column) + energy(k)
-      end do
+      ! A level without an own result has no energies.
+      if (size(history%model_history, 2) == 1) return
+      energy = get_energies(modes, state%motion)
+      associate (n_harmonic => ubound(modes%first, 1))
+         do n = 0, min(n_family, n_harmonic) - 1
+            history%model_history(i, 2 + n) = sum(energy(modes%first(n):modes%first(n + 1) - 1))
+         end do
+         history%model_history(i, 2 + n_family) = sum(energy(modes%first(min(n_family, n_harmonic)):))
+      end associate
    end subroutine record_motion
 
 end module thud_modal_ball

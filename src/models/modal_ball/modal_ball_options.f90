@@ -1,6 +1,8 @@
 !> Options of the modal ball; `thud_modal_ball` adds the solution.
 module thud_modal_ball_options
-   use thud_ball, only: ball_type
+   use thud_ball, only: ball_type, get_density
+   use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
+   use thud_constants, only: pi
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type, name_length
    use thud_force_history, only: force_history_type
@@ -9,6 +11,7 @@ module thud_modal_ball_options
    use thud_prony, only: check_fractional_loss
    use thud_sampling, only: sampling_type
    use thud_source_model, only: source_model_type
+   use thud_sphere_modes, only: family_type, get_families
    use thud_surface_rings, only: greatest_angle
    use thud_text, only: to_text
    implicit none (type, external)
@@ -16,14 +19,28 @@ module thud_modal_ball_options
 
    public :: modal_ball_options_type
 
-   !> Rings and highest frequency of the modes, Hz, of level 0, and their ratios from one level to the next.
-   real(wp), parameter :: coarse_rings = 30.0_wp, coarse_frequency = 1000.0_wp, ratio = 1.4_wp
+   !> Rings of levels 0 and 1.
+   real(wp), parameter :: coarse_rings = 36.0_wp, default_rings = 40.0_wp
+
+   !> Minimum of the highest frequency of the modes of level 0, Hz, and the same for stiff balls, divided by the velocity of
+   !> shear waves per outer radius.
+   real(wp), parameter :: min_frequency = 1000.0_wp, min_relative_frequency = 2.1_wp
+
+   !> Ratio of frequencies from one level to the next, and of rings from level 1 on.
+   real(wp), parameter :: ratio = 1.4_wp
 
    !> Highest level of resolution.
    integer, parameter :: highest_level = 3
 
-   !> Angle of the outermost ring divided by that of the cap that the deflection of a coarser drop would cut off.
-   real(wp), parameter :: margin = 1.15_wp
+   !> Angle of the outermost ring divided by that of the contact of a coarser drop; rings of level 0 are added.
+   real(wp), parameter :: margin = 1.1_wp
+   integer, parameter :: added_rings = 2
+
+   !> Minimum number of steps in a contact from level 1 on.
+   real(wp), parameter :: min_steps = 500.0_wp
+
+   !> Maximum phase angle of a mode in a step; faster modes respond statically.
+   real(wp), parameter, public :: max_phase = pi/2
 
    !> Options of the model.
    type, abstract, extends(source_model_type) :: modal_ball_options_type
@@ -52,11 +69,16 @@ module thud_modal_ball_options
       integer :: level = 1
       !> Angle of the outermost ring from the lowest point, rad; no key.
       real(wp) :: outermost_angle = greatest_angle
+      !> Highest frequency of the modes of level 0, Hz; no key.
+      real(wp) :: coarse_frequency = min_frequency
+      !> Modes that levels 0 and 1 share; no key: [0:highest harmonic].
+      type(family_type), allocatable :: families(:)
    contains
       procedure, pass(options) :: get_fields
       procedure, pass(options) :: check
       procedure, pass(options) :: get_highest_frequency
       procedure, pass(options) :: get_ring_count
+      procedure, pass(options) :: share_setup
       procedure, pass(options) :: set_level
       procedure, pass(options) :: get_highest_level
       procedure, pass(options) :: get_error_ratio
@@ -105,6 +127,26 @@ contains
       end if
    end subroutine check
 
+   !> Computes the modes of level 1, which include those of level 0.
+   subroutine share_setup(ball, options, sampling)
+      type(ball_type), intent(in) :: ball
+      class(modal_ball_options_type), intent(inout) :: options
+      type(sampling_type), intent(in) :: sampling
+      type(error_type), allocatable :: error
+      real(wp) :: highest_omega
+
+      options%level = 1
+      associate (shear_modulus => ball%youngs_modulus/(2*(1 + ball%poisson_ratio)))
+         options%coarse_frequency = max(min_frequency, &
+            min_relative_frequency*sqrt(shear_modulus/get_density(ball))/ball%outer_radius)
+      end associate
+      highest_omega = min(2*pi*options%get_highest_frequency(), max_phase*sampling%sample_rate*sampling%substeps)
+      call use_one_blas_thread()
+      ! After an error there are no families; the drop repeats it, and returns the error.
+      call get_families(ball, options%cavity_gas, highest_omega, options%families, error)
+      call restore_blas_threads()
+   end subroutine share_setup
+
    !> Sets the resolution: modes, rings around the contact of the coarser drop, and time steps.
    subroutine set_level(ball, options, level, sampling, coarse)
       type(ball_type), intent(in) :: ball
@@ -113,17 +155,28 @@ contains
       type(sampling_type), intent(inout) :: sampling
       type(force_history_type), intent(in) :: coarse
 
+      real(wp) :: contact_steps
+      integer :: refinement
+
+      if (level > 1 .and. allocated(options%families)) deallocate (options%families)
       options%level = level
-      sampling%substeps = sampling%substeps*2**level
-      if (options%rings > 0 .or. .not. coarse%max_deflection > 0.0_wp) return
-      ! The undeformed sphere, lowered by the deflection, would meet the floor at this angle; the contact is smaller.
-      options%outermost_angle = min(greatest_angle, &
-         margin*acos(1 - min(1.0_wp, coarse%max_deflection/ball%outer_radius)) + greatest_angle/coarse_rings)
+      refinement = 2**level
+      contact_steps = coarse%contact_time*sampling%sample_rate*sampling%substeps
+      ! Sticking rings converge slowly; without them few steps suffice.
+      if (contact_steps > 0.0_wp .and. options%floor_friction /= 'stick') then
+         refinement = min(2*refinement, max(refinement/2, ceiling(min_steps/contact_steps)))
+      end if
+      sampling%substeps = sampling%substeps*refinement
+      if (options%rings > 0 .or. .not. allocated(coarse%model_history)) return
+      options%outermost_angle = min(greatest_angle, margin*asin(maxval(coarse%model_history(:, 1))/ball%outer_radius) &
+         + added_rings*greatest_angle/(coarse_rings - 1))
    end subroutine set_level
 
    !> Highest level of resolution: the user's keys do not grow.
-   function get_highest_level(options) result(level)
+   function get_highest_level(ball, options, sampling) result(level)
+      type(ball_type), intent(in) :: ball
       class(modal_ball_options_type), intent(in) :: options
+      type(sampling_type), intent(in) :: sampling
       integer :: level
 
       level = merge(1, highest_level, options%rings > 0 .and. options%highest_frequency > 0.0_wp)
@@ -131,11 +184,12 @@ contains
 
    !> Estimated error of a result divided by its difference from the next coarser level: it is found from random balls
    !> (docs/modal_ball.md).
-   function get_error_ratio(options) result(ratio)
+   function get_error_ratio(options, level) result(ratio)
       class(modal_ball_options_type), intent(in) :: options
+      integer, intent(in) :: level
       real(wp) :: ratio
 
-      ratio = 1.3_wp
+      ratio = 1.0_wp
    end function get_error_ratio
 
    !> Number of rings: that of the user, fewer at level 0, or that of the level of resolution.
@@ -143,8 +197,8 @@ contains
       class(modal_ball_options_type), intent(in) :: options
       integer :: n_ring
 
-      n_ring = nint(coarse_rings*ratio**options%level)
-      if (options%rings > 0) n_ring = max(2, nint(options%rings*ratio**min(0, options%level - 1)))
+      n_ring = nint(merge(coarse_rings, default_rings*ratio**(options%level - 1), options%level == 0))
+      if (options%rings > 0) n_ring = max(2, nint(options%rings*ratio**(options%level - 1)))
    end function get_ring_count
 
    !> Highest frequency of oscillating modes, Hz: that of the user, lower at level 0, or that of the level of resolution.
@@ -152,9 +206,9 @@ contains
       class(modal_ball_options_type), intent(in) :: options
       real(wp) :: frequency
 
-      frequency = options%highest_frequency*ratio**min(0, options%level - 1)
+      frequency = options%highest_frequency*ratio**(options%level - 1)
       if (frequency > 0.0_wp) return
-      frequency = coarse_frequency*ratio**options%level
+      frequency = options%coarse_frequency*ratio**options%level
       ! Rings that are released lose the energy of modes without inertia.
       if (options%floor_friction == 'stick') frequency = 2*frequency
    end function get_highest_frequency

@@ -8,7 +8,7 @@ module thud_mode_step
    implicit none (type, external)
    private
 
-   public :: advance, get_energies, mode_step_type, set_factors
+   public :: advance, get_energies, get_mode_forces, get_surface, mode_step_type, set_factors
 
    !> Indices of amplitude q and rate v = q' in the motion of a mode; the internal variables x_k of the branches follow.
    integer, parameter, public :: index_amplitude = 1, index_rate = 2
@@ -20,6 +20,8 @@ module thud_mode_step
       real(wp), allocatable :: omega(:)
       !> Harmonic of each mode: [n_mode].
       integer, allocatable :: harmonic(:)
+      !> Index of the first mode of each harmonic, and behind the last mode of all: [0:n_harmonic].
+      integer, allocatable :: first(:)
       !> Long-term modulus divided by storage modulus.
       real(wp) :: equilibrium_ratio = 1.0_wp
       !> Moduli of the branches divided by the storage modulus, and their relaxation times, s: [n_branch].
@@ -30,8 +32,12 @@ module thud_mode_step
       real(wp), allocatable :: factor(:, :, :)
       !> Motion after one step from rest due to a unit force on the mode, constant in the step: [n_mode, 2 + n_branch].
       real(wp), allocatable :: gain(:, :)
-      !> Mode shapes at the rings, downwards, per unit amplitude: [n_mode, n_gap].
+      !> U and V of each mode at the outer surface, per unit amplitude: [n_mode, 2].
+      real(wp), allocatable :: surface(:, :)
+      !> Displacements of the rings due to unit U and V of each harmonic: [n_gap, 2*n_harmonic].
       real(wp), allocatable :: shape_at_ring(:, :)
+      !> The transpose: generalized forces on U and V of each harmonic due to unit forces on the rings.
+      real(wp), allocatable :: ring_load(:, :)
    end type mode_step_type
 
 contains
@@ -75,8 +81,8 @@ contains
    pure subroutine advance(modes, before, after)
       type(mode_step_type), intent(in) :: modes
       !> Motion at the beginning and at the end of the step: [n_mode, 2 + n_branch].
-      real(wp), intent(in) :: before(:, :)
-      real(wp), intent(out) :: after(:, :)
+      real(wp), intent(in), contiguous :: before(:, :)
+      real(wp), intent(out), contiguous :: after(:, :)
       integer :: i, k
 
       do i = 1, size(after, 2)
@@ -86,6 +92,43 @@ contains
          end do
       end do
    end subroutine advance
+
+   !> Displacements at the outer surface, U and V of each harmonic, m: [2*n_harmonic].
+   pure subroutine get_surface(modes, amplitude, displacement)
+      type(mode_step_type), intent(in) :: modes
+      !> Amplitudes, m sqrt(kg): [n_mode].
+      real(wp), intent(in) :: amplitude(:)
+      real(wp), intent(out) :: displacement(:)
+      real(wp) :: u, v
+      integer :: n, i
+
+      do n = 0, ubound(modes%first, 1) - 1
+         u = 0.0_wp
+         v = 0.0_wp
+         do i = modes%first(n), modes%first(n + 1) - 1
+            u = u + modes%surface(i, 1)*amplitude(i)
+            v = v + modes%surface(i, 2)*amplitude(i)
+         end do
+         displacement(2*n + 1) = u
+         displacement(2*n + 2) = v
+      end do
+   end subroutine get_surface
+
+   !> Forces on the modes due to generalized forces on U and V of each harmonic.
+   pure subroutine get_mode_forces(modes, load, force)
+      type(mode_step_type), intent(in) :: modes
+      !> Generalized forces, N: [2*n_harmonic].
+      real(wp), intent(in) :: load(:)
+      !> Forces on the modes, N/sqrt(kg): [n_mode].
+      real(wp), intent(out) :: force(:)
+      integer :: i
+
+      do i = 1, size(force)
+         associate (k => 2*modes%harmonic(i) + 1)
+            force(i) = modes%surface(i, 1)*load(k) + modes%surface(i, 2)*load(k + 1)
+         end associate
+      end do
+   end subroutine get_mode_forces
 
    !> Kinetic and elastic energy of each mode, J: [n_mode].
    pure function get_energies(modes, motion) result(energy)

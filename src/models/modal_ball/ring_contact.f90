@@ -8,7 +8,8 @@
 module thud_ring_contact
    use thud_error, only: error_type, numerical_error
    use thud_kinds, only: wp
-   use thud_lapack, only: dposv, dpotrf, dtrsv
+   use thud_lapack, only: dposv, dpotrf, dtrsm
+   use thud_product, only: add_product
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -27,15 +28,19 @@ module thud_ring_contact
       integer :: n_dof = 1
       !> Gaps due to unit forces, m/N: [n_gap, n_gap].
       real(wp), allocatable :: response(:, :)
-      !> Cholesky factor of the response: [n_gap, n_gap]. The touching rings are nearly always the first ones, and the factor
-      !> of a leading block is the leading block of the factor.
-      real(wp), allocatable :: factor(:, :)
+      !> Inverse of the Cholesky factor L of the response, and its transpose: [n_gap, n_gap]. The touching rings are nearly
+      !> always the first ones, and the inverse of a leading block of L is the leading block of the inverse.
+      real(wp), allocatable :: inverse(:, :), transposed(:, :)
       !> Forces in the last step, N, and gaps after it, m: [n_gap].
       real(wp), allocatable :: force(:), gap(:)
       !> Rings that touched in the last step, and rings that stick: [n_ring].
       logical, allocatable :: touches(:), sticks(:)
       !> Index of the outermost ring that touches, and of the last gap that a force closed; 0 for none.
       integer :: outermost = 0, last_closed_gap = 0
+      !> Workspace of a step: gaps that forces close, rings whose state is wrong, and a right-hand side: [n_gap].
+      integer, allocatable :: indices(:)
+      logical, allocatable :: wrong(:)
+      real(wp), allocatable :: right(:)
    end type ring_contact_type
 
 contains
@@ -50,16 +55,24 @@ contains
       type(ring_contact_type), intent(out) :: contact
       !> Whether the response is not positive definite.
       logical, intent(out) :: failed
-      integer :: n, info
+      real(wp), allocatable :: factor(:, :)
+      integer :: i, n, info
 
       n = size(response, 1)
       allocate (contact%response, source=response)
-      allocate (contact%factor, source=response)
       contact%n_dof = n_dof
-      allocate (contact%force(n), contact%gap(n), source=0.0_wp)
-      allocate (contact%touches(n/n_dof), contact%sticks(n/n_dof), source=.false.)
-      call dpotrf('L', n, contact%factor, n, info)
+      allocate (contact%force(n), contact%gap(n), contact%right(n), contact%inverse(n, n), source=0.0_wp)
+      allocate (contact%touches(n/n_dof), contact%sticks(n/n_dof), contact%wrong(n/n_dof), source=.false.)
+      allocate (contact%indices(n), source=0)
+      factor = response
+      call dpotrf('L', n, factor, n, info)
       failed = info /= 0
+      if (failed) return
+      do i = 1, n
+         contact%inverse(i, i) = 1.0_wp
+      end do
+      call dtrsm('L', 'L', 'N', 'N', n, n, 1.0_wp, factor, n, contact%inverse, n)
+      contact%transposed = transpose(contact%inverse)
    end subroutine new_ring_contact
 
    !> Forces of one step, by an active set that starts from the previous step.
@@ -67,29 +80,37 @@ contains
       !> The contact; forces and touching rings of this step are set here.
       type(ring_contact_type), intent(inout) :: contact
       !> Gaps without contact, m: [n_gap].
-      real(wp), intent(in) :: gap(:)
+      real(wp), intent(in), contiguous :: gap(:)
       !> Set if the touching rings were not found.
       type(error_type), allocatable, intent(out) :: error
-      logical :: wrong(size(contact%touches))
-      integer :: round, first_wrong
+      integer :: i, round, first_wrong
       logical :: failed
 
-      if (.not. any(contact%touches)) contact%touches = gap(::contact%n_dof) < 0.0_wp
+      if (.not. any(contact%touches)) then
+         do i = 1, size(contact%touches)
+            contact%touches(i) = gap(contact%n_dof*(i - 1) + 1) < 0.0_wp
+         end do
+      end if
       do round = 1, max_rounds
          call close_gaps(contact, gap, failed)
          if (failed) exit
-         associate (n => contact%last_closed_gap, n_dof => contact%n_dof)
-            contact%gap = gap
-            if (n > 0) contact%gap = gap + matmul(contact%response(:, :n), contact%force(:n))
-            wrong = merge(contact%force(::n_dof) < 0.0_wp, contact%gap(::n_dof) < -penetration_tolerance, &
-               contact%touches)
-         end associate
-         if (.not. any(wrong)) return
+         contact%gap = gap
+         call add_product(contact%response(:, :contact%last_closed_gap), contact%force, contact%gap)
+         do i = 1, size(contact%touches)
+            associate (k => contact%n_dof*(i - 1) + 1)
+               if (contact%touches(i)) then
+                  contact%wrong(i) = contact%force(k) < 0.0_wp
+               else
+                  contact%wrong(i) = contact%gap(k) < -penetration_tolerance
+               end if
+            end associate
+         end do
+         if (.not. any(contact%wrong)) return
          if (round < max_rounds/2) then
-            contact%touches = contact%touches .neqv. wrong
+            contact%touches = contact%touches .neqv. contact%wrong
          else
             ! Changing one ring at a time cannot cycle (Murty's rule).
-            first_wrong = findloc(wrong, .true., dim=1)
+            first_wrong = findloc(contact%wrong, .true., dim=1)
             contact%touches(first_wrong) = .not. contact%touches(first_wrong)
          end if
       end do
@@ -119,30 +140,42 @@ contains
       !> Whether the response of these gaps is not positive definite.
       logical, intent(out) :: failed
       real(wp), allocatable :: matrix(:, :), solution(:, :)
-      integer, allocatable :: indices(:)
-      logical :: closes(size(gap))
       integer :: i, n, info
 
-      closes(::contact%n_dof) = contact%touches
-      if (contact%n_dof == 2) closes(2::2) = contact%sticks
-      n = count(closes)
-      contact%last_closed_gap = findloc(closes, .true., dim=1, back=.true.)
-      contact%outermost = findloc(contact%touches, .true., dim=1, back=.true.)
+      n = 0
+      contact%outermost = 0
+      associate (n_dof => contact%n_dof)
+         do i = 1, size(contact%touches)
+            if (contact%touches(i)) then
+               contact%outermost = i
+               n = n + 1
+               contact%indices(n) = n_dof*(i - 1) + 1
+            end if
+            if (n_dof == 2 .and. contact%sticks(i)) then
+               n = n + 1
+               contact%indices(n) = 2*i
+            end if
+         end do
+      end associate
       contact%force = 0.0_wp
+      contact%last_closed_gap = 0
       failed = .false.
       if (n == 0) return
+      contact%last_closed_gap = contact%indices(n)
       if (contact%last_closed_gap == n) then
-         contact%force(:n) = -gap(:n)
-         call dtrsv('L', 'N', 'N', n, contact%factor, size(gap), contact%force, 1)
-         call dtrsv('L', 'T', 'N', n, contact%factor, size(gap), contact%force, 1)
+         contact%right(:n) = 0.0_wp
+         call add_product(contact%inverse(:, :n), gap, contact%right(:n))
+         contact%right(:n) = -contact%right(:n)
+         call add_product(contact%transposed(:, :n), contact%right, contact%force(:n))
       else
-         allocate (indices(n), matrix(n, n), solution(n, 1))
-         indices = pack([(i, i=1, size(gap))], closes)
-         matrix = contact%response(indices, indices)
-         solution(:, 1) = -gap(indices)
-         call dposv('L', n, 1, matrix, n, solution, n, info)
-         failed = info /= 0
-         if (.not. failed) contact%force(indices) = solution(:, 1)
+         associate (indices => contact%indices(:n))
+            matrix = contact%response(indices, indices)
+            allocate (solution(n, 1))
+            solution(:, 1) = -gap(indices)
+            call dposv('L', n, 1, matrix, n, solution, n, info)
+            failed = info /= 0
+            if (.not. failed) contact%force(indices) = solution(:, 1)
+         end associate
       end if
    end subroutine close_gaps
 

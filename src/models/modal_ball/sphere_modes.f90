@@ -8,13 +8,16 @@
 module thud_sphere_modes
    use thud_ball, only: ball_type, get_density
    use thud_constants, only: pi
+   use thud_error, only: error_type, numerical_error
+   use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
-   use thud_lapack, only: dgetf2, dgetrs, dposv, dsygvx
+   use thud_lapack, only: dgemm, dgetf2, dgetrs, dposv, dsygvx
    use thud_legendre, only: get_gauss_legendre, get_legendre
+   use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: basis_type, family_type, get_family, get_static_family, new_basis
+   public :: basis_type, family_type, get_families, get_family, get_static_family, limit_family, new_basis
 
    !> Distance of Poisson's ratio from 1/2 below which the material counts as incompressible. Closer to 1/2, rounding of the
    !> energy of compression would exceed the other energies. The modes differ from those of incompressible material by about
@@ -48,8 +51,10 @@ module thud_sphere_modes
       real(wp), allocatable :: polynomial(:, :, :)
       !> Polynomials and two derivatives at the outer and at the inner radius: [2, degree + 1, 3].
       real(wp), allocatable :: at_end(:, :, :)
-      !> Degree that resolves the harmonic 0.
-      integer :: degree = 0
+      !> Highest harmonic of the basis.
+      integer :: highest_harmonic = 0
+      !> Wavenumbers of shear and of compression waves at the highest frequency, 1/m.
+      real(wp) :: shear_wavenumber = 0.0_wp, compression_wavenumber = 0.0_wp
       !> Terms of the energies by their power of n (n + 1), see `set_gram`: [n_unknown, n_unknown, 5].
       real(wp), allocatable :: gram(:, :, :)
    end type basis_type
@@ -94,11 +99,12 @@ contains
       if (with_gas) basis%gas_stiffness = ball%heat_capacity_ratio*(ball%ambient_pressure + ball%gauge_pressure) &
          /(4.0_wp/3.0_wp*pi*basis%inner_radius**3)
 
-      basis%degree = min_degree
-      ! Half a polynomial degree for each radian of a shear wave across the wall, and some for its ends.
-      if (present(highest_omega)) basis%degree = max(min_degree, &
-         end_degree + ceiling(highest_omega*sqrt(basis%density/basis%shear_modulus)*ball%wall_thickness/2))
-      degree = get_degree(basis, highest_harmonic)
+      basis%highest_harmonic = highest_harmonic
+      if (present(highest_omega)) then
+         basis%shear_wavenumber = highest_omega*sqrt(basis%density/basis%shear_modulus)
+         basis%compression_wavenumber = highest_omega*sqrt(basis%density/(basis%lame + 2*basis%shear_modulus))
+      end if
+      degree = maxval([(get_degree(basis, i, basis%shear_wavenumber), i=0, highest_harmonic)])
       n = degree + 1
       allocate (node(degree + 6), basis%weight(degree + 6))
       call get_gauss_legendre(node, basis%weight)
@@ -124,28 +130,36 @@ contains
       type(basis_type), intent(inout) :: basis
       !> Number of polynomials.
       integer, intent(in) :: n
-      real(wp), dimension(size(basis%radius), 2*n) :: u, u_slope, d, e, w
-      integer :: power
+      real(wp), dimension(:, :), allocatable :: u, u_slope, d, e, w
+      integer :: n_unknown, power
 
+      n_unknown = merge(n, 2*n, basis%incompressible)
+      allocate (u(size(basis%radius), n_unknown), source=0.0_wp)
+      allocate (u_slope, d, e, w, mold=u)
+      u_slope = 0.0_wp
+      w = 0.0_wp
       ! Columns for U, then for W: U, r U', D = n (n + 1) V, E = n (n + 1) (r V' - V), W.
-      associate (r => spread(basis%radius, 2, n), p => basis%polynomial, zero => 0*basis%polynomial(:, :, 1))
-         u = reshape([p(:, :, 1), zero], shape(u))
-         u_slope = reshape([r*p(:, :, 2), zero], shape(u))
-         d = reshape([r*p(:, :, 2) + 2*p(:, :, 1), -p(:, :, 1)], shape(u))
-         e = reshape([r*(3*p(:, :, 2) + r*p(:, :, 3)) - r*p(:, :, 2) - 2*p(:, :, 1), &
-            p(:, :, 1) - r*p(:, :, 2)], shape(u))
-         w = reshape([zero, p(:, :, 1)], shape(u))
+      associate (r => spread(basis%radius, 2, n), p => basis%polynomial)
+         u(:, :n) = p(:, :, 1)
+         u_slope(:, :n) = r*p(:, :, 2)
+         d(:, :n) = r*p(:, :, 2) + 2*p(:, :, 1)
+         e(:, :n) = r*(3*p(:, :, 2) + r*p(:, :, 3)) - r*p(:, :, 2) - 2*p(:, :, 1)
+         if (n_unknown > n) then
+            d(:, n + 1:) = -p(:, :, 1)
+            e(:, n + 1:) = p(:, :, 1) - r*p(:, :, 2)
+            w(:, n + 1:) = p(:, :, 1)
+         end if
       end associate
       ! With L = n (n + 1) and the strain tensor e, the integral of r^2 e:e over the unit sphere, divided by that of P_n^2,
       ! is (rU')^2 + 2U^2 - 2UD + (1 - 1/L) D^2 + (L U^2 + 2 U E + E^2/L)/2.
-      allocate (basis%gram(2*n, 2*n, 5))
+      allocate (basis%gram(n_unknown, n_unknown, 5))
       associate (mu2 => 2*basis%shear_modulus)
-         basis%gram(:, :, 1) = mu2*(product_of(u_slope, u_slope) + 2*product_of(u, u) - mixed(u, d) + product_of(d, d) &
-            + mixed(u, e)/2) + basis%lame*product_of(w, w)
+         basis%gram(:, :, 1) = mu2*(product_of(u_slope, u_slope) + product_of(u, u) + product_of(u - d, u - d) &
+            + product_of(u, e)) + basis%lame*product_of(w, w)
          basis%gram(:, :, 2) = mu2*product_of(u, u)/2
          basis%gram(:, :, 3) = mu2*(product_of(e, e)/2 - product_of(d, d))
       end associate
-      associate (r => spread(basis%radius, 2, 2*n))
+      associate (r => spread(basis%radius, 2, n_unknown))
          basis%gram(:, :, 4) = basis%density*product_of(r*u, r*u)
          basis%gram(:, :, 5) = basis%density*product_of(r*d, r*d)
       end associate
@@ -155,39 +169,110 @@ contains
 
    contains
 
-      !> Integrals over the wall of products of columns: [n, n].
+      !> Integrals over the wall of products of columns: [n_unknown, n_unknown].
       function product_of(a, b) result(matrix)
-         !> Values at the radii: [n_node, n].
+         !> Values at the radii: [n_node, n_unknown].
          real(wp), intent(in) :: a(:, :)
-         !> Values at the radii: [n_node, n].
+         !> Values at the radii: [n_node, n_unknown].
          real(wp), intent(in) :: b(:, :)
          real(wp) :: matrix(size(a, 2), size(b, 2))
 
-         matrix = matmul(transpose(a), spread(basis%weight, 2, size(b, 2))*b)
+         associate (n_node => size(a, 1), weighted => spread(basis%weight, 2, size(b, 2))*b)
+            call dgemm('T', 'N', n_unknown, n_unknown, n_node, 1.0_wp, a, n_node, weighted, n_node, 0.0_wp, matrix, &
+               n_unknown)
+         end associate
       end function product_of
-
-      !> `product_of` in both orders.
-      function mixed(a, b) result(matrix)
-         real(wp), intent(in) :: a(:, :)
-         real(wp), intent(in) :: b(:, :)
-         !> The integrals: [n, n].
-         real(wp) :: matrix(size(a, 2), size(a, 2))
-
-         matrix = product_of(a, b) + product_of(b, a)
-      end function mixed
 
    end subroutine set_gram
 
    !> Degree of the polynomials that resolves a harmonic. Its modes fall off like r^n, which needs a degree proportional to
    !> sqrt(n ln(outer/inner radius)); the tests compare this degree with higher ones.
-   pure function get_degree(basis, harmonic) result(degree)
+   !>
+   !> Where a wave of the wavenumber k oscillates along the radius, its radial wavenumber is sqrt(k^2 - n (n + 1)/r^2). A
+   !> polynomial of degree d oscillates with up to d/sqrt((R - r)(r - R_i)) between the outer and the inner radius.
+   pure function get_degree(basis, harmonic, wavenumber) result(degree)
       !> The basis; its radii are set.
       type(basis_type), intent(in) :: basis
       integer, intent(in) :: harmonic
+      !> Wavenumber at the highest frequency, 1/m.
+      real(wp), intent(in) :: wavenumber
       integer :: degree
+      integer, parameter :: n_radius = 16
+      real(wp) :: oscillations, r
+      integer :: i
 
-      degree = basis%degree + ceiling(2.4_wp*sqrt(harmonic*log(basis%outer_radius/basis%inner_radius)))
+      oscillations = 0.0_wp
+      associate (outer => basis%outer_radius, inner => basis%inner_radius)
+         do i = 1, n_radius - 1
+            r = inner + (outer - inner)*i/n_radius
+            oscillations = max(oscillations, (wavenumber**2 - harmonic*(harmonic + 1)/r**2)*(outer - r)*(r - inner))
+         end do
+         degree = max(min_degree, end_degree + ceiling(sqrt(oscillations))) &
+            + ceiling(2.4_wp*sqrt(harmonic*log(outer/inner)))
+      end associate
    end function get_degree
+
+   !> The modes up to a frequency of all harmonics that have any.
+   subroutine get_families(ball, with_gas, highest_omega, families, error)
+      type(ball_type), intent(in) :: ball
+      !> Whether the enclosed gas resists changes of its volume.
+      logical, intent(in) :: with_gas
+      !> Highest angular frequency to keep, rad/s.
+      real(wp), intent(in) :: highest_omega
+      !> The modes, and their flexibilities: [0:highest harmonic].
+      type(family_type), allocatable, intent(out) :: families(:)
+      !> Set if the modes cannot be computed.
+      type(error_type), allocatable, intent(out) :: error
+      type(family_type), allocatable :: all(:)
+      type(basis_type) :: basis
+      integer :: n, highest
+      logical :: failed
+
+      ! Surface waves of this frequency; bending waves of thin walls are slower.
+      basis = new_basis(ball, 0, with_gas, highest_omega)
+      highest = 4 + ceiling(1.1_wp*basis%shear_wavenumber*ball%outer_radius)
+      allocate (all(0:highest))
+      n = 0
+      do
+         call check_interrupt(error)
+         if (allocated(error)) return
+         if (n > ubound(all, 1)) then
+            highest = 2*highest
+            block
+               type(family_type), allocatable :: more(:)
+               allocate (more(0:highest))
+               more(:n - 1) = all
+               call move_alloc(more, all)
+            end block
+         end if
+         if (basis%highest_harmonic < highest) basis = new_basis(ball, highest, with_gas, highest_omega)
+         call get_family(basis, n, highest_omega, all(n), failed)
+         if (failed) then
+            error = numerical_error('&modal_ball: the modes of harmonic '//to_text(n) &
+               //' cannot be computed; allowed: a thinner wall, or a lower highest_frequency')
+            return
+         end if
+         ! From n = 2 on the lowest frequencies of the harmonics increase.
+         if (n >= 2 .and. size(all(n)%omega) == 0) exit
+         n = n + 1
+      end do
+      allocate (families(0:n), source=all(:n))
+   end subroutine get_families
+
+   !> Leaves out the modes above a frequency; their flexibility remains.
+   pure subroutine limit_family(highest_omega, family)
+      !> Highest angular frequency to keep, rad/s.
+      real(wp), intent(in) :: highest_omega
+      type(family_type), intent(inout) :: family
+      integer :: k, n_mode
+
+      n_mode = count(family%omega <= highest_omega)
+      do k = n_mode + 1, size(family%omega)
+         family%flexibility = family%flexibility + outer(family%surface(:, k))/family%omega(k)**2
+      end do
+      family%omega = family%omega(:n_mode)
+      family%surface = family%surface(:, :n_mode)
+   end subroutine limit_family
 
    !> The modes of one harmonic up to a frequency, and the flexibility of all other modes.
    subroutine get_family(basis, harmonic, highest_omega, family, failed)
@@ -328,7 +413,7 @@ contains
       real(wp), allocatable, intent(out) :: surface(:, :)
       real(wp) :: l, area
       integer, allocatable :: used(:)
-      integer :: n, i
+      integer :: n, n_w, i
 
       ! Integral of P_n^2 over the unit sphere.
       area = 4*pi/(2*harmonic + 1)
@@ -337,19 +422,18 @@ contains
          return
       end if
       l = real(harmonic*(harmonic + 1), wp)
-      n = get_degree(basis, harmonic) + 1
-      associate (stride => size(basis%gram, 1)/2)
-         allocate (used(merge(n, 2*n, basis%incompressible)))
-         used(:n) = [(i, i=1, n)]
-         used(n + 1:) = [(stride + i, i=1, size(used) - n)]
-      end associate
+      n = get_degree(basis, harmonic, basis%shear_wavenumber) + 1
+      ! W belongs to compression waves, which are longer.
+      n_w = 0
+      if (.not. basis%incompressible) n_w = get_degree(basis, harmonic, basis%compression_wavenumber) + 1
+      used = [(i, i=1, n), (size(basis%polynomial, 2) + i, i=1, n_w)]
       stiffness = area*(basis%gram(used, used, 1) + l*basis%gram(used, used, 2) + basis%gram(used, used, 3)/l)
       mass = area*(basis%gram(used, used, 4) + basis%gram(used, used, 5)/l)
       allocate (surface(2, size(used)), source=0.0_wp)
       associate (p => basis%at_end(1, :n, :))
          surface(1, :n) = p(:, 1)
          surface(2, :n) = (basis%outer_radius*p(:, 2) + 2*p(:, 1))/l
-         if (.not. basis%incompressible) surface(2, n + 1:) = -p(:, 1)/l
+         surface(2, n + 1:) = -p(:n_w, 1)/l
       end associate
    end subroutine assemble
 
@@ -365,7 +449,7 @@ contains
       integer :: n, m
 
       n = 1
-      if (.not. basis%incompressible) n = get_degree(basis, 0) + 1
+      if (.not. basis%incompressible) n = get_degree(basis, 0, basis%shear_wavenumber) + 1
       m = size(basis%radius)
       allocate (u(m, n), u_slope(m, n), divergence(m, n), volume_change(n))
       scale = basis%outer_radius**2

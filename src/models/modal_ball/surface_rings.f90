@@ -8,7 +8,7 @@
 module thud_surface_rings
    use thud_constants, only: pi
    use thud_kinds, only: wp
-   use thud_legendre, only: get_gauss_legendre, get_legendre
+   use thud_legendre, only: get_gauss_legendre
    implicit none (type, external)
    private
 
@@ -40,47 +40,107 @@ contains
       !> Whether the rings stick.
       logical, intent(in) :: sticks
       type(surface_rings_type) :: rings
-      real(wp), allocatable :: value(:), first(:), second(:), node(:), weight(:)
+      real(wp), allocatable :: node(:), weight(:)
+      ! Displacements of the rings due to U and V, downwards and inwards: [n_ring, 2, n_dof, 0:highest].
+      real(wp), allocatable :: shapes(:, :, :, :)
       real(wp) :: area(n_ring)
-      real(wp) :: width, angle, area_fraction
-      integer :: i, j, k, n_node, row, highest
+      real(wp) :: width
+      integer :: i, k, n_node, highest
 
       ! The wavelength of the highest harmonic is the spacing of the rings.
       highest = nint(2*n_ring*pi/outermost_angle)
-      allocate (value(0:highest), first(0:highest), second(0:highest))
       width = outermost_angle/(n_ring - 1)
       rings%radius = sin([((i - 1)*width, i=1, n_ring)])
       rings%n_dof = merge(2, 1, sticks)
-      allocate (rings%height(n_ring), rings%shape_at_ring(rings%n_dof*n_ring, 2, 0:highest), source=0.0_wp)
+      allocate (rings%height(n_ring), shapes(n_ring, 2, rings%n_dof, 0:highest), source=0.0_wp)
       area = 0.0_wp
       ! Enough for all digits of a hat function times the highest harmonic.
       n_node = 4 + ceiling(highest*width/2)
       allocate (node(n_node), weight(n_node))
       call get_gauss_legendre(node, weight)
-      do i = 1, n_ring - 1
-         do k = 1, n_node
-            angle = (i - 1 + (1 + node(k))/2)*width
-            call get_legendre(cos(angle), value, first, second)
-            do j = 0, 1
-               area_fraction = weight(k)*merge(1 + node(k), 1 - node(k), j == 1)*sin(angle)
-               area(i + j) = area(i + j) + area_fraction
-               rings%height(i + j) = rings%height(i + j) + area_fraction*cos(angle)
-               ! Downwards: P_n cos t for U and -dP_n/dt sin t for V.
-               row = rings%n_dof*(i + j - 1) + 1
-               rings%shape_at_ring(row, 1, :) = rings%shape_at_ring(row, 1, :) + area_fraction*cos(angle)*value
-               rings%shape_at_ring(row, 2, :) = rings%shape_at_ring(row, 2, :) + area_fraction*sin(angle)**2*first
-               if (.not. sticks) cycle
-               ! Inwards: -P_n sin t for U and -dP_n/dt cos t for V.
-               rings%shape_at_ring(row + 1, 1, :) = rings%shape_at_ring(row + 1, 1, :) - area_fraction*sin(angle)*value
-               rings%shape_at_ring(row + 1, 2, :) = rings%shape_at_ring(row + 1, 2, :) + &
-                  area_fraction*sin(angle)*cos(angle)*first
-            end do
-         end do
+      do k = 1, n_node
+         call add_nodes(width*[(i - 1 + (1 + node(k))/2, i=1, n_ring - 1)], (1 - node(k))*weight(k), &
+            (1 + node(k))*weight(k), area, rings%height, shapes)
       end do
       rings%height = rings%height/area
-      do i = 1, size(rings%shape_at_ring, 1)
-         rings%shape_at_ring(i, :, :) = rings%shape_at_ring(i, :, :)/area(1 + (i - 1)/rings%n_dof)
+      do i = 1, n_ring
+         shapes(i, :, :, :) = shapes(i, :, :, :)/area(i)
+      end do
+      allocate (rings%shape_at_ring(rings%n_dof*n_ring, 2, 0:highest))
+      do i = 1, rings%n_dof
+         rings%shape_at_ring(i::rings%n_dof, :, :) = shapes(:, :, i, :)
       end do
    end function new_surface_rings
+
+   !> Adds one node of the quadrature in every interval between two rings.
+   pure subroutine add_nodes(angle, inner_weight, outer_weight, area, height, shapes)
+      !> Angles from the lowest point, rad: [n_ring - 1].
+      real(wp), intent(in) :: angle(:)
+      !> Weights of the hat functions of the inner and of the outer ring.
+      real(wp), intent(in) :: inner_weight, outer_weight
+      !> Integrals over the hat functions, of 1 and of the height: [n_ring].
+      real(wp), intent(inout) :: area(:), height(:)
+      !> Integrals of the displacements by U and V, downwards and inwards: [n_ring, 2, n_dof, 0:highest].
+      real(wp), intent(inout), contiguous :: shapes(:, :, :, 0:)
+      real(wp), dimension(size(angle)) :: cosine, sine, value, previous, slope, previous_slope
+      real(wp), dimension(size(angle), 2) :: down, inward
+      real(wp) :: next_factor, previous_factor, next, next_slope
+      integer :: i, n
+
+      cosine = cos(angle)
+      sine = sin(angle)
+      ! Downwards: P_n cos t for U and -dP_n/dt sin t for V.
+      down(:, 1) = sine*cosine
+      down(:, 2) = sine**3
+      ! Inwards: -P_n sin t for U and -dP_n/dt cos t for V.
+      inward(:, 1) = -sine**2
+      inward(:, 2) = sine**2*cosine
+      n = size(angle)
+      area(:n) = area(:n) + inner_weight*sine
+      area(2:) = area(2:) + outer_weight*sine
+      height(:n) = height(:n) + inner_weight*sine*cosine
+      height(2:) = height(2:) + outer_weight*sine*cosine
+      previous = 0.0_wp
+      value = 1.0_wp
+      previous_slope = 0.0_wp
+      slope = 0.0_wp
+      do n = 0, ubound(shapes, 4)
+         call add(down(:, 1), value, shapes(:, 1, 1, n))
+         call add(down(:, 2), slope, shapes(:, 2, 1, n))
+         if (size(shapes, 3) == 2) then
+            call add(inward(:, 1), value, shapes(:, 1, 2, n))
+            call add(inward(:, 2), slope, shapes(:, 2, 2, n))
+         end if
+         ! Legendre polynomials and derivatives of the next degree.
+         next_factor = real(2*n + 1, wp)/(n + 1)
+         previous_factor = real(n, wp)/(n + 1)
+         do i = 1, size(angle)
+            next = next_factor*cosine(i)*value(i) - previous_factor*previous(i)
+            next_slope = previous_slope(i) + (2*n + 1)*value(i)
+            previous(i) = value(i)
+            value(i) = next
+            previous_slope(i) = slope(i)
+            slope(i) = next_slope
+         end do
+      end do
+
+   contains
+
+      !> Adds a displacement at the nodes to the integrals of both rings.
+      pure subroutine add(direction, values, integral)
+         !> Factor of the displacement, and displacement: [n_ring - 1].
+         real(wp), intent(in), contiguous :: direction(:), values(:)
+         real(wp), intent(inout), contiguous :: integral(:)
+         integer :: i
+
+         do i = 1, size(values)
+            integral(i) = integral(i) + inner_weight*direction(i)*values(i)
+         end do
+         do i = 1, size(values)
+            integral(i + 1) = integral(i + 1) + outer_weight*direction(i)*values(i)
+         end do
+      end subroutine add
+
+   end subroutine add_nodes
 
 end module thud_surface_rings

@@ -1,0 +1,229 @@
+"""How often the stated numerical error covers the true one, over random sources.
+
+    python tests/bench/numerical_error.py MODEL [COUNT [SEED]]
+
+Each source is computed at the default resolution, at a fine one, and at one between, which shows
+how far the fine one is from convergence. Prints each source whose error is not covered, has no
+result, or exceeds 0.5 dB without a warning; then the coverage of the levels of all octaves.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+import sys
+import time
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from tqdm import tqdm
+
+import thud
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+# Errors below this are not distinguished from zero, dB.
+FLOOR = 0.02
+# Numerical error above which an impact carries a warning, and error that must not be without, dB.
+WARNED, MAXIMUM = 0.2, 0.5
+DENSITY = 900.0, 1300.0
+
+
+def log_uniform(chance: random.Random, low: float, high: float) -> float:
+    return math.exp(chance.uniform(math.log(low), math.log(high)))
+
+
+def ball(
+    chance: random.Random, *, wall: tuple[float, float], modulus: tuple[float, float]
+) -> thud.Ball:
+    """Return a ball of rubber, with a wall from a range of fractions of its radius."""
+    radius, ratio = chance.uniform(0.05, 0.15), chance.uniform(*wall)
+    volume = 4 / 3 * math.pi * radius**3 * (1 - (1 - ratio) ** 3)
+    return thud.Ball(
+        outer_radius=radius,
+        wall_thickness=ratio * radius,
+        mass=volume * chance.uniform(*DENSITY),
+        youngs_modulus=log_uniform(chance, *modulus),
+        poisson_ratio=chance.choice([0.5, chance.uniform(0.45, 0.499)]),
+    )
+
+
+def drop(chance: random.Random) -> thud.Drop:
+    return thud.Drop(height=log_uniform(chance, 0.1, 1.6))
+
+
+def duration(source: thud.Ball) -> float:
+    """Return a duration, s, several times the contact of a ball."""
+    volume = source.mass / (source.outer_radius**2 * source.wall_thickness)
+    return min(1.0, 0.06 + 40 * source.outer_radius * math.sqrt(volume / source.youngs_modulus))
+
+
+@dataclass(frozen=True)
+class Study:
+    """Random cases of a model, and keys of a fine resolution and of one between."""
+
+    draw: Callable[[random.Random], dict[str, Any]]
+    between: dict[str, Any]
+    fine: dict[str, Any]
+
+
+def shell(chance: random.Random) -> dict[str, Any]:
+    source = ball(chance, wall=(0.1, 0.5), modulus=(3e5, 3e7))
+    flux = chance.choice(["momentum_balance", "none", "retarding", "conservative"])
+    return {
+        "ball": source, "drop": drop(chance), "model": thud.HollowSphere(momentum_flux=flux),
+        "duration": duration(source), "sample_rate": log_uniform(chance, 8e3, 96e3),
+    }  # fmt: skip
+
+
+def modal_ball(chance: random.Random) -> dict[str, Any]:
+    source = ball(chance, wall=(0.1, 0.9), modulus=(4e5, 3e7))
+    model = thud.ModalBall(
+        damping_law=chance.choice(["constant", "rising", "fractional"]),
+        loss_factor=chance.uniform(0.02, 0.4),
+    )
+    return {
+        "ball": source, "drop": drop(chance), "model": model, "duration": duration(source),
+        "sample_rate": log_uniform(chance, 16e3, 96e3),
+    }  # fmt: skip
+
+
+def finite_element(chance: random.Random) -> dict[str, Any]:
+    source = ball(chance, wall=(0.1, 0.95), modulus=(6e5, 1e7))
+    loss = chance.choice([0.0, 0.05, 0.1, 0.2, 0.3])
+    model = thud.FiniteElement(
+        viscosity="fractional" if loss else "none",
+        loss_factor=loss or 0.1,
+        fractional_order=chance.choice([0.2, 0.3, 0.5, 0.7, 1.0]),
+        friction=chance.choice([0.0, 0.0, 0.3, 0.8]),
+    )
+    return {"ball": source, "drop": drop(chance), "model": model, "duration": duration(source)}
+
+
+def hunt_crossley(chance: random.Random) -> dict[str, Any]:
+    model = thud.HuntCrossley(
+        contact_time=chance.uniform(0.004, 0.04), exponent=chance.uniform(1.0, 3.0),
+        restitution=chance.uniform(0.2, 1.0),
+    )  # fmt: skip
+    return {
+        "ball": thud.Ball(mass=log_uniform(chance, 0.5, 50)), "drop": drop(chance), "model": model,
+        "duration": 0.2, "sample_rate": log_uniform(chance, 8e3, 96e3),
+    }  # fmt: skip
+
+
+def two_mass(chance: random.Random) -> dict[str, Any]:
+    model = thud.TwoMass(
+        belt_mass=chance.uniform(1, 4), inflation_pressure=chance.uniform(1e5, 3e5),
+        contact_width=chance.uniform(0.2, 0.6), carcass_stiffness=log_uniform(chance, 3e4, 3e5),
+        carcass_exponent=chance.uniform(1.5, 4), contact_damping=chance.uniform(0, 0.3),
+        belt_frequency=log_uniform(chance, 40, 200), belt_damping=chance.uniform(0.02, 0.6),
+    )  # fmt: skip
+    return {
+        "ball": thud.Ball(mass=chance.uniform(5, 10)), "drop": drop(chance), "model": model,
+        "duration": 0.3, "sample_rate": log_uniform(chance, 8e3, 96e3),
+    }  # fmt: skip
+
+
+def measured_modes(chance: random.Random) -> dict[str, Any]:
+    count = chance.randint(1, 6)
+    first = chance.uniform(15, 40)
+    shares = [chance.uniform(0.1, 1) ** 2 for _ in range(count)]
+    mass = chance.uniform(1, 8)
+    model = thud.MeasuredModes(
+        frequency=[first * chance.uniform(1, 1.2) * (1 + 2 * i) for i in range(count)],
+        damping_ratio=[chance.uniform(0.01, 0.2) for _ in range(count)],
+        effective_mass=[mass * share / sum(shares) for share in shares],
+    )
+    return {
+        "ball": thud.Ball(mass=mass), "drop": drop(chance), "model": model,
+        "duration": 0.3, "sample_rate": log_uniform(chance, 8e3, 96e3),
+    }  # fmt: skip
+
+
+SAMPLES = {"sample_rate": 4e5}, {"sample_rate": 1e6}
+STUDIES = {
+    "hollow_sphere": Study(shell, *SAMPLES),
+    "hunt_crossley": Study(hunt_crossley, *SAMPLES),
+    "two_mass": Study(two_mass, *SAMPLES),
+    "measured_modes": Study(measured_modes, *SAMPLES),
+    "modal_ball": Study(
+        modal_ball,
+        {"sample_rate": 96e3, "rings": 160, "highest_frequency": 2000.0, "substeps": 2},
+        {"sample_rate": 96e3, "rings": 240, "highest_frequency": 3000.0, "substeps": 4},
+    ),
+    "finite_element": Study(
+        finite_element,
+        {"radial_elements": 12, "polar_elements": 128},
+        {"radial_elements": 18, "polar_elements": 192},
+    ),
+}
+
+
+def levels(case: dict[str, Any], keys: dict[str, Any]) -> tuple[Any, Array]:
+    """Return the impact of a case, and its levels, dB."""
+    model = case["model"]
+    options = {name: value for name, value in keys.items() if hasattr(model, name)}
+    sampling = {name: value for name, value in keys.items() if name not in options}
+    if options:
+        fields = {name: getattr(model, name) for name in vars(model)}
+        model = type(model)(**{**fields, **options})
+    impact = thud.solve(**{**case, "model": model, **sampling})
+    return impact, np.asarray(impact.levels(force="floor"))
+
+
+def main() -> None:
+    """Compare all cases of a model."""
+    name = sys.argv[1]
+    count = int(sys.argv[2]) if len(sys.argv) > 2 else 500
+    chance = random.Random(int(sys.argv[3]) if len(sys.argv) > 3 else 1)  # noqa: S311
+    study = STUDIES[name]
+    errors, stated, rests, seconds, refused = [], [], [], [], 0
+    for i in tqdm(range(count), disable=None):
+        case = study.draw(chance)
+        begin = time.perf_counter()
+        try:
+            impact, here = levels(case, {})
+        except thud.ThudError as error:
+            refused += 1
+            print(i, error, case, flush=True)
+            continue
+        seconds.append(time.perf_counter() - begin)
+        try:
+            fine = levels(case, study.fine)[1]
+            rest = np.abs(fine - levels(case, study.between)[1])
+        except thud.ThudError as error:
+            print(i, "no reference:", error, flush=True)
+            continue
+        errors.append(np.abs(here - fine))
+        stated.append(impact.numerical_error.level)
+        rests.append(rest)
+        silent = (errors[-1] > MAXIMUM) & (stated[-1].max() < WARNED)
+        if silent.any() or (errors[-1] > np.maximum(stated[-1], FLOOR) + rest).any():
+            numbers = (values.round(2) for values in (errors[-1], stated[-1], rest))
+            print(i, "error {} stated {} reference {}".format(*numbers), case, flush=True)
+    error, said, rest = np.array(errors), np.array(stated), np.array(rests)
+    covered = error <= np.maximum(said, FLOOR)
+    silent = (error > MAXIMUM) & (said.max(axis=1, keepdims=True) < WARNED)
+    print(
+        f"{name}: {len(error)} sources, {refused} without a result; stated error covers "
+        f"{100 * covered.mean():.1f} % of the levels, "
+        f"{100 * covered[:, 4].mean():.1f} % at 500 Hz, "
+        "with the change between the two reference resolutions "
+        f"{100 * (error <= np.maximum(said, FLOOR) + rest).mean():.1f} %; largest error "
+        f"{error.max():.2f} dB, without a warning {error[said.max(axis=1) < WARNED].max():.2f} dB; "
+        f"{silent.sum()} above {MAXIMUM} dB without; change between the references up to "
+        f"{rest.max():.2f} dB, median {np.median(rest):.4f} dB; median time "
+        f"{1e3 * np.median(seconds):.1f} ms"
+    )
+
+
+if __name__ == "__main__":
+    warnings.simplefilter("ignore")
+    main()
