@@ -189,6 +189,7 @@ def test_held_surrogate_is_not_used_for_other_cases(
     [
         lambda case: replace(case, name="other", floor=thud.InfinitePlate(), modes=thud.Modes()),
         lambda case: replace(case, model=replace(case.model, radial_elements=6, polar_elements=48)),
+        lambda case: replace(case, sampling=replace(case.sampling, verify=True)),
         lambda case: replace(case, levels=replace(case.levels, bands="both")),
         lambda case: replace(case, ball=replace(case.ball, mass=2.45)),
         lambda case: replace(case, model=replace(case.model, snapshot_interval=1e-3)),

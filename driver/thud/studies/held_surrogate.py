@@ -36,7 +36,7 @@ def get_unknowns(case: Case) -> tuple[Unknown, ...]:
 def covered_case(case: Case, unknowns: tuple[Unknown, ...]) -> Case:
     """Return the drop of a case on a rigid floor as the held surrogate predicts it.
 
-    The mesh and the bands of the held surrogate replace those of the case: the mesh affects the
+    Mesh, verification and bands of the held surrogate replace those of the case: they affect the
     numerical error only. Raises InputError if a key differs from that of the surrogate, or is
     outside its region.
     """
@@ -52,7 +52,11 @@ def covered_case(case: Case, unknowns: tuple[Unknown, ...]) -> Case:
             if option.metadata.get("group") == "mesh"
         }
         result = replace(result, model=replace(result.model, **mesh))
-    result = replace(result, levels=replace(result.levels, bands=held.case.levels.bands))
+    result = replace(
+        result,
+        levels=replace(result.levels, bands=held.case.levels.bands),
+        sampling=replace(result.sampling, verify=held.case.sampling.verify),
+    )
     held.require(result, [entry.key for entry in unknowns])
     ranges = {u.key: (u.low, u.high) for u in unknowns}
     for name, region in zip(held.keys, held.region.tolist(), strict=True):
