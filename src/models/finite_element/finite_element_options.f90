@@ -164,6 +164,8 @@ contains
       real(wp) :: ratio
 
       ratio = merge(0.5_wp, 1/(refinement_ratio**2 - 1), level == 1)
+      ! Nodes that stick and slip converge more slowly.
+      if (options%contact%friction > 0.0_wp) ratio = 2*ratio
    end function get_error_ratio
 
    !> Size of the snapshots; of automatic elements at the highest level of resolution.
