@@ -205,7 +205,10 @@ def draw_figures(options: argparse.Namespace) -> int:
     for name, draw in tqdm(
         documentation.FIGURES.items(), unit="figure", disable=options.quiet or None, leave=False
     ):
-        results.write(figure_files(draw_all({name: draw}), options.format))
+        with warnings.catch_warnings(record=True) as caught:
+            drawn = draw_all({name: draw})
+        print_notes(f"{name}: {warning.message}" for warning in caught)
+        results.write(figure_files(drawn, options.format))
     if not options.quiet:
         print(f"Figures: {results.folder}")
     return 0
