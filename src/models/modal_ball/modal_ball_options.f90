@@ -36,7 +36,7 @@ module thud_modal_ball_options
    real(wp), parameter :: margin = 1.1_wp
    integer, parameter :: added_rings = 2
 
-   !> Minimum number of steps in a contact from level 1 on.
+   !> Number of steps in a contact from level 1 on, as far as at most twice the steps of a level reach it.
    real(wp), parameter :: min_steps = 500.0_wp
 
    !> Maximum phase angle of a mode in a step; faster modes respond statically.
