@@ -65,7 +65,7 @@ contains
          if (.not. (is_interrupt(error) .or. sampling%verify)) deallocate (error)
          return
       end if
-      if (.not. history%numerical_error%known) call estimate_error(finer, 1 + model%get_error_ratio(level), history)
+      if (.not. history%numerical_error%known) call estimate_error(finer, 1 + model%get_error_ratio(level + 1), history)
       if (sampling%verify) call add_verification(finer, history)
 
    contains
