@@ -98,7 +98,8 @@ class Case(Group, Displayed):
     compression : Compression or None
         Options of the quasi-static compression by the source model; None: no compression.
     unknowns : Unknowns or None
-        What is not known of the source; None: the defaults of the model, see `assess`.
+        What is not known of the source; None: the defaults of `assess`, which only standard balls
+        by finite elements have.
     ball, drop, sampling, levels, limits
         The other namelist groups.
     """

@@ -105,7 +105,7 @@ def _model_verdict(answer: Bundle) -> str:
     if verdict:
         return f"  {verdict.sentence}\n"
     if case.unknowns:
-        return "  Verdict over what is not known: by thud-driver assess\n"
+        return "  Verdict over what is not known: run thud-driver assess\n"
     return ""
 
 

@@ -21,8 +21,8 @@ def compute(case: Case) -> Impact:
     require_kind("case", case, Case)
     if case.model is None:
         refuse("&model is missing", "a case with a source model")
-    # `free_modes` and `compress` compute the other results of a case; fits and studies leave the
-    # ranges of its unknowns, which `assess` uses.
+    # `free_modes` and `compress` compute the other results of a case. `assess` uses its unknowns;
+    # fits and studies may compute drops outside their ranges.
     plain = replace(case, modes=None, compression=None, unknowns=None)
     return new_impact(case, ask("solve", case=case_text(plain)))
 

@@ -73,7 +73,7 @@ class DropsKind(Kind[SampleStudy, R]):
         table = table_of(content, "temperature") if "temperature" in content else None
         temperature = read_temperature(table, study.case, study.parameters)
         design = read_design(table_of(content, "design"), self.designs, study.parameters)
-        # Samples need no snapshots, free modes or compression.
+        # Samples need no snapshots, free modes, compression or unknowns.
         case = replace(study.case, modes=None, compression=None, unknowns=None)
         model_keys = (key for key in KEYS if key.owner == study.model)
         files = {key.name: 0.0 for key in model_keys if key.group == OUTPUT_GROUP}
