@@ -35,7 +35,6 @@ from thud.cli.command import (
 from thud.impact.compression import new_curve
 from thud.impact.compute import compute, new_impact
 from thud.impact.free_modes import new_modes
-from thud.level.assessment import VERDICTS
 
 if TYPE_CHECKING:
     import argparse
@@ -111,7 +110,7 @@ def _model_verdict(answer: Bundle) -> str:
 
 def assess_case(options: argparse.Namespace) -> int:
     """Assess a case over what is not known of its source; return the exit code."""
-    from thud.studies.model_verdict import assess
+    from thud.studies.model_verdict import OUTCOMES, assess
 
     case = read_case(options.case)
     folder = options.output or Path("outputs", f"{case.name}_unknowns")
@@ -127,7 +126,7 @@ def assess_case(options: argparse.Namespace) -> int:
         print(format_rows(verdict.rows()))
         print(f"by {verdict.method}")
     print(verdict.sentence)
-    return NOT_CONFORMING if options.check and verdict.result != VERDICTS[0] else 0
+    return NOT_CONFORMING if options.check and verdict.result != OUTCOMES[0] else 0
 
 
 ASSESS = Command(

@@ -138,14 +138,14 @@ class Impact(ImpactQuantities, Displayed):
     @property
     def finer(self) -> ImpactNumbers | None:
         """Numbers at a finer resolution; None without the key `verify`."""
-        found = self.model_quantities
-        if "finer_contact_time" not in found:
+        quantities = self.model_quantities
+        if "finer_contact_time" not in quantities:
             return None
         return ImpactNumbers(
-            level=np.array([found[f"finer_{name}"] for name in OCTAVE_NAMES]),
-            contact_time=found["finer_contact_time"],
-            restitution=found["finer_restitution"],
-            peak_force=found["finer_peak_force"],
+            level=np.array([quantities[f"finer_{name}"] for name in OCTAVE_NAMES]),
+            contact_time=quantities["finer_contact_time"],
+            restitution=quantities["finer_restitution"],
+            peak_force=quantities["finer_peak_force"],
         )
 
     @property

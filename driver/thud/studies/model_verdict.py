@@ -471,14 +471,14 @@ def _direct_source(impact: Impact, unknowns: tuple[Unknown, ...], *, progress: b
                 f"{failed.sum()} of {failed.size} drops have no result ({reason})",
                 "ranges of &unknowns in which all drops have results",
             )
-        force = case.levels.force
-        forces = result.elastic_force if force == "elastic" else result.floor_force
+        assessed = case.levels.force
+        forces = result.elastic_force if assessed == "elastic" else result.floor_force
         assert forces is not None  # noqa: S101 - `forces` was asked for
         others = [_column(case, columns, name) for name in ("mass", "height")]
-        peaks = [peak_count(one, result.sample_rate) for one in forces]
+        peaks = [peak_count(force, result.sample_rate) for force in forces]
         return np.column_stack(
             [
-                result.levels[force, "octave"], result.contact_time, result.restitution, peaks,
+                result.levels[assessed, "octave"], result.contact_time, result.restitution, peaks,
                 *(np.broadcast_to(other, len(peaks)) for other in others),
             ]
         )  # fmt: skip
