@@ -39,6 +39,9 @@ module thud_modal_ball_options
    !> Number of steps in a contact from level 1 on, as far as at most twice the steps of a level reach it.
    real(wp), parameter :: min_steps = 500.0_wp
 
+   !> Maximum number of steps of level 1 in a step of the input, see `set_level`.
+   integer, parameter :: max_refinement = 4
+
    !> Maximum phase angle of a mode in a step; faster modes respond statically.
    real(wp), parameter, public :: max_phase = pi/2
 
@@ -140,7 +143,8 @@ contains
          options%coarse_frequency = max(min_frequency, &
             min_relative_frequency*sqrt(shear_modulus/get_density(ball))/ball%outer_radius)
       end associate
-      highest_omega = min(2*pi*options%get_highest_frequency(), max_phase*sampling%sample_rate*sampling%substeps)
+      highest_omega = min(2*pi*options%get_highest_frequency(), &
+         max_phase*sampling%sample_rate*sampling%substeps*max_refinement)
       call use_one_blas_thread()
       ! After an error there are no families; the drop repeats it, and returns the error.
       call get_families(ball, options%cavity_gas, highest_omega, options%families, error)
