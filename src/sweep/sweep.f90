@@ -177,10 +177,11 @@ contains
 
          thread_case = case
          allocate (fields, source=get_active_fields(thread_case))
-         ! Samples have no free modes, no compression and no unknowns.
+         ! Samples have no free modes, no compression, no unknowns and no verification.
          thread_case%has_modes = .false.
          thread_case%has_compression = .false.
          thread_case%has_unknowns = .false.
+         thread_case%sampling%verify = .false.
          blocked = sweep%blocked
          !$omp do schedule(dynamic)
          do i = 1, size(remaining)
