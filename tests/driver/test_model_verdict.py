@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from conftest import naming
 from scipy.stats import truncnorm
 
 import thud
@@ -247,14 +248,23 @@ def test_verdict_of_direct_drops_is_that_of_a_closed_form() -> None:
 
 
 @pytest.mark.parametrize(
-    ("probability", "result"),
-    [(0.96, "conforms"), (0.95, "conforms"), (0.94, "undecided by the model"),
-     (0.06, "undecided by the model"), (0.04, "does not conform")],
+    ("probability", "error", "result"),
+    [(0.96, 0.0, "conforms"), (0.95, 0.0, "conforms"), (0.94, 0.0, "undecided by the model"),
+     (0.96, 0.02, "undecided by the model"), (0.06, 0.0, "undecided by the model"),
+     (0.04, 0.02, "undecided by the model"), (0.04, 0.0, "does not conform")],
 )  # fmt: skip
-def test_outcome_needs_95_percent(probability: float, result: str) -> None:
+def test_outcome_needs_95_percent(probability: float, error: float, result: str) -> None:
     verdict = thud.assess(thud.read_case(EXAMPLE))
-    assert replace(verdict, probability=probability).result == result
-    assert replace(verdict.criteria[0], probability=probability).result == result
+    assert replace(verdict, probability=probability, error=error).result == result
+    criterion = replace(verdict.criteria[0], probability=probability, error=error)
+    assert criterion.result == result
+
+
+def test_lists_of_unequal_length_are_refused() -> None:
+    unknowns = thud.Unknowns(key=("friction",), low=(0.0,), high=(), reason=("none known",))
+    case = thud.Case(ball=thud.Ball.standard(), model=thud.FiniteElement(), unknowns=unknowns)
+    with pytest.raises(thud.InputError, match=naming("&unknowns", "high")):
+        thud.compare({"ball": case})
 
 
 def test_run_prints_the_verdict(

@@ -208,8 +208,8 @@ class Modes(Group):
         Number of elements through the wall; 0: automatic; 0 <= radial_elements <= 64; group
         ``&mesh``.
     polar_elements : int
-        Number of elements from pole to pole; 0: automatic; 0 <= polar_elements <= 1024; group
-        ``&mesh``.
+        Number of elements from pole to pole, from 8; 0: automatic; 0 <= polar_elements <= 1024;
+        group ``&mesh``.
     """
 
     count: int = 6
@@ -402,8 +402,8 @@ class FiniteElement(Group):
         Number of elements through the wall; 0: automatic; 0 <= radial_elements <= 64; group
         ``&mesh``.
     polar_elements : int
-        Number of elements from pole to pole; 0: automatic; 0 <= polar_elements <= 1024; group
-        ``&mesh``.
+        Number of elements from pole to pole, from 8; 0: automatic; 0 <= polar_elements <= 1024;
+        group ``&mesh``.
     law : str
         Law of elasticity; "neo_hookean", "mooney_rivlin"; group ``&material``.
     mooney_share : float
@@ -1026,7 +1026,7 @@ KEYS = (
     Key("", "ball", "heat_capacity_ratio", "real", "", "ratio of specific heats of the enclosed gas", (), 1.0, 2.0),
     Key("modes", "modes", "count", "whole", "", "number of elastic free modes", (), 1.0, 100.0, True),
     Key("modes", "mesh", "radial_elements", "whole", "", "number of elements through the wall; 0: automatic", (), 0.0, 64.0, True),
-    Key("modes", "mesh", "polar_elements", "whole", "", "number of elements from pole to pole; 0: automatic", (), 0.0, 1024.0, True),
+    Key("modes", "mesh", "polar_elements", "whole", "", "number of elements from pole to pole, from 8; 0: automatic", (), 0.0, 1024.0, True),
     Key("compression", "compression", "max_deflection", "real", "m", "maximum approach of the plates", (), 1e-15, 10.0),
     Key("compression", "compression", "points", "whole", "", "number of points of the curve, including the undeformed ball", (), 2.0, 10000.0, True),
     Key("compression", "compression", "gas", "choice", "", "gas in the ball: leaves through the hole (vented), or is sealed in", ('vented', 'isothermal', 'adiabatic')),
@@ -1049,7 +1049,7 @@ KEYS = (
     Key("finite_element", "finite_element", "flight_after", "real", "s", "duration of free flight after the last contact", (), 0.0, 10.0),
     Key("finite_element", "finite_element", "step_safety", "real", "", "time step divided by the stability limit", (), 0.01, 0.98),
     Key("finite_element", "mesh", "radial_elements", "whole", "", "number of elements through the wall; 0: automatic", (), 0.0, 64.0, True),
-    Key("finite_element", "mesh", "polar_elements", "whole", "", "number of elements from pole to pole; 0: automatic", (), 0.0, 1024.0, True),
+    Key("finite_element", "mesh", "polar_elements", "whole", "", "number of elements from pole to pole, from 8; 0: automatic", (), 0.0, 1024.0, True),
     Key("finite_element", "material", "law", "choice", "", "law of elasticity", ('neo_hookean', 'mooney_rivlin')),
     Key("finite_element", "material", "mooney_share", "real", "", "second-invariant fraction of the shear modulus, for mooney_rivlin", (), 0.0, 1.0),
     Key("finite_element", "material", "bulk_ratio", "real", "", "maximum ratio of bulk to shear modulus; lower if Poisson's ratio implies a lower one", (), 2.0, 100000.0),

@@ -86,7 +86,7 @@ class ModelCriterion(Displayed):
     @property
     def result(self) -> str:
         """``"conforms"``, ``"does not conform"`` or ``"undecided by the model"``."""
-        return _outcome(self.probability)
+        return _outcome(self.probability, self.error)
 
     @property
     def hangs_on(self) -> str:
@@ -156,7 +156,7 @@ class ModelVerdict(Displayed):
     @property
     def result(self) -> str:
         """``"conforms"``, ``"does not conform"`` or ``"undecided by the model"``."""
-        return _outcome(self.probability)
+        return _outcome(self.probability, self.error)
 
     @property
     def decisive(self) -> ModelCriterion:
@@ -200,10 +200,10 @@ class ModelVerdict(Displayed):
         return rows
 
 
-def _outcome(probability: float) -> str:
-    if probability >= COVERAGE:
+def _outcome(probability: float, error: float) -> str:
+    if probability - error >= COVERAGE:
         return OUTCOMES[0]
-    return OUTCOMES[1] if probability <= 1 - COVERAGE else OUTCOMES[2]
+    return OUTCOMES[1] if probability + error <= 1 - COVERAGE else OUTCOMES[2]
 
 
 def _percent(probability: float, error: float) -> str:

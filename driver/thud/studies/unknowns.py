@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base._schema import FiniteElement
+from thud.base.checks import refuse
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -88,6 +89,12 @@ def stated_unknowns(case: Case) -> tuple[Unknown, ...]:
         return ()
     deviations = stated.standard_deviation or (0.0,) * len(stated.key)
     columns = (stated.key, stated.low, stated.high, deviations, stated.reason)
+    if len({len(column) for column in columns}) > 1:
+        lengths = ", ".join(str(len(column)) for column in columns)
+        refuse(
+            f"&unknowns: key, low, high, standard_deviation and reason have {lengths} entries",
+            "one entry for each key",
+        )
     return tuple(Unknown(*entries) for entries in zip(*columns, strict=True))
 
 

@@ -62,8 +62,8 @@ contains
       fields = [ &
          integer_field('radial_elements', options%radial_elements, 'number of elements through the wall; 0: automatic', &
          '[0, 64]'), &
-         integer_field('polar_elements', options%polar_elements, 'number of elements from pole to pole; 0: automatic', &
-         '[0, 1024]')]
+         integer_field('polar_elements', options%polar_elements, 'number of elements from pole to pole, from 8; ' &
+         //'0: automatic', '[0, 1024]')]
    end function get_mesh_fields
 
    !> Returns an error if there are too few elements.

@@ -130,9 +130,12 @@ contains
       history = new_force_history(sampling%sample_rate, n_sample, ['contact_force'])
       history%has_means = .true.
       history%impact_velocity = get_impact_velocity(drop)
-      history%model_history_name = [character(len=24) :: 'contact_radius_m']
-      if (options%level > 0) history%model_history_name = [history%model_history_name, [character(len=24) :: &
-         ('energy_n'//to_text(i)//'_J', i=0, n_family - 1), 'energy_rest_J']]
+      if (options%level > 0) then
+         history%model_history_name = [character(len=24) :: 'contact_radius_m', &
+            ('energy_n'//to_text(i)//'_J', i=0, n_family - 1), 'energy_rest_J']
+      else
+         history%model_history_name = [character(len=24) :: 'contact_radius_m']
+      end if
       allocate (history%model_history(n_sample, size(history%model_history_name)), source=0.0_wp)
       call use_one_blas_thread()
       rings = new_surface_rings(options%get_ring_count(), options%outermost_angle, options%floor_friction == 'stick')
