@@ -47,8 +47,8 @@ _SEED = 0
 _DIRECT_TIME = 60.0
 # A surrogate of a drop farther off than this many of its errors belongs to another model.
 _MAX_DEVIATION = 3.0
-# Training of other surrogates: maximum error, dB, and number of drops.
-_TRAINING = {"error": 0.5, "size": 1024}
+# Training of other surrogates: maximum error, dB, which widens the ranges, and number of drops.
+_TRAINING = {"error": 1.0, "size": 1024}
 # Quantile of the normal distribution for a two-sided interval of 95 %.
 _FACTOR = 1.96
 
