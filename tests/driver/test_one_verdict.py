@@ -11,6 +11,7 @@ from conftest import INPUTS
 
 import thud
 from thud import cli
+from thud.studies.model_verdict import assess_impact
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -46,7 +47,8 @@ def test_every_command_has_the_same_peak_levels_and_verdict(
     assert [shown[f"{f:g} Hz, dB"].split()[0] for f in thud.get_bands().nominal] == [
         f"{level:.2f}" for level in levels
     ]
-    assert shown["verdict"] == conformity.result
+    verdict = assess_impact(impact)
+    assert shown["verdict"].startswith((verdict or conformity).result)
 
     swept = thud.sweep(
         {"case": str(path), "parameters": {"height": {"values": [case.drop.height]}}}

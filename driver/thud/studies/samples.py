@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 # A block of samples should take about this time, s.
-_BLOCK_TIME = 1.0
+_BLOCK_TIME = 0.25
 # Number of samples that a surrogate predicts in about this time.
 _SURROGATE_BLOCK_SIZE = 2**16
 

@@ -27,6 +27,9 @@ module thud_sphere_modes
    !> Minimum degree of the polynomials, and the part of the degree that resolves the ends of waves across the wall.
    integer, parameter :: min_degree = 10, end_degree = 4
 
+   !> Maximum wavenumber of shear waves times outer radius: some hundred harmonics, whose modes take minutes.
+   real(wp), parameter :: max_waves = 600.0_wp
+
    !> Gram matrices of the basis, the same for every harmonic.
    type :: basis_type
       !> Outer radius, m.
@@ -225,9 +228,16 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(family_type), allocatable :: all(:)
       type(basis_type) :: basis
+      real(wp) :: wavenumber
       integer :: n, highest
       logical :: failed
 
+      wavenumber = highest_omega*sqrt(get_density(ball)*2*(1 + ball%poisson_ratio)/ball%youngs_modulus)
+      if (.not. wavenumber*ball%outer_radius <= max_waves) then
+         error = numerical_error('&modal_ball: the ball has too many modes up to '//to_text(highest_omega/(2*pi)) &
+            //' Hz; allowed: a stiffer or smaller ball, or a lower highest_frequency')
+         return
+      end if
       ! Surface waves of this frequency; bending waves of thin walls are slower.
       basis = new_basis(ball, 0, with_gas, highest_omega)
       highest = 4 + ceiling(1.1_wp*basis%shear_wavenumber*ball%outer_radius)
