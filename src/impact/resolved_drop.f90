@@ -47,8 +47,8 @@ contains
          if (.not. allocated(coarse_error)) coarse = history
          call solve_at(level, history, error)
          if (allocated(error)) then
-            if (is_interrupt(error) .or. .not. coarse%numerical_error%known) return
-            ! The next coarser level has a result, with its error.
+            if (is_interrupt(error) .or. level == 1) return
+            ! The next coarser level has a result.
             deallocate (error)
             history = coarse
             exit
