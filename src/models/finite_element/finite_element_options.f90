@@ -33,6 +33,9 @@ module thud_finite_element_options
    !> Number of elements along a contact radius.
    real(wp), parameter :: contact_elements = 4.5_wp
 
+   !> Maximum ratio of the number of elements for the contact to the number for the wall.
+   real(wp), parameter :: max_contact_ratio = 2.0_wp
+
    !> Highest level of resolution, and maximum time of its drop on one core, s.
    integer, parameter :: highest_level = 3
    real(wp), parameter :: max_cost = 4.0_wp
@@ -126,7 +129,7 @@ contains
       resolves_contact = is_automatic(options) .and. allocated(coarse%model_history)
       associate (mesh => options%mesh)
          mesh = get_element_counts(ball, mesh)
-         if (resolves_contact) mesh%polar_elements = nint(mesh%polar_elements*max(1.0_wp, min(2.0_wp, &
+         if (resolves_contact) mesh%polar_elements = nint(mesh%polar_elements*max(1.0_wp, min(max_contact_ratio, &
             contact_elements*pi*ball%outer_radius/mesh%polar_elements/maxval(coarse%model_history(:, 1)))))
          mesh%radial_elements = max(min_radial, nint(mesh%radial_elements*refinement))
          mesh%polar_elements = nint(mesh%polar_elements*refinement)
@@ -168,18 +171,18 @@ contains
       if (options%contact%friction > 0.0_wp) ratio = 2*ratio
    end function get_error_ratio
 
-   !> Size of the snapshots; of automatic elements at the highest level of resolution.
+   !> Size of the snapshots; of automatic elements the largest that the levels of resolution can have.
    function get_snapshot_shape(ball, options, sampling) result(extents)
       type(ball_type), intent(in) :: ball
       class(finite_element_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       integer :: extents(3)
+      integer :: factor(2)
 
-      integer :: factor
-
-      factor = merge(nint(refinement_ratio**(highest_level - 1)), 1, is_automatic(options))
+      factor = 1
+      if (is_automatic(options)) factor = nint(refinement_ratio**(highest_level - 1)*[max_contact_ratio, 1.0_wp])
       associate (counts => get_element_counts(ball, options%mesh))
-         extents = [factor*counts%polar_elements + 1, factor*counts%radial_elements + 1, get_frame_count(options, sampling)]
+         extents = [factor*[counts%polar_elements, counts%radial_elements] + 1, get_frame_count(options, sampling)]
       end associate
    end function get_snapshot_shape
 
