@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 import f90nml
@@ -257,6 +257,15 @@ def _plain(group: str, key: str, value: object) -> float | str | list[float | st
 def case_text(case: Case) -> bytes:
     """Return the text of the namelist file of a case, for the library."""
     return f"{case.to_namelist()}\n".encode(errors="surrogateescape")
+
+
+def impact_only(case: Case) -> Case:
+    """Return a case without free modes, compression and unknowns, which an impact does not use.
+
+    `free_modes`, `compress` and `assess` use them; fits and studies may compute drops outside the
+    ranges of the unknowns.
+    """
+    return replace(case, modes=None, compression=None, unknowns=None)
 
 
 def read_case(path: str | os.PathLike[str]) -> Case:

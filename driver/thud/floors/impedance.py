@@ -12,7 +12,7 @@ from thud.base._schema import BandSet, InfinitePlate
 from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_array, require_kind, require_real
 from thud.base.display import Displayed
-from thud.case.case import Case, case_text
+from thud.case.case import Case, case_text, impact_only
 from thud.impact.floor_impact import new_floor_impact
 from thud.impact.impact import Impact
 from thud.level.levels import force_exposure_levels, get_bands
@@ -221,9 +221,7 @@ def ball_impedance(
 
 def _force_on(source: Impact, resistance: float) -> Array:
     """Return the force of the same drop on a resistive floor, N, shape (n_sample,)."""
-    case = replace(
-        source.case, modes=None, compression=None, room=None, floor=InfinitePlate(resistance)
-    )
+    case = replace(impact_only(source.case), room=None, floor=InfinitePlate(resistance))
     impact = new_floor_impact(case, ask("floor_impact", case=case_text(case)), source.floor_force)
     if impact is None:
         refuse(

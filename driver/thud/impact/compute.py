@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from thud.base.bridge import ask, text
 from thud.base.checks import refuse, require_kind
-from thud.case.case import Case, case_text
+from thud.case.case import Case, case_text, impact_only
 from thud.impact.floor_impact import new_floor_impact
 from thud.impact.impact import Impact, impact_fields
 from thud.impact.room_level import new_room_level
@@ -21,10 +20,7 @@ def compute(case: Case) -> Impact:
     require_kind("case", case, Case)
     if case.model is None:
         refuse("&model is missing", "a case with a source model")
-    # `free_modes` and `compress` compute the other results of a case. `assess` uses its unknowns;
-    # fits and studies may compute drops outside their ranges.
-    plain = replace(case, modes=None, compression=None, unknowns=None)
-    return new_impact(case, ask("solve", case=case_text(plain)))
+    return new_impact(case, ask("solve", case=case_text(impact_only(case))))
 
 
 def new_impact(case: Case, answer: Bundle) -> Impact:

@@ -21,7 +21,7 @@ from thud.base.checks import (
 )
 from thud.base.immutable import freeze
 from thud.base.key import check_keywords
-from thud.case.case import Case, case_text, new_model
+from thud.case.case import Case, case_text, impact_only, new_model
 from thud.case.keys import find_key, key_owners
 from thud.impact.outcomes import Ensemble
 from thud.impact.quantities import RATING, ROOM_LEVEL
@@ -124,10 +124,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     sampling = {"sample_rate": sample_rate, "duration": duration, "substeps": substeps}
     keywords = {name: value for name, value in sampling.items() if value is not None}
     base = replace(
-        base,
-        modes=None,
-        compression=None,
-        unknowns=None,
+        impact_only(base),
         sampling=replace(base.sampling, **keywords),  # type: ignore[arg-type]
         levels=replace(base.levels, bands=bands or base.levels.bands),
         limits=Limits(source) if source is not None else base.limits,

@@ -385,8 +385,8 @@ def _warnings(residual: Array, deflection: Array, relative_touch: float) -> tupl
             "the first touch lies at the limit of the search: give data from first touch on"
         )
     if len(residual) >= MIN_TESTED:
-        doubts = residual_warnings(residual, deflection, "mm")
+        texts = residual_warnings(residual, deflection, "mm")
     else:
-        doubts = [text for text in [runs_warning(residual)] if text]
-    ratio = misfit_ratio(residual) if doubts else 1.0
-    return [*result, *(f"{text}; the model does not explain the curve" for text in doubts)], ratio
+        texts = [text for text in [runs_warning(residual)] if text]
+    ratio = misfit_ratio(residual) if texts else 1.0
+    return [*result, *(f"{text}; the model does not explain the curve" for text in texts)], ratio

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, Unpack
 
 from thud.base._schema import KEYS
 from thud.base.checks import refuse, require_choice
+from thud.case.case import impact_only
 from thud.case.keys import DENSITY, OUTPUT_GROUP, key_owners, value_in
 from thud.studies.backends import checked_backend
 from thud.studies.blocks import compute_samples, read_identity, result_names
@@ -74,7 +75,7 @@ class DropsKind(Kind[SampleStudy, R]):
         temperature = read_temperature(table, study.case, study.parameters)
         design = read_design(table_of(content, "design"), self.designs, study.parameters)
         # Samples need no snapshots, free modes, compression or unknowns.
-        case = replace(study.case, modes=None, compression=None, unknowns=None)
+        case = impact_only(study.case)
         model_keys = (key for key in KEYS if key.owner == study.model)
         files = {key.name: 0.0 for key in model_keys if key.group == OUTPUT_GROUP}
         if case.model and files:

@@ -20,7 +20,7 @@ from thud.base.bridge import version
 from thud.base.checks import refuse, refuse_unknown, refuse_value, require_kind, shown
 from thud.base.errors import InputError
 from thud.base.files import read_input
-from thud.case.case import Case, check_case, new_model, read_case, tables_case
+from thud.case.case import Case, check_case, impact_only, new_model, read_case, tables_case
 from thud.case.keys import DENSITY, TEMPERATURE, find_key, key_owners, with_values
 from thud.studies.parameter import Parameter, read_quantity, read_value
 
@@ -261,8 +261,7 @@ def _require_valid(study: Study, fixed: Mapping[str, Any]) -> None:
     messages = []
     for quantile in TRIAL_QUANTILES:
         try:
-            trial = study.trial_case(quantile)
-            check_case(replace(trial, modes=None, compression=None, unknowns=None))
+            check_case(impact_only(study.trial_case(quantile)))
         except InputError as error:
             messages.append(str(error))
     named = [_NAMED_KEY.match(message) for message in messages]

@@ -9,6 +9,7 @@ import numpy as np
 
 from thud.base._schema import FiniteElement
 from thud.base.checks import refuse
+from thud.case.case import impact_only
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -107,6 +108,4 @@ def blocked_case(case: Case, unknowns: tuple[Unknown, ...]) -> Case:
     is_viscous = isinstance(model, FiniteElement) and model.viscosity == "kelvin_voigt"
     if is_viscous and any(entry.key == "fractional_order" for entry in unknowns):
         model = replace(model, viscosity="fractional", fractional_order=ORDER_RANGE[1])  # type: ignore[type-var]
-    return replace(
-        case, model=model, floor=None, room=None, modes=None, compression=None, unknowns=None
-    )
+    return replace(impact_only(case), model=model, floor=None, room=None)
