@@ -16,8 +16,8 @@ from scipy.stats import truncnorm
 import thud
 from thud.cli import main
 from thud.comparison import comparison
-from thud.studies import held_surrogate, model_verdict
-from thud.studies.held_surrogate import FILE, covered_case, get_unknowns, is_covered
+from thud.studies import bundled_surrogate, model_verdict
+from thud.studies.bundled_surrogate import FILE, covered_case, get_unknowns, is_covered
 from thud.studies.unknowns import STANDARD_BALL, Unknown
 
 if TYPE_CHECKING:
@@ -115,28 +115,30 @@ def test_nothing_is_known_to_vary_elsewhere() -> None:
         thud.assess(thud.Case())
 
 
-# Held surrogate: drops at random points, in units of the stated 95 % errors.
+# Bundled surrogate: drops at random points, in units of the stated 95 % errors.
 
 
 def errors_at_random_points(
     count: int, seed: int
 ) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    held = held_surrogate.held_surrogate()
-    low, high = held.region.T
+    surrogate = bundled_surrogate.bundled_surrogate()
+    low, high = surrogate.region.T
     points = low + np.random.default_rng(seed).random((count, len(low))) * (high - low)
-    columns = dict(zip(held.keys, points.T, strict=True))
-    drops = thud.solve_many(columns, held.case)
-    predicted = held.predict(held.case, columns)
+    columns = dict(zip(surrogate.keys, points.T, strict=True))
+    drops = thud.solve_many(columns, surrogate.case)
+    predicted = surrogate.predict(surrogate.case, columns)
     assert not drops.status.any()
     assert not predicted["status"].any()
-    differences = [(predicted["floor_level"] - drops.floor_octaves) / held.error_of("floor_level")]
+    differences = [
+        (predicted["floor_level"] - drops.floor_octaves) / surrogate.error_of("floor_level")
+    ]
     for name in ("contact_time", "restitution"):
         ratio = 20 * np.log10(predicted[name] / getattr(drops, name))
-        differences.append((ratio / held.error_of(name))[:, np.newaxis])
+        differences.append((ratio / surrogate.error_of(name))[:, np.newaxis])
     return np.abs(np.concatenate(differences, axis=1))
 
 
-def test_held_surrogate_has_its_stated_error() -> None:
+def test_bundled_surrogate_has_its_stated_error() -> None:
     relative = errors_at_random_points(6, 1)
     # Of 42 numbers, 2 are expected beyond 1; 8 or more have a probability of 0.1 %.
     assert (relative > 1).sum() < 8
@@ -144,22 +146,22 @@ def test_held_surrogate_has_its_stated_error() -> None:
 
 
 @pytest.mark.slow
-def test_held_surrogate_has_its_stated_error_at_many_points() -> None:
+def test_bundled_surrogate_has_its_stated_error_at_many_points() -> None:
     relative = errors_at_random_points(200, 2)
     # 95 % less three standard deviations of a fraction of 200.
     assert ((relative <= 1).mean(axis=0) >= 0.95 - 3 * np.sqrt(0.95 * 0.05 / 200)).all()
 
 
-def test_held_surrogate_is_small_and_belongs_to_its_study() -> None:
-    path = Path(held_surrogate.__file__).with_name(FILE)
+def test_bundled_surrogate_is_small_and_belongs_to_its_study() -> None:
+    path = Path(bundled_surrogate.__file__).with_name(FILE)
     assert path.stat().st_size <= 1e6
     study = thud.read_study(ROOT / "inputs/studies/standard_ball.toml", "surrogate")
-    held = held_surrogate.held_surrogate()
-    assert held.keys == tuple(parameter.name for parameter in study.parameters)
-    np.testing.assert_allclose(held.region, [(p.low, p.high) for p in study.parameters])
+    surrogate = bundled_surrogate.bundled_surrogate()
+    assert surrogate.keys == tuple(parameter.name for parameter in study.parameters)
+    np.testing.assert_allclose(surrogate.region, [(p.low, p.high) for p in study.parameters])
     assert is_covered(study.case, STANDARD_BALL)
     # Otherwise: ./bootstrap surrogate
-    found, expected = dict(held.identity), dict(study.identity)
+    found, expected = dict(surrogate.identity), dict(study.identity)
     for identity in (found, expected):
         identity.pop("scikit-learn_version")
     assert found == expected
@@ -178,7 +180,7 @@ def test_held_surrogate_is_small_and_belongs_to_its_study() -> None:
         lambda case: replace(case, unknowns=BULK_RATIO),
     ],
 )  # fmt: skip
-def test_held_surrogate_is_not_used_for_other_cases(
+def test_bundled_surrogate_is_not_used_for_other_cases(
     change: Callable[[thud.Case], thud.Case],
 ) -> None:
     case = change(thud.read_case(FLAGSHIP))
@@ -196,7 +198,7 @@ def test_held_surrogate_is_not_used_for_other_cases(
         lambda case: replace(case, model=replace(case.model, snapshot_interval=1e-3)),
     ],
 )
-def test_held_surrogate_covers_the_neighborhood(
+def test_bundled_surrogate_covers_the_neighborhood(
     change: Callable[[thud.Case], thud.Case],
 ) -> None:
     assert is_covered(change(thud.read_case(FLAGSHIP)), STANDARD_BALL)
@@ -205,9 +207,9 @@ def test_held_surrogate_covers_the_neighborhood(
 def test_changed_model_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     impact = thud.solve(thud.read_case(FLAGSHIP))
     assert model_verdict.assess_impact(impact)
-    held = held_surrogate.held_surrogate()
-    other = replace(held, mean=held.mean + 1.0)
-    monkeypatch.setattr(model_verdict, "held_surrogate", lambda: other)
+    surrogate = bundled_surrogate.bundled_surrogate()
+    other = replace(surrogate, mean=surrogate.mean + 1.0)
+    monkeypatch.setattr(model_verdict, "bundled_surrogate", lambda: other)
     assert model_verdict.assess_impact(impact) is None
 
 
@@ -240,7 +242,7 @@ def test_verdict_of_direct_drops_is_that_of_a_closed_form() -> None:
         [contact.low, contact.high], np.pi * np.sqrt(2.5 / quantiles), atol=5e-5
     )
     assert contact.indices["stiffness"] == pytest.approx(1.0, abs=0.1)
-    assert contact.hangs_on == "stiffness"
+    assert contact.main_unknown == "stiffness"
     # Without losses the restitution is 1, for every stiffness.
     (restitution,) = (c for c in verdict.criteria if c.name == "restitution")
     assert restitution.probability == 0
@@ -274,9 +276,9 @@ def test_run_prints_the_verdict(
     assert main(["run", "--no-figures", str(FLAGSHIP)]) == 0
     printed = capsys.readouterr().out
     verdict = thud.assess(thud.read_case(FLAGSHIP))
-    assert f"  {verdict.sentence}\n" in printed
+    assert f"  {verdict.message}\n" in printed
     assert main(["assess", str(FLAGSHIP)]) == 0
-    assert verdict.sentence in capsys.readouterr().out.splitlines()
+    assert verdict.message in capsys.readouterr().out.splitlines()
     assert main(["assess", "-q", "--check", str(FLAGSHIP)]) == 3
 
 
@@ -302,5 +304,5 @@ def test_page_shows_the_verdict() -> None:
     page = (ROOT / "docs/verdict.md").read_text()
     verdict = thud.assess(thud.read_case(FLAGSHIP))
     shown = [" ".join(line.split()) for line in page.splitlines()]
-    for row in [*verdict.rows(), (verdict.sentence,)]:
+    for row in [*verdict.rows(), (verdict.message,)]:
         assert " ".join(" ".join(row).split()) in shown

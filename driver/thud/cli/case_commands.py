@@ -102,7 +102,7 @@ def _model_verdict(answer: Bundle) -> str:
     case = Case.from_text(text(answer["case"]))
     verdict = assess_impact(new_impact(case, answer))
     if verdict:
-        return f"  {verdict.sentence}\n"
+        return f"  {verdict.message}\n"
     if case.unknowns:
         return "  Verdict over what is not known: run thud-driver assess\n"
     return ""
@@ -125,7 +125,7 @@ def assess_case(options: argparse.Namespace) -> int:
         print()
         print(format_rows(verdict.rows()))
         print(f"by {verdict.method}")
-    print(verdict.sentence)
+    print(verdict.message)
     return NOT_CONFORMING if options.check and verdict.result != OUTCOMES[0] else 0
 
 

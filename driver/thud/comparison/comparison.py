@@ -107,7 +107,14 @@ class Comparison(Displayed, Page):
         blank = [""] * (len(rows) - 4 - len(criteria))
         limits = (row[0].shown_limits for row in criteria)
         columns = [
-            ["range (95 %)", "", "", *(c.range for c in v.criteria), *blank, f"{v.share} conforms"]
+            [
+                "range (95 %)",
+                "",
+                "",
+                *(c.range for c in v.criteria),
+                *blank,
+                f"{v.shown_probability} conforms",
+            ]
             for v in self._shared_verdicts()
         ]
         columns.append([f"limits, {self.source.replace('_', ' ')}", "", "", *limits, *blank, ""])

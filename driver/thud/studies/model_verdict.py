@@ -17,7 +17,7 @@ from thud.case.keys import value_in, with_values
 from thud.impact.compute import compute
 from thud.impact.ensemble import get_cost, solve_many
 from thud.level.levels import peak_count
-from thud.studies.held_surrogate import covered_case, get_unknowns, held_surrogate, is_covered
+from thud.studies.bundled_surrogate import bundled_surrogate, covered_case, get_unknowns, is_covered
 from thud.studies.trained_surrogate import keys_of
 from thud.studies.unknowns import blocked_case
 
@@ -89,7 +89,7 @@ class ModelCriterion(Displayed):
         return _outcome(self.probability, self.error)
 
     @property
-    def hangs_on(self) -> str:
+    def main_unknown(self) -> str:
         """Unknown with the largest total index; empty if the value does not vary."""
         return max(self.indices, key=lambda key: self.indices[key], default="")
 
@@ -113,17 +113,20 @@ class ModelCriterion(Displayed):
         quantity = self.criterion.quantity
         unit = f" {quantity.display_unit}" if quantity.display_unit else ""
         value = self.range or quantity.show(self.criterion.value)
-        hanging = f", hangs on {self.hangs_on}" if self.hangs_on else ""
-        return f"{quantity.title} {value}{unit}, limits {self.criterion.shown_limits}{hanging}"
+        unknown = f", main unknown: {self.main_unknown}" if self.main_unknown else ""
+        return f"{quantity.title} {value}{unit}, limits {self.criterion.shown_limits}{unknown}"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
         criterion, quantity = self.criterion, self.criterion.quantity
         return [
-            ("criterion", "value", "range (95 %)", "limits", "probability", "hangs on", "result"),
+            (
+                "criterion", "value", "range (95 %)", "limits", "probability", "main unknown",
+                "result",
+            ),
             (
                 quantity.label, quantity.show(criterion.value), self.range, criterion.shown_limits,
-                _percent(self.probability, self.error), self.hangs_on, self.result,
+                _percent(self.probability, self.error), self.main_unknown, self.result,
             ),
         ]  # fmt: skip
 
@@ -164,17 +167,18 @@ class ModelVerdict(Displayed):
         return min(self.criteria, key=lambda criterion: criterion.probability)
 
     @property
-    def share(self) -> str:
+    def shown_probability(self) -> str:
         """Probability that the source meets all criteria, with its error."""
         return _percent(self.probability, self.error)
 
     @property
     def reason(self) -> str:
         """The result, its probability, and the decisive criterion."""
-        return f"{self.result} ({self.share} of it conforms): {self.decisive.reason}"
+        probability = f"probability of conformity {self.shown_probability}"
+        return f"{self.result} ({probability}): {self.decisive.reason}"
 
     @property
-    def sentence(self) -> str:
+    def message(self) -> str:
         """The reason in a sentence of its own."""
         return f"Verdict over what is not known: {self.reason}"
 
@@ -188,7 +192,15 @@ class ModelVerdict(Displayed):
         return [
             header,
             *(criterion.rows()[1] for criterion in self.criteria),
-            ("all criteria", "", "", "", self.share, self.decisive.hangs_on, self.result),
+            (
+                "all criteria",
+                "",
+                "",
+                "",
+                self.shown_probability,
+                self.decisive.main_unknown,
+                self.result,
+            ),
         ]
 
     def unknown_rows(self) -> list[tuple[str, ...]]:
@@ -373,22 +385,22 @@ class SurrogateError(InputError):
 
 
 def assess_impact(impact: Impact) -> ModelVerdict | None:
-    """Return the verdict over what is not known of an impact, by the held surrogate.
+    """Return the verdict over what is not known of an impact, by the bundled surrogate.
 
-    None if nothing is known to vary, or the held surrogate does not cover the case or differs from
-    the impact.
+    None if nothing is known to vary, or the bundled surrogate does not cover the case or differs
+    from the impact.
     """
     unknowns = get_unknowns(impact.case)
     if not unknowns or not is_covered(impact.case, unknowns):
         return None
     try:
-        return _by_held_surrogate(impact, unknowns).assess()
+        return _by_bundled_surrogate(impact, unknowns).assess()
     except SurrogateError:
         return None
 
 
 def same_source(first: Case, second: Case) -> bool:
-    """Return whether the held surrogate covers two cases, and they differ in unknowns only."""
+    """Return whether the bundled surrogate covers two cases, and they differ in unknowns only."""
     unknowns = get_unknowns(first)
     if not unknowns or unknowns != get_unknowns(second) or first.limits != second.limits:
         return False
@@ -400,9 +412,9 @@ def same_source(first: Case, second: Case) -> bool:
     return keys[0] == keys[1]
 
 
-def _by_held_surrogate(impact: Impact, unknowns: tuple[Unknown, ...]) -> _Source:
+def _by_bundled_surrogate(impact: Impact, unknowns: tuple[Unknown, ...]) -> _Source:
     case = covered_case(impact.case, unknowns)
-    return _surrogate_source(impact, case, unknowns, held_surrogate())
+    return _surrogate_source(impact, case, unknowns, bundled_surrogate())
 
 
 def assess(
@@ -450,7 +462,7 @@ def assess(
     impact = compute(blocked)
     if is_covered(case, unknowns):
         with suppress(SurrogateError):
-            return _by_held_surrogate(impact, unknowns).assess()
+            return _by_bundled_surrogate(impact, unknowns).assess()
     count = SAMPLES + INDEX_SAMPLES * len(unknowns)
     if get_cost(blocked, [u.key for u in unknowns]) * count <= _DIRECT_TIME:
         return _direct_source(impact, unknowns, progress=progress).assess()

@@ -1,4 +1,4 @@
-"""The surrogate of the standard ball that the package holds, and the cases that it covers."""
+"""The surrogate of the standard ball in the package, and the cases that it covers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FILE = "standard_ball.npz"
 
 
 @cache
-def held_surrogate() -> Surrogate:
+def bundled_surrogate() -> Surrogate:
     """Return the surrogate of the standard ball by finite elements."""
     with resources.as_file(resources.files("thud.studies") / FILE) as path:
         return read_surrogate(path)
@@ -34,32 +34,32 @@ def get_unknowns(case: Case) -> tuple[Unknown, ...]:
 
 
 def covered_case(case: Case, unknowns: tuple[Unknown, ...]) -> Case:
-    """Return the drop of a case on a rigid floor as the held surrogate predicts it.
+    """Return the drop of a case on a rigid floor as the bundled surrogate predicts it.
 
-    Mesh, verification and bands of the held surrogate replace those of the case: they affect the
+    Mesh, verification and bands of the bundled surrogate replace those of the case: they affect the
     numerical error only. Raises InputError if a key differs from that of the surrogate, or is
     outside its region.
     """
-    held = held_surrogate()
+    surrogate = bundled_surrogate()
     result = blocked_case(case, unknowns)
-    if result.model is None or held.case.model is None:
+    if result.model is None or surrogate.case.model is None:
         message = "the case has no source model"
         raise InputError(message)
-    if result.model.name == held.case.model.name:
+    if result.model.name == surrogate.case.model.name:
         mesh = {
-            option.name: getattr(held.case.model, option.name)
-            for option in fields(held.case.model)
+            option.name: getattr(surrogate.case.model, option.name)
+            for option in fields(surrogate.case.model)
             if option.metadata.get("group") == "mesh"
         }
         result = replace(result, model=replace(result.model, **mesh))
     result = replace(
         result,
-        levels=replace(result.levels, bands=held.case.levels.bands),
-        sampling=replace(result.sampling, verify=held.case.sampling.verify),
+        levels=replace(result.levels, bands=surrogate.case.levels.bands),
+        sampling=replace(result.sampling, verify=surrogate.case.sampling.verify),
     )
-    held.require(result, [entry.key for entry in unknowns])
+    surrogate.require(result, [entry.key for entry in unknowns])
     ranges = {u.key: (u.low, u.high) for u in unknowns}
-    for name, region in zip(held.keys, held.region.tolist(), strict=True):
+    for name, region in zip(surrogate.keys, surrogate.region.tolist(), strict=True):
         value = value_in(result, name)
         low, high = ranges.get(name, region)
         if not (isinstance(value, float | int) and region[0] <= low <= value <= high <= region[1]):
@@ -69,7 +69,7 @@ def covered_case(case: Case, unknowns: tuple[Unknown, ...]) -> Case:
 
 
 def is_covered(case: Case, unknowns: tuple[Unknown, ...]) -> bool:
-    """Return whether the held surrogate predicts a case with all values of its unknowns."""
+    """Return whether the bundled surrogate predicts a case with all values of its unknowns."""
     try:
         covered_case(case, unknowns)
     except InputError:
