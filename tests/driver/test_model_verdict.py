@@ -16,8 +16,8 @@ from scipy.stats import truncnorm
 import thud
 from thud.cli import main
 from thud.comparison import comparison
-from thud.studies import bundled_surrogate, model_verdict
-from thud.studies.bundled_surrogate import FILE, covered_case, get_unknowns, is_covered
+from thud.studies import bundled_surrogate, model_assessment
+from thud.studies.bundled_surrogate import FILE, find_unknowns
 from thud.studies.unknowns import STANDARD_BALL, Unknown
 
 if TYPE_CHECKING:
@@ -105,8 +105,8 @@ def test_default_unknowns_have_reasons_and_stand_on_their_page() -> None:
 
 
 def test_own_unknowns_replace_the_defaults() -> None:
-    assert [unknown.key for unknown in get_unknowns(with_unknowns())] == list(UNKNOWNS.key)
-    assert get_unknowns(thud.read_case(FLAGSHIP)) == STANDARD_BALL
+    assert [unknown.key for unknown in find_unknowns(with_unknowns())[0]] == list(UNKNOWNS.key)
+    assert find_unknowns(thud.read_case(FLAGSHIP))[0] == STANDARD_BALL
 
 
 def test_nothing_is_known_to_vary_elsewhere() -> None:
@@ -159,7 +159,7 @@ def test_bundled_surrogate_is_small_and_belongs_to_its_study() -> None:
     surrogate = bundled_surrogate.bundled_surrogate()
     assert surrogate.keys == tuple(parameter.name for parameter in study.parameters)
     np.testing.assert_allclose(surrogate.region, [(p.low, p.high) for p in study.parameters])
-    assert is_covered(study.case, STANDARD_BALL)
+    assert find_unknowns(study.case)[1]
     # Otherwise: ./bootstrap surrogate
     found, expected = dict(surrogate.identity), dict(study.identity)
     for identity in (found, expected):
@@ -184,7 +184,7 @@ def test_bundled_surrogate_is_not_used_for_other_cases(
     change: Callable[[thud.Case], thud.Case],
 ) -> None:
     case = change(thud.read_case(FLAGSHIP))
-    assert not is_covered(case, get_unknowns(case) or STANDARD_BALL)
+    assert not find_unknowns(case)[1]
 
 
 @pytest.mark.parametrize(
@@ -201,16 +201,16 @@ def test_bundled_surrogate_is_not_used_for_other_cases(
 def test_bundled_surrogate_covers_the_neighborhood(
     change: Callable[[thud.Case], thud.Case],
 ) -> None:
-    assert is_covered(change(thud.read_case(FLAGSHIP)), STANDARD_BALL)
+    assert find_unknowns(change(thud.read_case(FLAGSHIP)))[1]
 
 
 def test_changed_model_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     impact = thud.solve(thud.read_case(FLAGSHIP))
-    assert model_verdict.assess_impact(impact)
+    assert model_assessment.assess_impact(impact)
     surrogate = bundled_surrogate.bundled_surrogate()
     other = replace(surrogate, mean=surrogate.mean + 1.0)
-    monkeypatch.setattr(model_verdict, "bundled_surrogate", lambda: other)
-    assert model_verdict.assess_impact(impact) is None
+    monkeypatch.setattr(model_assessment, "bundled_surrogate", lambda: other)
+    assert model_assessment.assess_impact(impact) is None
 
 
 def test_two_damping_laws_of_the_same_ball_have_one_verdict() -> None:
@@ -295,7 +295,8 @@ def test_studies_and_fits_may_leave_the_ranges_of_unknowns() -> None:
 
 def test_case_that_the_surrogate_covers_keeps_its_drop() -> None:
     case = thud.read_case(VISCOUS)
-    covered = covered_case(case, STANDARD_BALL)
+    _, covered = find_unknowns(case)
+    assert covered
     viscous, fractional = (thud.solve(one) for one in (case, covered))
     np.testing.assert_allclose(viscous.levels(), fractional.levels(), atol=0.02)
 

@@ -97,7 +97,7 @@ def _model_verdict(answer: Bundle) -> str:
     """Return the verdict over what is not known of a case in one line, or an empty text."""
     if "samples" not in answer:
         return ""
-    from thud.studies.model_verdict import assess_impact
+    from thud.studies.model_assessment import assess_impact
 
     case = Case.from_text(text(answer["case"]))
     verdict = assess_impact(new_impact(case, answer))
@@ -110,7 +110,8 @@ def _model_verdict(answer: Bundle) -> str:
 
 def assess_case(options: argparse.Namespace) -> int:
     """Assess a case over what is not known of its source; return the exit code."""
-    from thud.studies.model_verdict import OUTCOMES, assess
+    from thud.studies.model_assessment import assess
+    from thud.studies.model_verdict import OUTCOMES
 
     case = read_case(options.case)
     folder = options.output or Path("outputs", f"{case.name}_unknowns")

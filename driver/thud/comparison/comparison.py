@@ -28,7 +28,7 @@ from thud.level.levels import FORCES, SOURCES
 from thud.plot.impact_figures import common_source
 from thud.plot.pages import comparison_html, comparison_page
 from thud.plot.save_figures import page_files
-from thud.studies.model_verdict import assess_impact, same_source
+from thud.studies.model_assessment import assess_impacts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -250,28 +250,16 @@ def compare(
             solved[name] = item
     _require_same_drop(solved)
     limits = common_source(solved, source)
-    verdicts = _model_verdicts(solved, force, limits)
-    result = Comparison(solved, run_times, force, limits, verdicts)
+    assessed = {
+        name: impact
+        for name, impact in solved.items()
+        if isinstance(impact, Impact)
+        and impact.case.limits.source == limits
+        and force in {None, impact.case.levels.force}
+    }
+    result = Comparison(solved, run_times, force, limits, assess_impacts(assessed))
     for warning in result.warnings:
         warnings.warn(warning, PlausibilityWarning, stacklevel=2)
-    return result
-
-
-def _model_verdicts(
-    impacts: Mapping[str, ImpactResult], force: LevelsForce | None, source: LimitsSource
-) -> dict[str, ModelVerdict]:
-    """Return the verdicts over what is not known, by name; the same for the same source."""
-    result: dict[str, ModelVerdict] = {}
-    for name, impact in impacts.items():
-        if not isinstance(impact, Impact):
-            continue
-        case = impact.case
-        if case.limits.source != source or force not in {None, case.levels.force}:
-            continue
-        others = (verdict for n, verdict in result.items() if same_source(impacts[n].case, case))
-        verdict = next(others, None) or assess_impact(impact)
-        if verdict:
-            result[name] = verdict
     return result
 
 

@@ -23,7 +23,7 @@ from thud.level.levels import get_bands
 from thud.plot.impact_figures import contact_force
 from thud.plot.style import FORCE_NAMES
 from thud.recordings.read_recording import read_recording
-from thud.studies.model_verdict import assess_impact
+from thud.studies.model_assessment import assess_impact
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

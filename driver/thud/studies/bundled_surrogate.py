@@ -26,52 +26,47 @@ def bundled_surrogate() -> Surrogate:
         return read_surrogate(path)
 
 
-def get_unknowns(case: Case) -> tuple[Unknown, ...]:
-    """Return the unknowns that a case states; if none, those of the standard ball if it is one."""
-    if case.unknowns:
-        return stated_unknowns(case)
-    return STANDARD_BALL if is_covered(case, STANDARD_BALL) else ()
+def find_unknowns(case: Case) -> tuple[tuple[Unknown, ...], Case | None]:
+    """Return the unknowns of a case, and its drop as the bundled surrogate predicts it.
+
+    The unknowns are those that the case states; if none, those of the standard ball if it is one.
+    The drop is None if the surrogate does not cover the case with all values of its unknowns.
+    """
+    unknowns = stated_unknowns(case) if case.unknowns else STANDARD_BALL
+    covered = _covered_case(case, unknowns)
+    return (unknowns if case.unknowns or covered else ()), covered
 
 
-def covered_case(case: Case, unknowns: tuple[Unknown, ...]) -> Case:
-    """Return the drop of a case on a rigid floor as the bundled surrogate predicts it.
+def _covered_case(case: Case, unknowns: tuple[Unknown, ...]) -> Case | None:
+    """Return the drop of a case on a rigid floor as the bundled surrogate predicts it, or None.
 
-    Mesh, verification and bands of the bundled surrogate replace those of the case: they affect the
-    numerical error only. Raises InputError if a key differs from that of the surrogate, or is
-    outside its region.
+    Mesh, verification and bands of the surrogate replace those of the case: they affect the
+    numerical error only.
     """
     surrogate = bundled_surrogate()
     result = blocked_case(case, unknowns)
-    if result.model is None or surrogate.case.model is None:
-        message = "the case has no source model"
-        raise InputError(message)
-    if result.model.name == surrogate.case.model.name:
-        mesh = {
-            option.name: getattr(surrogate.case.model, option.name)
-            for option in fields(surrogate.case.model)
-            if option.metadata.get("group") == "mesh"
-        }
-        result = replace(result, model=replace(result.model, **mesh))
+    model, trained = result.model, surrogate.case.model
+    if model is None or trained is None or model.name != trained.name:
+        return None
+    mesh = {
+        option.name: getattr(trained, option.name)
+        for option in fields(trained)
+        if option.metadata.get("group") == "mesh"
+    }
     result = replace(
         result,
+        model=replace(model, **mesh),
         levels=replace(result.levels, bands=surrogate.case.levels.bands),
         sampling=replace(result.sampling, verify=surrogate.case.sampling.verify),
     )
-    surrogate.require(result, [entry.key for entry in unknowns])
+    try:
+        surrogate.require(result, [entry.key for entry in unknowns])
+    except InputError:
+        return None
     ranges = {u.key: (u.low, u.high) for u in unknowns}
     for name, region in zip(surrogate.keys, surrogate.region.tolist(), strict=True):
         value = value_in(result, name)
         low, high = ranges.get(name, region)
         if not (isinstance(value, float | int) and region[0] <= low <= value <= high <= region[1]):
-            message = f"{name} is outside the region of the surrogate; allowed: {low:g} to {high:g}"
-            raise InputError(message)
+            return None
     return result
-
-
-def is_covered(case: Case, unknowns: tuple[Unknown, ...]) -> bool:
-    """Return whether the bundled surrogate predicts a case with all values of its unknowns."""
-    try:
-        covered_case(case, unknowns)
-    except InputError:
-        return False
-    return True
