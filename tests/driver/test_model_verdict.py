@@ -277,6 +277,9 @@ def test_run_prints_the_verdict(
     printed = capsys.readouterr().out
     verdict = thud.assess(thud.read_case(FLAGSHIP))
     assert f"  {verdict.message}\n" in printed
+    # The values of the case do not conform; whether the source does is undecided.
+    assert "  With these values the source does not conform to the limits" in printed
+    assert "  The source" not in printed
     assert main(["assess", str(FLAGSHIP)]) == 0
     assert verdict.message in capsys.readouterr().out.splitlines()
     assert main(["assess", "-q", "--check", str(FLAGSHIP)]) == 3

@@ -138,7 +138,12 @@ ASSESS = Command(
             "the drops that train a surrogate, where an interrupted training resumes "
             "(default: outputs/<case name>_unknowns)"
         ),
-        argument("--check", action="store_true", help="exit with 3 unless the source conforms"),
+        argument(
+            "--check",
+            action="store_true",
+            help="exit with 3 unless the source conforms over what is not known of it "
+            "(run --check: with the values of the case)",
+        ),
         QUIET,
     ),
     assess_case,

@@ -67,7 +67,8 @@ contains
             end associate
          end do
          text = text//verification_rows(history, assessment)//newline
-         text = text//'  The source '//trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
+         text = text//'  With these values the source ' &
+            //trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
             //' to the limits of the '//replaced(trim(case%source), '_', ' ')//': it meets ' &
             //to_text(count(conforms(criteria)))//' of '//to_text(size(criteria))//' criteria.'//newline &
             //'  Levels in dB re 1 N, method '//trim(case%level_method)//'.'//newline
