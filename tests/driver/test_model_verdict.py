@@ -204,13 +204,31 @@ def test_bundled_surrogate_covers_the_neighborhood(
     assert find_unknowns(change(thud.read_case(FLAGSHIP)))[1]
 
 
-def test_changed_model_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_changed_model_is_noticed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     impact = thud.solve(thud.read_case(FLAGSHIP))
     assert model_assessment.assess_impact(impact)
     surrogate = bundled_surrogate.bundled_surrogate()
     other = replace(surrogate, mean=surrogate.mean + 1.0)
     monkeypatch.setattr(model_assessment, "bundled_surrogate", lambda: other)
     assert model_assessment.assess_impact(impact) is None
+    assert main(["run", "--no-figures", "-o", str(tmp_path), str(FLAGSHIP)]) == 0
+    assert "not known: run thud-driver assess" in capsys.readouterr().out
+    # A few drops of a coarse mesh replace the surrogate.
+    coarse = replace(impact.case, model=thud.FiniteElement(radial_elements=2, polar_elements=16))
+    for name, value in (("SAMPLES", 100), ("INDEX_SAMPLES", 4), ("_DIRECT_TIME", np.inf)):
+        monkeypatch.setattr(model_assessment, name, value)
+    expected = "100 drops; not by the bundled surrogate: the surrogate predicts "
+    assert thud.assess(coarse).method.startswith(expected)
+
+
+def test_version_of_the_bundled_surrogate_does_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
+    surrogate = bundled_surrogate.bundled_surrogate()
+    older = replace(surrogate, identity={**surrogate.identity, "thud": "0.1.0"})
+    bundled_surrogate.bundled_surrogate.cache_clear()
+    monkeypatch.setattr(bundled_surrogate, "read_surrogate", lambda _: older)
+    assert thud.assess(thud.read_case(FLAGSHIP)).method == surrogate.accuracy
 
 
 def test_two_damping_laws_of_the_same_ball_have_one_verdict() -> None:

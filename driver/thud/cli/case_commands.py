@@ -97,13 +97,14 @@ def _model_verdict(answer: Bundle) -> str:
     """Return the verdict over what is not known of a case in one line, or an empty text."""
     if "samples" not in answer:
         return ""
+    from thud.studies.bundled_surrogate import find_unknowns
     from thud.studies.model_assessment import assess_impact
 
     case = Case.from_text(text(answer["case"]))
     verdict = assess_impact(new_impact(case, answer))
     if verdict:
         return f"  {verdict.message}\n"
-    if case.unknowns:
+    if find_unknowns(case)[0]:
         return "  Verdict over what is not known: run thud-driver assess\n"
     return ""
 

@@ -283,14 +283,20 @@ def assess(
         )
     blocked = blocked_case(case, unknowns)
     impact = compute(blocked)
+    reason = ""
     if covered:
-        with suppress(SurrogateError):
+        try:
             return _by_bundled_surrogate(impact, covered, unknowns)
+        except SurrogateError as error:
+            reason = f"; not by the bundled surrogate: {error}"
     count = SAMPLES + INDEX_SAMPLES * len(unknowns)
     if get_cost(blocked, [u.key for u in unknowns]) * count <= _DIRECT_TIME:
-        return _direct_source(impact, unknowns, progress=progress).assess()
-    surrogate = _train(blocked, unknowns, output, progress=progress, replace_files=replace_files)
-    return _surrogate_source(impact, blocked, unknowns, surrogate).assess()
+        source = _direct_source(impact, unknowns, progress=progress)
+    else:
+        trained = _train(blocked, unknowns, output, progress=progress, replace_files=replace_files)
+        source = _surrogate_source(impact, blocked, unknowns, trained)
+    source.method += reason
+    return source.assess()
 
 
 def _direct_source(impact: Impact, unknowns: tuple[Unknown, ...], *, progress: bool) -> _Source:
