@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from thud.level.assessment import Criterion
     from thud.studies.unknowns import Unknown
 
-OUTCOMES = ("conforms", "does not conform", "undecided by the model")
+BY_MODEL = " by the model"
+OUTCOMES = ("conforms", "does not conform", f"undecided{BY_MODEL}")
 # Fraction of the distribution within the limits from which a criterion is met, and fraction of the
 # distribution within the stated range.
 COVERAGE = 0.95
@@ -91,7 +92,8 @@ class ModelCriterion(Displayed):
             ),
             (
                 quantity.label, quantity.show(criterion.value), self.range, criterion.shown_limits,
-                _percent(self.probability, self.error), self.main_unknown, self.result,
+                _percent(self.probability, self.error), self.main_unknown,
+                self.result.removesuffix(BY_MODEL),
             ),
         ]  # fmt: skip
 
@@ -164,7 +166,7 @@ class ModelVerdict(Displayed):
                 "",
                 self.shown_probability,
                 self.decisive.main_unknown,
-                self.result,
+                self.result.removesuffix(BY_MODEL),
             ),
         ]
 
