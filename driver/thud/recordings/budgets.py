@@ -14,7 +14,7 @@ from thud.recordings.recorded_levels import WITHIN_REPEATABILITY
 from thud.recordings.restitution import BOUNCES, IMPULSE, DropConditions
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -60,19 +60,18 @@ def average_estimates(estimates: Sequence[Estimate], *systematic: Contribution) 
 def level_estimates(
     levels: AverageLevels,
     calibration: float | None = None,
-    plate: NDArray[np.float64] | None = None,
+    systematic: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> tuple[Estimate, ...]:
     """Return average levels with their budgets, dB, shape (n_band,).
 
-    `calibration` is the relative standard uncertainty of the force, None if unknown; `plate` is the
-    standard uncertainty of the force plate's correction, dB, shape (n_band,), zero if not stated.
+    `calibration` is the relative standard uncertainty of the force, None if unknown; `systematic`
+    are further standard uncertainties that all drops share, dB, shape (n_band,), by name.
     """
     count = len(levels.names)
     contributions = dict(levels.contributions)
     if calibration is not None:
         contributions["calibration"] = np.full(len(levels.level), AMPLITUDE_DECIBEL * calibration)
-    if plate is not None and plate.any():
-        contributions["plate"] = plate
+    contributions |= systematic or {}
     budgets = (
         [
             Contribution(

@@ -8,7 +8,14 @@ from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from thud.base.checks import refuse, refuse_unknown, require_choice, require_number, shown
+from thud.base.checks import (
+    refuse,
+    refuse_unknown,
+    require_choice,
+    require_number,
+    require_whole,
+    shown,
+)
 from thud.base.errors import InputError
 from thud.level.assessment import get_criteria
 from thud.level.levels import SOURCES
@@ -16,6 +23,8 @@ from thud.recordings.channel import MIB, shown_path, shown_text
 from thud.recordings.force_units import Calibration, read_chain, require_unit
 from thud.recordings.plate import Plate, check_plate
 from thud.recordings.polarity import POLARITIES
+from thud.recordings.recorder_filter import KINDS, MAX_ORDER, RecorderFilter
+from thud.recordings.response import Chain
 from thud.recordings.restitution import DropConditions
 from thud.recordings.signal_files import regular_file
 
@@ -41,6 +50,11 @@ def _text(value: object, key: str) -> str:
     if not isinstance(value, str) or len(value) > MAX_TEXT or not value.isprintable():
         refuse(f"{key} = {shown(value)} is not allowed", f"a line of up to {MAX_TEXT} characters")
     return value
+
+
+def _whole(low: int, high: int, value: object, key: str) -> int:
+    require_whole(key, value, low, high)
+    return int(value)  # type: ignore[call-overload, no-any-return]
 
 
 def _texts(value: object, key: str) -> tuple[str, ...]:
@@ -124,6 +138,10 @@ class PlateConfig:
         Frequency, Hz, and quality factor of the first resonance, which will be corrected.
     f0_uncertainty : float or None
         Relative standard uncertainty of the frequency.
+    share : float
+        Share of this mode in the static response; 1 for a mass on a spring.
+    flat_limit : float or None
+        Frequency, Hz, up to which the response is flat within 2 %, if no resonance is stated.
     time_constant : float or None
         Time constant of the amplifier, s.
     full_scale : float or None
@@ -135,6 +153,8 @@ class PlateConfig:
     f0: float | None = _key(partial(_number, 1.0, 1e6))
     Q: float | None = _key(partial(_number, 0.5, 1e6))
     f0_uncertainty: float | None = _key(partial(_number, 0.0, 0.5))
+    share: float = _key(partial(_number, 0.001, 1.0), 1.0)
+    flat_limit: float | None = _key(partial(_number, 100.0, 1e6))
     time_constant: float | None = _key(partial(_number, 1e-3, 1e9))
     full_scale: float | None = _key(partial(_number, 1.0, 1e9))
     linearity: tuple[tuple[float, float], ...] = _key(_linearity, ())
@@ -144,11 +164,50 @@ def _plate(value: object, key: str) -> PlateConfig:
     if isinstance(value, PlateConfig):
         return value
     table = _checked(_table(value, key), PlateConfig, f"{key}: ")
-    if "f0_uncertainty" in table or ("f0" in table) != ("Q" in table):
-        for name in ("f0", "Q"):
-            if name not in table:
-                refuse(f"{key}: {name} is missing", "f0 and Q")
+    if {"f0", "Q", "f0_uncertainty", "share"} & set(table):
+        _require_keys(table, key, "f0", "Q")
+        if "flat_limit" in table:
+            refuse(f"{key}: f0 and flat_limit are both stated", "one of them")
     return PlateConfig(**table)
+
+
+def _require_keys(table: Mapping[str, object], key: str, *names: str) -> None:
+    for name in names:
+        if name not in table:
+            refuse(f"{key}: {name} is missing", " and ".join(names))
+
+
+@dataclass(frozen=True)
+class FilterConfig:
+    """The low-pass filter of the recorder or amplifier, which will be corrected.
+
+    Attributes
+    ----------
+    kind : str
+        ``"bessel"``, ``"butterworth"``, or ``"none"`` for a recorder whose response is flat in the
+        bands.
+    order : int or None
+        Order.
+    cutoff : float or None
+        Cutoff at -3 dB, Hz.
+    cutoff_uncertainty : float or None
+        Relative standard uncertainty of the cutoff.
+    """
+
+    kind: str = _key(partial(_choice, (*KINDS, "none")), "none")
+    order: int | None = _key(partial(_whole, 1, MAX_ORDER))
+    cutoff: float | None = _key(partial(_number, 1.0, 1e9))
+    cutoff_uncertainty: float | None = _key(partial(_number, 0.0, 0.5))
+
+
+def _filter(value: object, key: str) -> FilterConfig:
+    if isinstance(value, FilterConfig):
+        return value
+    table = _checked(_table(value, key), FilterConfig, f"{key}: ")
+    _require_keys(table, key, "kind")
+    if table["kind"] != "none":
+        _require_keys(table, key, "order", "cutoff")
+    return FilterConfig(**table)
 
 
 @dataclass(frozen=True)
@@ -177,6 +236,8 @@ class Config:
         Their standard uncertainties, kg and m.
     plate : PlateConfig or None
         The force plate.
+    filter : FilterConfig or None
+        The low-pass filter of the recorder.
     low_pass : bool
         Whether levels are those of the force below 1.25 kHz.
     limits : mapping
@@ -201,6 +262,7 @@ class Config:
     mass_uncertainty: float | None = _key(partial(_number, 0.0, 100.0))
     height_uncertainty: float | None = _key(partial(_number, 0.0, 10.0))
     plate: PlateConfig | None = _key(_plate)
+    filter: FilterConfig | None = _key(_filter)
     low_pass: bool = _key(_flag, default=False)
     limits: Mapping[str, tuple[float, float]] = field(
         default_factory=dict, metadata={"check": _limits}
@@ -212,7 +274,23 @@ class Config:
         plate = self.plate
         if plate is None or plate.f0 is None or plate.Q is None:
             return None
-        return Plate(plate.f0, plate.Q, frequency_uncertainty=plate.f0_uncertainty or 0.0)
+        return Plate(plate.f0, plate.Q, plate.f0_uncertainty or 0.0, plate.share)
+
+    @property
+    def recorder_filter(self) -> RecorderFilter | None:
+        """The filter to be corrected; an unknown uncertainty counts as zero."""
+        stated = self.filter
+        if stated is None or stated.order is None or stated.cutoff is None:
+            return None
+        kind: Any = stated.kind
+        return RecorderFilter(kind, stated.order, stated.cutoff, stated.cutoff_uncertainty or 0.0)
+
+    @property
+    def chain(self) -> Chain | None:
+        """The instruments whose responses are corrected."""
+        stated = (self.resonance, self.recorder_filter)
+        instruments = tuple(instrument for instrument in stated if instrument is not None)
+        return Chain(instruments) if instruments else None
 
     def conditions(self, calibration: float | None) -> DropConditions:
         """Return the conditions of the drops; an unknown uncertainty counts as zero."""

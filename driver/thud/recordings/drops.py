@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from thud.recordings.plate import Plate
+    from thud.recordings.response import Chain
     from thud.recordings.signal import Signal
 
 # Pulses are searched in means over cells, each CELL seconds long, in pieces of PIECE cells. Pieces
@@ -78,8 +78,8 @@ class Window:
         Windows of the bounces after the drop.
     warnings : tuple of str
         Possible faults of the pulse as a whole.
-    plate : Plate or None
-        Force plate whose resonance was corrected in the signal.
+    chain : Chain or None
+        Instruments whose responses were corrected in the signal.
     """
 
     name: str
@@ -89,7 +89,7 @@ class Window:
     contact: tuple[int, int]
     bounces: tuple[Window, ...] = ()
     warnings: tuple[str, ...] = ()
-    plate: Plate | None = None
+    chain: Chain | None = None
 
     @property
     def sample_rate(self) -> float:

@@ -18,8 +18,8 @@ from thud.base.processes import no_interrupt_in_processes, process_pool
 from thud.recordings.checkpoint import Checkpoint
 from thud.recordings.drops import find_windows
 from thud.recordings.measured_drop import measure_drop
-from thud.recordings.plate import correct_window
-from thud.recordings.ringing import check_ringing
+from thud.recordings.response import correct_window
+from thud.recordings.ringing import find_ringing, is_in_record
 
 if TYPE_CHECKING:
     import os
@@ -166,17 +166,20 @@ class _Processes(ExitStack):
 
 
 def measure_window(window: Window, config: Config) -> Drop:
-    """Return the drop in a window, after correction of the resonance of the force plate."""
+    """Return the drop in a window, after correction of the responses of the instruments."""
     steps, warnings = tuple[str, ...](), tuple[str, ...]()
-    plate = config.resonance
-    if plate is not None:
-        window, steps, warnings = correct_window(window, plate)
+    chain, plate, recorded = config.chain, config.resonance, window
+    if chain is not None:
+        window, steps, warnings = correct_window(window, chain)
     drop = measure_drop(window, config.conditions(window.signal.calibration_uncertainty))
     # A copy without the cached factors of the background, which are no longer needed.
     contact = replace(drop.contact, background=replace(drop.contact.background))
+    ringing = find_ringing(contact, chain)
     return replace(
         drop,
         contact=contact,
         steps=(*steps, *drop.steps),
-        warnings=(*warnings, *drop.warnings, *check_ringing(contact, plate)),
+        warnings=(*warnings, *drop.warnings, *([str(ringing)] if ringing else [])),
+        ringing=ringing,
+        plate_recorded=None if plate is None else is_in_record(recorded, contact, plate),
     )

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
     from thud.base._schema import BandSet
     from thud.recordings.drops import Window
+    from thud.recordings.response import Chain
+    from thud.recordings.ringing import Ringing
 
 # Number of draws of noise for its effect on the maximum.
 PEAK_DRAWS = 32
@@ -84,6 +86,11 @@ class Drop(Immutable):
         Processing of the signal, and possible faults, a sentence each.
     contact : Contact
         Times, background and gate of the contact.
+    ringing : Ringing or None
+        Ringing of the plate after the contact.
+    plate_recorded : bool or None
+        Whether the resonance of the stated plate is in the record; None if unclear, or none is
+        stated.
     """
 
     name: str
@@ -105,6 +112,8 @@ class Drop(Immutable):
     steps: tuple[str, ...]
     warnings: tuple[str, ...]
     contact: Contact
+    ringing: Ringing | None = None
+    plate_recorded: bool | None = None
 
     @property
     def time(self) -> NDArray[np.float64]:
@@ -184,7 +193,7 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
         noise=_noise(contact),
         bounces=tuple(begin.value - contact.touch.value for begin, _ in landings),
         steps=(*steps, *_removed(contact)),
-        warnings=(*window.warnings, *warnings, *_check_aliasing(contact), *unknown),
+        warnings=(*window.warnings, *warnings, *_check_aliasing(contact, window.chain), *unknown),
         contact=contact,
     )
 
@@ -264,10 +273,11 @@ def _removed(contact: Contact) -> tuple[str, ...]:
     return tuple(steps)
 
 
-def _check_aliasing(contact: Contact) -> tuple[str, ...]:
+def _check_aliasing(contact: Contact, chain: Chain | None) -> tuple[str, ...]:
     """Return a warning if content above half the rate may alias into the octave of 500 Hz.
 
-    The amplitude of a pulse with kinks is assumed to fall as 1/f**2 above half the rate.
+    The amplitude of a pulse with kinks is assumed to fall as 1/f**2 above half the rate; stated
+    instruments reduce it further.
     """
     rate = contact.sample_rate
     lower, upper = OCTAVE_500
@@ -279,6 +289,8 @@ def _check_aliasing(contact: Contact) -> tuple[str, ...]:
     octave_power = power[(frequency > lower) & (frequency < upper)].mean()
     top = max(power[frequency > ALIASED_FRACTION * rate].mean() - 3 * noise, 0.0)
     folded = top * (0.45 * rate / (rate - upper)) ** 4
+    if chain is not None:
+        folded *= abs(chain.response(np.array([rate - upper]))[0]) ** 2
     error = 20 * math.log10(1 + math.sqrt(folded / octave_power))
     if error < MAX_ALIASING_ERROR:
         return ()
