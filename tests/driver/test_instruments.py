@@ -151,6 +151,47 @@ def test_unstated_filter_is_assumed_by_the_rate() -> None:
     assert assumed_contributions(fast.drops, fast.config)["recorder filter, assumed"][-1] < 0.01
 
 
+def with_step(size: float, instant: float = 0.008, **config: Any) -> thud.Recording:  # noqa: ANN401
+    """Return the recording of a pulse whose offset changes after the touch, N and s."""
+    return measured(SMOOTH + size * (instant < TIME), **FLAT, **config)
+
+
+SMOOTH = 1500 * np.sin(np.pi * np.clip(TIME / 0.02, 0, 1)) ** 1.3
+
+
+@pytest.mark.parametrize("size", [15.0, -60.0])
+def test_step_of_the_offset_is_in_the_uncertainty(size: float) -> None:
+    truth = measured(SMOOTH, **FLAT)
+    for instant in (0.002, 0.01, 0.017):
+        recording = with_step(size, instant)
+        (drop,) = recording.drops
+        assert drop.offset_step == pytest.approx(size, abs=0.5)
+        assert any("the offset changes" in warning for warning in recording.warnings)
+        for level, right in zip(recording.level_estimates(), truth.levels(), strict=True):
+            assert abs(level.value - right) < 1.1 * level.expanded
+        for name in ("peak_force", "impulse"):
+            estimate, right = getattr(drop, name), getattr(truth.drops[0], name)
+            assert abs(estimate.value - right.value) < estimate.expanded
+            assert estimate.uncertainty > 5 * right.uncertainty
+
+
+@pytest.mark.parametrize("kind", ["quiet", "hum", "drift", "tremor", "droop 0.2 s", "droop 2 s"])
+def test_other_backgrounds_are_no_step(kind: str) -> None:
+    force = SMOOTH.copy()
+    if kind == "hum":
+        force += 60 * np.sin(2 * np.pi * 50 * TIME + 0.4)
+    elif kind == "drift":
+        force += 100 * TIME
+    elif kind == "tremor":
+        force += 20 * np.sin(2 * np.pi * 6 * TIME + 1)
+    elif kind.startswith("droop"):
+        tau = float(kind.split()[1])
+        force += scipy.signal.lfilter([-1 / tau / RATE], [1, -1 + 1 / tau / RATE], force)
+    recording = measured(force, **FLAT)
+    assert recording.drops[0].offset_step == 0
+    assert not recording.average().contributions["offset step"].any()
+
+
 def test_gain_of_two_is_six_decibels_in_every_band() -> None:
     change = level_change([make_drop(1.0)], lambda f: np.full(len(f), 2.0), "third")
     np.testing.assert_allclose(change, 20 * math.log10(2))

@@ -292,7 +292,14 @@ def test_restitution_by_impulse_and_flight_has_the_uncertainty_of_both() -> None
             slope, rel=1e-6 if name != "drop height" else 0.02
         )
     slope = 0.003 * (by_flight(0.7, 1.2 + 1e-6) - by_flight(0.7, 1.2 - 1e-6)) / 2e-6
-    assert shared["bounces"] == {"drop height": pytest.approx(slope)}
+    assert shared["bounces"]["drop height"] == pytest.approx(slope)
+    # What the models say of the release: 0.5 ms of gravity, and a flight from 4 mm above or below.
+    speed = np.sqrt(2 * 9.81 * 1.2)
+    assert shared["impulse"]["slow release"] == pytest.approx(9.81 * 5e-4 / speed / np.sqrt(3))
+    rise = ways["bounces"].value * speed
+    flight = (rise + np.sqrt(rise**2 + 2 * 9.81 * 4e-3)) / 9.81
+    longer = by_flight(flight, 1.2) - ways["bounces"].value
+    assert shared["bounces"]["deformed ball"] == pytest.approx(longer / np.sqrt(3), rel=2e-3)
     assert DropConditions(None, 2.4).restitutions(IMPULSE, CONTACT, FLIGHTS[:1]) == ({}, ())
     ways, (told,) = DropConditions().restitutions(IMPULSE, CONTACT, FLIGHTS)
     assert not ways

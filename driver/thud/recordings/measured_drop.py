@@ -6,8 +6,8 @@ Derivations: docs/recordings_theory.md.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,10 +18,13 @@ from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.contact import Contact, estimate_limits, find_contact
 from thud.recordings.faults import min_background, repair
 from thud.recordings.noise import Noise
+from thud.recordings.offset_step import find_offset_step, step_errors
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.restitution import BOUNCES, GRAVITY, DropConditions
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
@@ -86,6 +89,8 @@ class Drop(Immutable):
         Processing of the signal, and possible faults, a sentence each.
     contact : Contact
         Times, background and gate of the contact.
+    offset_step : float
+        Change of the offset during the contact, N; zero if there is none.
     ringing : Ringing or None
         Ringing of the plate after the contact.
     plate_recorded : bool or None
@@ -112,6 +117,7 @@ class Drop(Immutable):
     steps: tuple[str, ...]
     warnings: tuple[str, ...]
     contact: Contact
+    offset_step: float = 0.0
     ringing: Ringing | None = None
     plate_recorded: bool | None = None
 
@@ -156,7 +162,14 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
             f"{1e3 * contact_time.uncertainty:.2g} ms",
             f"an uncertainty up to 1/{MIN_CONTACT_RATIO:g} of it",
         )
-    impulse = _impulse(contact)
+    offset_step = find_offset_step(contact)
+    if offset_step:
+        changed = (
+            f"the offset changes by {offset_step:.3g} N during the contact; its effect is in the "
+            "uncertainty"
+        )
+        warnings += (changed,)
+    impulse = _with_step(_impulse(contact), np.sum, offset_step, contact, 1 / contact.sample_rate)
     # The first flight gives the restitution; without the height two flights are compared.
     landings = _landings(window, contact, 1 if conditions.height else 2)
     if conditions.height and landings:
@@ -187,7 +200,8 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
         shared_effects=shared,
         restitution_method=" and ".join(methods),
         restitutions=methods,
-        peak_force=_peak(contact),
+        peak_force=_with_step(_peak(contact), _largest, offset_step, contact),
+        offset_step=offset_step,
         impulse=impulse,
         effective_mass=conditions.effective_mass(impulse, contact_time, methods.get(BOUNCES)),
         noise=_noise(contact),
@@ -231,6 +245,25 @@ def _impulse(contact: Contact) -> Estimate:
     ones = np.full((1, len(contact.gated)), 1 / contact.sample_rate)
     variance = contact.covariance_of(ones)[0, 0]
     return Estimate(float((ones @ contact.gated)[0]), math.sqrt(variance))
+
+
+def _with_step(
+    estimate: Estimate,
+    quantity: Callable[..., Any],
+    step: float,
+    contact: Contact,
+    factor: float = 1.0,
+) -> Estimate:
+    """Return an estimate whose uncertainty includes that of the instant of an offset step."""
+    if not step:
+        return estimate
+    errors = quantity(step_errors(step, len(contact.gated)), axis=1)
+    half_width = factor * float(np.abs(errors).max())
+    return replace(estimate, uncertainty=math.hypot(estimate.uncertainty, half_width / 3**0.5))
+
+
+def _largest(errors: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
+    return np.asarray(np.abs(errors).max(axis=axis))
 
 
 def _peak(contact: Contact) -> Estimate:

@@ -13,6 +13,7 @@ from thud.base.immutable import Immutable
 from thud.level.levels import force_exposure_levels, get_bands
 from thud.recordings.band_noise import band_noise
 from thud.recordings.filters import filter_levels, low_pass_attenuation, low_pass_force
+from thud.recordings.offset_step import step_errors
 from thud.recordings.outliers import SIGNIFICANCE, Outlier, find_outliers
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ class DropLevels(Immutable):
         ``"background"``: less than 6 dB above it, the level is an upper bound; ``"rate"``: NaN,
         the sample rate is too low for the band.
     contributions : dict of ndarray, shape (n_band,)
-        Standard uncertainties, dB: noise, method, filter.
+        Standard uncertainties, dB: noise, method, filter, offset step.
     steps : tuple of str
         Processing, a sentence each.
     """
@@ -150,12 +151,26 @@ def _drop_levels(
         "noise": ENERGY_DECIBEL * deviation / 10 ** (level / 10),
         "method": np.abs(measured - exact) / math.sqrt(3),
         "filter": low_pass_attenuation(edges.upper, rate) / math.sqrt(3) * low_pass,
+        "offset step": _step_uncertainty(drop, bands),
     }
     steps = (*steps, f"levels: {_DESCRIPTIONS[method]}", *_background_steps(edges.nominal, flag))
     return DropLevels(
         drop.name, bands, method, level, _root_sum(contributions), measured, background, flag,
         contributions, steps,
     )  # fmt: skip
+
+
+def _step_uncertainty(drop: Drop, bands: BandSet) -> NDArray[np.float64]:
+    """Return the standard uncertainty due to a step of the offset during the contact, dB."""
+    if not drop.offset_step:
+        return np.zeros(len(get_bands(bands).nominal))
+    force = drop.force[slice(*drop.gate)]
+    exact = _levels(force, drop.sample_rate, bands, "exact")
+    changed = [
+        _levels(force + error, drop.sample_rate, bands, "exact")
+        for error in step_errors(drop.offset_step, len(force))
+    ]
+    return np.asarray(np.abs(np.array(changed) - exact).max(axis=0) / math.sqrt(3))
 
 
 def compare_methods(
