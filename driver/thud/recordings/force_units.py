@@ -127,19 +127,15 @@ def plain_number(calibration: T) -> T | float:
 
 
 def unit_of_chain(chain: str) -> str:
-    """Return the unit from which a chain converts to newtons; empty if it is not clear.
+    """Return the base unit from which a chain converts to newtons; empty if it is not clear.
 
     >>> unit_of_chain("4.1 pC/N, 10 mV/pC")
-    'mV'
+    'V'
     """
     factors = read_chain(chain)
-    ends: dict[str, str] = {}
-    for symbol in re.split(r"[\s/;,]+", chain):
-        unit = find_unit(symbol)
-        base = UNITS[unit][0] if unit else "N"
-        if base != "N" and _follow(base, factors, None) is not None:
-            ends.setdefault(base, unit)
-    return ends.popitem()[1] if len(ends) == 1 else ""
+    units = {unit for factor in factors for unit in (factor.top, factor.bottom)} - {"N"}
+    ends = [unit for unit in units if _follow(unit, factors, None) is not None]
+    return ends[0] if len(ends) == 1 else ""
 
 
 def newtons_per_unit(

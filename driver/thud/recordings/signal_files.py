@@ -333,7 +333,11 @@ def _scaled(
 def _rate(channel: Channel, stated: _Stated, name: str) -> tuple[float, tuple[str, ...]]:
     rate = channel.sample_rate if stated.sample_rate is None else float(stated.sample_rate)
     if rate is None:
-        refuse(f"{name}: the sample rate is not known", "sample_rate in Hz, or a column of times")
+        reason = "".join(f" ({step.rstrip('.')})" for step in channel.steps if "coarse" in step)
+        refuse(
+            f"{name}: the sample rate is not known{reason}",
+            "sample_rate in Hz, or a column of times",
+        )
     if not RATES[0] <= rate <= RATES[1]:
         refuse(f"{name}: the sample rate is {rate:.6g} Hz", f"{RATES[0]:g} to {RATES[1]:g} Hz")
     if channel.sample_rate in {None, rate}:
@@ -362,7 +366,8 @@ def _unit(channel: Channel, stated: _Stated, name: str) -> tuple[str, tuple[str,
     if channel.unit or isinstance(stated.calibration, str | Calibration):
         calibration = stated.calibration
         chain = calibration.chain if isinstance(calibration, Calibration) else str(calibration)
-        if not channel.unit and (unit := unit_of_chain(chain)):
+        unit = "" if channel.unit else unit_of_chain(chain)
+        if unit and (unit != "FS" or channel.may_be_fractions):
             return unit, (f"The file states no unit; by the calibration the values are in {unit}.",)
         description = f"in {shown_text(channel.unit)!r}" if channel.unit else "without a unit"
         refuse(f"{name}: the values are {description}", f"unit = one of {ALLOWED}")
