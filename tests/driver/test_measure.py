@@ -151,7 +151,10 @@ def test_source_and_limits_are_checked_before_anything_is_measured(
 
 
 def test_recording_has_the_name_of_its_first_signal() -> None:
-    signals = [Signal.from_array(half_sine(24e3, 0.1, 5280), 24e3, name) for name in ("a.b", "c")]
+    signals = [
+        Signal.from_array(half_sine(24e3, 0.1, 5280, duration=duration), 24e3, name)
+        for name, duration in (("a.b", 0.02), ("c", 0.021))
+    ]
     assert thud.Recording.from_signals(signals, Config()).name == "a"
 
 

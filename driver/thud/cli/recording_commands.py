@@ -51,8 +51,9 @@ def measure(options: argparse.Namespace) -> int:
             mass_uncertainty=options.mass_uncertainty,
             source=options.source,
             channel=channel_of(options.channel),
+            channels=options.channels,
             unit=options.unit,
-            calibration=options.calibration,
+            calibration=_single(options.calibration),
             calibration_uncertainty=options.calibration_uncertainty,
             polarity=options.polarity,
             sample_rate=options.sample_rate,
@@ -82,6 +83,11 @@ def measure(options: argparse.Namespace) -> int:
     return NOT_CONFORMING if options.check and not verdict else 0
 
 
+def _single(values: list[str] | None) -> list[str] | str | None:
+    """Return the values of a repeated option, and the value itself if there is one."""
+    return values[0] if values and len(values) == 1 else values
+
+
 MEASURE = Command(
     "levels, verdict and calibration report of recorded drops",
     (
@@ -102,9 +108,18 @@ MEASURE = Command(
             "--config", metavar="LAB.toml", help="file on laboratory, instruments, calibration"
         ),
         argument("--channel", metavar="NAME|NUMBER", help="channel of the force"),
+        argument(
+            "--channels",
+            metavar="sum|F1+F2",
+            help="load cells whose forces are added: sum for all channels of force",
+        ),
         argument("--unit", help="unit of the recorded values, if the file does not state it"),
         argument(
-            "--calibration", metavar="N/UNIT", help='such as "250 N/V" or "4.1 pC/N, 10 mV/pC"'
+            "--calibration",
+            metavar="N/UNIT",
+            action="append",
+            help='such as 250, "250 N/V" or "4.1 pC/N, 10 mV/pC"; repeated: one for each of '
+            "--channels",
         ),
         argument(
             "--calibration-uncertainty",

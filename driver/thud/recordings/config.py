@@ -20,7 +20,13 @@ from thud.base.errors import InputError
 from thud.level.assessment import get_criteria
 from thud.level.levels import SOURCES
 from thud.recordings.channel import MIB, shown_path, shown_text
-from thud.recordings.force_units import Calibration, read_chain, require_unit
+from thud.recordings.force_units import (
+    Calibration,
+    plain_number,
+    read_chain,
+    require_unit,
+)
+from thud.recordings.load_cells import require_channels
 from thud.recordings.plate import Plate, check_plate
 from thud.recordings.polarity import POLARITIES
 from thud.recordings.recorder_filter import KINDS, MAX_ORDER, RecorderFilter
@@ -82,6 +88,7 @@ def _channel(value: object, key: str) -> int | str:
 def _calibration(value: object, key: str) -> Calibration | str | float:
     if isinstance(value, Calibration):
         return value
+    value = plain_number(value)
     if not isinstance(value, str):
         return _number(-1e30, 1e30, value, key)
     try:
@@ -90,6 +97,14 @@ def _calibration(value: object, key: str) -> Calibration | str | float:
         message = f"{key}: {error}"
         raise InputError(message) from error
     return value
+
+
+def _calibrations(
+    value: object, key: str
+) -> Calibration | str | float | tuple[Calibration | str | float, ...]:
+    if not isinstance(value, list | tuple):
+        return _calibration(value, key)
+    return tuple(_calibration(entry, f"{key}, entry {i}") for i, entry in enumerate(value, 1))
 
 
 def _table(value: object, key: str) -> Mapping[str, object]:
@@ -226,7 +241,7 @@ class Config:
         Temperature of ball and air, degC.
     instruments : tuple of str
         Instruments.
-    channel, unit, polarity, sample_rate, calibration
+    channel, channels, unit, polarity, sample_rate, calibration
         As for `open_signals`.
     calibration_uncertainty : float or None
         Relative standard uncertainty of the force; by default that of the `Calibration`.
@@ -252,8 +267,11 @@ class Config:
     temperature: float | None = _key(partial(_number, -273.15, 200.0))
     instruments: tuple[str, ...] = _key(_texts, ())
     channel: int | str | None = _key(_channel)
+    channels: str | tuple[int | str, ...] | None = _key(require_channels)
     unit: str | None = _key(require_unit)
-    calibration: Calibration | str | float | None = _key(_calibration)
+    calibration: Calibration | str | float | tuple[Calibration | str | float, ...] | None = _key(
+        _calibrations
+    )
     calibration_uncertainty: float | None = _key(partial(_number, 0.0, 0.5))
     polarity: str | None = _key(partial(_choice, POLARITIES))
     sample_rate: float | None = _key(partial(_number, 1.0, 1e9))

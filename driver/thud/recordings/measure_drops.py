@@ -17,9 +17,16 @@ from thud.base.errors import NumericalError
 from thud.base.processes import no_interrupt_in_processes, process_pool
 from thud.recordings.checkpoint import Checkpoint
 from thud.recordings.drops import find_windows
+from thud.recordings.load_cells import repair_cells
 from thud.recordings.measured_drop import measure_drop
 from thud.recordings.response import correct_window
 from thud.recordings.ringing import find_ringing, is_in_record
+from thud.recordings.same_drops import (
+    Record,
+    refuse_copy,
+    refuse_same_drops,
+    refuse_simultaneous_channels,
+)
 
 if TYPE_CHECKING:
     import os
@@ -68,10 +75,11 @@ def measure_signals(
     """Return the drops of signals, their origins, and the relative uncertainty of the force.
 
     The uncertainty is the largest of all signals, None if it is unknown for any of them. The
-    arguments are those of `read_recording`. Raise InputError if there are no signals, or a drop
-    cannot be measured.
+    arguments are those of `read_recording`. Raise InputError if there are no signals, a drop
+    cannot be measured, or two signals record the same drop.
     """
-    drops: list[Drop] = []
+    records: list[Record] = []
+    searched: list[tuple[str, list[Window]]] = []
     origins: list[Origin] = []
     uncertainties: list[float | None] = []
     # BLAS threads slow down the many small matrix products.
@@ -83,18 +91,24 @@ def measure_signals(
         for signal in signals:
             if config.calibration_uncertainty is not None:
                 signal = replace(signal, calibration_uncertainty=config.calibration_uncertainty)  # noqa: PLW2901
+            refuse_copy(signal, records)
             # The processes start during the search for drops.
             if signal.path and signal.n_sample > MIN_DURATION * signal.sample_rate:
                 processes.start()
             windows = find_windows(signal, progress=progress)
-            drops += _measure(windows, config, stored, processes, progress=progress)
+            refuse_simultaneous_channels(windows, searched)
+            searched.append((signal.path, windows))
+            measured = _measure(windows, config, stored, processes, progress=progress)
+            records.append(Record(signal.name, signal.path, signal.checksum, tuple(measured)))
             uncertainties.append(signal.calibration_uncertainty)
             origins.append(Origin.of(signal, len(windows)))
-    if not drops:
+    if not records:
         refuse("there are no recordings", "one file or more")
+    refuse_same_drops(records)
     known = [uncertainty for uncertainty in uncertainties if uncertainty is not None]
     uncertainty = max(known) if len(known) == len(uncertainties) else None
-    return tuple(drops), tuple(origins), uncertainty
+    drops = tuple(drop for record in records for drop in record.drops)
+    return drops, tuple(origins), uncertainty
 
 
 def _measure(
@@ -168,9 +182,12 @@ class _Processes(ExitStack):
 def measure_window(window: Window, config: Config) -> Drop:
     """Return the drop in a window, after correction of the responses of the instruments."""
     steps, warnings = tuple[str, ...](), tuple[str, ...]()
+    if window.signal.cells:
+        window, steps, warnings = repair_cells(window)
     chain, plate, recorded = config.chain, config.resonance, window
     if chain is not None:
-        window, steps, warnings = correct_window(window, chain)
+        window, notes, remarks = correct_window(window, chain)
+        steps, warnings = (*steps, *notes), (*warnings, *remarks)
     drop = measure_drop(window, config.conditions(window.signal.calibration_uncertainty))
     # A copy without the cached factors of the background, which are no longer needed.
     contact = replace(drop.contact, background=replace(drop.contact.background))

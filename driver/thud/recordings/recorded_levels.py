@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import stdtrit
 
 from thud.base.checks import refuse, require_choice
 from thud.base.immutable import Immutable
@@ -14,12 +15,12 @@ from thud.level.levels import force_exposure_levels, get_bands
 from thud.recordings.band_noise import band_noise
 from thud.recordings.filters import filter_levels, low_pass_attenuation, low_pass_force
 from thud.recordings.offset_step import step_errors
-from thud.recordings.outliers import SIGNIFICANCE, Outlier, find_outliers
+from thud.recordings.outliers import EXPANDED, SIGNIFICANCE, Outlier, find_outliers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from thud.base._schema import BandSet
     from thud.recordings.measured_drop import Drop
@@ -33,8 +34,8 @@ BACKGROUND = (6.0, 15.0)
 MARGIN = 3e-3
 # Change of a level per relative change of an energy, dB.
 ENERGY_DECIBEL = 10 / math.log(10)
-# Contributions that are independent between drops: the repeatability includes them.
-WITHIN_REPEATABILITY = ("noise",)
+# Contribution that is independent between drops: their scatter includes it.
+NOISE, REPEATABILITY = "noise", "repeatability"
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +96,8 @@ class AverageLevels(Immutable):
         Standard deviation of the drops' levels, dB; NaN for a single drop.
     contributions : dict of ndarray, shape (n_band,)
         Standard uncertainties of the average, dB. The repeatability, with ``n_drop - 1`` degrees of
-        freedom, includes the noise, which is independent between drops.
+        freedom, includes the noise, which is independent between drops; `noise_exceeds` tells
+        which of the two counts.
     outliers : tuple of Outlier
         Drops that differ from the others.
     """
@@ -203,22 +205,37 @@ def average_levels(estimates: Sequence[DropLevels]) -> AverageLevels:
     contributions = {}
     for name in first.contributions:
         weighted = weights * np.array([e.contributions[name] for e in estimates])
-        independent = name in WITHIN_REPEATABILITY
         contributions[name] = (
-            np.sqrt((weighted**2).sum(axis=0)) if independent else weighted.sum(axis=0)
+            np.sqrt((weighted**2).sum(axis=0)) if name == NOISE else weighted.sum(axis=0)
         )
     if count > 1:
         error = energies.std(axis=0, ddof=1) / math.sqrt(count)
         error *= ENERGY_DECIBEL / 10 ** (level / 10)
-        contributions = {"repeatability": error, **contributions}
-    counted = {
-        n: c for n, c in contributions.items() if count == 1 or n not in WITHIN_REPEATABILITY
-    }
+        contributions = {REPEATABILITY: error, **contributions}
+        exceeds = noise_exceeds(error, contributions[NOISE], count)
+        counted = {
+            **contributions,
+            REPEATABILITY: np.where(exceeds, 0.0, error),
+            NOISE: np.where(exceeds, contributions[NOISE], 0.0),
+        }
+    else:
+        counted = contributions
     return AverageLevels(
         first.bands, first.method, tuple(e.name for e in estimates), drops, level, background,
         _root_sum(counted), flag, drops.std(axis=0, ddof=1) if count > 1 else unknown,
         contributions, _level_outliers(estimates, drops),
     )  # fmt: skip
+
+
+def noise_exceeds(scatter: ArrayLike, noise: ArrayLike, count: int) -> NDArray[np.bool_]:
+    """Whether the expanded uncertainty of a mean by noise exceeds that by scatter.
+
+    Both are standard uncertainties of the mean over a number of drops, above 1; the scatter has one
+    degree of freedom less. The scatter includes the noise, but may be small by chance.
+    """
+    return np.asarray(
+        EXPANDED * np.asarray(noise) > stdtrit(count - 1, 0.975) * np.asarray(scatter)
+    )
 
 
 _DESCRIPTIONS = {

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.fft import next_fast_len
 
 from thud.level.levels import get_bands
-from thud.recordings.faults import repair
+from thud.recordings.faults import read_repaired, repair
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -117,7 +117,7 @@ def correct_window(window: Window, chain: Chain) -> tuple[Window, tuple[str, ...
     # Faults must be found in the recorded force; the correction would make a dropout ring.
     force, steps, warnings = repair(window)
     repaired = replace(
-        window.signal, samples=partial(_read_repaired, window.signal, window.start, force)
+        window.signal, samples=partial(read_repaired, window.signal, window.start, force)
     )
     applied = replace(
         window.signal, samples=partial(_read_corrected, repaired, chain), full_scale=None
@@ -132,14 +132,3 @@ def _read_corrected(signal: Signal, chain: Chain, start: int, stop: int) -> NDAr
     first, last = max(start - margin, 0), min(stop + margin, signal.n_sample)
     corrected = correct_force(signal.read(first, last), signal.sample_rate, chain)
     return corrected[start - first : stop - first]
-
-
-def _read_repaired(
-    signal: Signal, begin: int, repaired: NDArray[np.float64], start: int, stop: int
-) -> NDArray[np.float64]:
-    """Return a force, N, from start to before stop, with repaired samples from `begin` on."""
-    force = signal.read(start, stop)
-    first, last = max(start, begin), min(stop, begin + len(repaired))
-    if first < last:
-        force[first - start : last - start] = repaired[first - begin : last - begin]
-    return force
