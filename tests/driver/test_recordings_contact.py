@@ -353,7 +353,7 @@ def test_only_rough_flanks_fall() -> None:
 def test_scale_of_a_contact_is_its_peak_below_the_band_edge() -> None:
     force = half_sine(RATE, 0.1, int(0.22 * RATE)) + 40
     force[2700] += 300
-    (window,) = drops.find_windows(Signal.from_array(force, RATE))
+    (window,) = drops.search_drops(Signal.from_array(force, RATE)).windows
     found = contact.find_contact(window, force[window.start : window.stop])
     expected = uniform_filter1d(force - 40, round(RATE / 1250)).max()
     assert found.peak == pytest.approx(expected, rel=1e-3)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.fft import next_fast_len
 
-from thud.level.levels import get_bands
+from thud.level.levels import get_bands, low_pass
 from thud.recordings.plate import TOLERANCE, Plate
 from thud.recordings.recorder_filter import assumed_filter
 
@@ -29,8 +30,6 @@ ASSUMED_FLAT = 1000.0
 MIN_WARNED = 0.1
 # Length of the spectrum of a pulse, in lengths of the pulse: the lowest band holds three lines.
 PADDING = 16
-# Sample rate below which the filter of the recorder is asked for, Hz.
-LOW_RATE = 6000.0
 
 
 def assumed_contributions(
@@ -70,38 +69,57 @@ def assumption_warnings(drops: Sequence[Drop], config: Config) -> tuple[str, ...
         band = int(np.nanargmax(half_widths))
         return f"up to {half_widths[band]:.2f} dB at {get_bands('octave').nominal[band]:g} Hz"
 
-    plate, flat = config.resonance, _flat_limit(config)
-    unsure = [drop.plate_recorded for drop in drops]
-    if plate is None and not any(drop.ringing for drop in drops) and flat is None:
-        result.append(
-            f"the response of the force plate is not stated ([plate]): it is assumed to be flat "
-            f"within {100 * TOLERANCE:g} % up to {ASSUMED_FLAT:g} Hz ({size('plate, assumed')})"
+    plate = config.resonance
+    rings = any(drop.ringing for drop in drops)
+    assumed = []
+    if plate is None and not rings and _flat_limit(config) is None:
+        assumed.append(
+            f"the force plate is flat within {100 * TOLERANCE:g} % up to {ASSUMED_FLAT:g} Hz "
+            f"([plate]; {size('plate, assumed')})"
         )
-    elif plate is None and any(drop.ringing for drop in drops):
+    if config.filter is None:
+        assumed.append(
+            "the filter of the recorder is at a quarter of the sample rate or above "
+            f"([filter]; {size('recorder filter, assumed')})"
+        )
+    if assumed:
+        result.append(f"not stated, and assumed for levels and peak: {'; '.join(assumed)}")
+    if plate is None and rings:
         result.append(
             "the resonance of the force plate is not stated: its estimated effect, "
             f"{size('plate, assumed')}, is in the uncertainty"
         )
-    if plate is not None and False in unsure and True not in unsure:
-        result.append(
-            f"the record does not show the stated resonance of {plate.frequency:.4g} Hz: its "
-            f"correction, {size('plate, assumed')}, is in the uncertainty; check [plate]"
-        )
-    elif plate is not None and True not in unsure:
+    seen = [drop.plate_recorded for drop in drops]
+    if plate is not None and True not in seen:
         change = level_change(drops, lambda f: np.abs(plate.response(f)), "octave")
-        if np.nanmax(np.abs(change)) > MIN_WARNED:
+        if False in seen:
+            result.append(
+                f"the record does not show the stated resonance of {plate.frequency:.4g} Hz: its "
+                f"correction, {size('plate, assumed')}, is in the uncertainty; check [plate]"
+            )
+        elif np.nanmax(np.abs(change)) > MIN_WARNED:
             result.append(
                 f"the record neither shows nor excludes the stated resonance of "
                 f"{plate.frequency:.4g} Hz: its correction, {np.nanmax(np.abs(change)):.2f} dB at "
                 "500 Hz, depends on [plate] alone"
             )
-    rate = min(drop.sample_rate for drop in drops)
-    if config.filter is None and rate < LOW_RATE:
-        result.append(
-            f"the sample rate is {rate:.4g} Hz and no filter is stated ([filter]): a filter before "
-            f"sampling may reduce the levels ({size('recorder filter, assumed')})"
-        )
     return tuple(result)
+
+
+def with_assumptions(drop: Drop, config: Config) -> Drop:
+    """Return a drop whose peak has the uncertainty due to instruments that are not stated."""
+    variance = drop.peak_force.uncertainty**2
+    force, rate = drop.contact.gated, drop.sample_rate
+    for gain in (_plate_gain([drop], config), _filter_gain([drop], config)):
+        if gain is not None:
+            length = next_fast_len(PADDING * len(force), real=True)
+            factor = gain(np.asarray(np.fft.rfftfreq(length, 1 / rate), dtype=np.float64))
+            changed = np.fft.irfft(np.fft.rfft(force, length) * factor, length)[: len(force)]
+            change = (
+                low_pass(np.pad(changed, 2), rate).max() - low_pass(np.pad(force, 2), rate).max()
+            )
+            variance += change**2 / 3
+    return replace(drop, peak_force=replace(drop.peak_force, uncertainty=math.sqrt(variance)))
 
 
 def level_change(

@@ -20,6 +20,7 @@ from thud.base.errors import InputError
 from thud.level.assessment import get_criteria
 from thud.level.levels import SOURCES
 from thud.recordings.channel import MIB, shown_path, shown_text
+from thud.recordings.choice import parse_numbers
 from thud.recordings.force_units import (
     Calibration,
     plain_number,
@@ -124,6 +125,21 @@ def _linearity(value: object, key: str) -> tuple[tuple[float, float], ...]:
     if len(pairs) < 2:  # noqa: PLR2004
         refuse(f"{key} = {shown(value)} is not allowed", "[[applied, indicated], ...], N")
     return tuple(_pair(pair, key, "applied, indicated", 1e-3, 1e9) for pair in pairs)
+
+
+def _numbers(value: object, key: str) -> str:
+    text = _text(value, key)
+    parse_numbers(text, key)
+    return text
+
+
+def _reasons(value: object, key: str) -> dict[str, str]:
+    table = _table(value, key)
+    reasons = {_numbers(str(number), key): _text(reason, key) for number, reason in table.items()}
+    for number, reason in reasons.items():
+        if not reason.strip():
+            refuse(f"{key}: {number} has no reason", 'a reason, such as "touched"')
+    return reasons
 
 
 def _limits(value: object, key: str) -> dict[str, tuple[float, float]]:
@@ -253,6 +269,13 @@ class Config:
         The force plate.
     filter : FilterConfig or None
         The low-pass filter of the recorder.
+    drops : str or None
+        Numbers of the drops to be measured, such as ``"1-5, 8"``; all by default. They count over
+        all files.
+    leave_out : mapping
+        Numbers of drops to be left out, with the reason: ``{"3": "touched"}``.
+    begin, end : float or None
+        Section of each file that is searched for drops, s.
     low_pass : bool
         Whether levels are those of the force below 1.25 kHz.
     limits : mapping
@@ -281,6 +304,10 @@ class Config:
     height_uncertainty: float | None = _key(partial(_number, 0.0, 10.0))
     plate: PlateConfig | None = _key(_plate)
     filter: FilterConfig | None = _key(_filter)
+    drops: str | None = _key(_numbers)
+    leave_out: Mapping[str, str] = field(default_factory=dict, metadata={"check": _reasons})
+    begin: float | None = _key(partial(_number, 0.0, 1e9))
+    end: float | None = _key(partial(_number, 0.0, 1e9))
     low_pass: bool = _key(_flag, default=False)
     limits: Mapping[str, tuple[float, float]] = field(
         default_factory=dict, metadata={"check": _limits}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from concurrent.futures import BrokenExecutor
 from contextlib import AbstractContextManager, ExitStack, nullcontext
@@ -15,8 +16,10 @@ from tqdm import tqdm
 from thud.base.checks import refuse
 from thud.base.errors import NumericalError
 from thud.base.processes import no_interrupt_in_processes, process_pool
+from thud.recordings.assumptions import with_assumptions
 from thud.recordings.checkpoint import Checkpoint
-from thud.recordings.drops import find_windows
+from thud.recordings.choice import choose, require_chosen
+from thud.recordings.drops import search_drops
 from thud.recordings.load_cells import repair_cells
 from thud.recordings.measured_drop import measure_drop
 from thud.recordings.response import correct_window
@@ -58,10 +61,11 @@ class Origin:
     drops: int
 
     @classmethod
-    def of(cls, signal: Signal, drops: int) -> Origin:
-        """Return the origin of a number of drops of a signal."""
+    def of(cls, signal: Signal, drops: int, notes: tuple[str, ...]) -> Origin:
+        """Return the origin of a number of drops of a signal, with notes on others."""
         names = (field.name for field in fields(cls)[:-1])
-        return cls(**{name: getattr(signal, name) for name in names}, drops=drops)
+        origin = cls(**{name: getattr(signal, name) for name in names}, drops=drops)
+        return replace(origin, steps=(*origin.steps, *notes))
 
 
 def measure_signals(
@@ -82,6 +86,7 @@ def measure_signals(
     searched: list[tuple[str, list[Window]]] = []
     origins: list[Origin] = []
     uncertainties: list[float | None] = []
+    count = 0
     # BLAS threads slow down the many small matrix products.
     if isinstance(checkpoint, Checkpoint):
         opened: AbstractContextManager[Checkpoint] = nullcontext(checkpoint)
@@ -95,15 +100,21 @@ def measure_signals(
             # The processes start during the search for drops.
             if signal.path and signal.n_sample > MIN_DURATION * signal.sample_rate:
                 processes.start()
-            windows = find_windows(signal, progress=progress)
-            refuse_simultaneous_channels(windows, searched)
-            searched.append((signal.path, windows))
+            search = search_drops(
+                signal, config.begin or 0.0, config.end or math.inf, progress=progress
+            )
+            windows, left_out = choose(search.windows, count + 1, config.drops, config.leave_out)
+            count += len(search.windows)
+            refuse_simultaneous_channels(search.windows, searched)
+            searched.append((signal.path, search.windows))
             measured = _measure(windows, config, stored, processes, progress=progress)
+            notes = (*search.ignored, *left_out)
             records.append(Record(signal.name, signal.path, signal.checksum, tuple(measured)))
             uncertainties.append(signal.calibration_uncertainty)
-            origins.append(Origin.of(signal, len(windows)))
+            origins.append(Origin.of(signal, len(windows), notes))
     if not records:
         refuse("there are no recordings", "one file or more")
+    require_chosen(count, sum(len(r.drops) for r in records), config.drops, config.leave_out)
     refuse_same_drops(records)
     known = [uncertainty for uncertainty in uncertainties if uncertainty is not None]
     uncertainty = max(known) if len(known) == len(uncertainties) else None
@@ -120,6 +131,8 @@ def _measure(
     progress: bool,
 ) -> list[Drop]:
     """Return the drops in the windows of one signal, including those of the checkpoint."""
+    if not windows:
+        return []
     signal = windows[0].signal
     measured = checkpoint.open(signal, config)
     remaining = [window for window in windows if window.start not in measured]
@@ -192,7 +205,7 @@ def measure_window(window: Window, config: Config) -> Drop:
     # A copy without the cached factors of the background, which are no longer needed.
     contact = replace(drop.contact, background=replace(drop.contact.background))
     ringing = find_ringing(contact, chain)
-    return replace(
+    drop = replace(
         drop,
         contact=contact,
         steps=(*steps, *drop.steps),
@@ -200,3 +213,4 @@ def measure_window(window: Window, config: Config) -> Drop:
         ringing=ringing,
         plate_recorded=None if plate is None else is_in_record(recorded, contact, plate),
     )
+    return with_assumptions(drop, config)

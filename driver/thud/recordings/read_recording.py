@@ -13,7 +13,7 @@ from thud.recordings.recording import Recording
 from thud.recordings.signal_files import open_signals
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from thud.base._schema import LimitsSource
     from thud.recordings.checkpoint import Checkpoint
@@ -34,6 +34,10 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     calibration_uncertainty: float | None = None,
     polarity: str | None = None,
     sample_rate: float | None = None,
+    drops: str | None = None,
+    leave_out: Mapping[str, str] | None = None,
+    begin: float | None = None,
+    end: float | None = None,
     low_pass: bool | None = None,
     config: Config | str | os.PathLike[str] | None = None,
     progress: bool = False,
@@ -58,6 +62,12 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
         As for `open_signals`.
     calibration_uncertainty
         Relative standard uncertainty of the force.
+    drops
+        Numbers of the drops to be measured, such as ``"1-5, 8"``. They count over all files.
+    leave_out
+        Numbers of drops to be left out, with the reason: ``{"3": "touched"}``.
+    begin, end
+        Section of each file that is searched for drops, s.
     low_pass
         Whether levels are those of the force below 1.25 kHz, as in the paper.
     config
@@ -88,6 +98,7 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
         "channels": channels, "unit": unit,
         "calibration": calibration, "calibration_uncertainty": calibration_uncertainty,
         "polarity": polarity, "sample_rate": sample_rate, "low_pass": low_pass,
+        "drops": drops, "leave_out": leave_out, "begin": begin, "end": end,
     }  # fmt: skip
     stated = {key: value for key, value in stated.items() if value is not None}
     require_whole("workers", workers, 1, MAX_THREADS)
