@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from functools import partial
@@ -150,13 +151,20 @@ def run_calibrate(options: argparse.Namespace) -> int:
         channel=channel_of(options.channel),
         unit=options.unit,
         uncertainty=options.uncertainty,
+        time_constant=options.time_constant,
+        time_constant_uncertainty=options.time_constant_uncertainty,
     )
     print(f'calibration = "{result.chain}"')
     print(f"calibration_uncertainty = {result.uncertainty:.2g}")
     if not options.quiet:
         print(f"# {result.origin}")
+        if result.time_constant:
+            print(f"# {result.time_constant}")
+    unknown = "uncertainty of the {} not stated: not included ({})"
+    if options.time_constant not in {None, math.inf} and not options.time_constant_uncertainty:
+        print_notes([unknown.format("time constant", "--time-constant-uncertainty")])
     if not options.uncertainty:
-        print_notes(["uncertainty of the known force not stated: not included (--uncertainty)"])
+        print_notes([unknown.format("known force", "--uncertainty")])
     return 0
 
 
@@ -172,6 +180,19 @@ CALIBRATE = Command(
             default=0.0,
             metavar="FRACTION",
             help="relative standard uncertainty of the mass or force, such as 0.001",
+        ),
+        argument(
+            "--time-constant",
+            type=float,
+            metavar="S",
+            help="time constant of the amplifier, inf without droop (default: fitted)",
+        ),
+        argument(
+            "--time-constant-uncertainty",
+            type=float,
+            default=0.0,
+            metavar="FRACTION",
+            help="relative standard uncertainty of a stated time constant, such as 0.02",
         ),
         argument("--channel", metavar="NAME|NUMBER", help="channel of the force"),
         argument("--unit", help="unit of the recorded values, if the file does not state it"),
