@@ -10,15 +10,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from conftest import naming
-from scipy.signal import lfilter
+from scipy.signal import cont2discrete, lfilter
 
 from thud import InputError, cli
 from thud.recordings.calibration import calibrate
+from thud.recordings.config import read_config
+from thud.recordings.plate_tap import TappedPlate, calibrate_tap
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from conftest import ErrorsOf
     from numpy.typing import NDArray
 
     from thud.recordings.force_units import Calibration
@@ -235,3 +238,156 @@ def test_time_constant_needs_a_time_scale(tmp_path: Path) -> None:
     assert found.time_constant is None
     with pytest.raises(InputError, match=naming("weight.csv", "sample rate")):
         calibrate(tmp_path / "weight.csv", force=FORCE, time_constant=10.0)
+
+
+# --- taps
+
+
+def tapped(  # noqa: PLR0913 - what differs between records
+    modes: list[tuple[float, float, float]],
+    seed: int,
+    *,
+    count: int = 1,
+    duration: float = 1e-3,
+    noise: float = 0.002,
+    rate: float = 20_000.0,
+    hum: float = 0.0,
+) -> Signal:
+    """Return taps on a plate with modes: frequency, Hz, quality, share in the static response.
+
+    The response to a force that is linear between the samples is exact.
+    """
+    rng = np.random.default_rng(seed)
+    time = np.arange(0, 0.1 + 0.4 * count, 1 / rate)
+    force = np.zeros(time.size)
+    for k in range(count):
+        begin = 0.1 + 0.4 * k + rng.uniform(0, 0.01)
+        phase = np.clip((time - begin) / (duration * rng.uniform(0.8, 1.2)), 0, 1)
+        force += rng.uniform(0.7, 1) * np.sin(np.pi * phase) ** 1.5
+    level = (1 - sum(share for *_, share in modes)) * force
+    for frequency, quality, share in modes:
+        omega = 2 * np.pi * frequency
+        system = ([omega**2], [1, omega / quality, omega**2])
+        numerator, denominator, _ = cont2discrete(system, 1 / rate, "foh")
+        level += share * lfilter(numerator.ravel(), denominator, force)
+    level += noise * rng.normal(size=time.size) + 0.1 + hum * np.sin(2 * np.pi * 50 * time)
+    return Signal.from_array(level, rate)
+
+
+def deviations(found: TappedPlate, frequency: float, quality: float) -> tuple[float, float]:
+    """Return the errors of frequency and quality in standard uncertainties."""
+    return (
+        math.log(found.frequency / frequency) / found.frequency_uncertainty,
+        math.log(found.quality / quality) / found.quality_uncertainty,
+    )
+
+
+@pytest.mark.parametrize("hum", [0.0, 0.02])
+@pytest.mark.parametrize("rate", [10_000.0, 51_200.0])
+@pytest.mark.parametrize("count", [1, 3])
+@pytest.mark.parametrize(("frequency", "quality"), [(900.0, 10.0), (1600.0, 60.0)])
+def test_taps_show_the_resonance_of_the_plate(
+    frequency: float, quality: float, count: int, rate: float, hum: float
+) -> None:
+    record = tapped([(frequency, quality, 1.0)], 1, count=count, rate=rate, hum=hum)
+    found = calibrate_tap(record)
+    assert found.count == count
+    assert not found.others
+    assert found.share is None
+    assert found.frequency_uncertainty < 2e-4
+    assert found.quality_uncertainty < 0.01
+    assert np.abs(deviations(found, frequency, quality)).max() < 4
+
+
+def test_errors_of_taps_are_as_large_as_stated() -> None:
+    """Of 60 normal errors 0 to 8 lie outside 95 %, with a probability of 99.7 %."""
+    errors = [
+        deviations(calibrate_tap(tapped([(1100.0, 30.0, 1.0)], k, noise=0.01)), 1100, 30)
+        for k in range(30)
+    ]
+    assert np.count_nonzero(np.abs(errors) > 1.96) <= 8
+
+
+def test_taps_that_differ_count_by_their_scatter() -> None:
+    one, other = (tapped([(frequency, 30.0, 1.0)], 1, count=2) for frequency in (1100.0, 1122.0))
+    level = np.concatenate([one.read(0, one.n_sample), other.read(0, other.n_sample)])
+    found = calibrate_tap(Signal.from_array(level, one.sample_rate))
+    assert found.count == 4
+    assert found.frequency == pytest.approx(1111, rel=1e-3)
+    # The standard deviation of the mean, 6.4 Hz, times 3.18/1.96 for four taps.
+    assert found.frequency_uncertainty == pytest.approx(6.35 / 1111 * 3.18 / 1.96, rel=0.02)
+
+
+def test_second_resonance_is_stated() -> None:
+    found = calibrate_tap(tapped([(1100.0, 30.0, 0.7), (2300.0, 40.0, 0.3)], 1, duration=5e-4))
+    assert np.abs(deviations(found, 1100, 30)).max() < 4
+    assert found.others == pytest.approx([2300], rel=1e-3)
+    assert "also resonances at 2300 Hz" in str(found)
+
+
+def test_share_of_a_small_mode_follows_from_the_antiresonance() -> None:
+    """Five taps of different duration; one alone might have this zero itself."""
+    record = tapped([(900.0, 40.0, 0.3)], 1, count=5)
+    found = calibrate_tap(record)
+    assert found.share == pytest.approx(0.3, abs=max(3 * found.share_uncertainty, 0.005))
+    assert found.share_uncertainty < 0.02
+    assert found.minimum_share <= 0.3
+    assert tomllib.loads(found.lines())["plate"]["share"] == pytest.approx(found.share, rel=2e-3)
+    alone = calibrate_tap(tapped([(900.0, 40.0, 0.3)], 1))
+    assert alone.share is None
+    assert 0 <= alone.minimum_share <= 0.3
+    assert "share in the static response" in str(alone)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_zeros_of_the_hammer_are_not_those_of_the_plate(seed: int) -> None:
+    found = calibrate_tap(tapped([(1100.0, 30.0, 1.0)], seed, count=4, duration=1.2e-3))
+    assert found.share is None
+    assert found.minimum_share < 1
+    short = calibrate_tap(tapped([(1100.0, 30.0, 1.0)], seed, duration=3e-4, rate=51_200.0))
+    assert 0.85 < short.minimum_share < 1
+
+
+@pytest.mark.parametrize(
+    ("level", "rate", "words"),
+    [
+        (np.zeros(20_000), 20_000.0, naming("recording", "no tap")),
+        (np.zeros(0), 20_000.0, naming("recording", "no tap")),
+        (np.random.default_rng(1).normal(size=20_000), 20_000.0, naming("recording", "no tap")),
+        (np.zeros(20_000), 1000.0, naming("sample rate", "2000 Hz")),
+        (
+            np.repeat([0.0, 1.0], [9_990, 10_010])
+            + np.random.default_rng(1).normal(0, 0.01, 20_000),
+            20_000.0,
+            naming("recording", "no resonance"),
+        ),
+    ],
+)
+def test_records_without_a_resonance(level: NDArray[np.float64], rate: float, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        calibrate_tap(Signal.from_array(level, rate))
+
+
+def test_command_prints_the_lines_of_the_plate(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], errors_of: ErrorsOf
+) -> None:
+    record = tapped([(1100.0, 30.0, 1.0)], 1, count=2)
+    level = record.read(0, record.n_sample)
+    path = tmp_path / "tap.csv"
+    rows = "\n".join(f"{k / record.sample_rate:.5f},{one:.6f}" for k, one in enumerate(level))
+    path.write_text(f"Time [s],Level\n{rows}\n")
+    assert cli.main(["calibrate", "--tap", str(path)]) == 0
+    shown = capsys.readouterr()
+    (tmp_path / "lab.toml").write_text(shown.out)
+    plate = read_config(tmp_path / "lab.toml").plate
+    assert plate is not None
+    assert plate.f0 == pytest.approx(1100, rel=1e-3)
+    assert plate.Q is not None
+    assert abs(plate.Q - 30) < 0.6
+    assert plate.f0_uncertainty is not None
+    assert 1e-6 < plate.f0_uncertainty < 1e-3
+    assert "# 2 taps in " in shown.out
+    assert not shown.err
+    assert re.search(
+        naming("--mass", "--tap"), errors_of("calibrate", "--tap", str(path), "--mass", "5")
+    )

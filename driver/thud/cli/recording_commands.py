@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from thud.base.checks import refuse
 from thud.base.display import draw_all
 from thud.base.tables import format_rows
 from thud.cli.command import (
@@ -140,19 +141,33 @@ MEASURE = Command(
 )
 
 
+# Options of `calibrate` for a known force.
+OF_A_FORCE = ("mass", "force", "uncertainty", "unit", "time_constant", "time_constant_uncertainty")
+
+
 def run_calibrate(options: argparse.Namespace) -> int:
     """Print the configuration lines of a calibration record; return the exit code."""
     from thud.recordings.calibration import calibrate
+    from thud.recordings.plate_tap import calibrate_tap
 
+    if options.tap:
+        for name in OF_A_FORCE:
+            if getattr(options, name) is not None:
+                refuse(f"calibrate: --{name.replace('_', '-')} with --tap", "a known force or taps")
+        plate = calibrate_tap(options.record, channel=channel_of(options.channel))
+        print(plate.lines())
+        if not options.quiet:
+            print(f"# {plate}")
+        return 0
     result = calibrate(
         options.record,
         force=options.force,
         mass=options.mass,
         channel=channel_of(options.channel),
         unit=options.unit,
-        uncertainty=options.uncertainty,
+        uncertainty=options.uncertainty or 0.0,
         time_constant=options.time_constant,
-        time_constant_uncertainty=options.time_constant_uncertainty,
+        time_constant_uncertainty=options.time_constant_uncertainty or 0.0,
     )
     print(f'calibration = "{result.chain}"')
     print(f"calibration_uncertainty = {result.uncertainty:.2g}")
@@ -169,15 +184,19 @@ def run_calibrate(options: argparse.Namespace) -> int:
 
 
 CALIBRATE = Command(
-    "calibration from a record of a known force applied to or removed from the plate",
+    "calibration from a record of a known force applied to or removed from the plate, or of taps",
     (
-        argument("record", metavar="FILE", help="record of the known force"),
+        argument("record", metavar="FILE", help="record of the known force or of the taps"),
+        argument(
+            "--tap",
+            action="store_true",
+            help="the record holds taps with a hammer: print the resonance of the plate",
+        ),
         argument("--mass", type=float, metavar="KG", help="mass that exerts the known force"),
         argument("--force", type=float, metavar="N", help="known force, if no mass is given"),
         argument(
             "--uncertainty",
             type=float,
-            default=0.0,
             metavar="FRACTION",
             help="relative standard uncertainty of the mass or force, such as 0.001",
         ),
@@ -190,7 +209,6 @@ CALIBRATE = Command(
         argument(
             "--time-constant-uncertainty",
             type=float,
-            default=0.0,
             metavar="FRACTION",
             help="relative standard uncertainty of a stated time constant, such as 0.02",
         ),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -97,7 +97,9 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
             f"calibrate(): force = {newtons:g} N, uncertainty = {uncertainty:g}",
             "a positive force, 0 <= uncertainty < 1",
         )
-    name, symbol, samples, count, sample_rate = _source(record, channel, unit)
+    name, symbol, samples, count, sample_rate = open_source(record, channel, unit)
+    if not symbol:
+        refuse(f"{name}: the values are without a unit", f"unit = one of {ALLOWED}")
     level = _means(samples, count)
     # Seconds per mean.
     interval = None if sample_rate is None else max(1, count // MEANS) / sample_rate
@@ -148,24 +150,31 @@ def _time_constant(rate: Rate, interval: float | None) -> TimeConstant | None:
     return TimeConstant(interval / rate.value, rate.uncertainty / rate.value, minimum)
 
 
-def _source(
-    record: Signal | str | os.PathLike[str], channel: int | str | None, unit: str | None
-) -> tuple[str, str, Callable[[int, int], NDArray[np.float64]], int, float | None]:
+class Source(NamedTuple):
+    """Values of one channel: name for messages, unit or "", samples, and their number and rate."""
+
+    name: str
+    unit: str
+    samples: Callable[[int, int], NDArray[np.float64]]
+    n_sample: int
+    sample_rate: float | None
+
+
+def open_source(
+    record: Signal | str | os.PathLike[str], channel: int | str | None, unit: str | None = None
+) -> Source:
+    """Return the values of a channel of a file, or of a signal, in their own unit."""
     if isinstance(record, Signal):
-        if unit is None:
-            refuse(f"{record.name}: the unit is not stated", f"unit = one of {ALLOWED}")
-        symbol = require_unit(unit, record.name)
-        return record.name, symbol, record.read, record.n_sample, record.sample_rate
+        symbol = "" if unit is None else require_unit(unit, record.name)
+        return Source(record.name, symbol, record.read, record.n_sample, record.sample_rate)
     path = regular_file(record)
-    channels = choose_channels(read_channels(path), channel, shown_path(path))
+    name = shown_path(path)
+    channels = choose_channels(read_channels(path), channel, name)
     if len(channels) != 1:
-        refuse(f"{shown_path(path)}: {len(channels)} channels match", "channel = one of them")
-    selected = channels[0]
+        refuse(f"{name}: {len(channels)} channels match", "channel = one of them")
+    (selected,) = channels
     symbol = find_unit(selected.unit) if unit is None else require_unit(unit, path.name)
-    if not symbol:
-        refuse(f"{shown_path(path)}: the values are without a unit", f"unit = one of {ALLOWED}")
-    name, rate = shown_path(path), selected.sample_rate
-    return name, symbol, selected.samples, selected.n_sample, rate
+    return Source(name, symbol, selected.samples, selected.n_sample, selected.sample_rate)
 
 
 def _means(samples: Callable[[int, int], NDArray[np.float64]], count: int) -> NDArray[np.float64]:
