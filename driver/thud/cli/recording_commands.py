@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from functools import partial
@@ -180,39 +181,76 @@ MEASURE = Command(
 )
 
 
+# Options of `calibrate` for a known force.
+OF_A_FORCE = ("mass", "force", "uncertainty", "unit", "time_constant", "time_constant_uncertainty")
+
+
 def run_calibrate(options: argparse.Namespace) -> int:
     """Print the configuration lines of a calibration record; return the exit code."""
     from thud.recordings.calibration import calibrate
+    from thud.recordings.plate_tap import calibrate_tap
 
+    if options.tap:
+        for name in OF_A_FORCE:
+            if getattr(options, name) is not None:
+                refuse(f"calibrate: --{name.replace('_', '-')} with --tap", "a known force or taps")
+        plate = calibrate_tap(options.record, channel=channel_of(options.channel))
+        print(plate.lines())
+        if not options.quiet:
+            print(f"# {plate}")
+        return 0
     result = calibrate(
         options.record,
         force=options.force,
         mass=options.mass,
         channel=channel_of(options.channel),
         unit=options.unit,
-        uncertainty=options.uncertainty,
+        uncertainty=options.uncertainty or 0.0,
+        time_constant=options.time_constant,
+        time_constant_uncertainty=options.time_constant_uncertainty or 0.0,
     )
     print(f'calibration = "{result.chain}"')
     print(f"calibration_uncertainty = {result.uncertainty:.2g}")
     if not options.quiet:
         print(f"# {result.origin}")
+        if result.time_constant:
+            print(f"# {result.time_constant}")
+    unknown = "uncertainty of the {} not stated: not included ({})"
+    if options.time_constant not in {None, math.inf} and not options.time_constant_uncertainty:
+        print_notes([unknown.format("time constant", "--time-constant-uncertainty")])
     if not options.uncertainty:
-        print_notes(["uncertainty of the known force not stated: not included (--uncertainty)"])
+        print_notes([unknown.format("known force", "--uncertainty")])
     return 0
 
 
 CALIBRATE = Command(
-    "calibration from a record of a known force applied to or removed from the plate",
+    "calibration from a record of a known force applied to or removed from the plate, or of taps",
     (
-        argument("record", metavar="FILE", help="record of the known force"),
+        argument("record", metavar="FILE", help="record of the known force or of the taps"),
+        argument(
+            "--tap",
+            action="store_true",
+            help="the record holds taps with a hammer: print the resonance of the plate",
+        ),
         argument("--mass", type=float, metavar="KG", help="mass that exerts the known force"),
         argument("--force", type=float, metavar="N", help="known force, if no mass is given"),
         argument(
             "--uncertainty",
             type=float,
-            default=0.0,
             metavar="FRACTION",
             help="relative standard uncertainty of the mass or force, such as 0.001",
+        ),
+        argument(
+            "--time-constant",
+            type=float,
+            metavar="S",
+            help="time constant of the amplifier, inf without droop (default: fitted)",
+        ),
+        argument(
+            "--time-constant-uncertainty",
+            type=float,
+            metavar="FRACTION",
+            help="relative standard uncertainty of a stated time constant, such as 0.02",
         ),
         argument("--channel", metavar="NAME|NUMBER", help="channel of the force"),
         argument("--unit", help="unit of the recorded values, if the file does not state it"),

@@ -48,6 +48,31 @@ class Factor(NamedTuple):
     bottom: str
 
 
+class TimeConstant(NamedTuple):
+    """Time constant of an amplifier, s, from a record of a known force.
+
+    Attributes
+    ----------
+    value : float
+        Time constant, s; infinite if the record shows no droop.
+    uncertainty : float
+        Its relative standard uncertainty.
+    minimum : float
+        Value, s, above which it lies with a probability of 95 %.
+    """
+
+    value: float
+    uncertainty: float
+    minimum: float
+
+    def __str__(self) -> str:
+        """Return a sentence for reports."""
+        if math.isinf(self.value):
+            return f"no droop: a time constant above {self.minimum:.2g} s"
+        exact = f", standard uncertainty {100 * self.uncertainty:.2g} %" * (self.uncertainty > 0)
+        return f"droop with a time constant of {self.value:.4g} s{exact}, taken off"
+
+
 @dataclass(frozen=True)
 class Calibration:
     """Conversion of recorded values to newtons.
@@ -61,11 +86,14 @@ class Calibration:
         Relative standard uncertainty; None if unknown.
     origin : str
         Where the calibration comes from, for reports.
+    time_constant : TimeConstant or None
+        Time constant of the amplifier, if the calibration comes from a record of a known force.
     """
 
     chain: str
     uncertainty: float | None = None
     origin: str = ""
+    time_constant: TimeConstant | None = None
 
     def __post_init__(self) -> None:
         """Raise InputError if the chain or the uncertainty are not allowed."""
