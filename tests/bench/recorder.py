@@ -27,7 +27,7 @@ import warnings
 import zlib
 from collections import Counter, defaultdict
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,13 +36,14 @@ import numpy as np
 
 import thud
 from thud.base.errors import InputError
+from thud.recordings.config import Config, PlateConfig
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from recorder_model import Array, Pulse
 
-from recorder_conditions import STATIC, STIFF, Condition, conditions, kind_of
+from recorder_conditions import FLAT, STATIC, Condition, conditions, kind_of
 from recorder_model import (
     GRAVITY,
     Ball,
@@ -78,6 +79,9 @@ GENERAL = re.compile(
 # force from 0.02 on, 1 % of an impulse.
 DIFFER = re.compile(r"impulse and by bounces differ by (-?[\d.]+)")
 SUSPECT = 0.02
+# Keys of the installed package; those it does not know are left out, where a condition is not about
+# them.
+KNOWN = {field.name for kind in (Config, PlateConfig) for field in fields(kind)}
 # What the words of a warning concern; a warning with none of them concerns everything.
 CONCERNS = (
     (re.compile(r"(?<![\d.])500 Hz|octave_500"), {"500 Hz"}),
@@ -171,10 +175,7 @@ def record(condition: Condition, seed: int, folder: Path) -> tuple[list[Path], P
     pulse, truth = drop_pulse(kind_of(condition, seed), ball, rng)
     doubts = condition.doubts
     error = {key: size * rng.normal() for key, size in doubts.items()}
-    chain = replace(
-        condition.chain, gain=1 + error.get("calibration", 0.0),
-        modes=condition.chain.modes or (STIFF,),
-    )  # fmt: skip
+    chain = replace(condition.chain, gain=1 + error.get("calibration", 0.0))
     config: dict[str, Any] = {
         "polarity": "positive", "mass": ball.mass + error.get("mass", 0.0),
         "height": ball.height + error.get("height", 0.0),
@@ -183,14 +184,15 @@ def record(condition: Condition, seed: int, folder: Path) -> tuple[list[Path], P
         "calibration": f"{chain.full_scale!r} N/FS" if condition.files != "newtons" else None,
         "calibration_uncertainty": doubts.get("calibration", 0.0),
     }  # fmt: skip
+    config |= condition.config
     if condition.plate_told:
-        mode, tau = STIFF, chain.time_constant
+        tau, plate = chain.time_constant, condition.config.get("plate", {})
         config["plate"] = {
-            "f0": mode.frequency, "Q": mode.quality, "f0_uncertainty": 0.001,
             "time_constant": STATIC if math.isinf(tau) else tau, "full_scale": chain.full_scale,
-            **condition.config.get("plate", {}),
+            **({} if "f0" in plate or "flat_limit" not in KNOWN else {"flat_limit": FLAT}), **plate,
         }  # fmt: skip
-    config |= {key: value for key, value in condition.config.items() if key != "plate"}
+    if condition.filter_told and "filter" in KNOWN:
+        config["filter"] = condition.config.get("filter", {"kind": "none"})
     if "f0" in doubts:
         plate = config["plate"]
         f0 = plate["f0"] * (1 + error["f0"])

@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 
 # Whether everything is stated.
 TOLD, UNTOLD = True, False
-# Plate and amplifier where a condition has no other: stated unless the condition is about them.
-STIFF = Mode(9000.0, 30.0)
+# Plate, amplifier and filter where a condition has no other: stated unless it is about them. Flat
+# up to FLAT, Hz, and static.
+FLAT = 20e3
 STATIC = 1e6
 
 
@@ -48,8 +49,8 @@ class Condition:
         (relative), mass, kg, height, m, f0 (relative).
     cells : Cells or None
         Load cells in channels of their own.
-    plate_told : bool
-        Whether the plate is stated.
+    plate_told, filter_told : bool
+        Whether plate and filter are stated.
     files : str
         ``"one"``, ``"table"``, or a kind of copies.
     weight : Weight or None
@@ -67,6 +68,7 @@ class Condition:
     doubts: Mapping[str, float] = field(default_factory=dict)
     cells: Cells | None = None
     plate_told: bool = True
+    filter_told: bool = True
     files: str = "one"
     weight: Weight | None = None
 
@@ -161,7 +163,9 @@ def _plate_untold() -> Iterator[Condition]:
     yield Condition("plate untold", "1200 Hz, Q 8, 8 kHz", UNTOLD, chain, plate_told=False)
     chain = Chain(noises=((5.0, 0.0),), modes=(Mode(1200.0, 25.0),))
     yield Condition("plate untold", "1200 Hz, Q 25, noise 5 N", UNTOLD, chain, plate_told=False)
-    yield Condition("plate untold", "9 kHz, Q 30", UNTOLD, plate_told=False)
+    chain = Chain(modes=(Mode(9000.0, 30.0),))
+    yield Condition("plate untold", "9 kHz, Q 30", UNTOLD, chain, plate_told=False)
+    yield Condition("plate untold", "flat, not stated", UNTOLD, plate_told=False)
 
 
 def _filter() -> Iterator[Condition]:
@@ -174,10 +178,15 @@ def _filter() -> Iterator[Condition]:
         name = f"{kind} {order}, {cutoff:g} Hz, {rate / 1e3:g} kHz"
         config = {"filter": {"kind": kind, "order": order, "cutoff": cutoff}}
         yield Condition("filter", name, TOLD, chain, config=config)
-        yield Condition("filter untold", name, UNTOLD, chain)
+        yield Condition("filter untold", name, UNTOLD, chain, filter_told=False)
     for rate in (2.5e3, 5e3, 25e3):
         chain = Chain(rate, filter=Filter("elliptic", 6, 0.4 * rate))
-        yield Condition("filter untold", f"elliptic 6, {rate / 1e3:g} kHz", UNTOLD, chain)
+        yield Condition(
+            "filter untold", f"elliptic 6, {rate / 1e3:g} kHz", UNTOLD, chain, filter_told=False
+        )
+    for rate in (2.5e3, 51.2e3):
+        name = f"flat, not stated, {rate / 1e3:g} kHz"
+        yield Condition("filter untold", name, UNTOLD, Chain(rate), filter_told=False)
 
 
 def _quantization() -> Iterator[Condition]:
