@@ -84,6 +84,7 @@ SUSPECT = 0.02
 KNOWN = {field.name for kind in (Config, PlateConfig) for field in fields(kind)}
 # What the words of a warning concern; a warning with none of them concerns everything.
 CONCERNS = (
+    (re.compile(r"\[?\bplate\b|resonance|\bfilter\b"), {*LEVELS, CONTACT, PEAK}),
     (re.compile(r"(?<![\d.])500 Hz|octave_500"), {"500 Hz"}),
     (re.compile(r"\blevels?\b|\boctaves?\b(?! of 500)|\bbands?\b"), set(LEVELS)),
     (re.compile(r"contact time"), {CONTACT}),
@@ -92,19 +93,17 @@ CONCERNS = (
     (re.compile(r"calibration"), {*LEVELS, PEAK, RESTITUTION, CALIBRATION}),
 )
 # Refusals: their words, and the words of the documentation that announce them.
-REFUSALS = (
-    (r"is too close to the bands", "recordings_levels.md", "f0 must be at least √2 times"),
-    (r"is clipped", "recordings", "clipped"),
-    (r"starts within the pulse|ends within the pulse|within the pulse or less than 1 ms",
-     "recordings", "1 ms of background"),
-    (r"two impacts", "recordings", "two impacts"),
-    (r"dropouts", "recordings", "dropouts"),
-    (r"cannot be distinguished from the noise", "recordings", "distinguished from the noise"),
-    (r"same instant|separate channels|channels", "recordings", "same instant"),
-    (r"overlap|given twice|equal recordings|same recording|same record", "recordings", "overlap"),
-    (r"state either polarity|polarity", "recordings", "the polarity must be stated"),
-    (r"no clear step|exponential|curv", "recordings", "exponential"),
-)  # fmt: skip
+REFUSALS = {
+    r"is too close to the bands": "a stated resonance below 1001 Hz",
+    r"is clipped": "the force is clipped",
+    r"the signal (starts|ends) within the pulse": "within the pulse or less than 1 ms from it",
+    r"two impacts": "two impacts overlap",
+    r"dropouts of": "dropouts of more than 1 ms",
+    r"cannot be distinguished from the noise|: no impact": "cannot be distinguished from the noise",
+    r"the sign is not clear": "the sign is not clear",
+    r"none of them in a unit of force": "several channels, none of them in a unit of force",
+    r"no clear step|the step is": "no clear step, or one that is uncertain",
+}
 
 
 @dataclass(frozen=True)
@@ -370,7 +369,8 @@ def documentation() -> str:
 def is_named(refusal: str) -> bool:
     """Whether the documentation announces a refusal."""
     return any(
-        re.search(words, refusal) and phrase in documentation() for words, _, phrase in REFUSALS
+        re.search(words, refusal) and phrase in documentation()
+        for words, phrase in REFUSALS.items()
     )
 
 
@@ -414,6 +414,12 @@ def silent(outcomes: list[Outcome]) -> list[tuple[Outcome, str, Value]]:
         for quantity, value in outcome.values.items()
         if value.is_silent(quantity)
     ]
+
+
+def warned(outcomes: list[Outcome]) -> int:
+    """Return the number of material errors beyond the uncertainty that a warning concerns."""
+    values = [pair for outcome in outcomes for pair in outcome.values.items()]
+    return sum(v.concerned and replace(v, concerned=False).is_silent(q) for q, v in values)
 
 
 def coverage(outcomes: list[Outcome]) -> Iterator[tuple[str, bool]]:
@@ -483,7 +489,7 @@ def main() -> int:
         said_no = sum(bool(o.refusal) for o in some)
         print(
             f"{'told' if is_told else 'untold'}: {wrong} of {count} values silent and material, "
-            f"{said_no} of {len(some)} records refused"
+            f"{warned(some)} with a warning; {said_no} of {len(some)} records refused"
         )
     skipped = sum(bool(o.unknown_key) for o in outcomes)
     print(

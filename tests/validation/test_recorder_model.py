@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 import scipy.signal
 import soundfile
+from threadpoolctl import threadpool_limits
 
 from thud.impact.contact_time import contact_span
 from thud.level.levels import low_pass
@@ -38,7 +40,19 @@ from recorder_model import (
     write_sound,
 )
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+# Threads only wait for each other in products of this size.
+pytestmark = pytest.mark.usefixtures("one_thread")
 FREQUENCIES = np.linspace(5.0, 1250.0, 60)
+
+
+@pytest.fixture(scope="module")
+def one_thread() -> Iterator[None]:
+    """Limit BLAS to one thread."""
+    with threadpool_limits(1, "blas"):
+        yield
 
 
 @pytest.mark.parametrize("kind", KINDS)
