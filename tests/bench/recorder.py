@@ -7,7 +7,8 @@ Told: everything is stated in the configuration, so 95 % of the intervals should
 Untold: the record has a fault that nobody states. An error is silent and material if it exceeds
 three stated standard uncertainties, the expanded one, and 0.1 dB, 0.1 ms, 0.01 of restitution or
 0.5 % of a peak or a calibration, and no warning concerns it. The exit code is 1 if there is one, if
-the coverage is outside 93 to 97 % by more than chance, or if a refusal is not in the documentation.
+the coverage is outside 93 to 97 % by more than chance, or if a refusal is not in the documentation
+or of what can be measured.
 """
 
 from __future__ import annotations
@@ -469,6 +470,11 @@ def main() -> int:
     if options.details:
         details(outcomes, loud)
     told = [o for o in outcomes if known[o.condition].told]
+    drops = [o for o in told if not known[o.condition].weight]
+    if drops:
+        kinds = table(drops, lambda o: kind_of(known[o.condition], o.seed))
+        print("told, by the kind of the pulse")
+        print("\n".join(kinds), end="\n\n")
     covered = list(coverage(told))
     print("told: inside the 95 % interval")
     print("\n".join(f"  {line}" for line, _ in covered))
@@ -482,24 +488,25 @@ def main() -> int:
         print(f"  {count} warnings in told records: {text[:150]}")
     refused = [o for o in outcomes if o.refusal]
     unnamed = [o for o in refused if not is_named(o.refusal)]
+    wrong = [o for o in refused if not known[o.condition].may_be_refused]
     for is_told in (True, False):
         some = [o for o in outcomes if known[o.condition].told is is_told]
         count = sum(len(o.values) for o in some)
-        wrong = sum(known[o.condition].told is is_told for o, _, _ in loud)
+        hidden = sum(known[o.condition].told is is_told for o, _, _ in loud)
         said_no = sum(bool(o.refusal) for o in some)
         print(
-            f"{'told' if is_told else 'untold'}: {wrong} of {count} values silent and material, "
+            f"{'told' if is_told else 'untold'}: {hidden} of {count} values silent and material, "
             f"{warned(some)} with a warning; {said_no} of {len(some)} records refused"
         )
     skipped = sum(bool(o.unknown_key) for o in outcomes)
     print(
-        f"{len(unnamed)} refusals not in the documentation, "
+        f"{len(unnamed)} refusals not in the documentation, {len(wrong)} of what can be measured, "
         f"{skipped} records with keys that are not known"
     )
     print(
         f"{len(chosen)} conditions, {len(outcomes)} records in {time.perf_counter() - start:.0f} s"
     )
-    return int(bool(loud or unnamed or not all(met for _, met in covered)))
+    return int(bool(loud or unnamed or wrong or not all(met for _, met in covered)))
 
 
 def details(outcomes: list[Outcome], loud: list[tuple[Outcome, str, Value]]) -> None:
@@ -517,6 +524,7 @@ def details(outcomes: list[Outcome], loud: list[tuple[Outcome, str, Value]]) -> 
         if outcome.refusal:
             c = known[outcome.condition]
             where = "" if is_named(outcome.refusal) else " (not in docs)"
+            where += "" if c.may_be_refused else " (can be measured)"
             print(f"refused{where}: {c.group}: {c.name}, seed {outcome.seed}: {outcome.refusal}")
 
 

@@ -26,6 +26,10 @@ FLAT = 20e3
 STATIC = 1e6
 
 
+# Groups whose faults may be refused: no measurement can be right, or known to be right.
+REFUSABLE = {"clipping", "duplicates", "channels", "offset step", "calibrate"}
+
+
 @dataclass(frozen=True)
 class Condition:
     """What is recorded, and what the configuration states of it.
@@ -55,6 +59,8 @@ class Condition:
         ``"one"``, ``"table"``, or a kind of copies.
     weight : Weight or None
         Record of a mass for `calibrate` in place of a drop.
+    refusable : bool
+        Whether it may be refused, besides faults of `REFUSABLE`.
     """
 
     group: str
@@ -71,6 +77,12 @@ class Condition:
     filter_told: bool = True
     files: str = "one"
     weight: Weight | None = None
+    refusable: bool = False
+
+    @property
+    def may_be_refused(self) -> bool:
+        """Whether a refusal is right."""
+        return self.refusable or (not self.told and self.group in REFUSABLE)
 
 
 def _clean() -> Iterator[Condition]:
@@ -134,7 +146,7 @@ def _plate() -> Iterator[Condition]:
     )
     chain = Chain(modes=(Mode(900.0, 25.0),))
     config = {"plate": {"f0": 900.0, "Q": 25.0}}
-    yield Condition("plate", "900 Hz, Q 25", chain=chain, config=config, doubts={"f0": 0.003})
+    yield Condition("plate", "900 Hz, Q 25", chain=chain, config=config, refusable=True)
 
 
 def _plate_untold() -> Iterator[Condition]:
@@ -283,7 +295,9 @@ def _channels() -> Iterator[Condition]:
 
 def _pretrigger() -> Iterator[Condition]:
     for before in (0.002, 0.005, 0.01, 0.02, 0.05):
-        yield Condition("pre-trigger", f"{1e3 * before:g} ms before", scene=Scene(before=before))
+        # Part of the 2 ms may be a soft begin of the pulse.
+        few, name = before < 0.003, f"{1e3 * before:g} ms before"
+        yield Condition("pre-trigger", name, scene=Scene(before=before), refusable=few)
     for after in (0.005, 0.01, 0.02, 0.1):
         scene = Scene(after=after, bounces=0)
         yield Condition("pre-trigger", f"{1e3 * after:g} ms after", scene=scene)
