@@ -5,10 +5,10 @@
 Each condition is recorded with several seeds, written to files with a configuration, and measured.
 Told: everything is stated in the configuration, so 95 % of the intervals should contain the truth.
 Untold: the record has a fault that nobody states. An error is silent and material if it exceeds
-three stated standard uncertainties, the expanded one, and 0.1 dB, 0.1 ms, 0.01 of restitution or
-0.5 % of a peak or a calibration, and no warning concerns it. The exit code is 1 if there is one, if
-the coverage is outside 93 to 97 % by more than chance, or if a refusal is not in the documentation
-or of what can be measured.
+three stated standard uncertainties (with few degrees of freedom, what covers as much), and 0.1 dB,
+0.1 ms, 0.01 of restitution or 0.5 % of a peak or a calibration, and no warning concerns it. The
+exit code is 1 if there is one, if the coverage is outside 93 to 97 % by more than chance, or if a
+refusal is not in the documentation or of what can be measured.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.special import ndtr, stdtrit
 
 import thud
 from thud.base.errors import InputError
@@ -104,26 +105,36 @@ REFUSALS = {
     r"the sign is not clear": "the sign is not clear",
     r"none of them in a unit of force": "several channels, none of them in a unit of force",
     r"no clear step|the step is": "no clear step, or one that is uncertain",
+    r"deviates by .* from any exponential decay": "fits no exponential decay",
+    r"drops at the same instants": "at the same instant",
+    r"is given twice|is the same drop as": "each drop once",
 }
 
 
 @dataclass(frozen=True)
 class Value:
-    """Measured quantity: error, standard and expanded uncertainty over the unit of the error."""
+    """Measured quantity: error, its standard uncertainty and degrees of freedom."""
 
     error: float
     uncertainty: float
-    expanded: float
     concerned: bool
+    freedom: float = math.inf
+
+    def is_within(self, deviations: float) -> bool:
+        """Whether the error is within so many deviations of a normal distribution."""
+        factor = deviations
+        if math.isfinite(self.freedom):
+            factor = float(stdtrit(self.freedom, ndtr(deviations)))
+        return abs(self.error) <= factor * self.uncertainty + 1e-12
 
     def is_inside(self) -> bool:
-        """Whether the interval contains the truth."""
-        return abs(self.error) <= self.expanded + 1e-12
+        """Whether the 95 % interval contains the truth."""
+        return self.is_within(1.96)
 
     def is_silent(self, quantity: str) -> bool:
         """Whether the error is material and nothing tells of it."""
-        limit = max(DEVIATIONS * self.uncertainty, self.expanded, MATERIAL[quantity])
-        return abs(self.error) > limit and not self.concerned
+        is_material = abs(self.error) > MATERIAL[quantity]
+        return is_material and not self.is_within(DEVIATIONS) and not self.concerned
 
 
 @dataclass(frozen=True)
@@ -324,7 +335,8 @@ def compare(recording: Any, truth: Truth, said: Iterable[str]) -> Iterator[tuple
         error = float(estimate.value - true[quantity])
         if estimate.upper_bound:
             error = min(error, 0.0)
-        yield quantity, Value(error, estimate.uncertainty, estimate.expanded, quantity in concerned)
+        is_concerned = quantity in concerned
+        yield quantity, Value(error, estimate.uncertainty, is_concerned, estimate.freedom)
     peaks = [drop.peak_force for drop in recording.drops]
     count = len(peaks)
     mean = float(np.mean([peak.value for peak in peaks]))
@@ -332,8 +344,8 @@ def compare(recording: Any, truth: Truth, said: Iterable[str]) -> Iterator[tuple
     if count > 1:
         variance += float(np.var([peak.value for peak in peaks], ddof=1)) / count
     relative = math.hypot(math.sqrt(variance) / mean, recording.calibration_uncertainty or 0.0)
-    factor = 1.96 if count == 1 else {2: 12.7, 3: 4.3, 4: 3.18, 5: 2.78}.get(count, 2.0)
-    yield PEAK, Value(mean / truth.peak - 1, relative, factor * relative, PEAK in concerned)
+    freedom = count - 1 if count > 1 else math.inf
+    yield PEAK, Value(mean / truth.peak - 1, relative, PEAK in concerned, freedom)
 
 
 def _calibrated(
@@ -352,7 +364,7 @@ def _calibrated(
     said = tuple(getattr(result, "warnings", ()))
     concerned = CALIBRATION in set().union(*map(concern, said)) if said else False
     u = result.uncertainty
-    return {CALIBRATION: Value(factor / chain.full_scale - 1, u, 1.96 * u, concerned)}, said
+    return {CALIBRATION: Value(factor / chain.full_scale - 1, u, concerned)}, said
 
 
 # --- report -----------------------------------------------------------------------------------

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import zlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -387,8 +387,25 @@ def _calibrate() -> Iterator[Condition]:
             text = f"{name}, time constant {tau:g} s"
             weight = Weight(off=off, end=end)
             yield Condition("calibrate", text, math.isinf(tau), chain, weight=weight)
-    chain = Chain(1e4, full_scale=500.0, noises=((0.1, 0.0),), drift=0.3)
-    yield Condition("calibrate", "on, drift", TOLD, chain, weight=Weight())
+    quiet = Chain(1e4, full_scale=500.0, noises=((0.1, 0.0),))
+    for name, chain in (
+        ("on, drift", replace(quiet, drift=0.3)),
+        ("on, hum 5 N", replace(quiet, hum=(50.0, 5.0))),
+        ("on, tremor 1 N", replace(quiet, tremor=1.0)),
+    ):
+        yield Condition("calibrate", name, TOLD, chain, weight=Weight())
+    droops = replace(quiet, time_constant=5)
+    for name, chain in (
+        ("on, two of 3 s", replace(droops, time_constant=3, second_time_constant=3)),
+        ("on, 3 and 20 s", replace(droops, time_constant=3, second_time_constant=20)),
+        ("on, 5 s, 0.05 N of brown noise", replace(droops, noises=((0.1, 0.0), (0.05, 2.0)))),
+        ("on, 5 s, drift", replace(droops, drift=0.3)),
+    ):
+        yield Condition("calibrate", name, UNTOLD, chain, weight=Weight())
+    weight = Weight(rise=1.0, knock=60.0)
+    yield Condition(
+        "calibrate", "laid on in 1 s", UNTOLD, replace(quiet, time_constant=5), weight=weight
+    )
 
 
 @cache

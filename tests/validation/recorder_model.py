@@ -464,8 +464,8 @@ class Chain:
         Samples per second, Hz.
     modes, filter : tuple of Mode, Filter or None
         Plate and anti-aliasing filter; None: a FIR filter at half the rate.
-    time_constant : float
-        Of the amplifier, s.
+    time_constant, second_time_constant : float
+        Of the amplifier, s, and of a further one.
     bits, full_scale : int, float
         Converter, and its range, N.
     noises : tuple of (float, float)
@@ -488,6 +488,7 @@ class Chain:
     modes: tuple[Mode, ...] = ()
     filter: Filter | None = None
     time_constant: float = math.inf
+    second_time_constant: float = math.inf
     bits: int = 24
     full_scale: float = 10_000.0
     noises: tuple[tuple[float, float], ...] = ((0.5, 0.0),)
@@ -591,6 +592,7 @@ def electric(
     """Return what amplifier and surroundings make of a force, N; `duration` of the contact, s."""
     n, rate = len(force), chain.rate
     values = chain.gain * droop(force, rate, chain.time_constant)
+    values = droop(values, rate, chain.second_time_constant)
     time = np.arange(n) / rate
     jump, where, width = scene.step
     if jump:

@@ -152,12 +152,15 @@ def test_files_hold_the_codes(tmp_path: Path) -> None:
 
 
 def test_errors_are_silent_unless_a_warning_concerns_them() -> None:
-    value = recorder.Value(0.5, 0.01, 0.02, concerned=False)
+    value = recorder.Value(0.5, 0.01, concerned=False)
     assert value.is_silent("500 Hz")
     assert not value.is_inside()
-    assert not recorder.Value(0.5, 0.01, 0.02, concerned=True).is_silent("500 Hz")
-    assert not recorder.Value(0.5, 0.2, 0.4, concerned=False).is_silent("500 Hz")
-    assert not recorder.Value(0.05, 0.001, 0.002, concerned=False).is_silent("500 Hz")
+    assert not recorder.Value(0.5, 0.01, concerned=True).is_silent("500 Hz")
+    assert not recorder.Value(0.5, 0.2, concerned=False).is_silent("500 Hz")
+    assert not recorder.Value(0.05, 0.001, concerned=False).is_silent("500 Hz")
+    # One degree of freedom: the quantile of 97.5 % is 12.7.
+    assert recorder.Value(0.126, 0.01, concerned=False, freedom=1).is_inside()
+    assert not recorder.Value(0.128, 0.01, concerned=False, freedom=1).is_inside()
     ringing = "the plate keeps ringing: its resonance affects levels, peaks and contact time"
     assert recorder.concern(ringing) == {*recorder.LEVELS, "peak", "contact"}
     assert recorder.concern("the octave of 500 Hz may be off by 0.3 dB") == {"500 Hz"}
