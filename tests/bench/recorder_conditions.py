@@ -398,7 +398,7 @@ def _calibrate() -> Iterator[Condition]:
     for name, chain in (
         ("on, two of 3 s", replace(droops, time_constant=3, second_time_constant=3)),
         ("on, 3 and 20 s", replace(droops, time_constant=3, second_time_constant=20)),
-        ("on, 5 s, 0.05 N of brown noise", replace(droops, noises=((0.1, 0.0), (0.05, 2.0)))),
+        ("on, 5 s, 0.02 N of brown noise", replace(droops, noises=((0.1, 0.0), (0.02, 2.0)))),
         ("on, 5 s, drift", replace(droops, drift=0.3)),
     ):
         yield Condition("calibrate", name, UNTOLD, chain, weight=Weight())
