@@ -73,10 +73,12 @@ DEVIATIONS = 3.0
 COVERAGE = (0.93, 0.97)
 # Warnings of records without a fault, which say nothing about an error.
 GENERAL = re.compile(
-    r"uncertainty not stated|the mass is not stated|the number of peaks is unknown|"
+    r"the mass is not stated|the number of peaks is unknown|"
     r"restitution is known of \d|it is no bounce|"
     r"force plate: (at [\d.]+ Hz the plate reads|up to [\d.]+ Hz the plate|the plate reads)"
 )
+# Uncertainties that are not included concern what they would widen.
+INCLUDED = re.compile(r"uncertainty not stated, and not included: (.*)")
 # Two restitutions that differ concern the restitution if they differ by more than 0.01, and the
 # force from 0.02 on, 1 % of an impulse.
 DIFFER = re.compile(r"impulse and by bounces differ by (-?[\d.]+)")
@@ -291,6 +293,8 @@ def concern(warning: str) -> set[str]:
     """Return the quantities that a warning concerns."""
     if GENERAL.search(warning):
         return set()
+    if missing := INCLUDED.search(warning):
+        warning = missing[1].replace("mass", "restitution").replace("drop height", "restitution")
     if differ := DIFFER.search(warning):
         difference = abs(float(differ[1]))
         named = {RESTITUTION} if difference >= MATERIAL[RESTITUTION] else set()
@@ -429,6 +433,17 @@ def silent(outcomes: list[Outcome]) -> list[tuple[Outcome, str, Value]]:
     ]
 
 
+def by_chance(outcomes: list[Outcome]) -> float:
+    """Return how many errors are silent on average if all are normal with their uncertainties."""
+    values = [pair for outcome in outcomes for pair in outcome.values.items()]
+    tails = [
+        2 * float(ndtr(-max(DEVIATIONS, MATERIAL[quantity] / value.uncertainty)))
+        for quantity, value in values
+        if value.uncertainty and not value.concerned
+    ]
+    return sum(tails)
+
+
 def warned(outcomes: list[Outcome]) -> int:
     """Return the number of material errors beyond the uncertainty that a warning concerns."""
     values = [pair for outcome in outcomes for pair in outcome.values.items()]
@@ -504,10 +519,12 @@ def main() -> int:
     for is_told in (True, False):
         some = [o for o in outcomes if known[o.condition].told is is_told]
         count = sum(len(o.values) for o in some)
+        chance = by_chance(some)
         hidden = sum(known[o.condition].told is is_told for o, _, _ in loud)
         said_no = sum(bool(o.refusal) for o in some)
         print(
-            f"{'told' if is_told else 'untold'}: {hidden} of {count} values silent and material, "
+            f"{'told' if is_told else 'untold'}: {hidden} of {count} values silent and material "
+            f"({chance:.1f} if errors are normal), "
             f"{warned(some)} with a warning; {said_no} of {len(some)} records refused"
         )
     skipped = sum(bool(o.unknown_key) for o in outcomes)

@@ -164,7 +164,8 @@ def test_errors_are_silent_unless_a_warning_concerns_them() -> None:
     ringing = "the plate keeps ringing: its resonance affects levels, peaks and contact time"
     assert recorder.concern(ringing) == {*recorder.LEVELS, "peak", "contact"}
     assert recorder.concern("the octave of 500 Hz may be off by 0.3 dB") == {"500 Hz"}
-    assert not recorder.concern("uncertainty not stated, and not included: calibration")
+    missing = "uncertainty not stated, and not included: mass, drop height"
+    assert recorder.concern(missing) == {"restitution"}
     assert recorder.concern("there are 2.0 ms of background") == set(recorder.QUANTITIES)
 
 
