@@ -423,6 +423,29 @@ def table(outcomes: list[Outcome], key: Callable[[Outcome], str]) -> Iterator[st
         )
 
 
+def summary(outcomes: list[Outcome]) -> Iterator[str]:
+    """Yield the table of docs/recordings_theory.md: what is inside is stated of told records."""
+    columns = {"levels": LEVELS, "contact time": (CONTACT,), "restitution": (RESTITUTION,),
+               "peak": (PEAK,), "calibration": (CALIBRATION,)}  # fmt: skip
+    yield "| conditions | records | refused | " + " | ".join(columns) + " | silent | warned |"
+    yield "|---" * (5 + len(columns)) + "|"
+    groups = defaultdict(list)
+    for outcome in outcomes:
+        condition = conditions()[outcome.condition]
+        name = condition.group.removesuffix(" untold")
+        groups[f"{name}{'' if condition.told else ', untold'}"].append(outcome)
+    for name, members in groups.items():
+        cells = []
+        for quantities in columns.values():
+            values = [o.values[q] for o in members for q in quantities if q in o.values]
+            inside = sum(value.is_inside() for value in values)
+            hidden = not values or name.endswith("untold")
+            cells.append("" if hidden else f"{100 * inside / len(values):.0f} %")
+        refused = sum(bool(outcome.refusal) for outcome in members)
+        counts = (len(members), refused, *cells, len(silent(members)), warned(members))
+        yield f"| {name} | {' | '.join(map(str, counts))} |"
+
+
 def silent(outcomes: list[Outcome]) -> list[tuple[Outcome, str, Value]]:
     """Return the silent and material errors."""
     return [
@@ -503,6 +526,7 @@ def main() -> int:
         print("told, by the kind of the pulse")
         print("\n".join(kinds), end="\n\n")
     covered = list(coverage(told))
+    print("\n".join(summary(outcomes)), end="\n\n")
     print("told: inside the 95 % interval")
     print("\n".join(f"  {line}" for line, _ in covered))
     alarms = Counter(
