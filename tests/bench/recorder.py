@@ -7,8 +7,9 @@ Told: everything is stated in the configuration, so 95 % of the intervals should
 Untold: the record has a fault that nobody states. An error is silent and material if it exceeds
 three stated standard uncertainties (with few degrees of freedom, what covers as much), and 0.1 dB,
 0.1 ms, 0.01 of restitution or 0.5 % of a peak or a calibration, and no warning concerns it. The
-exit code is 1 if there is one, if the coverage is outside 93 to 97 % by more than chance, or if a
-refusal is not in the documentation or of what can be measured.
+exit code is 1 if there is one, if the coverage is outside 93 to 97 % by more than chance, if a
+refusal is not in the documentation or of what can be measured, or if something else is measured as
+a drop.
 """
 
 from __future__ import annotations
@@ -222,8 +223,7 @@ def record(condition: Condition, seed: int, folder: Path) -> tuple[list[Path], P
         paths = [take(pulse, "drop")]
     elif condition.files.endswith("drops"):
         # Drops of one ball differ in the contact time, and with it in the levels.
-        count = {"two drops": 2, "five drops": 5}[condition.files]
-        paths = [take(_varied(pulse, rng), f"drop_{k}") for k in range(count)]
+        paths = [take(_varied(pulse, rng), f"drop_{k}") for k in range(condition.drops)]
     else:
         paths = _copies(take(_varied(pulse, rng), "drop"), condition.files, chain)
     path = folder / "lab.toml"
@@ -427,8 +427,12 @@ def summary(outcomes: list[Outcome]) -> Iterator[str]:
     """Yield the table of docs/recordings_theory.md: what is inside is stated of told records."""
     columns = {"levels": LEVELS, "contact time": (CONTACT,), "restitution": (RESTITUTION,),
                "peak": (PEAK,), "calibration": (CALIBRATION,)}  # fmt: skip
-    yield "| conditions | records | refused | " + " | ".join(columns) + " | silent | warned |"
-    yield "|---" * (5 + len(columns)) + "|"
+    yield (
+        "| conditions | records | refused | "
+        + " | ".join(columns)
+        + " | silent | warned | miscounted |"
+    )
+    yield "|---" * (6 + len(columns)) + "|"
     groups = defaultdict(list)
     for outcome in outcomes:
         condition = conditions()[outcome.condition]
@@ -442,8 +446,8 @@ def summary(outcomes: list[Outcome]) -> Iterator[str]:
             hidden = not values or name.endswith("untold")
             cells.append("" if hidden else f"{100 * inside / len(values):.0f} %")
         refused = sum(bool(outcome.refusal) for outcome in members)
-        counts = (len(members), refused, *cells, len(silent(members)), warned(members))
-        yield f"| {name} | {' | '.join(map(str, counts))} |"
+        errors = len(silent(members)), warned(members), len(miscounted(members))
+        yield f"| {name} | {' | '.join(map(str, (len(members), refused, *cells, *errors)))} |"
 
 
 def silent(outcomes: list[Outcome]) -> list[tuple[Outcome, str, Value]]:
@@ -465,6 +469,11 @@ def by_chance(outcomes: list[Outcome]) -> float:
         if value.uncertainty and not value.concerned
     ]
     return sum(tails)
+
+
+def miscounted(outcomes: list[Outcome]) -> list[Outcome]:
+    """Return the records in which something else counts as a drop, or a drop does not."""
+    return [o for o in outcomes if o.values and o.drops != conditions()[o.condition].drops]
 
 
 def warned(outcomes: list[Outcome]) -> int:
@@ -559,7 +568,9 @@ def main() -> int:
     print(
         f"{len(chosen)} conditions, {len(outcomes)} records in {time.perf_counter() - start:.0f} s"
     )
-    return int(bool(loud or unnamed or wrong or not all(met for _, met in covered)))
+    others = miscounted(outcomes)
+    print(f"{len(others)} records with another number of drops")
+    return int(bool(loud or unnamed or wrong or others or not all(met for _, met in covered)))
 
 
 def details(outcomes: list[Outcome], loud: list[tuple[Outcome, str, Value]]) -> None:
@@ -573,6 +584,9 @@ def details(outcomes: list[Outcome], loud: list[tuple[Outcome, str, Value]]) -> 
             f"{quantity}: error "
             f"{scale * value.error:+.3f}, u {scale * value.uncertainty:.4f}, {outcome.drops} drops"
         )
+    for outcome in miscounted(outcomes):
+        c = known[outcome.condition]
+        print(f"{outcome.drops} drops: {c.group}: {c.name}, seed {outcome.seed}")
     for outcome in outcomes:
         if outcome.refusal:
             c = known[outcome.condition]

@@ -80,6 +80,11 @@ class Condition:
     refusable: bool = False
 
     @property
+    def drops(self) -> int:
+        """Number of different drops in the files."""
+        return {"two drops": 2, "five drops": 5}.get(self.files, 1)
+
+    @property
     def may_be_refused(self) -> bool:
         """Whether a refusal is right."""
         return self.refusable or (not self.told and self.group in REFUSABLE)
@@ -241,6 +246,9 @@ def _footsteps() -> Iterator[Condition]:
     stood, left, leaves = (-10.0, 1.0, 750.0), (-1.5, 0.4, -750.0), (2.0, 0.4, -750.0)
     laid = ((-3.5, 0.08, 24.5), (-2.9, 0.1, -24.5), (-2.2, 0.05, 40.0), (-1.9, 0.06, -40.0))
     caught = ((0.95, 0.15, 60.0), (1.4, 0.3, -60.0))
+    bumps = (40.0, 150.0, 80.0, 200.0, 60.0, 120.0, 90.0, 180.0, 50.0, 70.0)
+    handled = tuple((0.3 * k - 3.6, 0.006 + 0.0015 * k, peak) for k, peak in enumerate(bumps))
+    heels = ((-3.45, 0.025, 250.0), (-2.85, 0.03, 400.0))
     four = tuple((begin, 0.012, 150.0) for begin in (-2.0, -1.5, 1.4, 1.9))
     scenes = {
         "steps beside the plate": Scene(before=3.0, taps=near),
@@ -256,6 +264,9 @@ def _footsteps() -> Iterator[Condition]:
         "tap of 60 N 30 ms before": Scene(before=1.0, taps=((-0.030, 0.005, 60.0),)),
         "tap of 100 N 100 ms after": Scene(before=1.0, taps=((0.12, 0.005, 100.0),)),
         "heel of 300 N after": Scene(before=1.0, after=3.0, taps=((2.0, 0.03, 300.0),)),
+        "ten bumps of 40 to 200 N before": Scene(before=4.0, taps=handled),
+        "steps with heels on the plate before": Scene(before=4.0, treads=walk, taps=heels),
+        "tap of 400 N before": Scene(before=2.0, taps=((-1.2, 0.012, 400.0),)),
         "ball caught": Scene(before=0.5, after=2.0, loads=caught),
     }
     for name, scene in scenes.items():
