@@ -207,10 +207,10 @@ def record(condition: Condition, seed: int, folder: Path) -> tuple[list[Path], P
         }  # fmt: skip
     if condition.filter_told and "filter" in KNOWN:
         config["filter"] = condition.config.get("filter", {"kind": "none"})
-    if "f0" in doubts:
-        plate = config["plate"]
-        f0 = plate["f0"] * (1 + error["f0"])
-        config["plate"] = {**plate, "f0": f0, "f0_uncertainty": doubts["f0"]}
+    for table, key in (("plate", "f0"), ("filter", "cutoff")):
+        if key in doubts:
+            value = config[table][key] * (1 + error[key])
+            config[table] = {**config[table], key: value, f"{key}_uncertainty": doubts[key]}
 
     def take(one: Pulse, name: str) -> Path:
         force = plate_force(one, ball, chain, condition.scene, rng)

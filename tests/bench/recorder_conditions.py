@@ -50,7 +50,7 @@ class Condition:
         Keys of the configuration, besides those of any recording.
     doubts : mapping
         Standard uncertainties that are stated, and from which errors are drawn: calibration
-        (relative), mass, kg, height, m, f0 (relative).
+        (relative), mass, kg, height, m, f0 and cutoff of the filter (relative).
     cells : Cells or None
         Load cells in channels of their own.
     plate_told, filter_told : bool
@@ -194,7 +194,7 @@ def _filter() -> Iterator[Condition]:
         chain = Chain(rate, filter=Filter(kind, order, cutoff))
         name = f"{kind} {order}, {cutoff:g} Hz, {rate / 1e3:g} kHz"
         config = {"filter": {"kind": kind, "order": order, "cutoff": cutoff}}
-        yield Condition("filter", name, TOLD, chain, config=config)
+        yield Condition("filter", name, TOLD, chain, config=config, doubts={"cutoff": 0.005})
         yield Condition("filter untold", name, UNTOLD, chain, filter_told=False)
     for rate in (2.5e3, 5e3, 25e3):
         chain = Chain(rate, filter=Filter("elliptic", 6, 0.4 * rate))

@@ -415,7 +415,8 @@ class Filter:
     """Anti-aliasing filter: ``"bessel"``, ``"butterworth"``, ``"elliptic"`` or ``"fir"``.
 
     The cutoff, Hz, is that of 3 dB; of an elliptic filter (0.1 dB ripple, 80 dB) the edge of the
-    passband; of a FIR filter of a delta-sigma converter the middle of its transition.
+    passband; of a FIR filter of a delta-sigma converter the middle of its transition. The static
+    response is one.
     """
 
     kind: str
@@ -433,7 +434,10 @@ class Filter:
             return np.asarray(1 / np.prod(s[:, None] - np.exp(1j * angles), axis=1))
         if self.kind == "elliptic":
             poles = scipy.signal.ellip(self.order, 0.1, 80, 1.0, analog=True, output="zpk")
-            return np.asarray(scipy.signal.freqs_zpk(*poles, np.abs(s))[1])
+            static, response = (
+                scipy.signal.freqs_zpk(*poles, w)[1] for w in (np.zeros(1), np.abs(s))
+            )
+            return np.asarray(response / static)
         # Symmetric, so that its delay is taken out: a raised-cosine transition, 10 % wide.
         x = np.clip((np.abs(s) - 0.907) / 0.186, 0, 1)
         return np.asarray(0.5 + 0.5 * np.cos(np.pi * x), dtype=complex)
