@@ -31,7 +31,8 @@ from thud.plot.recording_figures import recording_forces, recording_levels
 from thud.recordings.config import Config, PlateConfig
 from thud.recordings.read_recording import read_recording
 from thud.recordings.recording import Recording
-from thud.report.contents import read_date, report_data
+from thud.recordings.dates import read_date
+from thud.report.contents import report_data
 from thud.report.fonts import missing_characters
 from thud.report.notes import group_messages, shorten
 from thud.report.page import _range_picture, report_page

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -53,7 +53,9 @@ def average_estimates(estimates: Sequence[Estimate], *systematic: Contribution) 
     contributions = [Contribution("noise", noise, counted=count == 1)]
     if count > 1:
         error = float(values.std(ddof=1)) / math.sqrt(count)
-        contributions.insert(0, Contribution("repeatability", error, count - 1))
+        contributions.insert(
+            0, Contribution("repeatability", error, count - 1, divisor=math.sqrt(count))
+        )
     return Estimate.from_budget(float(values.mean()), *contributions, *systematic)
 
 
@@ -69,8 +71,14 @@ def level_estimates(
     """
     count = len(levels.names)
     contributions = dict(levels.contributions)
+    sizes: dict[str, dict[str, Any]] = {
+        name: {"divisor": math.sqrt(3)} for name in ("method", "filter")
+    }
+    if count > 1:
+        sizes["repeatability"] = {"divisor": math.sqrt(count)}
     if calibration is not None:
         contributions["calibration"] = np.full(len(levels.level), AMPLITUDE_DECIBEL * calibration)
+        sizes["calibration"] = {"size": calibration}
     if plate is not None and plate.any():
         contributions["plate"] = plate
     budgets = (
@@ -80,6 +88,7 @@ def level_estimates(
                 float(values[band]),
                 count - 1 if name == "repeatability" else math.inf,
                 counted=count == 1 or name not in WITHIN_REPEATABILITY,
+                **sizes.get(name, {}),
             )
             for name, values in contributions.items()
         ]
@@ -140,14 +149,17 @@ def average_restitution(
     known = [drop for drop in drops if drop.restitutions]
     causes = dict.fromkeys(cause for drop in known for cause in drop.shared_effects)
     systematic = [
-        _mean_effect(cause, [drop.shared_effects.get(cause, 0.0) for drop in known])
+        _mean_effect(cause, [drop.shared_effects.get(cause, 0.0) for drop in known], conditions)
         for cause in causes
     ]
     comparable = [drop for drop in known if {IMPULSE, BOUNCES} <= set(drop.restitutions)]
     difference = _difference(comparable, conditions)
     if abs(difference.value) > difference.expanded:
         half_width = abs(difference.value)
-        systematic.append(Contribution("impulse against bounces", half_width / math.sqrt(3)))
+        contribution = half_width / math.sqrt(3)
+        systematic.append(
+            Contribution("impulse against bounces", contribution, divisor=math.sqrt(3))
+        )
     return average_estimates([drop.restitution for drop in known], *systematic), difference
 
 
@@ -161,12 +173,13 @@ def _difference(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
         shared = conditions.shared_effects(drop.restitutions, drop.impulse)
         for cause, effect in shared[IMPULSE].items():
             effects.setdefault(cause, []).append(effect - shared[BOUNCES].get(cause, 0.0))
-    systematic = [_mean_effect(cause, values) for cause, values in effects.items()]
+    systematic = [_mean_effect(cause, values, conditions) for cause, values in effects.items()]
     return average_estimates(differences, *systematic)
 
 
-def _mean_effect(cause: str, effects: Sequence[float]) -> Contribution:
-    return Contribution(cause, abs(float(np.mean(effects))))
+def _mean_effect(cause: str, effects: Sequence[float], conditions: DropConditions) -> Contribution:
+    size, unit = conditions.uncertainties.get(cause, (math.nan, ""))
+    return Contribution(cause, abs(float(np.mean(effects))), size=size, unit=unit)
 
 
 def average_mass(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
@@ -185,7 +198,11 @@ def average_mass(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
     }
     return average_estimates(
         [drop.effective_mass for drop in known],
-        *(Contribution(cause, value) for cause, value in systematic.items() if value),
+        *(
+            _mean_effect(cause, [effect], conditions)
+            for cause, effect in systematic.items()
+            if effect
+        ),
     )
 
 

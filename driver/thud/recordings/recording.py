@@ -247,6 +247,7 @@ class Recording(Displayed):
         warnings += [
             f"force plate: {check.reason}" for check in config.plate_checks if check.met is False
         ]
+        warnings += config.check_due(origin.date for origin in self.origins)
         plate = config.resonance
         missing = {
             "calibration": self.calibration_uncertainty is None,

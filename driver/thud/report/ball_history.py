@@ -16,7 +16,8 @@ from thud.base.checks import refuse
 from thud.base.files import read_input
 from thud.base.immutable import Immutable
 from thud.level.assessment import VERDICTS
-from thud.report.contents import FORMAT, read_date
+from thud.recordings.dates import read_date
+from thud.report.contents import FORMAT
 from thud.report.rows import Style, criterion_row, criterion_style, limits_of, number
 
 if TYPE_CHECKING:
