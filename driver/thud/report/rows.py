@@ -22,8 +22,8 @@ HEAD = (
     "Criterion", "Value", "U (95 %)", "Limits", "Margin", "P (outside)", "Spread", "Background",
     "Verdict",
 )  # fmt: skip
-# Significant digits of an uncertainty, and maximum number of decimals of a value.
-DIGITS, MAX_DECIMALS = 2, 6
+# Significant digits of an uncertainty, and the width below which it is shown as zero.
+DIGITS, MIN_WIDTH = 2, 1e-6
 # Maximum of the degrees of freedom that are shown: above, Student's t differs by less than 0.1 %.
 MAX_FREEDOM = 1000.0
 
@@ -112,8 +112,9 @@ def expanded_text(criterion: dict[str, Any]) -> str:
 
 def rounded_style(criterion: dict[str, Any]) -> Style:
     """Return the format of a criterion with the decimals of its expanded uncertainty."""
-    style, expanded = criterion_style(criterion), criterion["expanded_uncertainty"]
-    return style._replace(decimals=_decimals(expanded / style.unit)) if expanded else style
+    style = criterion_style(criterion)
+    expanded = (criterion["expanded_uncertainty"] or 0.0) / style.unit
+    return style._replace(decimals=_decimals(expanded)) if expanded > MIN_WIDTH else style
 
 
 def width_text(width: float) -> str:
@@ -122,13 +123,13 @@ def width_text(width: float) -> str:
     >>> width_text(0.0996), width_text(1234.0)
     ('0.10', '1200')
     """
-    return number(width, _decimals(width)) if width else "0"
+    return number(width, _decimals(width)) if width > MIN_WIDTH else "0"
 
 
 def _decimals(width: float) -> int:
     """Return the number of decimals that leaves two significant digits of a width."""
     exponent = math.floor(math.log10(float(f"{width:.{DIGITS - 1}e}")))
-    return min(DIGITS - 1 - exponent, MAX_DECIMALS)
+    return DIGITS - 1 - exponent
 
 
 def freedom_text(freedom: float | None) -> str:

@@ -51,14 +51,13 @@ PAGE = Template("""<!DOCTYPE html>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>$title</title>
 <style>
-$fonts
 @page { size: A4; margin: 10mm 12mm 14mm;
   @bottom-left { content: "$identity"; font: 6.5pt '$family'; color: #444; width: 140mm; }
   @bottom-right { content: "page " counter(page) " of " counter(pages);
     font: 6.5pt '$family'; color: #444; }
 }
 :root { color-scheme: light; }
-html { font: 13px/1.4 '$family', sans-serif; color: #000; background: #fff; }
+html { font: 13px/1.4 '$family', Verdana, sans-serif; color: #000; background: #fff; }
 body { margin: 0 auto; font-variant-ligatures: none; overflow-wrap: anywhere; }
 h1 { font-size: 2em; line-height: 1.2; margin: 0 0 0.2em; }
 h2 { font-size: 1em; margin: 0.8em 0 0.2em; break-after: avoid; }
@@ -91,6 +90,7 @@ td, th { padding: 0; vertical-align: top; text-align: left; }
 .rule { margin: 0.3em 0 0.6em; }
 .figure { display: block; width: 100%; }
 li, tr { break-inside: avoid; }
+.columns > tbody > tr { break-inside: auto; }
 ul { margin: 0; padding: 0 0 0 1em; list-style: '–  '; }
 .files td:last-child { text-align: right; }
 .end { break-inside: avoid; }
@@ -100,9 +100,24 @@ ul { margin: 0; padding: 0 0 0 1em; list-style: '–  '; }
 .signature span { display: block; border-top: 1px solid #000; padding-top: 0.2em; }
 footer { margin-top: 0.8em; color: #444; font-size: 0.85em; }
 @media print {
-  html { font: 7.3pt/3.4mm '$family', sans-serif; }
+  html { font: 7.3pt/3.4mm '$family', Verdana, sans-serif; }
   body { width: 186mm; }
-  .range { width: 26mm; height: 3.4mm; }
+  .range { width: 22mm; height: 3.4mm; }
+  .cards, .files { table-layout: fixed; }
+  .cards th, .cards td { padding-left: 1.1mm; }
+  .criteria th { width: 16mm; }
+  .criteria th:first-child { width: 24mm; }
+  .criteria th:nth-child(2) { width: 18mm; }
+  .criteria th:nth-child(3) { width: 13mm; }
+  .criteria th:nth-child(4) { width: 19mm; }
+  .criteria th:nth-child(5), .criteria th:nth-child(7) { width: 10.5mm; }
+  .criteria th:nth-last-child(2) { width: 22mm; }
+  .criteria th:last-child { width: 26.5mm; }
+  .budget th { width: 20mm; }
+  .budget th:first-child { width: 38mm; }
+  .budget th:nth-child(2), .budget th:nth-child(4) { width: 12mm; }
+  .budget th:nth-child(7), .budget th:last-child { width: 27mm; }
+  .files td:last-child { width: 104mm; }
   .figures { height: 64mm; }
   .figure { width: 91mm; height: 64mm; }
   .signature { margin-top: 9mm; }
