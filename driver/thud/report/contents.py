@@ -32,12 +32,12 @@ FORMAT = "thud calibration report 1"
 FIELDS = {
     "number": "number of the report",
     "laboratory": "laboratory",
-    "address": "its address",
+    "address": "address of the laboratory",
     "client": "client",
     "ball": "ball",
     "serial": "serial number",
     "item": "description of the item",
-    "state": "its state",
+    "state": "state of the item",
     "received": "date of receipt",
     "date": "date of the measurement",
     "issued": "date of issue",
@@ -46,7 +46,7 @@ FIELDS = {
     "temperature": "temperature",
     "humidity": "humidity",
     "pressure": "air pressure",
-    "authorized_by": "who authorizes",
+    "authorized_by": "person who authorizes it",
 }
 
 

@@ -6,7 +6,7 @@ import io
 from typing import TYPE_CHECKING, Any
 
 import h5netcdf
-import h5py  # type: ignore[import-untyped]
+import h5py
 import numpy as np
 
 from thud.base._schema import QUANTITIES
