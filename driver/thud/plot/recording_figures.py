@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 # Height without the legend, inch: a report has two figures side by side.
 HEIGHT = 2.15
-# Maximum number of drops drawn as lines; the range of more drops is filled.
+# Maximum number of drops, and of outliers, drawn as lines; the range of more drops is filled.
 MAX_LINES = 40
 # Margin of the filtered force around the drawn times, s: longer than the filter's response.
 FILTER_MARGIN = 2e-2
@@ -162,9 +162,11 @@ def _draw_drops(
         name = f"{count} drops" if count > 1 else "drop"
         for i, curve in enumerate(curves[~marked]):
             axes.plot(x, curve, label=name if i == 0 else None, **THIN)
-    for i, curve in enumerate(curves[marked]):
+    for i, curve in enumerate(curves[marked][:MAX_LINES]):
         number = int(marked.sum())
         name = "outlier" if number == 1 else f"{number} outliers"
+        if number > MAX_LINES:
+            name += f", {MAX_LINES} of them drawn"
         axes.plot(x, curve, label=name if i == 0 else None, **DEVIANT)
 
 
