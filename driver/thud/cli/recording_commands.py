@@ -84,6 +84,8 @@ def measure(options: argparse.Namespace) -> int:
         for step in (*recording_files.messages(recording, "steps"), *recording.level_steps):
             print(f"  {step}")
         print(f"  {recording_files.verdict_text(recording)}")
+        if figures:
+            print(recording_files.missing_text(recording))
     messages = recording_files.messages(recording, "warnings")
     print_notes((*recording.own_warnings, *recording.outliers, *messages))
     if not options.quiet:

@@ -32,6 +32,10 @@ MIN_WARNED = 0.1
 PADDING = 16
 
 
+# Contributions of instruments that are not stated: rectangular distributions.
+ASSUMED_PLATE, ASSUMED_FILTER = ASSUMED = "plate, assumed", "recorder filter, assumed"
+
+
 def assumed_contributions(
     drops: Sequence[Drop], config: Config, bands: BandSet = "octave"
 ) -> dict[str, NDArray[np.float64]]:
@@ -50,8 +54,8 @@ def assumed_contributions(
             level_change(drops, lambda f: np.abs(shifted.response(f) / stated.response(f)), bands)
         )
     assumed = {
-        "plate, assumed": _plate_gain(drops, config),
-        "recorder filter, assumed": _filter_gain(drops, config),
+        ASSUMED_PLATE: _plate_gain(drops, config),
+        ASSUMED_FILTER: _filter_gain(drops, config),
     }
     for name, gain in assumed.items():
         if gain is not None:
@@ -75,19 +79,19 @@ def assumption_warnings(drops: Sequence[Drop], config: Config) -> tuple[str, ...
     if plate is None and not rings and _flat_limit(config) is None:
         assumed.append(
             f"the force plate is flat within {100 * TOLERANCE:g} % up to {ASSUMED_FLAT:g} Hz "
-            f"([plate]; {size('plate, assumed')})"
+            f"([plate]; {size(ASSUMED_PLATE)})"
         )
     if config.filter is None:
         assumed.append(
             "the filter of the recorder is at a quarter of the sample rate or above "
-            f"([filter]; {size('recorder filter, assumed')})"
+            f"([filter]; {size(ASSUMED_FILTER)})"
         )
     if assumed:
         result.append(f"not stated, and assumed for levels and peak: {'; '.join(assumed)}")
     if plate is None and rings:
         result.append(
             "the resonance of the force plate is not stated: its estimated effect, "
-            f"{size('plate, assumed')}, is in the uncertainty"
+            f"{size(ASSUMED_PLATE)}, is in the uncertainty"
         )
     seen = [drop.plate_recorded for drop in drops]
     if plate is not None and True not in seen:
@@ -95,7 +99,7 @@ def assumption_warnings(drops: Sequence[Drop], config: Config) -> tuple[str, ...
         if False in seen:
             result.append(
                 f"the record does not show the stated resonance of {plate.frequency:.4g} Hz: its "
-                f"correction, {size('plate, assumed')}, is in the uncertainty; check [plate]"
+                f"correction, {size(ASSUMED_PLATE)}, is in the uncertainty; check [plate]"
             )
         elif np.nanmax(np.abs(change)) > MIN_WARNED:
             result.append(

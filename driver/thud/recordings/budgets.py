@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from thud.level.estimate import Contribution, Estimate
 from thud.level.levels import RECORDED_BAND, peak_count
+from thud.recordings.assumptions import ASSUMED
 from thud.recordings.outliers import SIGNIFICANCE, find_outliers
 from thud.recordings.recorded_levels import NOISE, REPEATABILITY, noise_exceeds
 from thud.recordings.restitution import BOUNCES, IMPULSE, DropConditions
@@ -55,7 +56,9 @@ def average_estimates(estimates: Sequence[Estimate], *systematic: Contribution) 
         error = float(values.std(ddof=1)) / math.sqrt(count)
         exceeds = bool(noise_exceeds(error, noise, count))
         contributions = [
-            Contribution(REPEATABILITY, error, count - 1, counted=not exceeds),
+            Contribution(
+                REPEATABILITY, error, count - 1, counted=not exceeds, divisor=math.sqrt(count)
+            ),
             Contribution(NOISE, noise, counted=exceeds),
         ]
     return Estimate.from_budget(float(values.mean()), *contributions, *systematic)
@@ -73,8 +76,13 @@ def level_estimates(
     """
     count = len(levels.names)
     contributions = dict(levels.contributions)
+    rectangular = ("method", "filter", "offset step", *ASSUMED)
+    sizes: dict[str, dict[str, Any]] = {name: {"divisor": math.sqrt(3)} for name in rectangular}
+    if count > 1:
+        sizes[REPEATABILITY] = {"divisor": math.sqrt(count)}
     if calibration is not None:
         contributions["calibration"] = np.full(len(levels.level), AMPLITUDE_DECIBEL * calibration)
+        sizes["calibration"] = {"size": calibration}
     contributions |= systematic or {}
     counted: dict[str, NDArray[np.bool_]] = {}
     if count > 1:
@@ -87,6 +95,7 @@ def level_estimates(
                 float(values[band]),
                 count - 1 if name == REPEATABILITY else math.inf,
                 counted=name not in counted or bool(counted[name][band]),
+                **sizes.get(name, {}),
             )
             for name, values in contributions.items()
         ]
@@ -147,14 +156,17 @@ def average_restitution(
     known = [drop for drop in drops if drop.restitutions]
     causes = dict.fromkeys(cause for drop in known for cause in drop.shared_effects)
     systematic = [
-        _mean_effect(cause, [drop.shared_effects.get(cause, 0.0) for drop in known])
+        _mean_effect(cause, [drop.shared_effects.get(cause, 0.0) for drop in known], conditions)
         for cause in causes
     ]
     comparable = [drop for drop in known if {IMPULSE, BOUNCES} <= set(drop.restitutions)]
     difference = _difference(comparable, conditions)
     if abs(difference.value) > difference.expanded:
         half_width = abs(difference.value)
-        systematic.append(Contribution("impulse against bounces", half_width / math.sqrt(3)))
+        contribution = half_width / math.sqrt(3)
+        systematic.append(
+            Contribution("impulse against bounces", contribution, divisor=math.sqrt(3))
+        )
     return average_estimates([drop.restitution for drop in known], *systematic), difference
 
 
@@ -168,12 +180,13 @@ def _difference(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
         shared = conditions.shared_effects(drop.restitutions, drop.impulse)
         for cause, effect in shared[IMPULSE].items():
             effects.setdefault(cause, []).append(effect - shared[BOUNCES].get(cause, 0.0))
-    systematic = [_mean_effect(cause, values) for cause, values in effects.items()]
+    systematic = [_mean_effect(cause, values, conditions) for cause, values in effects.items()]
     return average_estimates(differences, *systematic)
 
 
-def _mean_effect(cause: str, effects: Sequence[float]) -> Contribution:
-    return Contribution(cause, abs(float(np.mean(effects))))
+def _mean_effect(cause: str, effects: Sequence[float], conditions: DropConditions) -> Contribution:
+    size, unit = conditions.uncertainties.get(cause, (math.nan, ""))
+    return Contribution(cause, abs(float(np.mean(effects))), size=size, unit=unit)
 
 
 def average_mass(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
@@ -192,7 +205,11 @@ def average_mass(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
     }
     return average_estimates(
         [drop.effective_mass for drop in known],
-        *(Contribution(cause, value) for cause, value in systematic.items() if value),
+        *(
+            _mean_effect(cause, [effect], conditions)
+            for cause, effect in systematic.items()
+            if effect
+        ),
     )
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
+from datetime import date
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,7 @@ from thud.level.assessment import get_criteria
 from thud.level.levels import SOURCES
 from thud.recordings.channel import MIB, shown_path, shown_text
 from thud.recordings.choice import parse_numbers
+from thud.recordings.dates import read_date
 from thud.recordings.force_units import (
     Calibration,
     plain_number,
@@ -37,12 +39,16 @@ from thud.recordings.signal_files import regular_file
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
+    from pathlib import Path
 
     from thud.base._schema import LimitsSource
     from thud.recordings.plate import PlateCheck
 
 MAX_TEXT = 500
+# Formats and maximum size of a picture in the report, bytes.
+PICTURES = {".svg": "image/svg+xml", ".png": "image/png", ".jpg": "image/jpeg"}
+MAX_PICTURE = 300_000
 
 
 def _number(low: float, high: float, value: object, key: str) -> float:
@@ -68,6 +74,21 @@ def _texts(value: object, key: str) -> tuple[str, ...]:
     return tuple(
         _text(text, key) for text in (value if isinstance(value, list | tuple) else [value])
     )
+
+
+def _date(value: object, key: str) -> str:
+    """Return a date as text in ISO 8601; empty if not stated."""
+    if isinstance(value, date):
+        return value.isoformat()
+    read = read_date(_text(value, key)) if value else None
+    if value and read is None:
+        refuse(f"{key} = {shown(value)} is not allowed", 'a date, such as "2024-05-03"')
+    return read.date().isoformat() if read else ""
+
+
+def _day(value: object, key: str) -> str:
+    """Return the date of the measurement as text, in any form."""
+    return value.isoformat() if isinstance(value, date) else _text(value, key)
 
 
 def _choice(choices: Mapping[str, object] | tuple[str, ...], value: object, key: str) -> str:
@@ -242,6 +263,106 @@ def _filter(value: object, key: str) -> FilterConfig:
 
 
 @dataclass(frozen=True)
+class Instrument:
+    """An instrument of the measurement and its calibration certificate.
+
+    Attributes
+    ----------
+    name, serial, certificate : str
+        Name, serial number, and number of the certificate.
+    calibrated, due : str
+        Dates of the certificate and of the next calibration.
+    """
+
+    name: str = _key(_text, "")
+    serial: str = _key(_text, "")
+    certificate: str = _key(_text, "")
+    calibrated: str = _key(_date, "")
+    due: str = _key(_date, "")
+
+
+def _instruments(value: object, key: str) -> tuple[str | Instrument, ...]:
+    return tuple(
+        Instrument(**_checked(entry, Instrument, f"{key}: "))
+        if isinstance(entry, Mapping)
+        else entry
+        if isinstance(entry, Instrument)
+        else _text(entry, key)
+        for entry in (value if isinstance(value, list | tuple) else [value])
+    )
+
+
+@dataclass(frozen=True)
+class ReportConfig:
+    """What a report of a laboratory states besides its results (ISO/IEC 17025, 7.8).
+
+    Attributes
+    ----------
+    number : str
+        Number of the report, on each page.
+    address, client : tuple of str
+        Address of the laboratory; name and address of the client: a line each.
+    item, state : str
+        Description of the item, and its state at receipt.
+    received, issued : str
+        Dates of receipt of the item and of issue of the report.
+    place, procedure, deviations : str
+        Place and procedure of the measurement, and deviations from the procedure.
+    humidity, pressure : float or None
+        Relative humidity, %, and static pressure of the air, Pa.
+    accreditation : str
+        Text on the accreditation.
+    accreditation_mark : str
+        File of the accreditation mark: SVG, PNG or JPEG.
+    authorized_by : str
+        Person who authorizes the report.
+    """
+
+    number: str = _key(_text, "")
+    address: tuple[str, ...] = _key(_texts, ())
+    client: tuple[str, ...] = _key(_texts, ())
+    item: str = _key(_text, "")
+    state: str = _key(_text, "")
+    received: str = _key(_date, "")
+    issued: str = _key(_date, "")
+    place: str = _key(_text, "")
+    procedure: str = _key(_text, "")
+    deviations: str = _key(_text, "")
+    humidity: float | None = _key(partial(_number, 0.0, 100.0))
+    pressure: float | None = _key(partial(_number, 5e4, 1.2e5))
+    accreditation: str = _key(_text, "")
+    accreditation_mark: str = _key(_text, "")
+    authorized_by: str = _key(_text, "")
+
+
+@dataclass(frozen=True)
+class Properties:
+    """Properties of the ball that are stated, not assessed (ISO 10140-5, annex F).
+
+    Attributes
+    ----------
+    diameter, wall_thickness : float or None
+        Outer diameter and wall thickness, m.
+    hardness, surface : str
+        Hardness with its scale, and condition of the surface.
+    temperature : float or None
+        Temperature of the ball, degC, if not that of the air.
+    """
+
+    diameter: float | None = _key(partial(_number, 0.01, 10.0))
+    wall_thickness: float | None = _key(partial(_number, 1e-4, 1.0))
+    hardness: str = _key(_text, "")
+    surface: str = _key(_text, "")
+    temperature: float | None = _key(partial(_number, -273.15, 200.0))
+
+
+def _table_of(kind: type[Any], value: object, key: str) -> Any:  # noqa: ANN401 - of `kind`
+    if isinstance(value, kind):
+        return value
+    return kind(**_checked(_table(value, key), kind, f"{key}: "))
+
+
+@dataclass(frozen=True)
 class Config:
     """What a laboratory states about its ball, instruments and files; None if unknown.
 
@@ -255,8 +376,12 @@ class Config:
         Source whose limits apply.
     temperature : float or None
         Temperature of ball and air, degC.
-    instruments : tuple of str
+    instruments : tuple of str or Instrument
         Instruments.
+    report : ReportConfig
+        What the report states besides the results.
+    properties : Properties
+        Properties of the ball that are stated, not assessed.
     channel, channels, unit, polarity, sample_rate, calibration
         As for `open_signals`.
     calibration_uncertainty : float or None
@@ -285,10 +410,12 @@ class Config:
     laboratory: str = _key(_text, "")
     ball: str = _key(_text, "")
     serial: str = _key(_text, "")
-    date: str = _key(_text, "")
+    date: str = _key(_day, "")
     source: LimitsSource = _key(partial(_choice, SOURCES), SOURCES[0])
     temperature: float | None = _key(partial(_number, -273.15, 200.0))
-    instruments: tuple[str, ...] = _key(_texts, ())
+    instruments: tuple[str | Instrument, ...] = _key(_instruments, ())
+    report: ReportConfig = _key(partial(_table_of, ReportConfig), ReportConfig())
+    properties: Properties = _key(partial(_table_of, Properties), Properties())
     channel: int | str | None = _key(_channel)
     channels: str | tuple[int | str, ...] | None = _key(require_channels)
     unit: str | None = _key(require_unit)
@@ -347,6 +474,19 @@ class Config:
             self.height_uncertainty or 0.0,
         )
 
+    def check_due(self, dates: Iterable[str]) -> list[str]:
+        """Return a warning for each instrument whose calibration was due before the measurement.
+
+        `dates` are those of the files, which count if no date is stated.
+        """
+        days = [read_date(text) for text in ([self.date] if self.date else dates)]
+        last = max((day.date().isoformat() for day in days if day), default="")
+        return [
+            f"{item.name}: its calibration was due on {item.due}, before the measurement"
+            for item in self.instruments
+            if isinstance(item, Instrument) and item.due and item.due < last
+        ]
+
     @property
     def plate_checks(self) -> tuple[PlateCheck, ...]:
         """Checks of the plate by the standard; none without ``[plate]``."""
@@ -378,7 +518,27 @@ def read_config(path: str | os.PathLike[str]) -> Config:
         refuse(
             f"{name}: is not valid TOML ({shown_text(error)})", 'lines such as unit = "V"', error
         )
-    return Config(**_checked(table, Config, f"{name}: "))
+    config = Config(**_checked(table, Config, f"{name}: "))
+    mark = config.report.accreditation_mark
+    if not mark:
+        return config
+    path = file.parent / mark
+    picture(path)
+    return replace(config, report=replace(config.report, accreditation_mark=str(path)))
+
+
+def picture(path: Path) -> tuple[str, bytes]:
+    """Return media type and content of a picture; raise InputError if it cannot be used."""
+    kind = PICTURES.get(path.suffix.lower().replace(".jpeg", ".jpg"))
+    allowed = f"{', '.join(PICTURES)} up to {MAX_PICTURE // 1000} kB"
+    problem = f"report: accreditation_mark = {shown(str(path))} cannot be used"
+    try:
+        content = path.read_bytes() if kind and path.stat().st_size <= MAX_PICTURE else b""
+    except (OSError, ValueError) as error:
+        refuse(f"{problem} ({shown_text(error)})", allowed, error)
+    if not kind or not content:
+        refuse(f"{problem} ({'too large or empty' if kind else 'no picture'})", allowed)
+    return kind, content
 
 
 def checked_config(config: Config) -> Config:

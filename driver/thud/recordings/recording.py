@@ -248,6 +248,7 @@ class Recording(Displayed):
         warnings += [
             f"force plate: {check.reason}" for check in config.plate_checks if check.met is False
         ]
+        warnings += config.check_due(origin.date for origin in self.origins)
         warnings += assumption_warnings(self.drops, config)
         plate, stated = config.resonance, config.recorder_filter
         missing = {

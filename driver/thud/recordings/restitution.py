@@ -45,6 +45,15 @@ class DropConditions:
         """Velocity at first touch, m/s; NaN if the drop height is unknown."""
         return math.sqrt(2 * GRAVITY * self.height) if self.height else math.nan
 
+    @property
+    def uncertainties(self) -> dict[str, tuple[float, str]]:
+        """Standard uncertainty and its unit by the cause of a shared effect."""
+        return {
+            "calibration": (self.calibration_uncertainty, ""),
+            "mass": (self.mass_uncertainty, "kg"),
+            "drop height": (self.height_uncertainty, "m"),
+        }
+
     def restitutions(
         self, impulse: Estimate, contact_time: Estimate, flights: Sequence[Estimate]
     ) -> tuple[dict[str, Estimate], tuple[str, ...]]:
