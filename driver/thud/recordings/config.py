@@ -501,6 +501,14 @@ class Config:
         )
 
 
+def config_from(table: Mapping[str, object], prefix: str = "") -> Config:
+    """Return the configuration of a table as in a file; messages begin with `prefix`.
+
+    Raise InputError if a key is unknown, or its value of the wrong type or out of range.
+    """
+    return Config(**_checked(table, Config, prefix))
+
+
 def read_config(path: str | os.PathLike[str]) -> Config:
     """Read a configuration.
 
@@ -518,7 +526,7 @@ def read_config(path: str | os.PathLike[str]) -> Config:
         refuse(
             f"{name}: is not valid TOML ({shown_text(error)})", 'lines such as unit = "V"', error
         )
-    config = Config(**_checked(table, Config, f"{name}: "))
+    config = config_from(table, f"{name}: ")
     mark = config.report.accreditation_mark
     if not mark:
         return config
