@@ -79,7 +79,7 @@ def _texts(value: object, key: str) -> tuple[str, ...]:
 def _date(value: object, key: str) -> str:
     """Return a date as text in ISO 8601; empty if not stated."""
     if isinstance(value, date):
-        return value.isoformat()
+        return value.isoformat()[:10]
     read = read_date(_text(value, key)) if value else None
     if value and read is None:
         refuse(f"{key} = {shown(value)} is not allowed", 'a date, such as "2024-05-03"')
