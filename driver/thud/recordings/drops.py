@@ -11,6 +11,7 @@ from scipy.ndimage import uniform_filter1d
 from tqdm import tqdm
 
 from thud.base.checks import refuse
+from thud.recordings.quantization import Quantization
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -80,6 +81,8 @@ class Window:
         Possible faults of the pulse as a whole.
     plate : Plate or None
         Force plate whose resonance was corrected in the signal.
+    quantization : Quantization
+        Errors of the recorded force by quantization.
     """
 
     name: str
@@ -90,6 +93,7 @@ class Window:
     bounces: tuple[Window, ...] = ()
     warnings: tuple[str, ...] = ()
     plate: Plate | None = None
+    quantization: Quantization = field(default_factory=Quantization)
 
     @property
     def sample_rate(self) -> float:

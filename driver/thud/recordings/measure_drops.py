@@ -20,6 +20,7 @@ from thud.recordings.drops import find_windows
 from thud.recordings.load_cells import repair_cells
 from thud.recordings.measured_drop import measure_drop
 from thud.recordings.plate import correct_window
+from thud.recordings.quantization import find_quantization
 from thud.recordings.ringing import check_ringing
 from thud.recordings.same_drops import (
     Record,
@@ -182,6 +183,7 @@ class _Processes(ExitStack):
 def measure_window(window: Window, config: Config) -> Drop:
     """Return the drop in a window, after correction of the resonance of the force plate."""
     steps, warnings = tuple[str, ...](), tuple[str, ...]()
+    window = replace(window, quantization=find_quantization(window))
     if window.signal.cells:
         window, steps, warnings = repair_cells(window)
     plate = config.resonance
