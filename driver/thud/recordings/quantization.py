@@ -72,7 +72,7 @@ def _quantization(force: NDArray[np.float64], window: Window) -> Quantization:
     offset = offset_deviation(background, step)
     # Floats with few digits are coarser at the peak.
     peak = float(contact.max() - np.median(background))
-    top = find_step(contact[contact > contact.max() - peak / 4])
+    top = find_step(contact[contact > contact.max() - peak / 3])
     if not offset and top <= step:
         return Quantization(step)
     step = max(step, top)
