@@ -177,7 +177,9 @@ def _difference(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
         impulse, bounces = (drop.restitutions[name] for name in (IMPULSE, BOUNCES))
         combined = math.hypot(impulse.uncertainty, bounces.uncertainty)
         differences.append(Estimate(impulse.value - bounces.value, combined))
-        shared = conditions.shared_effects(drop.restitutions, drop.impulse)
+        shared = conditions.shared_effects(
+            drop.restitutions, drop.impulse, drop.contact.quantization_impulse
+        )
         for cause, effect in shared[IMPULSE].items():
             effects.setdefault(cause, []).append(effect - shared[BOUNCES].get(cause, 0.0))
     systematic = [_mean_effect(cause, values, conditions) for cause, values in effects.items()]
@@ -199,9 +201,12 @@ def average_mass(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
     velocity_change = float(np.mean([drop.impulse.value for drop in known])) / value
     height_effect = value * conditions.speed / velocity_change * conditions.height_uncertainty
     height_effect /= 2 * conditions.height
+    impulses = [(drop.impulse.value, drop.contact.quantization_impulse) for drop in known]
+    impulse, quantization_impulse = np.mean(impulses, axis=0)
     systematic = {
         "calibration": value * conditions.calibration_uncertainty,
         "drop height": height_effect,
+        "quantization": value * float(quantization_impulse / impulse),
     }
     return average_estimates(
         [drop.effective_mass for drop in known],

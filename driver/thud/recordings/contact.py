@@ -12,7 +12,7 @@ from scipy.ndimage import convolve1d, uniform_filter1d
 
 from thud.base.immutable import Immutable
 from thud.level.estimate import Estimate
-from thud.level.levels import RECORDED_BAND
+from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.flanks import SMOOTHING, Flank, Posterior, find_touch
 from thud.recordings.noise import Background, fit_background
 from thud.recordings.response import correct_force
@@ -52,6 +52,12 @@ GATE_RATE = 10_000.0
 CORRECTION_PERIODS = 4.0
 # Error of begin and end due to content above the corrected frequencies, in periods of the highest.
 CORRECTION_ERROR = 0.06
+# Number of positions of a background within a quantization step.
+N_PHASE = 16
+# Weights of neighboring samples that give values between the steps.
+NO_GRID = np.array([0.21, 0.58, 0.21])
+# Fraction of the peak at which a contact begins and ends (`thud.impact.contact_time`).
+BEGIN = 0.01
 # Errors of samples due to quantization and the filter of the recorder, as a fraction of the peak.
 SAMPLE_ERROR = 2e-4
 
@@ -105,6 +111,32 @@ class Contact(Immutable):
         """Force within the gate, N."""
         first = self.span[0]
         return self.force[self.gate[0] - first : self.gate[1] - first]
+
+    @property
+    def quantization_errors(self) -> NDArray[np.float64]:
+        """Possible errors of the force in the gate by quantization, N, [n_phase, n]; empty if none.
+
+        They are those of the low-passed force for evenly spaced positions of the background
+        within its step. Noise lowers them like the error of the offset.
+        """
+        quantization = self.background.quantization
+        if not quantization.offset:
+            return np.empty((0, len(self.gated)))
+        time = np.arange(*self.gate) / self.sample_rate
+        is_contact = (time >= self.touch.value) & (time <= self.release.value)
+        # Without smoothing, forces that are multiples of the step would have no error.
+        smooth = np.convolve(low_pass(self.gated, self.sample_rate), NO_GRID, mode="same")
+        force = smooth * is_contact / quantization.step
+        phases = ((np.arange(N_PHASE) + 0.5) / N_PHASE - 0.5)[:, None]
+        errors = np.rint(force + phases) - force
+        return np.asarray(math.sqrt(12) * quantization.offset * errors)
+
+    @property
+    def quantization_impulse(self) -> float:
+        """Standard deviation of the impulse by quantization, N s."""
+        impulses = self.quantization_errors.sum(axis=1) / self.sample_rate
+        offset = self.background.quantization.offset * (self.end.value - self.begin.value)
+        return max(float(impulses.std()), offset) if impulses.size else 0.0
 
     def summed(self, functionals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return functionals of the samples of the gate, [k, n], summed in cells: [k, n_cell]."""
@@ -197,14 +229,22 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
     time = np.arange(*span) / rate - middle
     removed = np.interp(time, (cells[0] + cells[1]) / 2, background.predict_mean(cells))
     removed += edges.offset
+    corrected = force[slice(*span)] - removed
+    errors = [
+        math.hypot(correction_error, _step_error(background, flank, rate))
+        for flank in (
+            corrected[max(int(begin[0] * rate), 0) - span[0] :],
+            corrected[: int(-end[0] * rate) + 1 - span[0]][::-1],
+        )
+    ]
     return Contact(
         Estimate(t0, s0),
         Estimate(t1, s1),
-        Estimate(begin[0], math.hypot(begin[1], correction_error)),
-        Estimate(-end[0], math.hypot(end[1], correction_error)),
+        Estimate(begin[0], math.hypot(begin[1], errors[0])),
+        Estimate(-end[0], math.hypot(end[1], errors[1])),
         background.peak,
         span,
-        force[slice(*span)] - removed,
+        corrected,
         removed,
         gate,
         covariance,
@@ -212,6 +252,19 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
         background,
         rate,
     )
+
+
+def _step_error(background: Background, flank: NDArray[np.float64], rate: float) -> float:
+    """Return the standard deviation of an edge by quantization, s.
+
+    The flank, N, begins at the edge. Where the background lies within a step, offset and samples
+    are uncertain by half a step and a step: the edge by the time that the force needs for both.
+    """
+    step, offset = background.quantization.step, background.quantization.offset
+    if not offset:
+        return 0.0
+    above = np.flatnonzero(flank > BEGIN * background.peak + 1.5 * step)
+    return offset / step * float(above[0] if above.size else flank.size) / rate
 
 
 def find_edges(
@@ -238,8 +291,11 @@ def find_edges(
         cells, mean = background_means(force, before_stop, after_start, rate, middle)
         if noise is None:
             noise = fit_background(cells, mean, peak)
-        background = Background(cells, mean, noise.draws, peak)
-        fixed = Background(cells, mean, noise.variances[None], peak)
+            draws, quantization = noise.draws.copy(), window.quantization
+            draws[:, 0] = np.maximum(draws[:, 0], quantization.density)
+            noise = Background(cells, mean, draws, peak, quantization)
+        background = Background(cells, mean, noise.draws, peak, noise.quantization)
+        fixed = Background(cells, mean, noise.variances[None], peak, noise.quantization)
         posteriors = []
         for sign, background_end, pulse_end, interval in (
             (1, before_stop, first, touch),
@@ -322,6 +378,7 @@ def find_posterior(  # noqa: PLR0913, PLR0917 - all of them describe one flank
     weights = np.zeros((len(count), bounds[-1] - bounds[0] + 2 * margin))
     weights[np.repeat(np.arange(len(count)), count), margin + np.arange(count.sum())] = 1
     weights = convolve1d(weights / count[:, None], kernel, mode="constant")
+    covariance += background.quantization.offset**2
     covariance += background.variances[0] * rate / 2 * weights @ weights.T
     covariance += (SAMPLE_ERROR * background.peak) ** 2 * np.eye(len(value))
     time = (cells[0] + cells[1]) / 2 + middle

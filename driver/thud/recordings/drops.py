@@ -11,6 +11,7 @@ from scipy.ndimage import uniform_filter1d
 from tqdm import tqdm
 
 from thud.base.checks import refuse
+from thud.recordings.quantization import Quantization
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -86,6 +87,8 @@ class Window:
         Possible faults of the pulse as a whole.
     chain : Chain or None
         Instruments whose responses were corrected in the signal.
+    quantization : Quantization
+        Errors of the recorded force by quantization.
     """
 
     name: str
@@ -96,6 +99,7 @@ class Window:
     bounces: tuple[Window, ...] = ()
     warnings: tuple[str, ...] = ()
     chain: Chain | None = None
+    quantization: Quantization = field(default_factory=Quantization)
 
     @property
     def sample_rate(self) -> float:

@@ -27,6 +27,8 @@ CLIPPED_FRACTION = 0.999
 # Minimum jump into or out of the equal samples of a dropout, as a fraction of the peak force: no
 # flank rises as much between two samples at 20 kHz.
 MIN_JUMP = 0.04
+# Minimum jump in quantization steps.
+MIN_STEPS = 3.5
 # Minimum number of equal samples of a dropout.
 MIN_FROZEN = 3
 # Maximum total length of dropouts that are repaired, s.
@@ -116,8 +118,12 @@ def fill_dropouts(
     ends = starts + lengths - 1
     after = np.abs(pulse[np.minimum(ends + 1, len(pulse) - 1)] - pulse[ends])
     limit = MIN_JUMP * (pulse.max() if peak is None else peak)
+    limit = max(limit, MIN_STEPS * window.quantization.step)
     zero = (force[first:stop][starts] == 0) & (before > limit) & (after > limit)
-    frozen = (lengths >= MIN_FROZEN) & ((before > limit) | (after > limit))
+    # A constant background next to a steep flank is no dropout: it has one jump.
+    is_background = np.abs(pulse[starts]) < limit / 2
+    jumps = (before > limit).astype(int) + (after > limit)
+    frozen = (lengths >= MIN_FROZEN) & (jumps > is_background)
     lost = np.flatnonzero(zero | frozen)
     total = int(lengths[lost].sum())
     if not total:

@@ -22,6 +22,7 @@ from thud.recordings.choice import choose, require_chosen
 from thud.recordings.drops import search_drops
 from thud.recordings.load_cells import repair_cells
 from thud.recordings.measured_drop import measure_drop
+from thud.recordings.quantization import find_quantization
 from thud.recordings.response import correct_window
 from thud.recordings.ringing import find_ringing, is_in_record
 from thud.recordings.same_drops import (
@@ -195,6 +196,7 @@ class _Processes(ExitStack):
 def measure_window(window: Window, config: Config) -> Drop:
     """Return the drop in a window, after correction of the responses of the instruments."""
     steps, warnings = tuple[str, ...](), tuple[str, ...]()
+    window = replace(window, quantization=find_quantization(window))
     if window.signal.cells:
         window, steps, warnings = repair_cells(window)
     chain, plate, recorded = config.chain, config.resonance, window

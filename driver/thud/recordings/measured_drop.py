@@ -47,6 +47,8 @@ MIN_CONTACT_RATIO = 4.0
 # Maximum factor between the restitution by flight and the ratio of the peaks. Beyond it a pulse is
 # no bounce, because the force follows the velocity.
 MAX_BOUNCE_RATIO = 3.0
+# Deviation of the offset by quantization, as a fraction of the peak, that raises a warning.
+MAX_OFFSET = 5e-4
 # Minimum drift and hum that are noted, in standard deviations.
 MIN_DEVIATIONS = 3.0
 # Quantities of `QUANTITIES` that are estimated for each drop.
@@ -74,8 +76,8 @@ class Drop(Immutable):
     contact_time, restitution, peak_force, impulse, effective_mass : Estimate
         Units: s (`thud.impact.contact_time`), 1, N (below 1.25 kHz), N s and kg. NaN if unknown.
     shared_effects : dict of str to float
-        Change of the restitution by one standard uncertainty of calibration, mass and drop height,
-        which all drops share and the uncertainty of the restitution excludes.
+        Change of the restitution by one standard uncertainty of calibration, mass, drop height and
+        quantized background, which all drops share and the uncertainty of the restitution excludes.
     restitution_method : str
         ``"impulse"``, ``"bounces"``, ``"impulse and bounces"`` or ``""``.
     restitutions : dict of str to Estimate
@@ -186,7 +188,7 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
     ends = [contact.end, *(end for _, end in landings)]
     flights = [_between(end, begin) for end, (begin, _) in zip(ends, landings, strict=False)]
     methods, unknown = conditions.restitutions(impulse, contact_time, flights)
-    restitution, shared = conditions.mean(methods, impulse)
+    restitution, shared = conditions.mean(methods, impulse, contact.quantization_impulse)
     rate, first = window.sample_rate, contact.span[0]
     return Drop(
         name=window.name,
@@ -207,7 +209,13 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
         noise=_noise(contact),
         bounces=tuple(begin.value - contact.touch.value for begin, _ in landings),
         steps=(*steps, *_removed(contact)),
-        warnings=(*window.warnings, *warnings, *_check_aliasing(contact, window.chain), *unknown),
+        warnings=(
+            *window.warnings,
+            *warnings,
+            *_check_aliasing(contact, window.chain),
+            *_check_step(window, contact),
+            *unknown,
+        ),
         contact=contact,
     )
 
@@ -281,7 +289,8 @@ def _peak(contact: Contact) -> Estimate:
     maxima = [low_pass(force + noise, contact.sample_rate).max() for noise in draws]
     bias = max(float(np.mean(maxima) - low.max()), 0.0)
     variance = density * min(RECORDED_BAND, contact.sample_rate / 2) + bias**2
-    variance += contact.covariance[cell, cell]
+    # The top stays within a step for some time: its error is that of the offset again.
+    variance += contact.covariance[cell, cell] + 2 * contact.background.quantization.offset**2
     return Estimate(float(low.max()) - bias, math.sqrt(variance))
 
 
@@ -304,6 +313,18 @@ def _removed(contact: Contact) -> tuple[str, ...]:
     if amplitude > MIN_DEVIATIONS * deviation:
         steps.append(f"hum of {frequency:g} Hz with an amplitude of {amplitude:.3g} N was removed")
     return tuple(steps)
+
+
+def _check_step(window: Window, contact: Contact) -> tuple[str, ...]:
+    """Return a warning if the background of a coarse record lies within a quantization step."""
+    step, offset = window.quantization.step, contact.background.quantization.offset
+    if offset < MAX_OFFSET * contact.peak:
+        return ()
+    warning = (
+        f"the record has steps of {step:.3g} N, and the background lies within one of them: the "
+        f"offset is uncertain by {offset:.2g} N; measure with a smaller range"
+    )
+    return (warning,)
 
 
 def _check_aliasing(contact: Contact, chain: Chain | None) -> tuple[str, ...]:

@@ -57,7 +57,8 @@ class DropLevels(Immutable):
         ``"background"``: less than 6 dB above it, the level is an upper bound; ``"rate"``: NaN,
         the sample rate is too low for the band.
     contributions : dict of ndarray, shape (n_band,)
-        Standard uncertainties, dB: noise, method, filter, offset step.
+        Standard uncertainties, dB: noise, method, filter, offset step, and quantization if the
+        background lies within a step.
     steps : tuple of str
         Processing, a sentence each.
     """
@@ -140,12 +141,12 @@ def measure_levels(
 def _drop_levels(
     drop: Drop, bands: BandSet, method: str, noise: NDArray[np.float64], *, low_pass: bool
 ) -> DropLevels:
-    """Return the levels of a drop from the energies of its noise, [n_band, 2]."""
+    """Return the levels of a drop from the energies of its noise, [n_band, 3]."""
     force, steps = _gated(drop, low_pass=low_pass)
     rate, edges = drop.sample_rate, get_bands(bands)
     exact = _levels(force, rate, bands, "exact")
     measured = exact if method == "exact" else _levels(force, rate, bands, method)
-    expected, deviation = noise.T
+    expected, deviation, offset = noise.T
     with np.errstate(divide="ignore"):
         background = 10 * np.log10(expected)
     level, flag = _corrected(measured, background)
@@ -155,6 +156,8 @@ def _drop_levels(
         "filter": low_pass_attenuation(edges.upper, rate) / math.sqrt(3) * low_pass,
         "offset step": _step_uncertainty(drop, bands),
     }
+    if offset.any():
+        contributions["quantization"] = ENERGY_DECIBEL * offset / 10 ** (level / 10)
     steps = (*steps, f"levels: {_DESCRIPTIONS[method]}", *_background_steps(edges.nominal, flag))
     return DropLevels(
         drop.name, bands, method, level, _root_sum(contributions), measured, background, flag,
@@ -203,8 +206,9 @@ def average_levels(estimates: Sequence[DropLevels]) -> AverageLevels:
     weights = 10 ** (drops / 10)
     weights /= weights.sum(axis=0)
     contributions = {}
-    for name in first.contributions:
-        weighted = weights * np.array([e.contributions[name] for e in estimates])
+    none = np.zeros(len(level))
+    for name in dict.fromkeys(name for e in estimates for name in e.contributions):
+        weighted = weights * np.array([e.contributions.get(name, none) for e in estimates])
         contributions[name] = (
             np.sqrt((weighted**2).sum(axis=0)) if name == NOISE else weighted.sum(axis=0)
         )

@@ -81,9 +81,12 @@ class DropConditions:
         return methods, ()
 
     def shared_effects(
-        self, methods: dict[str, Estimate], impulse: Estimate
+        self, methods: dict[str, Estimate], impulse: Estimate, quantization_impulse: float = 0.0
     ) -> dict[str, dict[str, float]]:
-        """Return the change of each restitution due to one standard uncertainty of each cause."""
+        """Return the change of each restitution due to one standard uncertainty of each cause.
+
+        `quantization_impulse` is that of the impulse by quantization of the background, N s.
+        """
         effects: dict[str, dict[str, float]] = {}
         relative_speed_uncertainty = (
             self.height_uncertainty / (2 * self.height) if self.height else 0.0
@@ -95,6 +98,7 @@ class DropConditions:
                 "mass": -ratio * self.mass_uncertainty / (self.mass or math.nan),
                 "drop height": -(1 + methods[IMPULSE].value) * relative_speed_uncertainty,
                 "slow release": GRAVITY * SLOW_RELEASE / self.speed / math.sqrt(3),
+                "quantization": ratio * quantization_impulse / impulse.value,
             }
         if BOUNCES in methods:
             value = methods[BOUNCES].value
@@ -107,7 +111,7 @@ class DropConditions:
         return effects
 
     def mean(
-        self, methods: dict[str, Estimate], impulse: Estimate
+        self, methods: dict[str, Estimate], impulse: Estimate, quantization_impulse: float = 0.0
     ) -> tuple[Estimate, dict[str, float]]:
         """Return the weighted mean over the methods, and the shared effects on this mean.
 
@@ -116,7 +120,7 @@ class DropConditions:
         """
         if not methods:
             return Estimate.unknown(), {}
-        effects = self.shared_effects(methods, impulse)
+        effects = self.shared_effects(methods, impulse, quantization_impulse)
         deviations = {name: max(estimate.uncertainty, 1e-12) for name, estimate in methods.items()}
         weights = {
             name: 1 / (deviations[name] ** 2 + sum(effect**2 for effect in effects[name].values()))
