@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from conftest import naming
+from scipy import stats
 from scipy.signal import cont2discrete, lfilter
 
 from thud import InputError, cli
+from thud.recordings import load_steps
 from thud.recordings.calibration import calibrate
 from thud.recordings.config import read_config
 from thud.recordings.plate_tap import TappedPlate, calibrate_tap
@@ -238,6 +240,23 @@ def test_time_constant_needs_a_time_scale(tmp_path: Path) -> None:
     assert found.time_constant is None
     with pytest.raises(InputError, match=naming("weight.csv", "sample rate")):
         calibrate(tmp_path / "weight.csv", force=FORCE, time_constant=10.0)
+
+
+def test_step_is_that_of_least_squares_with_its_uncertainty() -> None:
+    """Two levels and a common drift of second degree, if the amplifier is stated not to droop."""
+    rng = np.random.default_rng(6)
+    index = np.arange(100)
+    level = 3 + 0.02 * index + (index >= 50) + rng.normal(scale=0.1, size=100)
+    plateaus = [load_steps.Plateau(5, 45), load_steps.Plateau(56, 96)]
+    found, misfit = load_steps._fit_steps(level, plateaus, 4, load_steps.Rate(0, 0))  # noqa: SLF001
+    used = np.r_[5:45, 56:96]
+    columns = np.column_stack([used >= 50, np.ones(80), used, used**2])
+    factors, (square,), *_ = np.linalg.lstsq(columns, level[used])
+    # What still decays takes one more degree of freedom.
+    variance = np.linalg.inv(columns.T @ columns)[0, 0] * square / 75
+    assert found.sizes == pytest.approx([factors[0]])
+    assert found.uncertainty == pytest.approx(np.sqrt(variance) * stats.t(75).ppf(0.975) / 1.96)
+    assert (misfit, found.rate) == (0, (0, 0))
 
 
 # --- taps

@@ -12,7 +12,7 @@ from scipy.ndimage import uniform_filter1d
 from synthetic import half_sine, make_drop
 
 from thud.level.levels import low_pass
-from thud.recordings import calibration, contact, drops, flanks, measured_drop
+from thud.recordings import contact, drops, flanks, measured_drop
 from thud.recordings.contact import Contact, cells_between, uniform_bounds
 from thud.recordings.plate import Plate
 from thud.recordings.response import Chain, correct_force
@@ -186,25 +186,6 @@ def test_content_that_folds_back_falls_with_the_square_of_the_frequency(
         draws = np.array([[factor * white, 0, 0, 0, 0]])
         noisy = replace(one, background=replace(one.background, draws=draws))
         assert bool(measured_drop._check_aliasing(noisy)) == expected  # noqa: SLF001
-
-
-def test_level_at_an_edge_is_that_of_a_line_with_its_uncertainty() -> None:
-    rng = np.random.default_rng(6)
-    level = 3 + 0.02 * np.arange(100) + rng.normal(scale=0.1, size=100)
-    for begin, end, edge in ((0, 60, 60), (40, 100, 40)):
-        # A tenth at both ends is left out: what settles.
-        place = np.arange(begin + 6, end - 6)
-        (slope, value), covariance = np.polyfit(place - edge, level[place], 1, cov=True)
-        del slope
-        found = calibration._level_at(level, begin, end, edge)  # noqa: SLF001
-        assert found == pytest.approx((value, np.sqrt(covariance[1, 1])))
-    # Of several steps: their own uncertainty, or the scatter where that is more.
-    for own in (0.01, 5.0):
-        sizes = [10.0, 11.0, 12.5]
-        mean, deviation = calibration._mean([(size, own) for size in sizes])  # noqa: SLF001
-        assert mean == pytest.approx(np.mean(sizes))
-        assert deviation == pytest.approx(max(own / np.sqrt(3), stats.sem(sizes)))
-    assert calibration._mean([(10.0, 0.2)]) == (10.0, 0.2)  # noqa: SLF001
 
 
 # Flanks: times of 30 cells, whose noise is known.
