@@ -56,6 +56,7 @@ from recorder_model import (
     drop_pulse,
     electric,
     plate_force,
+    tap_record,
     weight_record,
     write_sound,
     write_table,
@@ -65,10 +66,11 @@ DOCS = Path(__file__).parents[2] / "docs"
 BANDS = ("31.5", "63", "125", "250", "500")
 LEVELS = tuple(f"{band} Hz" for band in BANDS)
 CONTACT, RESTITUTION, PEAK, CALIBRATION = "contact", "restitution", "peak", "calibration"
-QUANTITIES = (*LEVELS, CONTACT, RESTITUTION, PEAK, CALIBRATION)
-# Errors that matter; relative ones of peak and calibration.
+RESONANCE, QUALITY = "f0", "Q"
+QUANTITIES = (*LEVELS, CONTACT, RESTITUTION, PEAK, CALIBRATION, RESONANCE, QUALITY)
+# Errors that matter: dB, s, and relative ones of peak, calibration, resonance and quality.
 MATERIAL = {**dict.fromkeys(LEVELS, 0.1), CONTACT: 1e-4, RESTITUTION: 0.01, PEAK: 5e-3,
-            CALIBRATION: 5e-3}  # fmt: skip
+            CALIBRATION: 5e-3, RESONANCE: 5e-3, QUALITY: 0.05}  # fmt: skip
 # Stated standard uncertainties that an error must exceed.
 DEVIATIONS = 3.0
 COVERAGE = (0.93, 0.97)
@@ -107,6 +109,7 @@ REFUSALS = {
     r"cannot be distinguished from the noise|: no impact": "cannot be distinguished from the noise",
     r"the sign is not clear": "the sign is not clear",
     r"none of them in a unit of force": "several channels, none of them in a unit of force",
+    r"no resonance stands out": "If no resonance stands out",
     r"no clear step|the step is": "no clear step, or one that is uncertain",
     r"deviates by .* from any exponential decay": "fits no exponential decay",
     r"drops at the same instants": "at the same instant",
@@ -310,8 +313,9 @@ def measure(task: tuple[int, int]) -> Outcome:
     with tempfile.TemporaryDirectory() as directory, warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
-            if condition.weight:
-                values, said = _calibrated(condition, seed, Path(directory))
+            if condition.weight or condition.taps:
+                calibrated = _tapped if condition.taps else _calibrated
+                values, said = calibrated(condition, seed, Path(directory))
                 return Outcome(index, seed, values, 1, warnings=said)
             paths, config, truth = record(condition, seed, Path(directory))
             recording = thud.read_recording(paths, config=config)
@@ -371,6 +375,25 @@ def _calibrated(
     return {CALIBRATION: Value(factor / chain.full_scale - 1, u, concerned)}, said
 
 
+def _tapped(
+    condition: Condition, seed: int, folder: Path
+) -> tuple[dict[str, Value], tuple[str, ...]]:
+    try:
+        from thud.recordings.plate_tap import calibrate_tap
+    except ImportError as error:
+        message = "lab.toml: calibrate_tap is not known"
+        raise InputError(message) from error
+    chain, path = condition.chain, folder / "tap.wav"
+    values = tap_record(condition.taps, chain, generator(condition, seed))
+    write_sound(path, convert(values, chain), chain)
+    result, mode = calibrate_tap(path), chain.modes[0]
+    pairs = {
+        RESONANCE: (result.frequency / mode.frequency, result.frequency_uncertainty),
+        QUALITY: (result.quality / mode.quality, result.quality_uncertainty),
+    }
+    return {key: Value(ratio - 1, u, concerned=False) for key, (ratio, u) in pairs.items()}, ()
+
+
 # --- report -----------------------------------------------------------------------------------
 
 
@@ -400,45 +423,48 @@ def cell(values: list[tuple[str, Value]]) -> str:
     return f"{inside}/{len(values)}" + (f" **{silent}**" if silent else "")
 
 
-def table(outcomes: list[Outcome], key: Callable[[Outcome], str]) -> Iterator[str]:
-    """Yield a table of outcomes by a key: inside/values, and silent ones in bold."""
+def row(*cells: object) -> str:
+    """Return a row of a table."""
+    return f"| {' | '.join(map(str, cells))} |"
+
+
+def grouped(
+    outcomes: list[Outcome], key: Callable[[Outcome], str]
+) -> Iterator[tuple[str, list[Outcome]]]:
+    """Yield outcomes by a key, in the order of its first use."""
     groups = defaultdict(list)
     for outcome in outcomes:
         groups[key(outcome)].append(outcome)
-    width = max(map(len, groups))
-    yield f"| {'':{width}s} | measured | refused | " + " | ".join(QUANTITIES) + " |"
-    yield "|---" * (3 + len(QUANTITIES)) + "|"
-    for name, members in groups.items():
+    yield from groups.items()
+
+
+def table(outcomes: list[Outcome], key: Callable[[Outcome], str]) -> Iterator[str]:
+    """Yield a table of outcomes by a key: inside/values, and silent ones in bold."""
+    shown = [q for q in QUANTITIES if any(q in outcome.values for outcome in outcomes)]
+    yield row("", "measured", "refused", *shown)
+    yield row(*["---"] * (3 + len(shown)))
+    for name, members in grouped(outcomes, key):
         measured = [outcome for outcome in members if outcome.values]
         refused = sum(bool(outcome.refusal) for outcome in members)
         skipped = "" if measured or refused else " (key not known)"
-        cells = [
-            cell([(quantity, o.values[quantity]) for o in measured if quantity in o.values])
-            for quantity in QUANTITIES
-        ]
-        yield (
-            f"| {name + skipped:{width}s} | {len(measured)} | {refused} | "
-            + " | ".join(cells)
-            + " |"
-        )
+        cells = [cell([(q, o.values[q]) for o in measured if q in o.values]) for q in shown]
+        yield row(name + skipped, len(measured), refused, *cells)
 
 
 def summary(outcomes: list[Outcome]) -> Iterator[str]:
     """Yield the table of docs/recordings_theory.md: what is inside is stated of told records."""
-    columns = {"levels": LEVELS, "contact time": (CONTACT,), "restitution": (RESTITUTION,),
-               "peak": (PEAK,), "calibration": (CALIBRATION,)}  # fmt: skip
-    yield (
-        "| conditions | records | refused | "
-        + " | ".join(columns)
-        + " | silent | warned | miscounted |"
-    )
-    yield "|---" * (6 + len(columns)) + "|"
-    groups = defaultdict(list)
-    for outcome in outcomes:
+    columns: dict[str, tuple[str, ...]] = {
+        "levels": LEVELS, "contact time": (CONTACT,), "restitution": (RESTITUTION,),
+        "peak": (PEAK,), "calibration": (CALIBRATION,), "f0, Q": (RESONANCE, QUALITY),
+    }  # fmt: skip
+    yield row("conditions", "records", "refused", *columns, "silent", "warned", "miscounted")
+    yield row(*["---"] * (6 + len(columns)))
+
+    def name_of(outcome: Outcome) -> str:
         condition = conditions()[outcome.condition]
-        name = condition.group.removesuffix(" untold")
-        groups[f"{name}{'' if condition.told else ', untold'}"].append(outcome)
-    for name, members in groups.items():
+        return condition.group.removesuffix(" untold") + ", untold" * (not condition.told)
+
+    for name, members in grouped(outcomes, name_of):
         cells = []
         for quantities in columns.values():
             values = [o.values[q] for o in members for q in quantities if q in o.values]
@@ -447,7 +473,7 @@ def summary(outcomes: list[Outcome]) -> Iterator[str]:
             cells.append("" if hidden else f"{100 * inside / len(values):.0f} %")
         refused = sum(bool(outcome.refusal) for outcome in members)
         errors = len(silent(members)), warned(members), len(miscounted(members))
-        yield f"| {name} | {' | '.join(map(str, (len(members), refused, *cells, *errors)))} |"
+        yield row(name, len(members), refused, *cells, *errors)
 
 
 def silent(outcomes: list[Outcome]) -> list[tuple[Outcome, str, Value]]:
@@ -529,7 +555,7 @@ def main() -> int:
     if options.details:
         details(outcomes, loud)
     told = [o for o in outcomes if known[o.condition].told]
-    drops = [o for o in told if not known[o.condition].weight]
+    drops = [o for o in told if CONTACT in o.values]
     if drops:
         kinds = table(drops, lambda o: kind_of(known[o.condition], o.seed))
         print("told, by the kind of the pulse")
@@ -578,7 +604,7 @@ def details(outcomes: list[Outcome], loud: list[tuple[Outcome, str, Value]]) -> 
     known = conditions()
     for outcome, quantity, value in loud:
         c = known[outcome.condition]
-        scale = 1e3 if quantity == CONTACT else 100 if quantity in {PEAK, CALIBRATION} else 1
+        scale = 1e3 if quantity == CONTACT else 1 if quantity in {*LEVELS, RESTITUTION} else 100
         print(
             f"silent: {c.group}: {c.name}, seed {outcome.seed}, {kind_of(c, outcome.seed)}: "
             f"{quantity}: error "

@@ -59,6 +59,8 @@ class Condition:
         ``"one"``, ``"table"``, or a kind of copies.
     weight : Weight or None
         Record of a mass for `calibrate` in place of a drop.
+    taps : tuple of (float, float)
+        Taps on the plate for `calibrate --tap`: duration, s, and peak, N.
     refusable : bool
         Whether it may be refused, besides faults of `REFUSABLE`.
     """
@@ -77,6 +79,7 @@ class Condition:
     filter_told: bool = True
     files: str = "one"
     weight: Weight | None = None
+    taps: tuple[tuple[float, float], ...] = ()
     refusable: bool = False
 
     @property
@@ -419,13 +422,35 @@ def _calibrate() -> Iterator[Condition]:
     )
 
 
+def _tap() -> Iterator[Condition]:
+    taps = ((0.0005, 400.0), (0.0008, 300.0), (0.0012, 500.0))
+    for f0 in (1050.0, 1600.0, 2500.0):
+        for quality in (5.0, 15.0, 50.0):
+            chain = Chain(modes=(Mode(f0, quality),))
+            # It decays while the hammer touches the plate.
+            brief, name = quality < 3e-3 * f0, f"{f0:g} Hz, Q {quality:g}"
+            yield Condition("tap", name, chain=chain, taps=taps, refusable=brief)
+    mode = Mode(1300.0, 20.0)
+    for name, chain in (
+        ("20 kHz", Chain(20e3, modes=(mode,))),
+        ("noise 5 N", Chain(modes=(mode,), noises=((5.0, 0.0),))),
+        ("hum 5 N", Chain(modes=(mode,), hum=(50.0, 5.0))),
+        ("pink noise 2 N", Chain(modes=(mode,), noises=((2.0, 1.0),))),
+        ("second mode", Chain(modes=(Mode(1300.0, 20.0, 0.8), Mode(2300.0, 30.0, 0.2)))),
+        ("near mode", Chain(modes=(Mode(1300.0, 20.0, 0.7), Mode(1500.0, 30.0, 0.3)))),
+    ):
+        yield Condition("tap", name, chain=chain, taps=taps)
+    yield Condition("tap", "one tap", chain=Chain(modes=(mode,)), taps=taps[:1])
+    yield Condition("tap", "soft taps", chain=Chain(modes=(mode,)), taps=((0.003, 200.0),) * 3)
+
+
 @cache
 def conditions() -> tuple[Condition, ...]:
     """Return all conditions."""
     groups = (
         _clean, _noise, _surroundings, _droop, _plate, _plate_untold, _filter, _quantization,
         _offset_step, _duplicates, _footsteps, _channels, _pretrigger, _bounces, _doubts, _mixed,
-        _clipping, _calibrate,
+        _clipping, _calibrate, _tap,
     )  # fmt: skip
     return tuple(condition for group in groups for condition in group())
 

@@ -523,6 +523,16 @@ class Chain:
         spectrum = scipy.fft.rfft(pulse.force(time)) * self.response(frequency)
         return first, scipy.fft.irfft(spectrum, length)[::factor]
 
+    def pass_events(self, events: list[tuple[float, Pulse]], count: int) -> Array:
+        """Return the first samples of pulses that begin at times, s, N."""
+        force = np.zeros(count)
+        for touch, event in events:
+            first, samples = self.pass_pulse(event, touch)
+            low, high = max(first, 0), min(first + len(samples), count)
+            if low < high:
+                force[low:high] += samples[low - first : high - first]
+        return force
+
 
 @dataclass(frozen=True)
 class Scene:
@@ -576,12 +586,7 @@ def plate_force(
     events = [(onset + touch, landing) for touch, landing in landings]
     count = int((events[-1][0] + landings[-1][1].duration + scene.after) * chain.rate)
     events += [(onset + time, half_cosine(length, peak)) for time, length, peak in scene.taps]
-    force = np.zeros(count)
-    for touch, event in events:
-        first, samples = chain.pass_pulse(event, touch)
-        low, high = max(first, 0), min(first + len(samples), count)
-        if low < high:
-            force[low:high] += samples[low - first : high - first]
+    force = chain.pass_events(events, count)
     time = np.arange(count) / chain.rate - onset
     for begin, length, change in scene.loads:
         force += change * _ramp((time - begin) / length)
@@ -716,4 +721,16 @@ def weight_record(weight: Weight, chain: Chain, rng: np.random.Generator) -> Arr
         if begin:
             late = np.maximum(time - begin, 0)
             force += weight.knock * np.exp(-late / 0.05) * np.sin(2 * np.pi * 12 * late)
+    return electric(force, chain, Scene(), 0.0, rng)
+
+
+def tap_record(
+    taps: tuple[tuple[float, float], ...], chain: Chain, rng: np.random.Generator
+) -> Array:
+    """Return the record of taps with a hammer, each a duration, s, and a peak, N."""
+    events = [
+        (0.5 * (k + 1) + rng.uniform() / chain.rate, half_cosine(*tap))
+        for k, tap in enumerate(taps)
+    ]
+    force = chain.pass_events(events, int(0.5 * (len(taps) + 1) * chain.rate))
     return electric(force, chain, Scene(), 0.0, rng)
