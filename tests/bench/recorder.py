@@ -112,8 +112,8 @@ REFUSALS = {
     r"no resonance stands out": "If no resonance stands out",
     r"no clear step|the step is": "no clear step, or one that is uncertain",
     r"deviates by .* from any exponential decay": "fits no exponential decay",
-    r"drops at the same instants": "at the same instant",
-    r"is given twice|is the same drop as": "each drop once",
+    r"drops at the same instants": "drops at the same instants in several channels",
+    r"is given twice|is the same drop as": "the same drop twice",
 }
 
 

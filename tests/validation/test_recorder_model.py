@@ -169,6 +169,23 @@ def test_errors_are_silent_unless_a_warning_concerns_them() -> None:
     assert recorder.concern("there are 2.0 ms of background") == set(recorder.QUANTITIES)
 
 
+def test_coverage_is_met_within_chance() -> None:
+    def covered(inside: int, count: int) -> bool:
+        values = [
+            recorder.Value(1.0, 1.0 if k < inside else 0.1, concerned=False) for k in range(count)
+        ]
+        outcomes = [recorder.Outcome(0, k, {"peak": value}) for k, value in enumerate(values)]
+        ((line, met),) = recorder.coverage(outcomes)
+        assert line.endswith("missed") is not met
+        return met
+
+    assert covered(95, 100)
+    assert covered(90, 100)
+    assert covered(100, 100)
+    assert not covered(88, 100)
+    assert not covered(500, 500)
+
+
 @pytest.mark.parametrize("group", list(dict.fromkeys(c.group for c in recorder.conditions())))
 def test_each_part_of_the_bench_measures(group: str) -> None:
     index = next(k for k, c in enumerate(recorder.conditions()) if c.group == group)
