@@ -1,7 +1,7 @@
 !> Impact of a source of a few masses: integrates in time from first touch until the source has left for good, samples the
 !> forces, and checks the balances of impulse and energy.
 module thud_lumped
-   use thud_contact_source, only: coarse_step_error, contact_source_type, is_coarse_step
+   use thud_contact_source, only: coarse_step_error, contact_source_type
    use thud_coupled_impact, only: solve_coupled
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error
@@ -51,7 +51,7 @@ contains
          allocate (moving, source=source)
          call integrate()
          if (.not. allocated(error)) exit
-         if (.not. is_coarse_step(error) .or. halving == max_halvings) return
+         if (.not. error%has_coarse_steps .or. halving == max_halvings) return
          deallocate (error, moving)
          steps = 2*steps
       end do
