@@ -5,6 +5,7 @@ module thud_force_history
    use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
    use thud_motion, only: motion_type
+   use thud_power, only: not_a_number
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -28,14 +29,14 @@ module thud_force_history
    !> Length of the name of a force component.
    integer, parameter :: name_length = 24
 
-   !> Errors due to the resolution.
+   !> Errors due to the resolution; NaN if they are not known.
    type :: numerical_error_type
       !> Whether they could be estimated.
       logical :: known = .false.
       !> Errors of the octave levels of the force on the floor, dB.
-      real(wp) :: octave(octave_count) = 0.0_wp
+      real(wp) :: octave(octave_count) = not_a_number
       !> Errors of contact time, s, restitution, and peak force, N.
-      real(wp) :: contact_time = 0.0_wp, restitution = 0.0_wp, peak_force = 0.0_wp
+      real(wp) :: contact_time = not_a_number, restitution = not_a_number, peak_force = not_a_number
    end type numerical_error_type
 
    !> Force of one impact, and numbers that describe it.
