@@ -62,6 +62,23 @@ def test_results_have_no_unknown_error(case_file: CaseFile, run: Run, tmp_path: 
     assert impact.restitution > 0
 
 
+def test_shortened_steps_are_stated() -> None:
+    assert "shortened_time_step" not in thud.solve().model_quantities
+    with pytest.warns(thud.PlausibilityWarning, match="youngs_modulus"):
+        impact = thud.solve(thud.Ball(youngs_modulus=2e10))
+    assert impact.model_quantities["shortened_time_step"] == pytest.approx(1 / (4 * 44100))
+
+
+@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
+def test_reduced_step_of_an_unstable_run_is_stated() -> None:
+    options = {"radial_elements": 3, "polar_elements": 12, "viscosity": "none"}
+    keys = {"model": "finite_element", "sample_rate": 16000.0, "step_safety": 0.98, **options}
+    quantities = thud.solve(**keys).model_quantities  # type: ignore[arg-type]
+    assert "reduced_step_safety" not in quantities
+    quantities = thud.solve(drop=thud.Drop(height=4.0), **keys).model_quantities  # type: ignore[arg-type]
+    assert quantities["reduced_step_safety"] == pytest.approx(0.75 * 0.98)
+
+
 VERIFIED = {
     "shell": {"model": "hollow_sphere", "sample_rate": 8000.0},
     "modes of the user": {"model": "modal_ball", "rings": 20, "highest_frequency": 600.0},

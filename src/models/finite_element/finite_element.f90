@@ -10,7 +10,7 @@ module thud_finite_element
    use thud_element_block, only: n_element
    use thud_error, only: error_type, input_error, numerical_error
    use thud_finite_element_options, only: finite_element_options_type, get_frame_count, get_stride
-   use thud_force_history, only: force_history_type
+   use thud_force_history, only: add_model_quantity, force_history_type
    use thud_impact_record, only: continue_flight, finish_record, max_energy_residual, new_impact_record, record_sample
    use thud_impact_run, only: choose_step, get_energy, get_mean_height, get_mean_velocity, impact_run_type, max_steps, &
       new_impact_run, update_position, update_velocity
@@ -172,7 +172,8 @@ contains
       end do
    end subroutine compress
 
-   !> Force history of one drop. A run that turns out to be unstable is repeated with a smaller step.
+   !> Force history of one drop. A run that turns out to be unstable is repeated with a smaller step, and the history states
+   !> the reduced `step_safety`.
    subroutine solve(ball, drop, options, sampling, history, error, receiver)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
@@ -187,9 +188,11 @@ contains
       allocate (attempted, source=options)
       do attempt = 1, max_attempts
          call solve_once(ball, drop, attempted, sampling, history, error, receiver)
-         if (history%energy_residual <= max_energy_residual) return
+         if (history%energy_residual <= max_energy_residual) exit
          attempted%step_safety = next_safety*attempted%step_safety
       end do
+      if (attempt > 1 .and. .not. allocated(error)) call add_model_quantity(history, 'reduced_step_safety', '', &
+         attempted%step_safety)
    end subroutine solve
 
    !> Force history of one drop with the step as it is.

@@ -11,7 +11,7 @@ module thud_modal_ball
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
-   use thud_force_history, only: continue_to_zero, force_history_type, max_residual, new_force_history
+   use thud_force_history, only: add_model_quantity, continue_to_zero, force_history_type, max_residual, new_force_history
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_lapack, only: dgemm
@@ -426,9 +426,7 @@ contains
       gain = ball%mass*(history%impact_velocity + state%velocity + state%gravity*time)
       history%impulse_residual = abs(history%impulse - gain)/gain
       history%floor_work = state%floor_work
-      history%model_quantity_name = [character(len=len(history%model_quantity_name)) :: 'contact_loss']
-      history%model_quantity_unit = [character(len=len(history%model_quantity_unit)) :: 'J']
-      history%model_quantity = [state%contact_loss]
+      call add_model_quantity(history, 'contact_loss', 'J', state%contact_loss)
       initial = ball%mass/2*history%impact_velocity**2
       energy = ball%mass*(state%velocity**2/2 + state%gravity*(state%height - ball%outer_radius)) &
          + state%loss + state%contact_loss + state%floor_work
