@@ -2,7 +2,7 @@
 !> that the memory does not grow with the table.
 module thud_samples_run
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
-   use thud_case, only: case_type
+   use thud_case, only: case_type, keep_impact_only
    use thud_case_text, only: get_case_text
    use thud_compute, only: get_assessed_force
    use thud_constants, only: version
@@ -62,10 +62,7 @@ contains
 
       call load_case(path, case, error, unchecked=.true.)
       if (allocated(error)) return
-      ! Samples have no free modes, no compression and no unknowns.
-      case%has_modes = .false.
-      case%has_compression = .false.
-      case%has_unknowns = .false.
+      call keep_impact_only(case)
       if (.not. case%has_impact) error = input_error(path//': &model is missing; allowed: samples of a case ' &
          //'with a source model')
       if (allocated(error)) return
