@@ -91,10 +91,13 @@ contains
       !> A sweep of an earlier call, whose matrices are reused if they fit, or an empty sweep.
       type(sweep_type), intent(inout) :: sweep
       type(projections_type) :: wanted
+      type(case_type) :: sample
 
       call get_level_bands(case%bands, sweep%bands, sweep%first_band)
       sweep%levels = levels
-      sweep%cost = get_cost(case)
+      sample = case
+      if (size(columns) > 0) sample%sampling%verify = .false.
+      sweep%cost = get_cost(sample)
       if (size(columns) > 0 .and. suits_batch(case, columns)) sweep%cost = batch_cost*get_step_count(case%sampling, &
          typical_contact)
       sweep%floor_column = get_floor_columns(case, sweep%bands(sweep%first_band:))

@@ -73,12 +73,13 @@ module thud_finite_element
 
 contains
 
-   !> Approximate time of one drop on one core, s.
-   function get_cost(ball, options, sampling, receiver) result(cost)
+   !> Approximate time of a drop at one resolution on one core, s.
+   function get_cost(ball, options, sampling, receiver, contact_time) result(cost)
       type(ball_type), intent(in) :: ball
       class(finite_element_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(receiver_type), intent(in), optional :: receiver
+      real(wp), intent(in), optional :: contact_time
       real(wp) :: cost
       real(wp) :: speed, interval, time, n_step, element_cost, damping
 
@@ -106,11 +107,13 @@ contains
          end associate
          interval = interval*(hypot(1.0_wp, damping) - damping)
       end if
-      time = typical_contact + options%flight_before + options%flight_after
+      time = typical_contact
+      ! A contact is over when shear waves have crossed the ball.
+      if (present(contact_time)) time = contact_time + 2*ball%outer_radius/sqrt(ball%youngs_modulus/3/get_density(ball))
+      time = time + options%flight_before + options%flight_after
       if (options%bounces > 1) time = sampling%duration
       n_step = max(get_step_count(sampling, time), min(time, sampling%duration)/interval)
-      ! With the drop of elements of twice the size.
-      cost = 5.0e-3_wp + 1.125_wp*n_step*element_cost
+      cost = 2.5e-3_wp + n_step*element_cost
       if (present(receiver)) cost = cost + n_step*3.0e-9_wp*get_pole_count(receiver)
    end function get_cost
 

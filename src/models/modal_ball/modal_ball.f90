@@ -48,28 +48,29 @@ module thud_modal_ball
 
 contains
 
-   !> Approximate time of one drop on one core, s.
-   function get_cost(ball, options, sampling, receiver) result(cost)
+   !> Approximate time of a drop at one resolution on one core, s.
+   function get_cost(ball, options, sampling, receiver, contact_time) result(cost)
       type(ball_type), intent(in) :: ball
       class(modal_ball_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(receiver_type), intent(in), optional :: receiver
+      real(wp), intent(in), optional :: contact_time
       real(wp) :: cost
-      real(wp) :: n_mode, n_gap, step_cost
+      real(wp) :: n_mode, n_gap, step_cost, time
 
+      time = typical_contact
+      if (present(contact_time)) time = contact_time
       n_mode = 0.08_wp*options%get_highest_frequency()
       n_gap = options%get_ring_count()*merge(2.0_wp, 1.0_wp, options%floor_friction == 'stick')
-      cost = 2.5e-3_wp + 1.0e-9_wp*n_mode*n_gap**2
+      cost = 1.3e-3_wp + 5.0e-10_wp*n_mode*n_gap**2
       step_cost = 4.0e-7_wp + n_mode*(2.5e-9_wp + 6.0e-11_wp*n_gap)
       ! Maxwell branches.
       if (options%damping_law == 'fractional') step_cost = step_cost + 8.0e-9_wp*n_mode
       if (present(receiver)) step_cost = step_cost + 2.6e-9_wp*get_pole_count(receiver)
-      ! Both levels; sticking rings need twice the steps.
-      step_cost = merge(3, 2, options%floor_friction == 'stick')*step_cost
       if (present(receiver)) then
          cost = cost + get_step_count(sampling)*step_cost
       else
-         cost = cost + get_step_count(sampling, typical_contact)*step_cost
+         cost = cost + get_step_count(sampling, time)*step_cost
       end if
    end function get_cost
 
