@@ -89,6 +89,7 @@ def answer_case(case: Case) -> Answer:
     verdict = assess_impact(impact)
     if verdict:
         answer["model_verdict"] = {"result": verdict.result, "reason": verdict.reason}
+        answer["warnings"] += verdict.warnings
         for entry, criterion in zip(answer["criteria"], verdict.criteria, strict=True):
             entry["range"] = criterion.range
     on_floor = impact.on_floor
@@ -162,12 +163,14 @@ def _criterion(criterion: Criterion) -> Answer:
     scale, unit = (1e3, "ms") if criterion.unit == "s" else (1.0, criterion.unit)
     name, band = criterion.name.rpartition("octave_")[1:]
     expanded = scale * criterion.estimate.expanded
+    # Numerical errors are often too small to be shown.
+    smallest = 0.5 * 10.0**-criterion.quantity.decimals
     return {
         "name": f"{band.replace('_', '.')} Hz" if name else humanize(band),
         "band": bool(name),
         "unit": unit,
         "value": None if np.isnan(criterion.value) else round(scale * criterion.value, 6),
-        "uncertainty": expanded if 0 < expanded < np.inf else None,
+        "uncertainty": expanded if smallest <= expanded < np.inf else None,
         "lower": round(scale * criterion.lower, 6),
         "upper": round(scale * criterion.upper, 6),
         "verdict": criterion.result,

@@ -14,7 +14,7 @@ from thud.base._schema import LIMITS, QUANTITIES
 from thud.base.checks import refuse, refuse_value, require_choice
 from thud.base.display import Displayed
 from thud.base.quantity import Quantity
-from thud.level.estimate import Estimate
+from thud.level.estimate import NUMERICAL_ERROR, Estimate
 from thud.level.levels import BANDWIDTHS, SOURCES, get_bands, to_float
 
 if TYPE_CHECKING:
@@ -120,7 +120,9 @@ class Criterion(Displayed):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
-        return [("criterion", "value", "uncertainty (95 %)", "limits", "result"), self._row()]
+        names = {contribution.name for contribution in self.estimate.contributions}
+        uncertainty = NUMERICAL_ERROR if names == {NUMERICAL_ERROR} else "uncertainty (95 %)"
+        return [("criterion", "value", uncertainty, "limits", "result"), self._row()]
 
     def _row(self) -> tuple[str, ...]:
         name = re.sub(r"(\d)_(\d)", r"\1.\2", self.name).replace("_", " ")
@@ -129,6 +131,7 @@ class Criterion(Displayed):
             return name, "", "", limits, "not known"
         value = f"{self.value:.4g} {self.unit}".strip()
         expanded = f"{self.estimate.expanded:.2g}" if self.estimate.uncertainty else ""
+        expanded = expanded.replace("nan", "unknown")
         result = self.result
         if result == VERDICTS[1]:
             result = "too low" if self.value < self.lower else "too high"

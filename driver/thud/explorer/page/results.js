@@ -57,7 +57,8 @@ function margin(criterion) {
 
 function missedSide(criterion) {
   if (criterion.value === null) return "not known";
-  if (margin(criterion) >= 0) return criterion.verdict === "conforms" ? "" : "undecided";
+  if (criterion.verdict === "inconclusive") return "undecided";
+  if (margin(criterion) >= 0) return "";
   return criterion.value < criterion.lower ? "low" : "high";
 }
 
