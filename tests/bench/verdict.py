@@ -42,9 +42,7 @@ def main() -> None:
             f"{shown(criterion.probability_range)}; {within:.3f} within {criterion.low:.5g} to "
             f"{criterion.high:.5g}"
         )
-    print(
-        f"all: {inside.mean():.3f} of {count} conform, stated {shown(verdict.probability_range)}"
-    )
+    print(f"all: {inside.mean():.3f} of {count} conform, stated {shown(verdict.probability_range)}")
 
 
 def shown(ends: tuple[float, float]) -> str:

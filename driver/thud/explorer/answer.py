@@ -19,6 +19,7 @@ from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
 from thud.impact.ensemble import get_cost
 from thud.impact.floor_impact import FloorImpact
+from thud.level.estimate import NUMERICAL_ERROR
 from thud.level.levels import get_bands
 from thud.plot.impact_figures import contact_force
 from thud.plot.style import FORCE_NAMES
@@ -164,13 +165,15 @@ def _criterion(criterion: Criterion) -> Answer:
     name, band = criterion.name.rpartition("octave_")[1:]
     expanded = scale * criterion.estimate.expanded
     # Numerical errors are often too small to be shown.
-    smallest = 0.5 * 10.0**-criterion.quantity.decimals
+    is_computed = criterion.uncertainty_name == NUMERICAL_ERROR
+    smallest = 0.5 * 10.0**-criterion.quantity.decimals if is_computed else 0.0
     return {
         "name": f"{band.replace('_', '.')} Hz" if name else humanize(band),
         "band": bool(name),
         "unit": unit,
         "value": None if np.isnan(criterion.value) else round(scale * criterion.value, 6),
-        "uncertainty": expanded if smallest <= expanded < np.inf else None,
+        "uncertainty": expanded if expanded > smallest and expanded < np.inf else None,
+        "uncertainty_name": criterion.uncertainty_name,
         "lower": round(scale * criterion.lower, 6),
         "upper": round(scale * criterion.upper, 6),
         "verdict": criterion.result,

@@ -58,6 +58,12 @@ class Criterion(Displayed):
         return self.estimate.unit
 
     @property
+    def uncertainty_name(self) -> str:
+        """``"numerical error"`` for a computed value, else ``"uncertainty (95 %)"``."""
+        names = {contribution.name for contribution in self.estimate.contributions}
+        return NUMERICAL_ERROR if names == {NUMERICAL_ERROR} else "uncertainty (95 %)"
+
+    @property
     def quantity(self) -> Quantity:
         """Declaration of the quantity, with title, display unit and decimals."""
         band = self.name.removeprefix("octave_").replace("_", ".")
@@ -120,9 +126,7 @@ class Criterion(Displayed):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
-        names = {contribution.name for contribution in self.estimate.contributions}
-        uncertainty = NUMERICAL_ERROR if names == {NUMERICAL_ERROR} else "uncertainty (95 %)"
-        return [("criterion", "value", uncertainty, "limits", "result"), self._row()]
+        return [("criterion", "value", self.uncertainty_name, "limits", "result"), self._row()]
 
     def _row(self) -> tuple[str, ...]:
         name = re.sub(r"(\d)_(\d)", r"\1.\2", self.name).replace("_", " ")
