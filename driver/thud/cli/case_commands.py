@@ -105,6 +105,7 @@ def _model_verdict(answer: Bundle) -> tuple[str, dict[str, bytes]]:
     case = Case.from_text(text(answer["case"]))
     verdict = assess_impact(new_impact(case, answer))
     if verdict:
+        print_notes(verdict.warnings)
         return f"  {verdict.message}\n", {FILE: verdict.to_csv().encode()}
     if find_unknowns(case)[0]:
         return "  Verdict over what is not known: run thud-driver assess\n", {}
