@@ -1,6 +1,7 @@
 !> Computes all results that a case asks for: free modes, quasi-static compression, the drop on a rigid floor with its levels
 !> and criteria, the drop on the floor of the case, the level in the room below, and warnings. It reads and writes no files.
 module thud_compute
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    !$ use omp_lib, only: omp_get_max_threads
    use thud_band, only: band_type, get_level_bands, octave_count
    use thud_case, only: case_type, check_case, get_floor_number, get_model_number
@@ -15,11 +16,11 @@ module thud_compute
    use thud_plate, only: plate_type
    use thud_progress, only: let_first_thread_report
    use thud_receiver, only: is_rigid, receiver_type
-   use thud_resolved_drop, only: solve_drop
+   use thud_resolved_drop, only: get_drop_cost, solve_drop
    use thud_room, only: check_below, get_room_bands, get_room_level, room_level_type
    use thud_sampling, only: get_sample_count
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
-      get_source_limits, source_limits_type
+      get_source_limits, is_inconclusive, source_limits_type
    use thud_system, only: is_forked
    use thud_warnings, only: get_warnings, warning_length
    implicit none (type, external)
@@ -130,7 +131,8 @@ contains
       n_thread = 1
       associate (model => case%models(get_model_number(case))%model)
          !$ if (case%has_floor .and. .not. is_forked()) n_thread = min(2, omp_get_max_threads())
-         if (n_thread > 1) n_thread = merge(2, 1, model%get_cost(case%ball, case%sampling) > min_thread_cost)
+         if (n_thread > 1) n_thread = merge(2, 1, &
+            get_drop_cost(model, case%ball, case%drop, case%sampling) > min_thread_cost)
       end associate
       if (n_thread == 1) then
          call compute_impact(case, scope, impact, error)
@@ -190,7 +192,7 @@ contains
       if (.not. allocated(on_floor%floor_velocity)) deallocate (on_floor)
    end subroutine drop_on_floor
 
-   !> Approximate computing time of a case's drop and levels on one core.
+   !> Approximate computing time of a case's drop, with its verification, and levels on one core.
    function get_cost(case) result(cost)
       type(case_type), intent(in) :: case
       !> The time, s; for an invalid case the time of its check.
@@ -202,11 +204,11 @@ contains
       call check_case(case, error)
       if (allocated(error)) return
       associate (model => case%models(get_model_number(case))%model)
-         cost = cost + model%get_cost(case%ball, case%sampling)
+         cost = cost + get_drop_cost(model, case%ball, case%drop, case%sampling)
          if (.not. (case%has_floor .and. model%couples())) return
          call case%floors(get_floor_number(case))%model%get_receiver(receiver, error)
          if (allocated(error) .or. is_rigid(receiver)) return
-         cost = cost + 1.0e-3_wp + model%get_cost(case%ball, case%sampling, receiver)
+         cost = cost + 1.0e-3_wp + get_drop_cost(model, case%ball, case%drop, case%sampling, receiver)
       end associate
    end function get_cost
 
@@ -269,6 +271,11 @@ contains
       if (allocated(error)) return
       criteria = get_criteria(limits, level(:octave_count), history%contact_time, history%restitution, &
          get_peak_count(force, history%sample_rate), case%ball%mass, case%drop%height)
+      associate (computed => criteria(:octave_count + 2))
+         computed%error = ieee_value(1.0_wp, ieee_quiet_nan)
+         if (history%numerical_error%known) computed%error = [history%numerical_error%octave, &
+            history%numerical_error%contact_time, history%numerical_error%restitution]
+      end associate
    end subroutine assess_force
 
    !> Level in the room below, from a force history.
@@ -322,14 +329,16 @@ contains
       index = findloc(force_names == case%level_force, .true., dim=1)
    end function get_assessed_force
 
-   !> Whether the source of a case conforms.
+   !> Whether the source of a case conforms, whatever the numerical errors of its values.
    pure function is_conforming(case, assessment) result(yes)
       type(case_type), intent(in) :: case
       type(assessment_type), intent(in) :: assessment
       !> The assessed force meets all criteria.
       logical :: yes
 
-      yes = all(conforms(assessment%criteria(:, get_assessed_force(case))))
+      associate (criteria => assessment%criteria(:, get_assessed_force(case)))
+         yes = all(conforms(criteria) .and. .not. is_inconclusive(criteria))
+      end associate
    end function is_conforming
 
 end module thud_compute

@@ -6,8 +6,9 @@ import re
 import subprocess
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import f90nml
 import numpy as np
 import pytest
 from conftest import naming
@@ -111,9 +112,183 @@ def test_own_unknowns_replace_the_defaults() -> None:
 
 
 def test_nothing_is_known_to_vary_elsewhere() -> None:
-    message = "nothing is known to vary in this case; allowed: &unknowns with key"
+    message = "nothing is known to vary in this case: .*model = .*; allowed: &unknowns with key"
     with pytest.raises(thud.InputError, match=message):
         thud.assess(thud.Case())
+
+
+@pytest.mark.parametrize(
+    ("group", "key", "value", "allowed"),
+    [("drop", "height", 0.9, "0.95 <= height <= 1.05"),
+     ("ball", "youngs_modulus", 1.6e6, "1.8e+06 <= youngs_modulus"),
+     ("model", "layer_stiffness", 1e9, "&contact: layer_stiffness = 1000000000.0 differs")],
+)  # fmt: skip
+def test_message_names_the_key_outside_the_default_unknowns(
+    group: str, key: str, value: float, allowed: str
+) -> None:
+    case = thud.read_case(FLAGSHIP)
+    other = replace(case, **{group: replace(getattr(case, group), **{key: value})})
+    with pytest.raises(thud.InputError, match=re.escape(allowed)):
+        thud.assess(other)
+
+
+def hunt_crossley(**unknowns: tuple[float, float]) -> thud.Case:
+    ends = list(zip(*unknowns.values(), strict=True))
+    stated = thud.Unknowns(tuple(unknowns), *ends, reason=("an example",) * len(unknowns))
+    model = thud.HuntCrossley(stiffness=61685.0, exponent=1.0, restitution=0.8)
+    return thud.Case(model=model, unknowns=stated)
+
+
+def test_unknown_without_effect_is_refused() -> None:
+    case = hunt_crossley(stiffness=(5e4, 8e4), youngs_modulus=(1e6, 3e6))
+    with pytest.raises(thud.InputError, match=r"= 1e\+06 and 3e\+06 make the same drop"):
+        thud.assess(case)
+
+
+@pytest.mark.parametrize(
+    ("model", "key", "low", "high", "message"),
+    [(thud.FiniteElement(viscosity="fractional", fractional_order=0.3, loss_factor=0.143),
+      "loss_factor", 0.1, 0.9, "&unknowns: loss_factor = 0.9 are impossible"),
+     (thud.FiniteElement(viscosity="kelvin_voigt"), "fractional_order", 0.2, 0.5,
+      "fractional_order = 1 of the drop is outside low = 0.2 and high = 0.5")],
+)  # fmt: skip
+def test_impossible_ranges_are_refused_before_any_drop(  # noqa: PLR0913, PLR0917
+    model: thud.FiniteElement,
+    key: str,
+    low: float,
+    high: float,
+    message: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail(*_: object) -> None:
+        pytest.fail("a drop is computed")
+
+    monkeypatch.setattr(model_assessment, "compute", fail)
+    unknowns = thud.Unknowns(key=(key,), low=(low,), high=(high,), reason=("an example",))
+    with pytest.raises(thud.InputError, match=re.escape(message)):
+        thud.assess(replace(thud.read_case(FLAGSHIP), model=model, unknowns=unknowns))
+
+
+def test_direct_drops_are_computed_in_small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in (("SAMPLES", 300), ("INDEX_SAMPLES", 8)):
+        monkeypatch.setattr(model_assessment, name, value)
+    case = hunt_crossley(stiffness=(5e4, 8e4))
+    expected = thud.assess(case)
+    sizes = []
+    solve_many = model_assessment.solve_many
+
+    def counted(columns: dict[str, Any], *others: Any, **options: Any) -> thud.Ensemble:  # noqa: ANN401
+        sizes.append(len(columns["stiffness"]))
+        return solve_many(columns, *others, **options)
+
+    monkeypatch.setattr(model_assessment, "solve_many", counted)
+    length = case.sampling.sample_rate * case.sampling.duration
+    monkeypatch.setattr(model_assessment, "_MAX_BYTES", 16 * length * 100)
+    found = thud.assess(case)
+    assert max(sizes) == 100
+    assert found.identity == expected.identity
+
+
+def test_numerical_errors_of_direct_drops_widen_the_range(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = hunt_crossley(stiffness=(5e4, 8e4))
+    coarse = replace(case, sampling=replace(case.sampling, sample_rate=8000.0))
+    monkeypatch.setattr(model_assessment, "SAMPLES", 512)
+    monkeypatch.setattr(model_assessment, "INDEX_SAMPLES", 16)
+    criterion, finer = (thud.assess(c).criteria[4] for c in (coarse, case))
+    assert criterion.high - criterion.low > finer.high - finer.low
+    # The restitution does not vary; its error alone is a range.
+    source = model_assessment._direct_source(  # noqa: SLF001
+        thud.solve(case), find_unknowns(case)[0], progress=False
+    )
+    source.numerical_errors[:, 6] = 0.01
+    restitution = source.assess().criteria[6]
+    assert not restitution.indices
+    low, high = (float(end) for end in restitution.range.split(" to "))
+    assert low < 0.8 < high
+
+
+def test_huge_standard_deviation_is_uniform() -> None:
+    fractions = np.linspace(0, 1, 11)
+    for deviation in (2e3, 1e18):
+        values = Unknown("mass", 2.0, 3.0, deviation, "").quantiles(fractions, 2.5)
+        np.testing.assert_allclose(values, 2 + fractions, rtol=1e-6)
+
+
+def test_comparison_shares_equal_verdicts_only() -> None:
+    case = thud.read_case(FLAGSHIP)
+    unknowns = thud.Unknowns(
+        key=("youngs_modulus",), low=(1.87e6,), high=(2.29e6,), reason=("hardness",),
+        standard_deviation=(2e4,),
+    )  # fmt: skip
+    soft, hard = (
+        replace(case, name=name, ball=replace(case.ball, youngs_modulus=e), unknowns=unknowns)
+        for name, e in (("soft", 1.95e6), ("hard", 2.2e6))
+    )
+    impacts = {one.name: thud.solve(one) for one in (soft, hard)}
+    impacts["twin"] = impacts["hard"]
+    found = model_assessment.assess_impacts(impacts)
+    reverse = model_assessment.assess_impacts(dict(reversed(impacts.items())))
+    assert {n: v.identity for n, v in found.items()} == {n: v.identity for n, v in reverse.items()}
+    assert found["twin"] is found["hard"]
+    assert found["soft"].identity != found["hard"].identity
+
+
+def test_verdict_does_not_depend_on_the_mesh_of_the_case() -> None:
+    case = thud.read_case(FLAGSHIP)
+    coarse = replace(case, model=replace(case.model, radial_elements=3, polar_elements=16))
+    found, expected = (thud.assess(thud.solve(one)) for one in (coarse, case))
+    assert found.identity == expected.identity
+
+
+def test_probability_is_an_interval_within_its_bounds() -> None:
+    verdict = thud.assess(thud.read_case(FLAGSHIP))
+    wide = replace(verdict, probability=0.22, error=0.45)
+    assert wide.shown_probability == "0 to 67 %"
+    assert replace(verdict, probability=0.9, error=0.3).shown_probability == "60 to 100 %"
+
+
+def test_wide_probabilities_raise_a_warning() -> None:
+    verdict = thud.assess(thud.read_case(FLAGSHIP))
+    assert not verdict.warnings
+    criteria = list(verdict.criteria)
+    criteria[4] = replace(criteria[4], probability=0.5, error=0.21)
+    errors = {
+        model_assessment._SURROGATE: np.full(10, 0.1),  # noqa: SLF001
+        model_assessment._NUMERICAL: np.full(10, 0.2),  # noqa: SLF001
+    }
+    (warning,) = model_assessment._warnings(tuple(criteria), errors)  # noqa: SLF001
+    assert warning == (
+        "500 Hz: the probability is 29 to 71 %, so wide mainly because of the numerical error of "
+        "the drops, 0.2 dB: refine &mesh or &sampling"
+    )
+
+
+def test_numerical_error_makes_the_verdict_of_a_drop_inconclusive(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ball = thud.Ball(poisson_ratio=0.5, youngs_modulus=2.08e6)
+    model = thud.FiniteElement(radial_elements=3, polar_elements=16)
+    impact = thud.solve(thud.Case(ball=ball, model=model))
+    verdict = impact.assess()
+    assert all(c.lower <= c.value <= c.upper for c in verdict.criteria)
+    assert verdict.result == "inconclusive"
+    assert not verdict
+    (cause,) = (c for c in verdict.criteria if c.result == "inconclusive")
+    assert cause.estimate.expanded == pytest.approx(impact.octave_500_error)
+    assert verdict.rows()[0][2] == "numerical error"
+    thud.write_case(impact.case, tmp_path / "case.nml")
+    folder = tmp_path / "results"
+    run = ["run", "--no-figures", "--check", "-o", str(folder), str(tmp_path / "case.nml")]
+    assert main(run) == 3
+    assert "it is inconclusive whether the source conforms" in capsys.readouterr().out
+    summary = f90nml.read(folder / "summary.nml")["verdict"]
+    assert (summary["conforms"], summary["result"]) == (False, "inconclusive")
+    assert summary["numerical_error"][4] == impact.octave_500_error
+    assert "10.5,14.5,inconclusive" in (folder / "levels.csv").read_text()
+    header, *rows = (folder / "model_verdict.csv").read_text().splitlines()
+    assert header.startswith("criterion,unit,value,low,high,")
+    assert len(rows) == len(verdict.criteria) + 1
+    assert comparison.compare({"coarse": impact}).rows()[7][1].endswith(" undecided")
 
 
 # Bundled surrogate: drops at random points, in units of the stated 95 % errors.
@@ -196,6 +371,7 @@ def test_bundled_surrogate_is_not_used_for_other_cases(
         lambda case: replace(case, sampling=replace(case.sampling, verify=True)),
         lambda case: replace(case, levels=replace(case.levels, bands="both")),
         lambda case: replace(case, ball=replace(case.ball, mass=2.45)),
+        lambda case: replace(case, sampling=replace(case.sampling, sample_rate=16000.0)),
         lambda case: replace(case, model=replace(case.model, snapshot_interval=1e-3)),
     ],
 )
@@ -300,7 +476,13 @@ def test_run_prints_the_verdict(
     assert "  With these values the source does not conform to the limits" in printed
     assert "  The source" not in printed
     assert main(["assess", str(FLAGSHIP)]) == 0
-    assert verdict.message in capsys.readouterr().out.splitlines()
+    assert capsys.readouterr().out.startswith(f"{verdict}\nResults: ")
+    undecided = [c.criterion.quantity.title for c in verdict.criteria if c.result != "conforms"]
+    assert undecided == ["63 Hz", "500 Hz"]
+    assert all(title in verdict.message for title in undecided)
+    for folder in ("rubber_ball_fe", "rubber_ball_fe_unknowns"):
+        text = Path(f"outputs/{folder}/model_verdict.csv").read_text()
+        assert text == verdict.to_csv()
     assert main(["assess", "-q", "--check", str(FLAGSHIP)]) == 3
 
 

@@ -47,6 +47,38 @@ def test_error_of_the_default_is_small_and_not_shown(case_file: CaseFile, run: R
     assert "numerical error" not in shown
 
 
+def test_results_have_no_unknown_error(case_file: CaseFile, run: Run, tmp_path: Path) -> None:
+    run(case_file("&ball / &drop / &model /"), "--output", "results")
+    summary = tmp_path / "results/summary.nml"
+    lines = summary.read_text().splitlines(keepends=True)
+    summary.write_text("".join(line for line in lines if "_error = " not in line))
+    # Without the checksums the file may differ from that of the run.
+    (tmp_path / "results/.thud").unlink()
+    with pytest.warns(thud.PlausibilityWarning, match="missing"):
+        impact = thud.read_results(tmp_path / "results")
+    error = impact.numerical_error
+    assert np.isnan([*error.level, error.contact_time, error.restitution, error.peak_force]).all()
+    assert np.isnan(impact.to_xarray()["octave_500_error"])
+    assert impact.restitution > 0
+
+
+def test_shortened_steps_are_stated() -> None:
+    assert "shortened_time_step" not in thud.solve().model_quantities
+    with pytest.warns(thud.PlausibilityWarning, match="youngs_modulus"):
+        impact = thud.solve(thud.Ball(youngs_modulus=2e10))
+    assert impact.model_quantities["shortened_time_step"] == pytest.approx(1 / (4 * 44100))
+
+
+@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
+def test_reduced_step_of_an_unstable_run_is_stated() -> None:
+    options = {"radial_elements": 3, "polar_elements": 12, "viscosity": "none"}
+    keys = {"model": "finite_element", "sample_rate": 16000.0, "step_safety": 0.98, **options}
+    quantities = thud.solve(**keys).model_quantities  # type: ignore[arg-type]
+    assert "reduced_step_safety" not in quantities
+    quantities = thud.solve(drop=thud.Drop(height=4.0), **keys).model_quantities  # type: ignore[arg-type]
+    assert quantities["reduced_step_safety"] == pytest.approx(0.75 * 0.98)
+
+
 VERIFIED = {
     "shell": {"model": "hollow_sphere", "sample_rate": 8000.0},
     "modes of the user": {"model": "modal_ball", "rings": 20, "highest_frequency": 600.0},

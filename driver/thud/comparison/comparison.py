@@ -23,6 +23,7 @@ from thud.base.files import Page
 from thud.case.case import Case, read_case
 from thud.impact.compute import compute
 from thud.impact.impact import Impact
+from thud.level.assessment import VERDICTS
 from thud.level.impact_result import ImpactResult
 from thud.level.levels import FORCES, SOURCES
 from thud.plot.impact_figures import common_source
@@ -57,8 +58,8 @@ class Comparison(Displayed, Page):
     source : str
         Impact source whose limits apply.
     model_verdicts : dict of str to ModelVerdict
-        Verdicts over what is not known, by the names of impacts that have one; impacts that differ
-        in nothing else share one.
+        Verdicts over what is not known, by the names of impacts that have one; impacts with equal
+        verdicts share one.
     """
 
     impacts: dict[str, ImpactResult]
@@ -70,8 +71,10 @@ class Comparison(Displayed, Page):
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings of all impacts, each after the name of its impact."""
-        return [f"{name}: {warning}" for name, i in self.impacts.items() for warning in i.warnings]
+        """Warnings of all impacts and their verdicts, each after the name of its impact."""
+        lists = [(name, impact.warnings) for name, impact in self.impacts.items()]
+        lists += [(name, verdict.warnings) for name, verdict in self.model_verdicts.items()]
+        return [f"{name}: {warning}" for name, warnings in lists for warning in warnings]
 
     def __repr__(self) -> str:
         """Return the names of the compared impacts."""
@@ -155,12 +158,13 @@ def _cell(criterion: Criterion, quantity: Quantity) -> str:
     """Return the value of a criterion, and whether it is too low, too high or undecided."""
     if np.isnan(criterion.value):
         return "unknown"
-    if criterion.conforms:
+    conforms, fails, _ = VERDICTS
+    if criterion.result == conforms:
         state = ""
-    elif criterion.value < criterion.lower:
-        state = "low"
+    elif criterion.result == fails:
+        state = "low" if criterion.value < criterion.lower else "high"
     else:
-        state = "high" if criterion.value > criterion.upper else "undecided"
+        state = "undecided"
     return f"{criterion.value * quantity.display_scale:z.{quantity.decimals}f} {state}".rstrip()
 
 

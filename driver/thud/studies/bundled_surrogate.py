@@ -8,6 +8,7 @@ from importlib import resources
 from typing import TYPE_CHECKING
 
 from thud.base.bridge import version
+from thud.base.checks import refuse
 from thud.base.errors import InputError
 from thud.case.keys import value_in
 from thud.studies.trained_surrogate import Surrogate, read_surrogate
@@ -39,21 +40,33 @@ def find_unknowns(case: Case) -> tuple[tuple[Unknown, ...], Case | None]:
     The drop is None if the surrogate does not cover the case with all values of its unknowns.
     """
     unknowns = stated_unknowns(case) if case.unknowns else STANDARD_BALL
-    covered = _covered_case(case, unknowns)
-    return (unknowns if case.unknowns or covered else ()), covered
+    try:
+        return unknowns, _covered_case(case, unknowns)
+    except InputError:
+        return (unknowns if case.unknowns else ()), None
 
 
-def _covered_case(case: Case, unknowns: tuple[Unknown, ...]) -> Case | None:
-    """Return the drop of a case on a rigid floor as the bundled surrogate predicts it, or None.
+def reason_without_defaults(case: Case) -> str:
+    """Return why the default unknowns do not hold for a case; empty if they do."""
+    try:
+        _covered_case(case, STANDARD_BALL)
+    except InputError as error:
+        return str(error).replace("; allowed: ", ", allowed: ")
+    return ""
 
-    Mesh, verification and bands of the surrogate replace those of the case: they affect the
-    numerical error only.
+
+def _covered_case(case: Case, unknowns: tuple[Unknown, ...]) -> Case:
+    """Return the drop of a case on a rigid floor as the bundled surrogate predicts it.
+
+    Mesh, sampling and bands of the surrogate replace those of the case: they affect the numerical
+    error only. Raises InputError with the key that the surrogate does not cover.
     """
     surrogate = bundled_surrogate()
     result = blocked_case(case, unknowns)
     model, trained = result.model, surrogate.case.model
-    if model is None or trained is None or model.name != trained.name:
-        return None
+    assert trained is not None  # noqa: S101 - see `Surrogate.is_complete`
+    if model is None or model.name != trained.name:
+        refuse(f"model = {model.name if model else ''!r}", repr(trained.name))
     mesh = {
         option.name: getattr(trained, option.name)
         for option in fields(trained)
@@ -63,16 +76,13 @@ def _covered_case(case: Case, unknowns: tuple[Unknown, ...]) -> Case | None:
         result,
         model=replace(model, **mesh),
         levels=replace(result.levels, bands=surrogate.case.levels.bands),
-        sampling=replace(result.sampling, verify=surrogate.case.sampling.verify),
+        sampling=surrogate.case.sampling,
     )
-    try:
-        surrogate.require(result, [entry.key for entry in unknowns])
-    except InputError:
-        return None
+    surrogate.require(result, [entry.key for entry in unknowns])
     ranges = {u.key: (u.low, u.high) for u in unknowns}
     for name, region in zip(surrogate.keys, surrogate.region.tolist(), strict=True):
         value = value_in(result, name)
         low, high = ranges.get(name, region)
         if not (isinstance(value, float | int) and region[0] <= low <= value <= high <= region[1]):
-            return None
+            refuse(f"{name} = {value:g}", f"{region[0]:g} <= {name} <= {region[1]:g}")
     return result

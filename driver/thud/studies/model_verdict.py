@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from thud.base.display import Displayed
+from thud.base.tables import format_rows
 
 if TYPE_CHECKING:
     from thud.base._schema import LimitsSource
@@ -14,6 +15,10 @@ if TYPE_CHECKING:
 
 BY_MODEL = " by the model"
 OUTCOMES = ("conforms", "does not conform", f"undecided{BY_MODEL}")
+# File with the rows of a verdict, in SI units.
+FILE = "model_verdict.csv"
+# Width of an interval of a probability above which it means little.
+MAX_WIDTH = 0.4
 # Fraction of the distribution within the limits from which a criterion is met, and fraction of the
 # distribution within the stated range.
 COVERAGE = 0.95
@@ -50,9 +55,14 @@ class ModelCriterion(Displayed):
         return self.criterion.name
 
     @property
+    def probability_range(self) -> tuple[float, float]:
+        """Interval of the probability (95 %)."""
+        return _interval(self.probability, self.error)
+
+    @property
     def result(self) -> str:
         """``"conforms"``, ``"does not conform"`` or ``"undecided by the model"``."""
-        return _outcome(self.probability, self.error)
+        return _outcome(*self.probability_range)
 
     @property
     def main_unknown(self) -> str:
@@ -61,13 +71,12 @@ class ModelCriterion(Displayed):
 
     @property
     def range(self) -> str:
-        """Range in the display unit; empty if the value does not vary."""
-        if not self.indices:
-            return ""
+        """Range in the display unit; empty if its ends are equal."""
         quantity = self.criterion.quantity
         digits = max(quantity.decimals - 1, 1)
         ends = (f"{end * quantity.display_scale:z.{digits}f}" for end in (self.low, self.high))
-        return " to ".join(ends)
+        low, high = ends
+        return f"{low} to {high}" if low != high else ""
 
     def __repr__(self) -> str:
         """Return reason and result."""
@@ -92,7 +101,7 @@ class ModelCriterion(Displayed):
             ),
             (
                 quantity.label, quantity.show(criterion.value), self.range, criterion.shown_limits,
-                _percent(self.probability, self.error), self.main_unknown,
+                _percent(*self.probability_range), self.main_unknown,
                 self.result.removesuffix(BY_MODEL),
             ),
         ]  # fmt: skip
@@ -114,6 +123,8 @@ class ModelVerdict(Displayed):
         Probability that the source meets all criteria, and its error (95 %).
     method : str
         How the distribution was computed.
+    warnings : tuple of str
+        Probabilities that are known poorly, with the cause.
     """
 
     source: LimitsSource
@@ -122,11 +133,23 @@ class ModelVerdict(Displayed):
     probability: float
     error: float
     method: str
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def probability_range(self) -> tuple[float, float]:
+        """Interval of the probability (95 %)."""
+        return _interval(self.probability, self.error)
 
     @property
     def result(self) -> str:
         """``"conforms"``, ``"does not conform"`` or ``"undecided by the model"``."""
-        return _outcome(self.probability, self.error)
+        return _outcome(*self.probability_range)
+
+    @property
+    def identity(self) -> tuple[object, ...]:
+        """Everything but the values of the case, to find equal verdicts."""
+        results = ((c.low, c.high, c.probability, c.error) for c in self.criteria)
+        return self.source, self.unknowns, self.method, self.probability, self.error, *results
 
     @property
     def decisive(self) -> ModelCriterion:
@@ -135,14 +158,19 @@ class ModelVerdict(Displayed):
 
     @property
     def shown_probability(self) -> str:
-        """Probability that the source meets all criteria, with its error."""
-        return _percent(self.probability, self.error)
+        """Interval of the probability that the source meets all criteria."""
+        return _percent(*self.probability_range)
 
     @property
     def reason(self) -> str:
-        """The result, its probability, and the decisive criterion."""
+        """The result, its probability, and all criteria that do not conform or are undecided.
+
+        If there are none, the decisive criterion.
+        """
         probability = f"probability of conformity {self.shown_probability}"
-        return f"{self.result} ({probability}): {self.decisive.reason}"
+        causes = [c for c in self.criteria if c.result != OUTCOMES[0]] or [self.decisive]
+        causes.sort(key=lambda criterion: criterion.probability)
+        return f"{self.result} ({probability}): {'; '.join(c.reason for c in causes)}"
 
     @property
     def message(self) -> str:
@@ -152,6 +180,30 @@ class ModelVerdict(Displayed):
     def __repr__(self) -> str:
         """Return the result and its probability."""
         return f"<ModelVerdict, {self.source}: {self.result} ({self.probability:.0%})>"
+
+    def __str__(self) -> str:
+        """Return unknowns, criteria, method and result as text."""
+        tables = format_rows(self.unknown_rows()), "", format_rows(self.rows())
+        return "\n".join((*tables, f"by {self.method}", self.message))
+
+    def to_csv(self) -> str:
+        """Return the criteria as CSV, SI units, levels in dB; the last row is that of all."""
+        columns = (
+            "criterion", "unit", "value", "low", "high", "lower_limit", "upper_limit",
+            "probability_low", "probability_high", "main_unknown", "result",
+        )  # fmt: skip
+        lines = [",".join(columns)]
+        for entry in self.criteria:
+            criterion = entry.criterion
+            numbers = (
+                criterion.value, entry.low, entry.high, criterion.lower, criterion.upper,
+                *entry.probability_range,
+            )  # fmt: skip
+            cells = (criterion.name, criterion.unit, *map(repr, numbers), entry.main_unknown)
+            lines.append(",".join((*cells, entry.result)))
+        low, high = self.probability_range
+        lines.append(f"all,,,,,,,{low!r},{high!r},{self.decisive.main_unknown},{self.result}")
+        return "\n".join(lines) + "\n"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
@@ -179,12 +231,21 @@ class ModelVerdict(Displayed):
         return rows
 
 
-def _outcome(probability: float, error: float) -> str:
-    if probability - error >= COVERAGE:
+def _interval(probability: float, error: float) -> tuple[float, float]:
+    return max(probability - error, 0.0), min(probability + error, 1.0)
+
+
+def _outcome(low: float, high: float) -> str:
+    if low >= COVERAGE:
         return OUTCOMES[0]
-    return OUTCOMES[1] if probability + error <= 1 - COVERAGE else OUTCOMES[2]
+    return OUTCOMES[1] if high <= 1 - COVERAGE else OUTCOMES[2]
 
 
-def _percent(probability: float, error: float) -> str:
-    half = f" ± {100 * error:.0f}" if 100 * error >= 0.5 else ""  # noqa: PLR2004 - rounds to 0
-    return f"{100 * probability:.0f}{half} %"
+def _percent(low: float, high: float) -> str:
+    """Return an interval of a probability in percent.
+
+    >>> _percent(0.85, 0.881)
+    '85 to 88 %'
+    """
+    ends = dict.fromkeys(f"{100 * end:.0f}" for end in (low, high))
+    return f"{' to '.join(ends)} %"

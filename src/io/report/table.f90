@@ -10,8 +10,8 @@ module thud_table
    use thud_numerical_error, only: finer_quantities
    use thud_quantities, only: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
       sample_quantity_count
-   use thud_report, only: get_verdict_word
-   use thud_source_limits, only: conforms, criterion_type
+   use thud_report, only: get_verdict, get_verdict_word
+   use thud_source_limits, only: conforms, criterion_type, is_inconclusive
    use thud_text, only: fixed, flush_right, newline, padded, replaced, to_text
    implicit none (type, external)
    private
@@ -31,6 +31,7 @@ contains
       type(assessment_type), intent(in) :: assessment
       character(len=:), allocatable :: text
       real(wp) :: values(history_quantity_count)
+      character(len=:), allocatable :: verdict, undecided
       integer :: i, assessed, other
 
       assessed = get_assessed_force(case)
@@ -62,15 +63,24 @@ contains
          text = text//model_quantity_rows(history)
          do i = 1, octave_count
             associate (error => history%numerical_error%octave(i))
-               if (error > shown_error) text = text//row('numerical error at ' &
+               if (.not. history%numerical_error%known) exit
+               if (error > shown_error .or. is_inconclusive(criteria(i))) text = text//row('numerical error at ' &
                   //get_band_name(assessment%bands(i))//' Hz', error, 2, 'dB')
             end associate
          end do
+         if (.not. history%numerical_error%known) text = text//'  '//padded('numerical error', 22) &
+            //flush_right('unknown', 10)//newline
          text = text//verification_rows(history, assessment)//newline
-         text = text//'  With these values the source ' &
-            //trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
-            //' to the limits of the '//replaced(trim(case%source), '_', ' ')//': it meets ' &
-            //to_text(count(conforms(criteria)))//' of '//to_text(size(criteria))//' criteria.'//newline &
+         verdict = 'the source '//get_verdict(criteria)
+         undecided = ''
+         if (any(is_inconclusive(criteria))) then
+            undecided = '; '//to_text(count(is_inconclusive(criteria)))//' inconclusive by the numerical error'
+            if (get_verdict(criteria) == 'inconclusive') verdict = 'it is inconclusive whether the source conforms'
+         end if
+         text = text//'  With these values '//verdict//' to the limits of the ' &
+            //replaced(trim(case%source), '_', ' ')//': it meets ' &
+            //to_text(count(conforms(criteria) .and. .not. is_inconclusive(criteria)))//' of '//to_text(size(criteria)) &
+            //' criteria'//undecided//'.'//newline &
             //'  Levels in dB re 1 N, method '//trim(case%level_method)//'.'//newline
       end associate
 
