@@ -151,3 +151,33 @@ def test_elements_refine_themselves_or_state_the_error(name: str) -> None:
     stated = impact.numerical_error.level + finer.numerical_error.level
     assert (error < stated + 0.02).all()
     assert error.max() < 0.6 * np.abs(coarse.levels(force="floor") - levels).max()
+
+
+def slipping(friction: float, mesh: tuple[int, int] = (3, 24), **options: object) -> thud.Impact:
+    radial, polar = mesh
+    keys = {"model": "finite_element", "radial_elements": radial, "polar_elements": polar}
+    return thud.solve(thud.Ball.standard(), friction=friction, **keys, **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
+def test_stick_and_slip_raises_the_stated_error() -> None:
+    """Meshes that are too coarse for it agree with each other."""
+    least = np.array([0.03, 0.05, 0.25, 0.6, 1.3]) * 64 / 24
+    for friction in (0.4, 0.9):
+        assert (slipping(friction).numerical_error.level >= least).all()
+    for friction in (0.0, 0.3, 1.0):
+        assert (slipping(friction).numerical_error.level < least).any()
+    viscous = slipping(0.4, viscosity="kelvin_voigt").numerical_error.level
+    assert (viscous < least).any()
+    fine = slipping(0.4, (8, 96)).numerical_error.level
+    assert (fine >= least * 24 / 96).all()
+    assert (fine < least).all()
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
+def test_stated_error_covers_that_of_friction() -> None:
+    for friction in (0.2, 0.4):
+        coarse, fine = slipping(friction, (8, 64)), slipping(friction, (16, 128))
+        change = np.abs(coarse.levels(force="floor") - fine.levels(force="floor"))
+        assert (change <= coarse.numerical_error.level + 0.01).all()
