@@ -26,11 +26,12 @@ contains
    subroutine estimate_error(coarse, ratio, history)
       !> The same drop at a coarser resolution; its sampling rate may be lower.
       type(force_history_type), intent(in) :: coarse
-      !> Error of the history divided by the difference.
+      !> Error of a level of the history divided by the difference.
       real(wp), intent(in) :: ratio
       !> The history; its errors are set.
       type(force_history_type), intent(inout) :: history
       real(wp) :: level(octave_count, 3), change(octave_count)
+      real(wp) :: time_change, peak_change, first_order_ratio
       type(error_type), allocatable :: error
 
       call get_force_exposure_levels(coarse%floor_force, coarse%sample_rate, get_octaves(), 'exact', level(:, 1), error)
@@ -38,19 +39,28 @@ contains
       call get_force_exposure_levels(history%floor_force, history%sample_rate, get_octaves(), 'exact', level(:, 2), error)
       if (allocated(error)) return
       change = abs(level(:, 2) - level(:, 1))
+      peak_change = abs(history%peak_force - coarse%peak_force)
+      time_change = abs(get_contact_time(history) - get_contact_time(coarse))
       if (size(coarse%floor_force) == size(history%floor_force)) then
          ! Levels may agree by chance, the forces do not.
          call get_force_exposure_levels(history%floor_force - coarse%floor_force, history%sample_rate, get_octaves(), &
             'exact', level(:, 3), error)
          if (allocated(error)) return
          change = max(change, in_phase*20/log(10.0_wp)*10**((level(:, 3) - level(:, 2))/20))
+         ! The root of the mean square of the difference during the contact.
+         peak_change = max(peak_change, sqrt(sum(10**(level(:, 3)/10))/history%contact_time))
       end if
       change = ratio*change
       if (history%has_means) change = change + get_mean_loss(history%sample_rate)
-      history%numerical_error = numerical_error_type(known=.true., octave=change, &
-         contact_time=ratio*abs(get_contact_time(history) - get_contact_time(coarse)), &
-         restitution=ratio*abs(history%restitution - coarse%restitution), &
-         peak_force=ratio*abs(history%peak_force - coarse%peak_force))
+      ! Levels converge with the square of the step or element size, `ratio` = 1/(q**2 - 1) for sizes in the ratio q; contact time,
+      ! restitution and peak in proportion to it, 1/(q - 1).
+      first_order_ratio = 1/(sqrt(1 + 1/ratio) - 1)
+      time_change = first_order_ratio*time_change
+      ! Means show the end of the contact to within an interval.
+      if (history%has_means) time_change = max(time_change, 1/history%sample_rate)
+      history%numerical_error = numerical_error_type(known=.true., octave=change, contact_time=time_change, &
+         restitution=first_order_ratio*abs(history%restitution - coarse%restitution), &
+         peak_force=first_order_ratio*peak_change)
    end subroutine estimate_error
 
    !> Maximum reduction of octave levels by means over a sampling interval, dB: that of the highest frequency of each octave.
