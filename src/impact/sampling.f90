@@ -93,7 +93,7 @@ contains
       type(validity_limit_type) :: limit
 
       limit = validity_limit_type('sampling', 'sample_rate in Hz', sampling%sample_rate, lowest=8000.0_wp, &
-         reason='below, samples falsify the level at 500 Hz, by up to 2 dB at 2000 Hz')
+         reason='aliasing changes the level at 500 Hz by up to 2 dB', subject='levels hold')
    end function get_rate_limit
 
    !> Number of samples of the record.

@@ -38,6 +38,7 @@ module thud_source_model
       procedure, pass(options) :: share_setup
       procedure, pass(options) :: set_level
       procedure, pass(options) :: get_highest_level
+      procedure, pass(options) :: chooses_resolution
       procedure, pass(options) :: get_reference_level
       procedure, pass(options) :: get_error_ratio
       procedure, pass(options) :: get_min_error
@@ -200,6 +201,14 @@ contains
 
       level = 1
    end function get_highest_level
+
+   !> Whether the model chooses its resolution; by default it is that of the input.
+   function chooses_resolution(options) result(yes)
+      class(source_model_type), intent(in) :: options
+      logical :: yes
+
+      yes = .false.
+   end function chooses_resolution
 
    !> Level whose difference from a level shows the error of the latter: by default the next coarser one.
    function get_reference_level(options, level) result(reference)

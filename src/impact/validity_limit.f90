@@ -24,6 +24,8 @@ module thud_validity_limit
       real(wp) :: value = 0.0_wp, lowest = -huge(1.0_wp), highest = huge(1.0_wp)
       !> Reason for the limit, as the end of a message.
       character(len=96) :: reason = ''
+      !> What holds inside the range.
+      character(len=16) :: subject = 'the theory holds'
    end type validity_limit_type
 
 contains
@@ -45,7 +47,7 @@ contains
 
       below = limit%value < limit%lowest
       message = '&'//trim(limit%group)//': '//trim(limit%quantity)//' is '//trim(rounded(limit%value)) &
-         //', the theory holds '//trim(merge('from ', 'up to', below))//' ' &
+         //', '//trim(limit%subject)//' '//trim(merge('from ', 'up to', below))//' ' &
          //trim(rounded(merge(limit%lowest, limit%highest, below)))//': '//limit%reason
    end function get_limit_message
 

@@ -23,7 +23,7 @@ COARSE += " &modal_ball rings = 10, highest_frequency = 300 /"
 
 def test_results_keep_the_stated_error(case_file: CaseFile, run: Run, tmp_path: Path) -> None:
     path = case_file(COARSE)
-    with pytest.warns(thud.PlausibilityWarning, match=r"numerical error .* 500 Hz .* dB"):
+    with pytest.warns(thud.PlausibilityWarning, match=r"numerical error .* dB \(.* to 500 Hz\)"):
         impact = thud.solve(thud.read_case(path))
     error = impact.numerical_error
     assert error.level.shape == (5,)
@@ -135,6 +135,53 @@ def test_verification_is_printed_beside_the_stated_error(case_file: CaseFile, ru
     numbers = [f"{finer:.2f}", "dB", f"{change:.2f}", f"{error:.2f}"]
     assert lines[-1] == ["level,", "500", "Hz", "octave", *numbers]
     assert "finer octave" not in shown
+    assert "(16000 samples per second)" in shown
+    assert "exceeded" not in shown
+    assert "-0.00" not in shown
+
+
+FINE_MESH = {"radial_elements": 4, "polar_elements": 34}
+RESOLUTIONS = {
+    "&model name = 'finite_element' / &mesh radial_elements = 3, polar_elements = 24 /": (
+        "mesh 3 x 24\n", "&mesh radial_elements, polar_elements (now 3 x 24)", FINE_MESH,
+    ),
+    "&model name = 'modal_ball' / &modal_ball rings = 10, highest_frequency = 300 /": (
+        "10 rings, modes up to 300 Hz, substeps 1\n",
+        "&modal_ball rings, highest_frequency (now 10, 300 Hz)",
+        {"rings": 14, "highest_frequency": 420.0},
+    ),
+    "&model name = 'modal_ball' /": (
+        "40 rings, modes up to 1400 Hz, substeps 1, automatic\n", "", {"rings": 56},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", RESOLUTIONS)
+@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
+def test_resolution_is_stated(text: str, case_file: CaseFile, run: Run) -> None:
+    shown, keys, finer = RESOLUTIONS[text]
+    path = case_file(f"&ball / &drop / {text} &sampling verify = .true. /")
+    result = run(path, "--output", "results")
+    assert f"resolution: {shown}" in result.stdout
+    assert keys in result.stderr
+    quantities = thud.solve(thud.read_case(path)).model_quantities
+    assert {name: quantities[f"finer_{name}"] for name in finer} == pytest.approx(finer)
+
+
+def test_errors_of_the_drop_on_a_floor_are_shown(case_file: CaseFile, run: Run) -> None:
+    text = "&ball / &drop / &model name = 'modal_ball' / &floor name = 'infinite_plate' /"
+    text += " &modal_ball rings = 10, highest_frequency = 300 / &sampling verify = .true. /"
+    path = case_file(text)
+    with pytest.warns(thud.PlausibilityWarning, match="numerical error"):
+        impact = thud.solve(thud.read_case(path))
+    assert impact.on_floor
+    result = run(path)
+    errors = impact.numerical_error.level[4], impact.on_floor.numerical_error.level[4]
+    lines = [line.split() for line in result.stdout.splitlines() if "  error at 500" in line]
+    assert lines == [["error", "at", "500", "Hz", f"{errors[0]:.2f}", "dB", f"{errors[1]:.2f}", "dB"]]
+    assert result.stdout.count("at a finer resolution") == 2
+    assert result.stderr.count("the numerical error") == 2
+    assert result.stderr.count("&floor: the numerical error") == 1
 
 
 AWKWARD = {

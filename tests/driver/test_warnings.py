@@ -85,9 +85,9 @@ OUTSIDE = {
     naming("octaves", "63 Hz", "1e-12"): "&drop height = 10 / &sampling"
     " duration = 2 / &model name = 'hunt_crossley' /"
     " &hunt_crossley contact_time = 1, exponent = 3 /",
-    naming("numerical error", "dB", "resolution"): "&drop height = 0.01 /"
+    naming("numerical error", "dB", "&mesh", "x 32"): "&drop height = 0.01 /"
     " &ball youngs_modulus = 2.08e6 / &model name = 'finite_element' / &mesh polar_elements = 32 /",
-    naming("numerical error", "500 Hz", "dB"): "&model name = 'modal_ball' /"
+    naming("numerical error", "dB", "500 Hz", "&modal_ball"): "&model name = 'modal_ball' /"
     " &modal_ball rings = 10, highest_frequency = 300 /",
     naming("&floor: restitution", "-1.0e-6"): "&model name = 'hunt_crossley' /"
     " &hunt_crossley contact_time = 0.02 / &floor name = 'oscillator' /"

@@ -71,6 +71,7 @@ module thud_finite_element_options
       procedure, pass(options) :: get_snapshot_shape
       procedure, pass(options) :: set_level
       procedure, pass(options) :: get_highest_level
+      procedure, pass(options) :: chooses_resolution
       procedure, pass(options) :: get_reference_level
       procedure, pass(options) :: get_error_ratio
       procedure, pass(options) :: get_min_error
@@ -138,7 +139,7 @@ contains
       logical :: resolves_contact
 
       refinement = merge(0.5_wp, refinement_ratio**(level - 1), level == 0)
-      resolves_contact = is_automatic(options) .and. allocated(coarse%model_history)
+      resolves_contact = options%chooses_resolution() .and. allocated(coarse%model_history)
       associate (mesh => options%mesh)
          mesh = get_element_counts(ball, mesh)
          if (resolves_contact) mesh%polar_elements = nint(mesh%polar_elements*max(1.0_wp, min(max_contact_ratio, &
@@ -157,19 +158,19 @@ contains
       integer :: level
 
       level = 1
-      if (.not. is_automatic(options)) return
+      if (.not. options%chooses_resolution()) return
       do while (level < highest_level .and. options%get_cost(ball, sampling)*refinement_ratio**(3*level) < max_cost)
          level = level + 1
       end do
    end function get_highest_level
 
    !> Whether the resolution may be chosen: the user's keys do not grow.
-   pure function is_automatic(options) result(yes)
+   function chooses_resolution(options) result(yes)
       class(finite_element_options_type), intent(in) :: options
       logical :: yes
 
       yes = options%mesh%radial_elements == 0 .and. options%mesh%polar_elements == 0
-   end function is_automatic
+   end function chooses_resolution
 
    !> The level with elements of twice the size, if there is one.
    function get_reference_level(options, level) result(reference)
@@ -226,7 +227,7 @@ contains
       integer :: factor(2)
 
       factor = 1
-      if (is_automatic(options)) factor = nint(refinement_ratio**(highest_level - 1)*[max_contact_ratio, 1.0_wp])
+      if (options%chooses_resolution()) factor = nint(refinement_ratio**(highest_level - 1)*[max_contact_ratio, 1.0_wp])
       associate (counts => get_element_counts(ball, options%mesh))
          extents = [factor*[counts%polar_elements, counts%radial_elements] + 1, get_frame_count(options, sampling)]
       end associate
