@@ -47,8 +47,12 @@ contains
       allocate (prepared, source=model)
       call prepared%share_setup(ball, sampling)
       call solve_at(0, history, coarse_error)
-      if (is_interrupt(coarse_error)) call move_alloc(coarse_error, error)
-      if (allocated(error)) return
+      if (allocated(coarse_error)) then
+         if (is_interrupt(coarse_error) .or. coarse_error%has_short_record) then
+            call move_alloc(coarse_error, error)
+            return
+         end if
+      end if
       do level = 1, highest
          if (.not. allocated(coarse_error)) then
             coarse = history

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -247,3 +248,14 @@ def test_stated_error_covers_that_of_friction() -> None:
         coarse, fine = slipping(friction, (8, 64)), slipping(friction, (16, 128))
         change = np.abs(coarse.levels(force="floor") - fine.levels(force="floor"))
         assert (change <= coarse.numerical_error.level + 0.01).all()
+
+
+def test_short_record_is_found_at_the_coarsest_mesh() -> None:
+    soft = thud.Ball(youngs_modulus=3e5, poisson_ratio=0.49)
+    with pytest.raises(thud.InputError, match=r"contact 1 is over; set .* at least 0\.\d{3} s") as caught:
+        thud.solve(soft, model="finite_element")
+    needed = float(str(caught.value).split()[-2])
+    keys = {"radial_elements": 2, "polar_elements": 16}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert thud.solve(soft, duration=1.02 * needed, model="finite_element", **keys).restitution > 0
