@@ -46,7 +46,8 @@ contains
       type(field_type) :: fields(4)
 
       fields = [ &
-         real_field('sample_rate', sampling%sample_rate, 'Hz', 'samples per second', '[2000, 1e7]'), &
+         real_field('sample_rate', sampling%sample_rate, 'Hz', 'samples per second; from 16000 with finite_element', &
+         '[2000, 1e7]'), &
          real_field('duration', sampling%duration, 's', 'duration of the record from first touch', &
          '[0.001, 10]'), &
          integer_field('substeps', sampling%substeps, 'integration steps per sampling interval', '[1, 10000]'), &
