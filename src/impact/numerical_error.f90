@@ -61,8 +61,8 @@ contains
       end if
       change = ratio*change
       if (history%has_means) change = change + get_mean_loss(history%sample_rate)
-      ! Levels converge with the square of the step or element size, `ratio` = 1/(q**2 - 1) for sizes in the ratio q; contact time,
-      ! restitution and peak in proportion to it, 1/(q - 1).
+      ! Levels converge with the square of the step or element size: `ratio` = 1/(q**2 - 1) for sizes in the ratio q. Contact
+      ! time, restitution and peak converge in proportion to it: 1/(q - 1).
       first_order_ratio = 1/(sqrt(1 + 1/ratio) - 1)
       time_change = first_order_ratio*time_change
       ! Means show the end of the contact to within an interval.

@@ -209,34 +209,35 @@ def main() -> None:
         errors.append(np.abs(here - fine))
         stated.append(impact.numerical_error.level)
         rests.append(rest)
-        said = impact.numerical_error
-        limit = np.array([said.contact_time, said.restitution, said.peak_force])
+        own = impact.numerical_error
+        limit = np.array([own.contact_time, own.restitution, own.peak_force])
         floors = FLOORS * np.array([scalars[0], 1.0, scalars[2]])
         difference = np.abs(scalars - fine_scalars)
         scalars_covered.append(difference <= np.maximum(limit, floors))
         if not scalars_covered[-1].all():
-            print(i, "contact time, restitution, peak: error", difference, "stated", limit, flush=True)
+            print(
+                i, "contact time, restitution, peak: error", difference, "stated", limit, flush=True
+            )
         silent = (errors[-1] > MAXIMUM) & (stated[-1].max() < WARNED)
         if silent.any() or (errors[-1] > np.maximum(stated[-1], FLOOR) + rest).any():
             numbers = (values.round(2) for values in (errors[-1], stated[-1], rest))
             print(i, "error {} stated {} reference {}".format(*numbers), case, flush=True)
-    error, claims, rest = np.array(errors), np.array(stated), np.array(rests)
-    covered = error <= np.maximum(claims, FLOOR)
-    silent = (error > MAXIMUM) & (claims.max(axis=1, keepdims=True) < WARNED)
+    error, said, rest = np.array(errors), np.array(stated), np.array(rests)
+    covered = error <= np.maximum(said, FLOOR)
+    silent = (error > MAXIMUM) & (said.max(axis=1, keepdims=True) < WARNED)
     print(
         f"{name}: {len(error)} sources, {refused} without a result; stated error covers "
         f"{100 * covered.mean():.1f} % of the levels, "
         f"{100 * covered[:, 4].mean():.1f} % at 500 Hz, "
         "with the change between the two reference resolutions "
-        f"{100 * (error <= np.maximum(claims, FLOOR) + rest).mean():.1f} %; largest error "
-        f"{error.max():.2f} dB, without a warning {error[claims.max(axis=1) < WARNED].max():.2f} dB; "
+        f"{100 * (error <= np.maximum(said, FLOOR) + rest).mean():.1f} %; largest error "
+        f"{error.max():.2f} dB, without a warning {error[said.max(axis=1) < WARNED].max():.2f} dB; "
         f"{silent.sum()} above {MAXIMUM} dB without; change between the references up to "
         f"{rest.max():.2f} dB, median {np.median(rest):.4f} dB; median time "
         f"{1e3 * np.median(seconds):.1f} ms"
     )
     shares = 100 * np.mean(scalars_covered, axis=0)
-    print("covers {:.0f} % of the contact times, {:.0f} % of the restitutions, ".format(*shares[:2]), end="")
-    print(f"{shares[2]:.0f} % of the peak forces")
+    print("contact times {:.0f} %, restitutions {:.0f} %, peak forces {:.0f} %".format(*shares))
 
 
 if __name__ == "__main__":

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 import warnings
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -179,7 +179,9 @@ def test_errors_of_the_drop_on_a_floor_are_shown(case_file: CaseFile, run: Run) 
     result = run(path)
     errors = impact.numerical_error.level[4], impact.on_floor.numerical_error.level[4]
     lines = [line.split() for line in result.stdout.splitlines() if "  error at 500" in line]
-    assert lines == [["error", "at", "500", "Hz", f"{errors[0]:.2f}", "dB", f"{errors[1]:.2f}", "dB"]]
+    assert lines == [
+        ["error", "at", "500", "Hz", f"{errors[0]:.2f}", "dB", f"{errors[1]:.2f}", "dB"]
+    ]
     assert result.stdout.count("at a finer resolution") == 2
     assert result.stderr.count("the numerical error") == 2
     assert result.stderr.count("&floor: the numerical error") == 1
@@ -252,10 +254,14 @@ def test_stated_error_covers_that_of_friction() -> None:
 
 def test_short_record_is_found_at_the_coarsest_mesh() -> None:
     soft = thud.Ball(youngs_modulus=3e5, poisson_ratio=0.49)
-    with pytest.raises(thud.InputError, match=r"contact 1 is over; set .* at least 0\.\d{3} s") as caught:
+    with pytest.raises(
+        thud.InputError, match=r"contact 1 is over; set .* at least 0\.\d{3} s"
+    ) as caught:
         thud.solve(soft, model="finite_element")
     needed = float(str(caught.value).split()[-2])
     keys = {"radial_elements": 2, "polar_elements": 16}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        assert thud.solve(soft, duration=1.02 * needed, model="finite_element", **keys).restitution > 0
+        assert (
+            thud.solve(soft, duration=1.02 * needed, model="finite_element", **keys).restitution > 0
+        )

@@ -76,7 +76,9 @@ OUTSIDE = {
     naming("&ball: wall_thickness", "outer_radius", 0.5, 0.4): "&ball wall_thickness = 0.0445 /",
     naming("&ball: poisson_ratio", 0.3, 0.45, "0.50"): "&ball poisson_ratio = 0.3 /",
     naming("&drop: deflection", "outer_radius", 0.5): "&drop height = 3 /",
-    naming("&drop: deflection", "wall_thickness", 0.5, "thin wall", "9 dB off those of finite elements"): "&ball"
+    naming(
+        "&drop: deflection", "wall_thickness", 0.5, "thin wall", "9 dB off those of finite elements"
+    ): "&ball"
     " wall_thickness = 0.016, mass = 1, youngs_modulus = 5e6, poisson_ratio = 0.49 /"
     " &model name = 'modal_ball' /",
     naming("&drop: deflection", "wall_thickness", 2.0, "buckles"): "&ball wall_thickness = 0.0272,"

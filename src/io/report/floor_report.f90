@@ -124,8 +124,8 @@ contains
       call add_quantity(get_quantity('floor_work'), 0.0_wp, contact%floor_work)
       do i = 1, octave_count
          associate (errors => [impact%history%numerical_error%octave(i), contact%numerical_error%octave(i)])
-            if (errors(2) > shown_error) call add_row('error at '//get_band_name(octaves(i))//' Hz', errors(1), errors(2), 2, &
-               'dB')
+            if (errors(2) > shown_error) call add_row('error at '//get_band_name(octaves(i))//' Hz', errors(1), errors(2), &
+               2, 'dB')
          end associate
       end do
       text = text//get_verification_rows(contact)

@@ -4,11 +4,11 @@ module thud_table
    use thud_case, only: case_type, get_model_number
    use thud_compression, only: compression_type
    use thud_compute, only: assessment_type, get_assessed_force
+   use thud_error, only: error_type
+   use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
-   use thud_error, only: error_type
-   use thud_force_exposure, only: get_force_exposure_levels
    use thud_numerical_error, only: finer_prefix, finer_quantities, get_resolution, resolution_quantities
    use thud_quantities, only: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
       sample_quantity_count

@@ -46,7 +46,7 @@ module thud_finite_element_options
    !> The viscosity of Kelvin and Voigt prevents it.
    real(wp), parameter :: slip_friction(2) = [0.33_wp, 0.95_wp]
 
-   !> Changes of the octave levels of the standard ball by it, from the default number of elements to the converged level, dB;
+   !> Changes of the octave levels of the standard ball by it, from the default elements to the converged level, dB;
    !> the change is taken as proportional to the element size.
    real(wp), parameter :: slip_error(octave_count) = [0.03_wp, 0.05_wp, 0.25_wp, 0.6_wp, 1.3_wp]
 
