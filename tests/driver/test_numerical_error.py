@@ -164,6 +164,7 @@ def test_resolution_is_stated(text: str, case_file: CaseFile, run: Run) -> None:
     path = case_file(f"&ball / &drop / {text} &sampling verify = .true. /")
     result = run(path, "--output", "results")
     assert f"resolution: {shown}" in result.stdout
+    assert "penetration" not in result.stdout
     assert keys in result.stderr
     quantities = thud.solve(thud.read_case(path)).model_quantities
     assert {name: quantities[f"finer_{name}"] for name in finer} == pytest.approx(finer)

@@ -228,6 +228,8 @@ contains
       do i = 1, size(history%model_quantity_name)
          if (index(history%model_quantity_name(i), finer_prefix) == 1) cycle
          if (any(resolution_quantities == history%model_quantity_name(i))) cycle
+         ! On a hard floor there is none.
+         if (history%model_quantity_name(i) == 'maximum_penetration' .and. .not. history%model_quantity(i) > 0.0_wp) cycle
          power = 0
          if (history%model_quantity_unit(i) /= '') power = floor(log10(max(abs(history%model_quantity(i)), tiny(1.0_wp)))/3)
          if (abs(power) > 3) power = 0

@@ -140,7 +140,7 @@ contains
       call add_model_quantity(history, 'bulk_modulus', 'Pa', run%body%material%bulk_modulus)
       call add_model_quantity(history, 'simulated_time', 's', run%time)
       call add_model_quantity(history, 'minimum_step', 's', run%shortest_interval)
-      if (run%penetration > 0.0_wp) call add_model_quantity(history, 'maximum_penetration', 'm', run%penetration)
+      call add_model_quantity(history, 'maximum_penetration', 'm', run%penetration)
       call add_model_quantity(history, 'radial_elements', '', real(run%body%mesh%n_radial, wp))
       call add_model_quantity(history, 'polar_elements', '', real(run%body%mesh%n_polar, wp))
       gain = ball%mass*(get_mean_velocity(run) + speed + run%gravity*run%time)
