@@ -2,11 +2,13 @@
 !> levels of the octaves agree. The difference is the stated numerical error.
 module thud_resolved_drop
    use thud_ball, only: ball_type
+   use thud_band, only: octave_count
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, signal_base
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
+   use thud_motion, only: motion_type
    use thud_numerical_error, only: add_verification, estimate_error, get_largest_error
    use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
@@ -35,17 +37,28 @@ contains
       type(receiver_type), intent(in), optional :: receiver
       class(source_model_type), allocatable :: prepared
       type(force_history_type) :: coarse, finer
+      type(force_history_type), allocatable :: references(:)
+      real(wp), allocatable :: min_error(:, :)
       type(error_type), allocatable :: coarse_error
-      integer :: level, highest
+      integer :: level, highest, reference
 
       highest = model%get_highest_level(ball, sampling)
+      allocate (references(0:highest), min_error(octave_count, 0:highest + 1))
       allocate (prepared, source=model)
       call prepared%share_setup(ball, sampling)
       call solve_at(0, history, coarse_error)
-      if (is_interrupt(coarse_error)) call move_alloc(coarse_error, error)
-      if (allocated(error)) return
+      if (allocated(coarse_error)) then
+         if (is_interrupt(coarse_error) .or. coarse_error%has_short_record) then
+            call move_alloc(coarse_error, error)
+            return
+         end if
+      end if
       do level = 1, highest
-         if (.not. allocated(coarse_error)) coarse = history
+         if (.not. allocated(coarse_error)) then
+            coarse = history
+            references(level - 1) = history
+            references(level - 1)%motion = motion_type()
+         end if
          call solve_at(level, history, error)
          if (allocated(error)) then
             if (is_interrupt(error) .or. level == 1) return
@@ -54,8 +67,12 @@ contains
             history = coarse
             exit
          end if
-         if (.not. allocated(coarse_error)) call estimate_error(coarse, model%get_error_ratio(level), history)
          if (allocated(coarse_error)) deallocate (coarse_error)
+         reference = model%get_reference_level(level)
+         if (allocated(references(reference)%floor_force)) then
+            call estimate_error(references(reference), model%get_error_ratio(level), history)
+            history%numerical_error%octave = max(history%numerical_error%octave, min_error(:, level))
+         end if
          if (history%numerical_error%known .and. get_largest_error(history) <= max_error) exit
       end do
       level = min(level, highest)
@@ -66,7 +83,10 @@ contains
          if (.not. (is_interrupt(error) .or. sampling%verify)) deallocate (error)
          return
       end if
-      if (.not. history%numerical_error%known) call estimate_error(finer, 1 + model%get_error_ratio(level + 1), history)
+      if (.not. history%numerical_error%known) then
+         call estimate_error(finer, 1 + model%get_error_ratio(level + 1), history)
+         history%numerical_error%octave = max(history%numerical_error%octave, min_error(:, level))
+      end if
       if (sampling%verify) call add_verification(finer, history)
 
    contains
@@ -83,6 +103,7 @@ contains
          resolved_sampling = sampling
          call resolved%set_level(ball, level, resolved_sampling, coarse)
          call resolved%solve(ball, drop, resolved_sampling, history, error, receiver)
+         min_error(:, level) = resolved%get_min_error(ball)
       end subroutine solve_at
 
    end subroutine solve_drop

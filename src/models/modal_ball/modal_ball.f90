@@ -148,6 +148,10 @@ contains
             allocate (history%floor_displacement(n_sample), history%floor_velocity(n_sample), source=0.0_wp)
          end if
          call march(ball, sampling, interval, rings, modes, static, contact, state, history, error)
+         call add_model_quantity(history, 'rings', '', real(size(rings%radius), wp))
+         call add_model_quantity(history, 'highest_frequency', 'Hz', &
+            min(options%get_highest_frequency(), max_phase/(2*pi*interval)))
+         call add_model_quantity(history, 'substeps', '', real(sampling%substeps, wp))
       end if
       call restore_blas_threads()
    end subroutine solve

@@ -84,6 +84,7 @@ module thud_modal_ball_options
       procedure, pass(options) :: share_setup
       procedure, pass(options) :: set_level
       procedure, pass(options) :: get_highest_level
+      procedure, pass(options) :: chooses_resolution
       procedure, pass(options) :: get_error_ratio
    end type modal_ball_options_type
 
@@ -183,8 +184,16 @@ contains
       type(sampling_type), intent(in) :: sampling
       integer :: level
 
-      level = merge(1, highest_level, options%rings > 0 .and. options%highest_frequency > 0.0_wp)
+      level = merge(highest_level, 1, options%chooses_resolution())
    end function get_highest_level
+
+   !> Whether the input leaves rings or modes open.
+   function chooses_resolution(options) result(yes)
+      class(modal_ball_options_type), intent(in) :: options
+      logical :: yes
+
+      yes = options%rings == 0 .or. .not. options%highest_frequency > 0.0_wp
+   end function chooses_resolution
 
    !> Estimated error of a result divided by its difference from the next coarser level: it is found from random balls
    !> (docs/modal_ball.md).
