@@ -73,16 +73,17 @@ contains
 
       fields = [ &
          integer_field('bounces', options%bounces, 'number of contacts to compute', '[1, 100]'), &
-         real_field('flight_before', options%flight_before, 's', 'duration of free flight before first touch', '[0, 1]'), &
+         real_field('flight_before', options%flight_before, 's', 'duration of free flight before first touch', '[0, 1]', &
+         is_numerical=.true.), &
          real_field('flight_after', options%flight_after, 's', 'duration of free flight after the last contact', &
-         '[0, 10]'), &
+         '[0, 10]', is_numerical=.true.), &
          real_field('step_safety', options%step_safety, '', 'time step divided by the stability limit', &
-         '[0.01, 0.98]'), &
+         '[0.01, 0.98]', is_numerical=.true.), &
          in_group('mesh', get_mesh_fields(options%mesh)), &
          in_group('material', get_material_fields(options%material)), &
          in_group('contact', get_contact_fields(options%contact)), &
          in_group('output', [real_field('snapshot_interval', options%snapshot_interval, 's', &
-         'time between snapshots of the deformed ball; 0: none', '[0, 10]')])]
+         'time between snapshots of the deformed ball; 0: none', '[0, 10]', is_numerical=.true.)])]
    end function get_fields
 
    !> Returns an error if options do not fit each other, the ball or the memory.

@@ -96,7 +96,8 @@ contains
 
       fields = [ &
          real_field('highest_frequency', options%highest_frequency, 'Hz', &
-         'highest frequency of oscillating modes; faster ones follow without inertia; 0: automatic', '[0, 20000]'), &
+         'highest frequency of oscillating modes; faster ones follow without inertia; 0: automatic', '[0, 20000]', &
+         is_numerical=.true.), &
          integer_field('rings', options%rings, &
          'number of rings on the surface, from the lowest point to 60 degrees; 0: automatic', '[0, 400]'), &
          choice_field('damping_law', options%damping_law, 'damping law: loss factor as a function of frequency', &
