@@ -37,7 +37,9 @@ contains
       type(force_history_type) :: coarse, finer
       type(error_type), allocatable :: coarse_error
       integer :: level, highest
+      logical :: is_finest
 
+      is_finest = .false.
       highest = model%get_highest_level(ball, sampling)
       allocate (prepared, source=model)
       call prepared%share_setup(ball, sampling)
@@ -52,6 +54,7 @@ contains
             ! The next coarser level has a result.
             deallocate (error)
             history = coarse
+            is_finest = .true.
             exit
          end if
          if (.not. allocated(coarse_error)) call estimate_error(coarse, model%get_error_ratio(level), history)
@@ -59,11 +62,12 @@ contains
          if (history%numerical_error%known .and. get_largest_error(history) <= max_error) exit
       end do
       level = min(level, highest)
-      if (history%numerical_error%known .and. .not. sampling%verify) return
+      if (is_finest .or. history%numerical_error%known .and. .not. sampling%verify) return
       ! The error is not known if the coarsest resolution fails and there is one level.
       call solve_at(level + 1, finer, error)
       if (allocated(error)) then
-         if (.not. (is_interrupt(error) .or. sampling%verify)) deallocate (error)
+         ! The result stands without the finer one; `get_warnings` reports that.
+         if (.not. is_interrupt(error)) deallocate (error)
          return
       end if
       if (.not. history%numerical_error%known) call estimate_error(finer, 1 + model%get_error_ratio(level + 1), history)
