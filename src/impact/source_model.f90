@@ -37,6 +37,7 @@ module thud_source_model
       procedure, pass(options) :: share_setup
       procedure, pass(options) :: set_level
       procedure, pass(options) :: get_highest_level
+      procedure, pass(options) :: get_expected_level
       procedure, pass(options) :: get_error_ratio
    end type source_model_type
 
@@ -198,12 +199,26 @@ contains
       level = 1
    end function get_highest_level
 
+   !> Level at which the resolution is probably fine enough, for estimates of the computing time; by default 1.
+   function get_expected_level(ball, options, contact) result(level)
+      type(ball_type), intent(in) :: ball
+      class(source_model_type), intent(in) :: options
+      !> Expected contact time, deflection and contact radius, for models that use the wall.
+      type(force_history_type), intent(in) :: contact
+      integer :: level
+
+      level = 1
+   end function get_expected_level
+
    !> Estimated error of a result divided by its difference from the next coarser level. By default somewhat more than the
    !> 1/3 of an error that is proportional to the square of the step, as that of a force that begins with a jump.
-   function get_error_ratio(options, level) result(ratio)
+   function get_error_ratio(ball, options, level, history) result(ratio)
+      type(ball_type), intent(in) :: ball
       class(source_model_type), intent(in) :: options
       !> Level of the result.
       integer, intent(in) :: level
+      !> The result.
+      type(force_history_type), intent(in) :: history
       real(wp) :: ratio
 
       ratio = 0.4_wp

@@ -40,6 +40,9 @@ module thud_finite_element_options
    integer, parameter :: highest_level = 3
    real(wp), parameter :: max_cost = 3.54_wp
 
+   !> Wall thickness relative to the radius below which, and coefficient of friction above which higher levels are expected.
+   real(wp), parameter :: thin_wall = 0.25_wp, high_friction = 0.3_wp
+
    !> Options of the model.
    type, abstract, extends(source_model_type) :: finite_element_options_type
       !> Number of contacts to follow.
@@ -61,6 +64,7 @@ module thud_finite_element_options
       procedure, pass(options) :: get_snapshot_shape
       procedure, pass(options) :: set_level
       procedure, pass(options) :: get_highest_level
+      procedure, pass(options) :: get_expected_level
       procedure, pass(options) :: get_error_ratio
    end type finite_element_options_type
 
@@ -152,6 +156,18 @@ contains
       end do
    end function get_highest_level
 
+   !> Nodes that stick and slip, and thin walls need higher levels.
+   function get_expected_level(ball, options, contact) result(level)
+      type(ball_type), intent(in) :: ball
+      class(finite_element_options_type), intent(in) :: options
+      type(force_history_type), intent(in) :: contact
+      integer :: level
+
+      level = 1
+      if (options%contact%friction > 0.0_wp .or. ball%wall_thickness < thin_wall*ball%outer_radius) level = 2
+      if (options%contact%friction > high_friction) level = highest_level
+   end function get_expected_level
+
    !> Whether the resolution may be chosen: the user's keys do not grow.
    pure function is_automatic(options) result(yes)
       class(finite_element_options_type), intent(in) :: options
@@ -162,9 +178,11 @@ contains
 
    !> Estimated error of a result divided by its difference from the next coarser level, for errors proportional to the
    !> square of the element size; at level 1 more, since the elements of level 0 are often outside of that order.
-   function get_error_ratio(options, level) result(ratio)
+   function get_error_ratio(ball, options, level, history) result(ratio)
+      type(ball_type), intent(in) :: ball
       class(finite_element_options_type), intent(in) :: options
       integer, intent(in) :: level
+      type(force_history_type), intent(in) :: history
       real(wp) :: ratio
 
       ratio = merge(0.5_wp, 1/(refinement_ratio**2 - 1), level == 1)
