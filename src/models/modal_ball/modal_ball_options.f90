@@ -48,6 +48,9 @@ module thud_modal_ball_options
    real(wp), parameter :: many_modes(2) = [180.0_wp, 240.0_wp]
    real(wp), parameter :: small_contact = 0.2_wp
 
+   !> Wall thickness relative to the radius below which sticking needs level 3.
+   real(wp), parameter :: thin_wall = 0.2_wp
+
    !> Number of steps in a contact from level 1 on, as far as at most twice the steps of a level reach it.
    real(wp), parameter :: min_steps = 500.0_wp
 
@@ -217,6 +220,8 @@ contains
       level = 1
       if (n_mode > many_modes(1) .or. maxval(contact%model_history) < small_contact*ball%outer_radius) level = 2
       if (n_mode > many_modes(2)) level = 3
+      ! Rings of thin walls that stick do not converge.
+      if (options%floor_friction == 'stick' .and. ball%wall_thickness < thin_wall*ball%outer_radius) level = 3
       if (options%get_error_ratio(ball, level, contact) > 1.0_wp) level = level + 1
    end function get_expected_level
 
