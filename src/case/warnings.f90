@@ -9,7 +9,7 @@ module thud_warnings
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_numerical_error, only: get_resolution_keys
+   use thud_numerical_error, only: finer_quantities, get_resolution_keys
    use thud_registry, only: floor_names, model_names
    use thud_sampling, only: get_rate_limit
    use thud_text, only: fixed, quoted, to_text
@@ -87,6 +87,8 @@ contains
       call add_level_warnings(history, warnings)
       call add_error_warning(history, '', warnings)
       if (present(on_floor)) call add_error_warning(on_floor, '&floor: ', warnings)
+      if (case%sampling%verify .and. all(history%model_quantity_name /= finer_quantities(1))) call add(warnings, &
+         '&sampling: verify: the drop cannot be computed at a finer resolution, and is not verified')
       if (present(on_floor)) call add_limit_warnings(case, on_floor, warnings)
    end subroutine get_warnings
 

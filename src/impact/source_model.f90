@@ -40,6 +40,7 @@ module thud_source_model
       procedure, pass(options) :: get_highest_level
       procedure, pass(options) :: chooses_resolution
       procedure, pass(options) :: get_reference_level
+      procedure, pass(options) :: get_expected_level
       procedure, pass(options) :: get_error_ratio
       procedure, pass(options) :: get_min_error
    end type source_model_type
@@ -220,12 +221,26 @@ contains
       reference = level - 1
    end function get_reference_level
 
-   !> Estimated error of a level in dB divided by its difference from that of the reference level. By default somewhat more
-   !> than the 1/3 of an error that is proportional to the square of the step, as that of a force that begins with a jump.
-   function get_error_ratio(options, level) result(ratio)
+   !> Level at which the resolution is probably fine enough, for estimates of the computing time; by default 1.
+   function get_expected_level(ball, options, contact) result(level)
+      type(ball_type), intent(in) :: ball
+      class(source_model_type), intent(in) :: options
+      !> Expected contact time, deflection and contact radius, for models that use the wall.
+      type(force_history_type), intent(in) :: contact
+      integer :: level
+
+      level = 1
+   end function get_expected_level
+
+   !> Estimated error of a result divided by its difference from the reference level. By default somewhat more than the
+   !> 1/3 of an error that is proportional to the square of the step, as that of a force that begins with a jump.
+   function get_error_ratio(ball, options, level, history) result(ratio)
+      type(ball_type), intent(in) :: ball
       class(source_model_type), intent(in) :: options
       !> Level of the result.
       integer, intent(in) :: level
+      !> The result.
+      type(force_history_type), intent(in) :: history
       real(wp) :: ratio
 
       ratio = 0.4_wp

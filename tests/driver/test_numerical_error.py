@@ -101,7 +101,7 @@ def test_reduced_step_of_an_unstable_run_is_stated() -> None:
 
 VERIFIED = {
     "shell": {"model": "hollow_sphere", "sample_rate": 8000.0},
-    "modes of the user": {"model": "modal_ball", "rings": 20, "highest_frequency": 600.0},
+    "modes of the user": {"model": "modal_ball", "rings": 20, "highest_frequency": 800.0},
     "elements of the user": {"model": "finite_element", "polar_elements": 24},
 }
 

@@ -104,6 +104,17 @@ OUTSIDE = {
 }
 
 
+def test_drop_without_a_finer_one_is_not_verified(case_file: CaseFile) -> None:
+    # At 1.4 times the frequency there are too many modes.
+    text = "&ball wall_thickness = 0.01, mass = 0.8, youngs_modulus = 4e5 / &drop height = 0.003 /"
+    text += " &model name = 'modal_ball' / &modal_ball highest_frequency = 9500, rings = 20 /"
+    text += " &sampling duration = 0.3, verify = .true. /"
+    with pytest.warns(thud.PlausibilityWarning, match="is not verified"):
+        impact = thud.solve(thud.read_case(case_file(text)))
+    assert impact.finer is None
+    assert sum("verify: the drop cannot be computed" in text for text in impact.warnings) == 1
+
+
 def test_values_at_the_limits_of_rubbers_raise_no_warning(case_file: CaseFile) -> None:
     text = "&ball poisson_ratio = {}, youngs_modulus = 3e9 / &sampling sample_rate = 1e6 /"
     for ratio, number in ((0.45, 0), (0.4499, 1)):

@@ -50,6 +50,9 @@ module thud_finite_element_options
    !> the change is taken as proportional to the element size.
    real(wp), parameter :: slip_error(octave_count) = [0.03_wp, 0.05_wp, 0.25_wp, 0.6_wp, 1.3_wp]
 
+   !> Wall thickness relative to the radius below which, and coefficient of friction above which higher levels are expected.
+   real(wp), parameter :: thin_wall = 0.25_wp, high_friction = 0.3_wp
+
    !> Options of the model.
    type, abstract, extends(source_model_type) :: finite_element_options_type
       !> Number of contacts to follow.
@@ -73,6 +76,7 @@ module thud_finite_element_options
       procedure, pass(options) :: get_highest_level
       procedure, pass(options) :: chooses_resolution
       procedure, pass(options) :: get_reference_level
+      procedure, pass(options) :: get_expected_level
       procedure, pass(options) :: get_error_ratio
       procedure, pass(options) :: get_min_error
    end type finite_element_options_type
@@ -86,16 +90,17 @@ contains
 
       fields = [ &
          integer_field('bounces', options%bounces, 'number of contacts to compute', '[1, 100]'), &
-         real_field('flight_before', options%flight_before, 's', 'duration of free flight before first touch', '[0, 1]'), &
+         real_field('flight_before', options%flight_before, 's', 'duration of free flight before first touch', '[0, 1]', &
+         is_numerical=.true.), &
          real_field('flight_after', options%flight_after, 's', 'duration of free flight after the last contact', &
-         '[0, 10]'), &
+         '[0, 10]', is_numerical=.true.), &
          real_field('step_safety', options%step_safety, '', 'time step divided by the stability limit', &
-         '[0.01, 0.98]'), &
+         '[0.01, 0.98]', is_numerical=.true.), &
          in_group('mesh', get_mesh_fields(options%mesh)), &
          in_group('material', get_material_fields(options%material)), &
          in_group('contact', get_contact_fields(options%contact)), &
          in_group('output', [real_field('snapshot_interval', options%snapshot_interval, 's', &
-         'time between snapshots of the deformed ball; 0: none', '[0, 10]')])]
+         'time between snapshots of the deformed ball; 0: none', '[0, 10]', is_numerical=.true.)])]
    end function get_fields
 
    !> Returns an error if options do not fit each other, the ball or the memory.
@@ -164,6 +169,18 @@ contains
       end do
    end function get_highest_level
 
+   !> Nodes that stick and slip, and thin walls need higher levels.
+   function get_expected_level(ball, options, contact) result(level)
+      type(ball_type), intent(in) :: ball
+      class(finite_element_options_type), intent(in) :: options
+      type(force_history_type), intent(in) :: contact
+      integer :: level
+
+      level = 1
+      if (options%contact%friction > 0.0_wp .or. ball%wall_thickness < thin_wall*ball%outer_radius) level = 2
+      if (options%contact%friction > high_friction) level = highest_level
+   end function get_expected_level
+
    !> Whether the resolution may be chosen: the user's keys do not grow.
    function chooses_resolution(options) result(yes)
       class(finite_element_options_type), intent(in) :: options
@@ -183,9 +200,11 @@ contains
 
    !> Estimated error of a level divided by its difference from the reference level, for errors proportional to the square of
    !> the element size; with elements of twice the size more, since these are often outside of that order.
-   function get_error_ratio(options, level) result(ratio)
+   function get_error_ratio(ball, options, level, history) result(ratio)
+      type(ball_type), intent(in) :: ball
       class(finite_element_options_type), intent(in) :: options
       integer, intent(in) :: level
+      type(force_history_type), intent(in) :: history
       real(wp) :: ratio
 
       ratio = merge(1/(refinement_ratio**2 - 1), 0.5_wp, level == 2)
