@@ -205,7 +205,8 @@ contains
       type(sampling_type), intent(in) :: sampling
       integer :: level
 
-      level = merge(highest_level, 1, options%chooses_resolution() .and. .not. has_few_modes(options, get_coarse_frequency(ball)))
+      level = merge(highest_level, 1, options%chooses_resolution() &
+         .and. .not. has_few_modes(options, get_coarse_frequency(ball)))
    end function get_highest_level
 
    !> Whether the input leaves rings or modes open.
