@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 import thud
+from thud.explorer.answer import answer_case
+from thud.studies.model_verdict import _Source
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -60,6 +63,22 @@ def test_results_have_no_unknown_error(case_file: CaseFile, run: Run, tmp_path: 
     assert np.isnan([*error.level, error.contact_time, error.restitution, error.peak_force]).all()
     assert np.isnan(impact.to_xarray()["octave_500_error"])
     assert impact.restitution > 0
+
+
+def test_verdict_and_page_do_not_take_an_unknown_error_as_small(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    known = thud.solve()
+    unknown = replace(known, octave_500_error=np.nan)
+    methods = [
+        _Source(impact, (), lambda _: np.empty(0), "drops").method for impact in (known, unknown)
+    ]
+    assert methods[0] == "drops"
+    assert "numerical error of the drops is unknown" in methods[1]
+    monkeypatch.setattr("thud.explorer.answer.compute", lambda _: unknown)
+    titles = [title for title, *_ in answer_case(known.case)["numbers"]]
+    assert "contact time" in titles
+    assert not any("numerical error" in title for title in titles)
 
 
 def test_shortened_steps_are_stated() -> None:

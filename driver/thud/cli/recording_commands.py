@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from thud.base.checks import refuse
 from thud.base.display import draw_all
 from thud.base.tables import format_rows
 from thud.cli.command import (
@@ -38,24 +39,31 @@ def measure(options: argparse.Namespace) -> int:
     from thud.report import recording_files
 
     figures = not options.no_figures
-    files = results_of(options, Path(options.drops[0]).stem, [*options.drops, options.config])
+    files = results_of(
+        options, Path(options.recordings[0]).stem, [*options.recordings, options.config]
+    )
     files.require(recording_files.file_names(figures=figures))
     folder = files.folder
     # Measured drops are kept until the results are written.
     with Checkpoint(folder) as checkpoint:
         recording = read_recording(
-            options.drops,
+            options.recordings,
             height=options.height,
             mass=options.mass,
             height_uncertainty=options.height_uncertainty,
             mass_uncertainty=options.mass_uncertainty,
             source=options.source,
             channel=channel_of(options.channel),
+            channels=options.channels,
             unit=options.unit,
-            calibration=options.calibration,
+            calibration=_single(options.calibration),
             calibration_uncertainty=options.calibration_uncertainty,
             polarity=options.polarity,
             sample_rate=options.sample_rate,
+            drops=options.drops,
+            leave_out=_left_out(options) or None,
+            begin=options.begin,
+            end=options.end,
             low_pass=options.low_pass or None,
             config=options.config,
             progress=not options.quiet and sys.stderr.isatty(),
@@ -82,10 +90,27 @@ def measure(options: argparse.Namespace) -> int:
     return NOT_CONFORMING if options.check and not verdict else 0
 
 
+def _single(values: list[str] | None) -> list[str] | str | None:
+    """Return the values of a repeated option, and the value itself if there is one."""
+    return values[0] if values and len(values) == 1 else values
+
+
+def _left_out(options: argparse.Namespace) -> dict[str, str]:
+    """Return the numbers of the drops to be left out, with their reasons."""
+    numbers, reasons = options.leave_out or [], options.because or []
+    if len(reasons) == 1:
+        reasons *= len(numbers)
+    if len(reasons) != len(numbers):
+        refuse("--leave-out: a drop is left out without a reason", '--because "touched"')
+    return dict(zip(numbers, reasons, strict=True))
+
+
 MEASURE = Command(
     "levels, verdict and calibration report of recorded drops",
     (
-        argument("drops", nargs="+", metavar="FILE", help="recordings of one or more drops each"),
+        argument(
+            "recordings", nargs="+", metavar="FILE", help="recordings of one or more drops each"
+        ),
         argument("--source", choices=SOURCES, help="source of the limits (default: rubber_ball)"),
         argument("--mass", type=float, metavar="KG", help="mass of the source"),
         argument("--height", type=float, metavar="M", help="drop height"),
@@ -102,9 +127,18 @@ MEASURE = Command(
             "--config", metavar="LAB.toml", help="file on laboratory, instruments, calibration"
         ),
         argument("--channel", metavar="NAME|NUMBER", help="channel of the force"),
+        argument(
+            "--channels",
+            metavar="sum|F1+F2",
+            help="load cells whose forces are added: sum for all channels of force",
+        ),
         argument("--unit", help="unit of the recorded values, if the file does not state it"),
         argument(
-            "--calibration", metavar="N/UNIT", help='such as "250 N/V" or "4.1 pC/N, 10 mV/pC"'
+            "--calibration",
+            metavar="N/UNIT",
+            action="append",
+            help='such as 250, "250 N/V" or "4.1 pC/N, 10 mV/pC"; repeated: one for each of '
+            "--channels",
         ),
         argument(
             "--calibration-uncertainty",
@@ -121,6 +155,13 @@ MEASURE = Command(
             metavar="HZ",
             help="sample rate, if the file does not state it",
         ),
+        argument("--drops", metavar="NUMBERS", help='drops to be measured, such as "1-5,8"'),
+        argument("--leave-out", action="append", metavar="NUMBERS", help="drops to be left out"),
+        argument("--because", action="append", metavar="TEXT", help="why drops are left out"),
+        argument(
+            "--from", dest="begin", type=float, metavar="S", help="begin of the searched section"
+        ),
+        argument("--to", dest="end", type=float, metavar="S", help="end of the searched section"),
         argument(
             "--low-pass",
             action="store_true",

@@ -10,11 +10,11 @@ import numpy as np
 from thud.level.estimate import Contribution, Estimate
 from thud.level.levels import RECORDED_BAND, peak_count
 from thud.recordings.outliers import SIGNIFICANCE, find_outliers
-from thud.recordings.recorded_levels import WITHIN_REPEATABILITY
+from thud.recordings.recorded_levels import NOISE, REPEATABILITY, noise_exceeds
 from thud.recordings.restitution import BOUNCES, IMPULSE, DropConditions
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -41,8 +41,8 @@ def average_estimates(estimates: Sequence[Estimate], *systematic: Contribution) 
     """Return the mean of one quantity over drops, without unknown values.
 
     The uncertainty of each estimate is its noise, which the repeatability of two or more drops
-    includes. Systematic contributions (calibration, drop height) are shared by all drops; the
-    average does not reduce them.
+    includes; the larger of both counts (`noise_exceeds`). Systematic contributions (calibration,
+    drop height) are shared by all drops; the average does not reduce them.
     """
     known = [estimate for estimate in estimates if math.isfinite(estimate.value)]
     if not known:
@@ -50,36 +50,43 @@ def average_estimates(estimates: Sequence[Estimate], *systematic: Contribution) 
     count = len(known)
     values = np.array([estimate.value for estimate in known])
     noise = float(np.sqrt(np.sum([estimate.uncertainty**2 for estimate in known]))) / count
-    contributions = [Contribution("noise", noise, counted=count == 1)]
+    contributions = [Contribution(NOISE, noise)]
     if count > 1:
         error = float(values.std(ddof=1)) / math.sqrt(count)
-        contributions.insert(0, Contribution("repeatability", error, count - 1))
+        exceeds = bool(noise_exceeds(error, noise, count))
+        contributions = [
+            Contribution(REPEATABILITY, error, count - 1, counted=not exceeds),
+            Contribution(NOISE, noise, counted=exceeds),
+        ]
     return Estimate.from_budget(float(values.mean()), *contributions, *systematic)
 
 
 def level_estimates(
     levels: AverageLevels,
     calibration: float | None = None,
-    plate: NDArray[np.float64] | None = None,
+    systematic: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> tuple[Estimate, ...]:
     """Return average levels with their budgets, dB, shape (n_band,).
 
-    `calibration` is the relative standard uncertainty of the force, None if unknown; `plate` is the
-    standard uncertainty of the force plate's correction, dB, shape (n_band,), zero if not stated.
+    `calibration` is the relative standard uncertainty of the force, None if unknown; `systematic`
+    are further standard uncertainties that all drops share, dB, shape (n_band,), by name.
     """
     count = len(levels.names)
     contributions = dict(levels.contributions)
     if calibration is not None:
         contributions["calibration"] = np.full(len(levels.level), AMPLITUDE_DECIBEL * calibration)
-    if plate is not None and plate.any():
-        contributions["plate"] = plate
+    contributions |= systematic or {}
+    counted: dict[str, NDArray[np.bool_]] = {}
+    if count > 1:
+        exceeds = noise_exceeds(contributions[REPEATABILITY], contributions[NOISE], count)
+        counted = {REPEATABILITY: ~exceeds, NOISE: exceeds}
     budgets = (
         [
             Contribution(
                 name,
                 float(values[band]),
-                count - 1 if name == "repeatability" else math.inf,
-                counted=count == 1 or name not in WITHIN_REPEATABILITY,
+                count - 1 if name == REPEATABILITY else math.inf,
+                counted=name not in counted or bool(counted[name][band]),
             )
             for name, values in contributions.items()
         ]

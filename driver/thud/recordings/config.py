@@ -8,14 +8,30 @@ from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from thud.base.checks import refuse, refuse_unknown, require_choice, require_number, shown
+from thud.base.checks import (
+    refuse,
+    refuse_unknown,
+    require_choice,
+    require_number,
+    require_whole,
+    shown,
+)
 from thud.base.errors import InputError
 from thud.level.assessment import get_criteria
 from thud.level.levels import SOURCES
 from thud.recordings.channel import MIB, shown_path, shown_text
-from thud.recordings.force_units import Calibration, read_chain, require_unit
+from thud.recordings.choice import parse_numbers
+from thud.recordings.force_units import (
+    Calibration,
+    plain_number,
+    read_chain,
+    require_unit,
+)
+from thud.recordings.load_cells import require_channels
 from thud.recordings.plate import Plate, check_plate
 from thud.recordings.polarity import POLARITIES
+from thud.recordings.recorder_filter import KINDS, MAX_ORDER, RecorderFilter
+from thud.recordings.response import Chain
 from thud.recordings.restitution import DropConditions
 from thud.recordings.signal_files import regular_file
 
@@ -43,6 +59,11 @@ def _text(value: object, key: str) -> str:
     return value
 
 
+def _whole(low: int, high: int, value: object, key: str) -> int:
+    require_whole(key, value, low, high)
+    return int(value)  # type: ignore[call-overload, no-any-return]
+
+
 def _texts(value: object, key: str) -> tuple[str, ...]:
     return tuple(
         _text(text, key) for text in (value if isinstance(value, list | tuple) else [value])
@@ -68,6 +89,7 @@ def _channel(value: object, key: str) -> int | str:
 def _calibration(value: object, key: str) -> Calibration | str | float:
     if isinstance(value, Calibration):
         return value
+    value = plain_number(value)
     if not isinstance(value, str):
         return _number(-1e30, 1e30, value, key)
     try:
@@ -76,6 +98,14 @@ def _calibration(value: object, key: str) -> Calibration | str | float:
         message = f"{key}: {error}"
         raise InputError(message) from error
     return value
+
+
+def _calibrations(
+    value: object, key: str
+) -> Calibration | str | float | tuple[Calibration | str | float, ...]:
+    if not isinstance(value, list | tuple):
+        return _calibration(value, key)
+    return tuple(_calibration(entry, f"{key}, entry {i}") for i, entry in enumerate(value, 1))
 
 
 def _table(value: object, key: str) -> Mapping[str, object]:
@@ -95,6 +125,21 @@ def _linearity(value: object, key: str) -> tuple[tuple[float, float], ...]:
     if len(pairs) < 2:  # noqa: PLR2004
         refuse(f"{key} = {shown(value)} is not allowed", "[[applied, indicated], ...], N")
     return tuple(_pair(pair, key, "applied, indicated", 1e-3, 1e9) for pair in pairs)
+
+
+def _numbers(value: object, key: str) -> str:
+    text = _text(value, key)
+    parse_numbers(text, key)
+    return text
+
+
+def _reasons(value: object, key: str) -> dict[str, str]:
+    table = _table(value, key)
+    reasons = {_numbers(str(number), key): _text(reason, key) for number, reason in table.items()}
+    for number, reason in reasons.items():
+        if not reason.strip():
+            refuse(f"{key}: {number} has no reason", 'a reason, such as "touched"')
+    return reasons
 
 
 def _limits(value: object, key: str) -> dict[str, tuple[float, float]]:
@@ -124,6 +169,10 @@ class PlateConfig:
         Frequency, Hz, and quality factor of the first resonance, which will be corrected.
     f0_uncertainty : float or None
         Relative standard uncertainty of the frequency.
+    share : float
+        Share of this mode in the static response; 1 for a mass on a spring.
+    flat_limit : float or None
+        Frequency, Hz, up to which the response is flat within 2 %, if no resonance is stated.
     time_constant : float or None
         Time constant of the amplifier, s.
     full_scale : float or None
@@ -135,6 +184,8 @@ class PlateConfig:
     f0: float | None = _key(partial(_number, 1.0, 1e6))
     Q: float | None = _key(partial(_number, 0.5, 1e6))
     f0_uncertainty: float | None = _key(partial(_number, 0.0, 0.5))
+    share: float = _key(partial(_number, 0.001, 1.0), 1.0)
+    flat_limit: float | None = _key(partial(_number, 100.0, 1e6))
     time_constant: float | None = _key(partial(_number, 1e-3, 1e9))
     full_scale: float | None = _key(partial(_number, 1.0, 1e9))
     linearity: tuple[tuple[float, float], ...] = _key(_linearity, ())
@@ -144,11 +195,50 @@ def _plate(value: object, key: str) -> PlateConfig:
     if isinstance(value, PlateConfig):
         return value
     table = _checked(_table(value, key), PlateConfig, f"{key}: ")
-    if "f0_uncertainty" in table or ("f0" in table) != ("Q" in table):
-        for name in ("f0", "Q"):
-            if name not in table:
-                refuse(f"{key}: {name} is missing", "f0 and Q")
+    if {"f0", "Q", "f0_uncertainty", "share"} & set(table):
+        _require_keys(table, key, "f0", "Q")
+        if "flat_limit" in table:
+            refuse(f"{key}: f0 and flat_limit are both stated", "one of them")
     return PlateConfig(**table)
+
+
+def _require_keys(table: Mapping[str, object], key: str, *names: str) -> None:
+    for name in names:
+        if name not in table:
+            refuse(f"{key}: {name} is missing", " and ".join(names))
+
+
+@dataclass(frozen=True)
+class FilterConfig:
+    """The low-pass filter of the recorder or amplifier, which will be corrected.
+
+    Attributes
+    ----------
+    kind : str
+        ``"bessel"``, ``"butterworth"``, or ``"none"`` for a recorder whose response is flat in the
+        bands.
+    order : int or None
+        Order.
+    cutoff : float or None
+        Cutoff at -3 dB, Hz.
+    cutoff_uncertainty : float or None
+        Relative standard uncertainty of the cutoff.
+    """
+
+    kind: str = _key(partial(_choice, (*KINDS, "none")), "none")
+    order: int | None = _key(partial(_whole, 1, MAX_ORDER))
+    cutoff: float | None = _key(partial(_number, 1.0, 1e9))
+    cutoff_uncertainty: float | None = _key(partial(_number, 0.0, 0.5))
+
+
+def _filter(value: object, key: str) -> FilterConfig:
+    if isinstance(value, FilterConfig):
+        return value
+    table = _checked(_table(value, key), FilterConfig, f"{key}: ")
+    _require_keys(table, key, "kind")
+    if table["kind"] != "none":
+        _require_keys(table, key, "order", "cutoff")
+    return FilterConfig(**table)
 
 
 @dataclass(frozen=True)
@@ -167,7 +257,7 @@ class Config:
         Temperature of ball and air, degC.
     instruments : tuple of str
         Instruments.
-    channel, unit, polarity, sample_rate, calibration
+    channel, channels, unit, polarity, sample_rate, calibration
         As for `open_signals`.
     calibration_uncertainty : float or None
         Relative standard uncertainty of the force; by default that of the `Calibration`.
@@ -177,6 +267,15 @@ class Config:
         Their standard uncertainties, kg and m.
     plate : PlateConfig or None
         The force plate.
+    filter : FilterConfig or None
+        The low-pass filter of the recorder.
+    drops : str or None
+        Numbers of the drops to be measured, such as ``"1-5, 8"``; all by default. They count over
+        all files.
+    leave_out : mapping
+        Numbers of drops to be left out, with the reason: ``{"3": "touched"}``.
+    begin, end : float or None
+        Section of each file that is searched for drops, s.
     low_pass : bool
         Whether levels are those of the force below 1.25 kHz.
     limits : mapping
@@ -191,8 +290,11 @@ class Config:
     temperature: float | None = _key(partial(_number, -273.15, 200.0))
     instruments: tuple[str, ...] = _key(_texts, ())
     channel: int | str | None = _key(_channel)
+    channels: str | tuple[int | str, ...] | None = _key(require_channels)
     unit: str | None = _key(require_unit)
-    calibration: Calibration | str | float | None = _key(_calibration)
+    calibration: Calibration | str | float | tuple[Calibration | str | float, ...] | None = _key(
+        _calibrations
+    )
     calibration_uncertainty: float | None = _key(partial(_number, 0.0, 0.5))
     polarity: str | None = _key(partial(_choice, POLARITIES))
     sample_rate: float | None = _key(partial(_number, 1.0, 1e9))
@@ -201,6 +303,11 @@ class Config:
     mass_uncertainty: float | None = _key(partial(_number, 0.0, 100.0))
     height_uncertainty: float | None = _key(partial(_number, 0.0, 10.0))
     plate: PlateConfig | None = _key(_plate)
+    filter: FilterConfig | None = _key(_filter)
+    drops: str | None = _key(_numbers)
+    leave_out: Mapping[str, str] = field(default_factory=dict, metadata={"check": _reasons})
+    begin: float | None = _key(partial(_number, 0.0, 1e9))
+    end: float | None = _key(partial(_number, 0.0, 1e9))
     low_pass: bool = _key(_flag, default=False)
     limits: Mapping[str, tuple[float, float]] = field(
         default_factory=dict, metadata={"check": _limits}
@@ -212,7 +319,23 @@ class Config:
         plate = self.plate
         if plate is None or plate.f0 is None or plate.Q is None:
             return None
-        return Plate(plate.f0, plate.Q, frequency_uncertainty=plate.f0_uncertainty or 0.0)
+        return Plate(plate.f0, plate.Q, plate.f0_uncertainty or 0.0, plate.share)
+
+    @property
+    def recorder_filter(self) -> RecorderFilter | None:
+        """The filter to be corrected; an unknown uncertainty counts as zero."""
+        stated = self.filter
+        if stated is None or stated.order is None or stated.cutoff is None:
+            return None
+        kind: Any = stated.kind
+        return RecorderFilter(kind, stated.order, stated.cutoff, stated.cutoff_uncertainty or 0.0)
+
+    @property
+    def chain(self) -> Chain | None:
+        """The instruments whose responses are corrected."""
+        stated = (self.resonance, self.recorder_filter)
+        instruments = tuple(instrument for instrument in stated if instrument is not None)
+        return Chain(instruments) if instruments else None
 
     def conditions(self, calibration: float | None) -> DropConditions:
         """Return the conditions of the drops; an unknown uncertainty counts as zero."""

@@ -11,18 +11,19 @@ import numpy as np
 from scipy.ndimage import convolve1d, uniform_filter1d
 
 from thud.base.immutable import Immutable
+from thud.impact.contact_time import THRESHOLD
 from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND
 from thud.recordings.flanks import SMOOTHING, Flank, Posterior, find_touch
 from thud.recordings.noise import Background, fit_background
-from thud.recordings.plate import correct_plate
+from thud.recordings.response import correct_force
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.recordings.drops import Window
     from thud.recordings.noise import Cells
-    from thud.recordings.plate import Plate
+    from thud.recordings.response import Chain
 
 # Maximum length of the background on either side of the contact, s. A longer background lowers the
 # noise of the offset by less than 5 %.
@@ -36,6 +37,9 @@ FLANK = 3e-3
 MARGIN = 2e-3
 # Maximum time from the start of the pulse that the search for drops returns to the touch, s.
 MAX_DELAY = 1e-3
+# Time from a fifth of the peak to THRESHOLD over that from half of it to a fifth: of an exponential
+# decay. Flanks that end earlier, as powers of time, have less.
+REACH = math.log(0.2 / THRESHOLD) / math.log(0.5 / 0.2)
 # Width of the cells of a flank, s: from MIN_CELL to MAX_CELL in the interval of the touch; outside,
 # GROWTH times the distance from this interval, if this is more.
 MIN_CELL = 2e-5
@@ -47,12 +51,11 @@ CONTACT_CELL = 2e-4
 # more at low rates, at which the anti-aliasing filter is close to the octave of 500 Hz.
 GATE_SAMPLES = 8
 GATE_RATE = 10_000.0
-# Duration of the impulse response of a force plate's correction before and after the impulse, in
-# periods of the resonance.
-PLATE_PERIODS = 2.0
-# Error of begin and end due to content above the corrected frequencies, in periods of the
-# resonance.
-PLATE_ERROR = 0.03
+# Duration of the impulse response of a correction before and after the impulse, in periods of the
+# highest corrected frequency.
+CORRECTION_PERIODS = 4.0
+# Error of begin and end due to content above the corrected frequencies, in periods of the highest.
+CORRECTION_ERROR = 0.06
 # Errors of samples due to quantization and the filter of the recorder, as a fraction of the peak.
 SAMPLE_ERROR = 2e-4
 
@@ -144,9 +147,9 @@ def _background_bounds(length: int, rate: float) -> NDArray[np.intp]:
     return indices[indices <= length]
 
 
-def _spread(rate: float, plate: Plate | None) -> int:
+def _spread(rate: float, chain: Chain | None) -> int:
     """Return the number of samples by which filters spread a flank."""
-    periods = int(PLATE_PERIODS * rate / plate.frequency / 2) if plate else 0
+    periods = int(CORRECTION_PERIODS * rate / chain.highest / 2) if chain else 0
     return int((GATE_RATE / rate) ** 2) + periods
 
 
@@ -182,8 +185,8 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
     (t0, s0), begin = edges.touch.edge_times()
     (t1, s1), end = edges.release.edge_times()
     t1 = -t1
-    plate_error = PLATE_ERROR / window.plate.frequency if window.plate else 0.0
-    margin = GATE_SAMPLES + _spread(rate, window.plate)
+    correction_error = CORRECTION_ERROR / window.chain.highest if window.chain else 0.0
+    margin = GATE_SAMPLES + _spread(rate, window.chain)
     gate = (
         max(int((t0 - 3 * s0) * rate) - margin, 0),
         min(int((t1 + 3 * s1) * rate) + margin + 1, len(force)),
@@ -201,8 +204,8 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
     return Contact(
         Estimate(t0, s0),
         Estimate(t1, s1),
-        Estimate(begin[0], math.hypot(begin[1], plate_error)),
-        Estimate(-end[0], math.hypot(end[1], plate_error)),
+        Estimate(begin[0], math.hypot(begin[1], correction_error)),
+        Estimate(-end[0], math.hypot(end[1], correction_error)),
         background.peak,
         span,
         force[slice(*span)] - removed,
@@ -227,12 +230,21 @@ def find_edges(
     # At most half of a short background is cut off.
     before_stop = int(max(first - MARGIN * rate, first / 2))
     after_start = int(min(stop + MARGIN * rate, (stop + len(force)) / 2))
-    touch = (before_stop / rate, first / rate + MARGIN)
-    release = (stop / rate - MARGIN, after_start / rate)
     offset = float(np.median(np.concatenate([force[:before_stop], force[after_start:]])))
     force = force - offset
     width = max(1, round(rate / RECORDED_BAND))
-    peak = float(uniform_filter1d(force[first:stop], width).max())
+    smooth = uniform_filter1d(force[first:stop], width)
+    peak = float(smooth.max())
+    low = float(smooth.min())
+    half, fifth = (
+        first + np.flatnonzero(smooth >= low + level * (peak - low))[[0, -1]]
+        for level in (0.5, 0.2)
+    )
+    reach = fifth + REACH * (fifth - half)
+    before_stop = int(np.clip(reach[0], first / 2, before_stop))
+    after_start = int(np.clip(reach[1], after_start, (stop + len(force)) / 2))
+    touch = (before_stop / rate, first / rate + MARGIN)
+    release = (stop / rate - MARGIN, after_start / rate)
     for pass_index in range(passes):
         # The first of two passes needs only the coarse grid.
         searches = 1 + 2 * pass_index if passes > 1 else 2
@@ -252,7 +264,7 @@ def find_edges(
                 sign * background_end, search, end, rate, fine=pass_index > 0
             )
             posteriors.append(
-                find_posterior(force, bounds, search, fixed, rate, middle, searches, window.plate)
+                find_posterior(force, bounds, search, fixed, rate, middle, searches, window.chain)
             )
         if pass_index + 1 < passes:
             touch, reverse = (
@@ -260,7 +272,7 @@ def find_edges(
             )
             release = (-reverse[1], -reverse[0])
             # Samples into which filters spread the flanks are no background.
-            spread = _spread(rate, window.plate)
+            spread = _spread(rate, window.chain)
             before_stop = max(int(touch[0] * rate) - spread, first // 2)
             after_start = min(int(release[1] * rate) + 1 + spread, (stop + len(force) + 1) // 2)
     return Edges(posteriors[0], posteriors[1], background, offset, (before_stop, after_start))
@@ -301,7 +313,7 @@ def find_posterior(  # noqa: PLR0913, PLR0917 - all of them describe one flank
     rate: float,
     middle: float,
     searches: int,
-    plate: Plate | None = None,
+    chain: Chain | None = None,
 ) -> Posterior:
     """Return the posterior of the touch within an interval, s, from cells with bounds in samples.
 
@@ -318,7 +330,7 @@ def find_posterior(  # noqa: PLR0913, PLR0917 - all of them describe one flank
     value = _means(smooth, bounds - bounds[0]) - mean
     # Weights of the samples in the smoothed means.
     count = np.diff(bounds)
-    kernel = SMOOTHING if plate is None else np.convolve(SMOOTHING, _response(plate, rate))
+    kernel = SMOOTHING if chain is None else np.convolve(SMOOTHING, _response(chain, rate))
     margin = len(kernel) // 2
     weights = np.zeros((len(count), bounds[-1] - bounds[0] + 2 * margin))
     weights[np.repeat(np.arange(len(count)), count), margin + np.arange(count.sum())] = 1
@@ -329,18 +341,18 @@ def find_posterior(  # noqa: PLR0913, PLR0917 - all of them describe one flank
     if reversed_:
         time, value, covariance = -time[::-1], value[::-1], covariance[::-1, ::-1]
     flank = Flank(
-        time, value, covariance, background.peak, 1 / rate, release=bool(reversed_), plate=plate
+        time, value, covariance, background.peak, 1 / rate, release=bool(reversed_), chain=chain
     )
     return find_touch(flank, *interval, searches)
 
 
 @lru_cache(maxsize=4)
-def _response(plate: Plate, rate: float) -> NDArray[np.float64]:
-    """Return the impulse response of a force plate's correction; the impulse is in the middle."""
-    length = int(PLATE_PERIODS * rate / plate.frequency)
+def _response(chain: Chain, rate: float) -> NDArray[np.float64]:
+    """Return the impulse response of a correction; the impulse is in the middle."""
+    length = int(CORRECTION_PERIODS * rate / chain.highest)
     impulse = np.zeros(2 * length + 1)
     impulse[length] = 1
-    return correct_plate(impulse, rate, plate)
+    return correct_force(impulse, rate, chain)
 
 
 def flank_bounds(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -34,6 +34,7 @@ EXAMPLES = "such as 250 (N per unit), '250 N/V', '4.1 pC/N, 10 mV/pC', '10 V/FS,
 FACTOR = re.compile(
     r"(?P<value>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<top>[^\s/]+)\s*/\s*(?P<bottom>.+)"
 )
+T = TypeVar("T")
 # Maximum number of factors in a chain, and range of N per unit.
 MAX_FACTORS = 8
 SIZES = (1e-30, 1e30)
@@ -115,6 +116,26 @@ def read_chain(text: object) -> list[Factor]:
     if not 1 <= len(factors) <= MAX_FACTORS:
         refuse(f"calibration: {len(factors)} factors", f"1 to {MAX_FACTORS}, {EXAMPLES}")
     return factors
+
+
+def plain_number(calibration: T) -> T | float:
+    """Return a calibration, as a number if it is the text of one."""
+    try:
+        return float(calibration) if isinstance(calibration, str) else calibration
+    except ValueError:
+        return calibration
+
+
+def unit_of_chain(chain: str) -> str:
+    """Return the base unit from which a chain converts to newtons; empty if it is not clear.
+
+    >>> unit_of_chain("4.1 pC/N, 10 mV/pC")
+    'V'
+    """
+    factors = read_chain(chain)
+    units = {unit for factor in factors for unit in (factor.top, factor.bottom)} - {"N"}
+    ends = [unit for unit in units if _follow(unit, factors, None) is not None]
+    return ends[0] if len(ends) == 1 else ""
 
 
 def newtons_per_unit(

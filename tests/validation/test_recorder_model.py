@@ -1,0 +1,183 @@
+"""The recorder model against closed forms, and one record of each part of its bench."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+import scipy.signal
+import soundfile
+from threadpoolctl import threadpool_limits
+
+from thud.impact.contact_time import contact_span
+from thud.level.levels import low_pass
+
+sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
+import recorder
+from recorder_model import (
+    FINE_RATE,
+    GRAVITY,
+    KINDS,
+    Ball,
+    Cells,
+    Chain,
+    Filter,
+    Mode,
+    Pulse,
+    SinePower,
+    bounces,
+    coloured_noise,
+    convert,
+    droop,
+    drop_pulse,
+    half_cosine,
+    plate_response,
+    write_sound,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+# Threads only wait for each other in products of this size.
+pytestmark = pytest.mark.usefixtures("one_thread")
+FREQUENCIES = np.linspace(5.0, 1250.0, 60)
+
+
+@pytest.fixture(scope="module")
+def one_thread() -> Iterator[None]:
+    """Limit BLAS to one thread."""
+    with threadpool_limits(1, "blas"):
+        yield
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_quadrature_of_a_pulse_is_its_closed_transform(kind: str) -> None:
+    ball = Ball(restitution=0.8, deformation=0.002)
+    pulse, truth = drop_pulse(kind, ball, np.random.default_rng(3))
+    errors = np.abs(pulse.transform(FREQUENCIES) - pulse.quadrature(FREQUENCIES))
+    assert errors.max() < 1e-7 * truth.impulse
+    # The impulse is the change of momentum, and the weight of the ball during the contact.
+    change = ball.mass * (ball.velocity * (1 + ball.restitution) + GRAVITY * pulse.duration)
+    assert math.isclose(truth.impulse, change, rel_tol=1e-9)
+    rate = 1e6
+    force = pulse.force(np.arange(int(pulse.duration * rate) + 2) / rate)
+    begin, end = contact_span(force, rate)
+    assert abs(end - begin - truth.contact_time) < 1e-7
+    peak = low_pass(np.pad(force[::10], 2000), rate / 10).max()
+    assert abs(peak / truth.peak - 1) < 1e-3
+    assert 8 <= truth.levels[4] <= 15.5
+
+
+def test_levels_of_a_half_sine() -> None:
+    pulse = Pulse(0.02, ((1500.0, SinePower(0.02, 1.0)),))
+    np.testing.assert_allclose(pulse.levels(), [38.313, 30.605, 19.258, 8.932, -0.439], atol=6e-4)
+    # sin(pi t / T) = 1 %
+    begin, end = pulse.contact()
+    assert abs(end - begin - 0.02 * (1 - 2 * math.asin(0.01) / math.pi)) < 1e-8
+
+
+def test_filters_are_those_of_scipy() -> None:
+    omega = 2 * np.pi * FREQUENCIES
+    for order in (2, 4, 8):
+        for kind, design in (("bessel", scipy.signal.bessel), ("butterworth", scipy.signal.butter)):
+            more = {"norm": "mag"} if kind == "bessel" else {}
+            b, a = design(order, 2 * np.pi * 900.0, analog=True, **more)
+            expected = scipy.signal.freqs(b, a, omega)[1]
+            response = Filter(kind, order, 900.0).response(FREQUENCIES)
+            np.testing.assert_allclose(response, expected, rtol=1e-6)
+
+
+def test_plate_is_an_oscillator_in_time() -> None:
+    omega, quality = 2 * np.pi * 1200.0, 8.0
+    chain = Chain(200e3, (Mode(1200.0, quality),), Filter("butterworth", 1, 1e9))
+    tap = half_cosine(0.004, 100.0)
+    first, samples = chain.pass_pulse(tap, 0.1)
+    time = np.arange(2000) / FINE_RATE
+    plate = ([omega**2], [1.0, omega / quality, omega**2])
+    expected = scipy.signal.lsim(plate, tap.force(time), time)[1]
+    begin = round(0.1 * chain.rate) - first
+    np.testing.assert_allclose(samples[begin : begin + len(time)], expected, atol=0.02)
+    # Static deformation of several modes together.
+    modes = (Mode(1000.0, 5.0, 0.7), Mode(2000.0, 9.0, 0.3))
+    assert abs(plate_response(modes, np.zeros(1))[0] - 1) < 1e-12
+
+
+def test_droop_of_a_step_is_exponential() -> None:
+    time = np.arange(5000) / 1e3
+    expected = np.exp(-time / 2.0)
+    np.testing.assert_allclose(droop(np.ones(5000), 1e3, 2.0), expected, rtol=5e-4)
+
+
+def test_noise_has_its_deviation_and_slope() -> None:
+    rng = np.random.default_rng(1)
+    parts = (
+        (100 - 10) / (2000 - 1),
+        math.log(100 / 10) / math.log(2000 / 1),
+        (1 / 10 - 1 / 100) / (1 - 1 / 2000),
+    )
+    for slope, part in enumerate(parts):
+        noise = coloured_noise(400_000, 4e3, 3.0, float(slope), rng)
+        frequency, density = scipy.signal.welch(noise, 4e3, nperseg=8000)
+        inside = (frequency >= 10) & (frequency <= 100)
+        assert abs(float(np.trapezoid(density[inside], frequency[inside])) / 9 / part - 1) < 0.1
+
+
+def test_flight_ends_where_the_center_returns() -> None:
+    ball = Ball(restitution=0.8, deformation=0.002)
+    pulse, _ = drop_pulse("sine", ball, np.random.default_rng(5))
+    (touch, bounce), (second, _) = bounces(pulse, ball, 2)
+    flight = touch - pulse.duration
+    height = -ball.deformation + 0.8 * ball.velocity * flight - GRAVITY / 2 * flight**2
+    assert abs(height) < 1e-12
+    assert second > touch + bounce.duration
+    assert bounce.impulse < pulse.impulse
+
+
+def test_files_hold_the_codes(tmp_path: Path) -> None:
+    force = np.array([-5.0, 0.0, 12.4, 999.0, 5000.0])
+    for bits in (8, 12, 16, 24):
+        chain = Chain(bits=bits, full_scale=1000.0)
+        path = tmp_path / f"{bits}.wav"
+        write_sound(path, convert(force, chain), chain)
+        values = soundfile.read(path)[0] * 1000
+        step = 1000 / 2 ** (bits - 1)
+        clipped = np.minimum(force, 1000 - step)
+        np.testing.assert_allclose(values, np.rint(clipped / step) * step, atol=1e-9)
+    assert abs(Cells().shares().sum() - 1) < 1e-12
+
+
+def test_errors_are_silent_unless_a_warning_concerns_them() -> None:
+    value = recorder.Value(0.5, 0.01, concerned=False)
+    assert value.is_silent("500 Hz")
+    assert not value.is_inside()
+    assert not recorder.Value(0.5, 0.01, concerned=True).is_silent("500 Hz")
+    assert not recorder.Value(0.5, 0.2, concerned=False).is_silent("500 Hz")
+    assert not recorder.Value(0.05, 0.001, concerned=False).is_silent("500 Hz")
+    # One degree of freedom: the quantile of 97.5 % is 12.7.
+    assert recorder.Value(0.126, 0.01, concerned=False, freedom=1).is_inside()
+    assert not recorder.Value(0.128, 0.01, concerned=False, freedom=1).is_inside()
+    ringing = "the plate keeps ringing: its resonance affects levels, peaks and contact time"
+    assert recorder.concern(ringing) == {*recorder.LEVELS, "peak", "contact"}
+    assert recorder.concern("the octave of 500 Hz may be off by 0.3 dB") == {"500 Hz"}
+    missing = "uncertainty not stated, and not included: mass, drop height"
+    assert recorder.concern(missing) == {"restitution"}
+    assert recorder.concern("there are 2.0 ms of background") == set(recorder.QUANTITIES)
+
+
+@pytest.mark.parametrize("group", list(dict.fromkeys(c.group for c in recorder.conditions())))
+def test_each_part_of_the_bench_measures(group: str) -> None:
+    index = next(k for k, c in enumerate(recorder.conditions()) if c.group == group)
+    outcome = recorder.measure((index, 0))
+    condition = recorder.conditions()[index]
+    assert outcome.refusal or outcome.unknown_key or outcome.values
+    if condition.told and outcome.values:
+        # Nothing is grossly off, whether or not it is inside its interval.
+        assert all(abs(outcome.values[q].error) < 1 for q in outcome.values), outcome
+    table = list(recorder.table([outcome], lambda _: group))
+    assert len(table) == 3
+    assert group in table[-1]
