@@ -169,6 +169,22 @@ def test_impossible_ranges_are_refused_before_any_drop(  # noqa: PLR0913, PLR091
         thud.assess(replace(thud.read_case(FLAGSHIP), model=model, unknowns=unknowns))
 
 
+def test_method_is_that_of_the_measured_time_if_the_estimate_is_too_low(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def train(*_: object, **__: object) -> None:
+        message = "a surrogate is trained"
+        raise thud.NumericalError(message)
+
+    monkeypatch.setattr(model_assessment, "_train", train)
+    times = iter([0.0, 8.0])
+    monkeypatch.setattr(model_assessment.time, "process_time", lambda: next(times))
+    with pytest.raises(thud.NumericalError, match="trained"):
+        thud.assess(hunt_crossley(stiffness=(5e4, 8e4)), progress=True)
+    # A drop takes 1 s.
+    assert "up to an estimated 17 min on one core" in capsys.readouterr().err
+
+
 def test_direct_drops_are_computed_in_small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in (("SAMPLES", 300), ("INDEX_SAMPLES", 8)):
         monkeypatch.setattr(model_assessment, name, value)
