@@ -14,7 +14,7 @@ from thud.base.immutable import Immutable
 from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.flanks import SMOOTHING, Flank, Posterior, find_touch
-from thud.recordings.noise import Background, fit_background
+from thud.recordings.noise import MAINS, Background, fit_background
 from thud.recordings.plate import correct_plate
 
 if TYPE_CHECKING:
@@ -129,7 +129,11 @@ class Contact(Immutable):
         smooth = np.convolve(low_pass(self.gated, self.sample_rate), NO_GRID, mode="same")
         force = smooth * is_contact / quantization.step
         phases = ((np.arange(N_PHASE) + 0.5) / N_PHASE - 0.5)[:, None]
-        errors = np.rint(force + phases) - force
+        # Hum that stays within the step is hidden, too.
+        turns = 0.618 * np.arange(N_PHASE)[:, None] + MAINS[0] * time
+        hum = (0.5 - np.abs(phases)) * np.sin(2 * np.pi * turns)
+        phases = np.concatenate([np.broadcast_to(phases, hum.shape), phases + hum])
+        errors = (np.rint(force + phases) - force) * is_contact
         return np.asarray(math.sqrt(12) * quantization.offset * errors)
 
     @property
