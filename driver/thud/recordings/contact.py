@@ -14,7 +14,7 @@ from thud.base.immutable import Immutable
 from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.flanks import SMOOTHING, Flank, Posterior, find_touch
-from thud.recordings.noise import MAINS, Background, fit_background
+from thud.recordings.noise import MAINS, N_HARMONIC, Background, fit_background
 from thud.recordings.plate import correct_plate
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ class Contact(Immutable):
         """Possible errors of the force in the gate by quantization, N, [n_phase, n]; empty if none.
 
         They are those of the low-passed force for evenly spaced positions of the background
-        within its step. Noise lowers them like the error of the offset.
+        within its step, without and with hum. Noise lowers them like the error of the offset.
         """
         quantization = self.background.quantization
         if not quantization.offset:
@@ -129,9 +129,10 @@ class Contact(Immutable):
         smooth = np.convolve(low_pass(self.gated, self.sample_rate), NO_GRID, mode="same")
         force = smooth * is_contact / quantization.step
         phases = ((np.arange(N_PHASE) + 0.5) / N_PHASE - 0.5)[:, None]
-        # Hum that stays within the step is hidden, too.
-        turns = 0.618 * np.arange(N_PHASE)[:, None] + MAINS[0] * time
-        hum = (0.5 - np.abs(phases)) * np.sin(2 * np.pi * turns)
+        # Hum that stays within the step is hidden, too, and steps of hum look like its harmonics.
+        order = np.arange(1, N_HARMONIC + 1)[:, None, None]
+        turns = 0.618 * order * np.arange(N_PHASE)[:, None] + order * MAINS[0] * time
+        hum = (0.5 - np.abs(phases)) * (np.sin(2 * np.pi * turns) / np.sqrt(order)).sum(axis=0)
         phases = np.concatenate([np.broadcast_to(phases, hum.shape), phases + hum])
         errors = (np.rint(force + phases) - force) * is_contact
         return np.asarray(math.sqrt(12) * quantization.offset * errors)
