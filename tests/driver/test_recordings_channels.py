@@ -172,6 +172,25 @@ def test_channels_to_be_added_must_be_forces(tmp_path: Path) -> None:
         thud.read_recording(path, channels="sum")
 
 
+def test_forces_that_are_left_out_are_named(tmp_path: Path) -> None:
+    path = write_table(tmp_path / "cells.csv", cells(), NAMES)
+    for given, missing in (
+        ({"channel": "F1"}, "F2, F3, F4"),
+        ({"channels": "F1+F2+F3"}, "F4"),
+    ):
+        (signal,) = open_signals(path, **given)
+        (message,) = signal.warnings
+        assert message.endswith(f"other channels, too, which are not included: {missing}")
+    (signal,) = open_signals(path, channels="sum")
+    assert not signal.warnings
+    # The sum of load cells, small lateral forces, and a channel without any signal.
+    force = sum(cells())
+    columns = [*cells(), force, 0.01 * force, np.ones(len(force))]
+    path = write_table(tmp_path / "plate.csv", columns, [*NAMES, "Fz", "Fx", "F0"])
+    assert not open_signals(path, channel="Fz")[0].warnings
+    assert not open_signals(path, channels="F1+F2+F3+F4")[0].warnings
+
+
 def test_faults_of_single_load_cells_are_found(tmp_path: Path) -> None:
     first, *others = cells()
     path = write_table(tmp_path / "clipped.csv", [np.minimum(first, 200), *others], NAMES)

@@ -17,7 +17,12 @@ from thud.recordings.budgets import average_mass
 from thud.recordings.config import Config
 from thud.recordings.drops import find_windows
 from thud.recordings.measure_drops import measure_window
-from thud.recordings.quantization import find_quantization, find_step, offset_deviation
+from thud.recordings.quantization import (
+    find_quantization,
+    find_step,
+    offset_deviation,
+    slow_deviation,
+)
 from thud.recordings.recording import Recording
 from thud.recordings.restitution import GRAVITY
 from thud.recordings.signal import Signal
@@ -90,6 +95,18 @@ def test_constant_background_is_one_step_wide() -> None:
     # Noise of a step and more averages the steps.
     noise = np.rint(np.random.default_rng(1).normal(0.3, 1.0, 4800))
     assert offset_deviation(noise, 1.0) == 0.0
+
+
+def test_hum_does_not_average_steps_like_noise() -> None:
+    time = np.arange(9600) / RATE
+    rng = np.random.default_rng(2)
+    for amplitude in (0.5, 2.0, 8.0):
+        hum = amplitude * np.sin(2 * np.pi * 50 * time)
+        slow = slow_deviation(np.rint(hum + rng.normal(0.2, 0.02, time.size)), 1.0)
+        span = 1 + math.sqrt(8) * amplitude / math.sqrt(2)
+        assert slow == pytest.approx(1 / math.sqrt(12 * span), rel=0.1)
+        assert slow_deviation(np.rint(hum + rng.normal(0.2, 0.8, time.size)), 1.0) == 0.0
+    assert slow_deviation(np.zeros(100), 1.0) == slow_deviation(time, 0.0) == 0.0
 
 
 def test_offset_lies_within_its_deviation() -> None:

@@ -15,7 +15,7 @@ from thud.impact.contact_time import THRESHOLD
 from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.flanks import SMOOTHING, Flank, Posterior, find_touch
-from thud.recordings.noise import Background, fit_background
+from thud.recordings.noise import MAINS, N_HARMONIC, Background, fit_background
 from thud.recordings.response import correct_force
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ class Contact(Immutable):
         """Possible errors of the force in the gate by quantization, N, [n_phase, n]; empty if none.
 
         They are those of the low-passed force for evenly spaced positions of the background
-        within its step. Noise lowers them like the error of the offset.
+        within its step, without and with hum. Noise lowers them like the error of the offset.
         """
         quantization = self.background.quantization
         if not quantization.offset:
@@ -132,7 +132,12 @@ class Contact(Immutable):
         smooth = np.convolve(low_pass(self.gated, self.sample_rate), NO_GRID, mode="same")
         force = smooth * is_contact / quantization.step
         phases = ((np.arange(N_PHASE) + 0.5) / N_PHASE - 0.5)[:, None]
-        errors = np.rint(force + phases) - force
+        # Hum that stays within the step is hidden, too, and steps of hum look like its harmonics.
+        order = np.arange(1, N_HARMONIC + 1)[:, None, None]
+        turns = 0.618 * order * np.arange(N_PHASE)[:, None] + order * MAINS[0] * time
+        hum = (0.5 - np.abs(phases)) * (np.sin(2 * np.pi * turns) / np.sqrt(order)).sum(axis=0)
+        phases = np.concatenate([np.broadcast_to(phases, hum.shape), phases + hum])
+        errors = (np.rint(force + phases) - force) * is_contact
         return np.asarray(math.sqrt(12) * quantization.offset * errors)
 
     @property

@@ -27,6 +27,8 @@ MIN_GAPS = 4
 MIN_FRACTION = 0.9
 # Standard deviation of the background in steps above which its mean has no error by quantization.
 MAX_DEVIATION = 0.6
+# Deviation of the noise from sample to sample, in steps, above which it averages the steps.
+MAX_FAST = 0.4
 # Maximum number of samples of the background that count as independent.
 MAX_COUNT = 1000
 # Grid of mean and standard deviation of a background before quantization, in steps.
@@ -69,7 +71,7 @@ def _quantization(force: NDArray[np.float64], window: Window) -> Quantization:
     contact = force[first:stop]
     background = np.concatenate([before, after])
     step = find_step(np.concatenate([background, contact]))
-    offset = offset_deviation(background, step)
+    offset = max(offset_deviation(background, step), slow_deviation(background, step))
     # Floats with few digits are coarser at the peak.
     peak = float(contact.max() - np.median(background))
     top = find_step(contact[contact > contact.max() - peak / 3])
@@ -99,6 +101,22 @@ def find_step(values: NDArray[np.float64]) -> float:
     if len(is_near) < MIN_GAPS or is_near.mean() < MIN_FRACTION:
         return 0.0
     return step if step > MIN_STEP * np.abs(values).max() else 0.0
+
+
+def slow_deviation(background: NDArray[np.float64], step: float) -> float:
+    """Return the standard deviation of a slowly varying background by quantization.
+
+    Hum and drift change the background over several steps, without averaging them like noise from
+    sample to sample of deviation s: the factor exp(-2 pi**2 s**2 / step**2) is that of the first
+    harmonic of the error over the steps.
+    """
+    if not step or np.ptp(background) < step / 2:
+        return 0.0
+    variance = float(np.mean(np.diff(background) ** 2)) / 2 / step**2
+    fast = max(variance - 1 / 12, 0.0) if variance > 1 / 12 else 0.0
+    span = 1 + math.sqrt(8) * float(background.std()) / step
+    deviation = step / math.sqrt(12) * math.exp(-2 * np.pi**2 * fast) / math.sqrt(span)
+    return deviation if fast < MAX_FAST**2 else 0.0
 
 
 def offset_deviation(background: NDArray[np.float64], step: float) -> float:

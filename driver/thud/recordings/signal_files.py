@@ -51,6 +51,11 @@ RATES = (2500.0, 1e8)
 # Minimum stored fraction of a file, below which it is sparse, and maximum number of pieces counted.
 MIN_STORED = 0.01
 MAX_PIECES = 1000
+# Minimum peak of a channel of force that was not chosen, as a fraction of the chosen peak, that
+# raises a warning, and maximum deviation of the sum of such peaks from the chosen peak if it is
+# their sum.
+MIN_MISSING = 0.2
+MAX_SUM_DEVIATION = 0.1
 
 
 def open_signals(  # noqa: PLR0913 - the keys of the configuration
@@ -110,12 +115,16 @@ def open_signals(  # noqa: PLR0913 - the keys of the configuration
         cells = _choose_cells(entries, require_channels(channels), name)
         each = _calibrations(calibration, len(cells), name)
         stated = [_Stated(stated_unit, entry, polarity, sample_rate) for entry in each]
-        return [_sum(file, cells, stated)]
+        signal = _sum(file, cells, stated)
+        return [signal if any(each) else _with_missing(signal, cells, entries)]
     chosen = choose_channels(entries, channel, name)
     each = _calibrations(calibration, 1, name)
     result = _Stated(stated_unit, each[0], polarity, sample_rate)
     try:
-        return [_signal(file, entry, result, several=len(entries) > 1) for entry in chosen]
+        signals = [_signal(file, entry, result, several=len(entries) > 1) for entry in chosen]
+        if channel is None or result.calibration:
+            return signals
+        return [_with_missing(signals[0], chosen, entries)]
     except InputError as error:
         if len(chosen) == 1:
             raise
@@ -158,6 +167,34 @@ def _choose_cells(
         refuse(f'{name}: channels = "{SUM}" finds {len(cells)} channel of force', "two or more")
     refuse_directions([shown_text(cell.name) for cell in cells], name)
     return cells
+
+
+def _with_missing(signal: Signal, chosen: list[Channel], entries: list[Channel]) -> Signal:
+    """Return a signal with a warning if channels that were not chosen hold more of the force."""
+    numbers = {entry.number for entry in chosen}
+    others = [entry for entry in entries if entry.number not in numbers and _is_force(entry)]
+    if not others or not all(map(_is_force, chosen)):
+        return signal
+    own = scan(signal.read, signal.n_sample, signal.name).peak(1.0)
+    peaks = {}
+    for entry in others:
+        scale = UNITS[find_unit(entry.unit)][1]
+        try:
+            extremes = scan(entry.samples, entry.n_sample, signal.name)
+        except InputError:  # it holds no signal
+            continue
+        peaks[shown_text(entry.name) or str(entry.number)] = max(
+            extremes.peak(scale), extremes.peak(-scale)
+        )
+    large = [name for name, peak in peaks.items() if peak > MIN_MISSING * own]
+    # The chosen channel may be the sum of the others.
+    if not large or abs(sum(peaks.values()) / own - 1) < MAX_SUM_DEVIATION:
+        return signal
+    warning = (
+        f"{signal.name}: the file has forces in other channels, too, which are not included: "
+        f"{', '.join(large)}"
+    )
+    return replace(signal, warnings=(*signal.warnings, warning))
 
 
 def _is_force(channel: Channel) -> bool:
