@@ -11,7 +11,6 @@ import numpy as np
 from scipy.ndimage import convolve1d, uniform_filter1d
 
 from thud.base.immutable import Immutable
-from thud.impact.contact_time import THRESHOLD
 from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.flanks import SMOOTHING, Flank, Posterior, find_touch
@@ -37,9 +36,9 @@ FLANK = 3e-3
 MARGIN = 2e-3
 # Maximum time from the start of the pulse that the search for drops returns to the touch, s.
 MAX_DELAY = 1e-3
-# Time from a fifth of the peak to THRESHOLD over that from half of it to a fifth: of an exponential
-# decay. Flanks that end earlier, as powers of time, have less.
-REACH = math.log(0.2 / THRESHOLD) / math.log(0.5 / 0.2)
+# Time from a fifth of the peak to the end of the search over that from half of it to a fifth. A
+# power of time up to 4 passes 1 % in it; in a longer search, strong noise may be a slow release.
+REACH = 2.0
 # Width of the cells of a flank, s: from MIN_CELL to MAX_CELL in the interval of the touch; outside,
 # GROWTH times the distance from this interval, if this is more.
 MIN_CELL = 2e-5
