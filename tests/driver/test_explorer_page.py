@@ -130,6 +130,17 @@ def test_recording_on_the_page_is_assessed(browser: Browser, server: Served) -> 
     sync_api.expect(found).to_be_visible(timeout=60_000)
     found.locator("button").click()
     sync_api.expect(page.locator("#variants")).to_be_hidden()
+    # What the file does not say of plate and filter.
+    for key, value in (("plate_f0", "1100"), ("plate_Q", "25"), ("filter_cutoff", "5e3")):
+        page.locator(f"#recording_{key}").fill(value)
+    page.locator("#recording_filter_kind").select_option("bessel")
+    page.locator("#file").set_input_files(RECORDING)
+    message = page.locator("#message")
+    sync_api.expect(message).to_contain_text("filter: order is missing", timeout=60_000)
+    page.locator("#recording_filter_order").fill("4")
+    page.locator("#file").set_input_files(RECORDING)
+    sync_api.expect(found).to_be_visible(timeout=60_000)
+    found.locator("button").click()
     # The same, dropped on the page.
     drop = """([bytes, name]) => {
         const data = new DataTransfer();

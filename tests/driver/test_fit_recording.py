@@ -142,11 +142,11 @@ def test_too_little_quiet_leaves_the_noise_to_the_residuals(shell: thud.Impact) 
 
 def _measured(force: np.ndarray, rate: float) -> Recording:
     """Return the recording of a force in memory."""
-    from thud.recordings.drops import find_windows
+    from thud.recordings.drops import search_drops
     from thud.recordings.measured_drop import measure_drop
     from thud.recordings.restitution import DropConditions
 
-    windows = find_windows(Signal.from_array(force, rate))
+    windows = search_drops(Signal.from_array(force, rate)).windows
     return Recording(
         "memory", tuple(measure_drop(window, DropConditions()) for window in windows), ()
     )

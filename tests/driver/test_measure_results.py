@@ -196,13 +196,13 @@ def test_netcdf_holds_drops_levels_and_provenance(tmp_path: Path) -> None:
         assert len(found.attrs["warnings"]) > 300_000
 
 
-def test_without_xarray_a_warning_tells_what_is_left_out(
+def test_without_h5netcdf_a_warning_tells_what_is_left_out(
     noisy: thud.Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recording_files.save(noisy, Results(tmp_path), figures=False)
     assert names(tmp_path) == FILES
-    monkeypatch.setitem(sys.modules, "xarray", None)
+    monkeypatch.setitem(sys.modules, "h5netcdf", None)
     monkeypatch.delitem(sys.modules, "thud.report.netcdf")
-    with pytest.warns(ReportWarning, match=naming("recording.nc", "xarray", "pip install")):
+    with pytest.warns(ReportWarning, match=naming("recording.nc", "h5netcdf", "pip install")):
         recording_files.save(noisy, Results(tmp_path), figures=False)
     assert names(tmp_path) == FILES - {"recording.nc"}

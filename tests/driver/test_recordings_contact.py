@@ -12,9 +12,10 @@ from scipy.ndimage import uniform_filter1d
 from synthetic import half_sine, make_drop
 
 from thud.level.levels import low_pass
-from thud.recordings import calibration, contact, drops, flanks, measured_drop
+from thud.recordings import contact, drops, flanks, measured_drop
 from thud.recordings.contact import Contact, cells_between, uniform_bounds
-from thud.recordings.plate import Plate, correct_plate
+from thud.recordings.plate import Plate
+from thud.recordings.response import Chain, correct_force
 from thud.recordings.signal import Signal
 
 RATE = 25600.0
@@ -69,13 +70,13 @@ def test_flank_cells_are_fine_around_the_touch() -> None:
 
 def test_response_of_a_correction_is_that_of_a_long_record() -> None:
     plate = Plate(1600.0, 30.0)
-    found = contact._response(plate, RATE)  # noqa: SLF001
+    found = contact._response(Chain((plate,)), RATE)  # noqa: SLF001
     reach = len(found) // 2
     unit = np.zeros(4001)
     unit[2000] = 1
     # Two periods of the resonance on both sides of its sample.
     assert len(found) == 2 * int(2 * RATE / 1600) + 1
-    long = correct_plate(unit, RATE, plate)[2000 - reach : 2000 + reach + 1]
+    long = correct_force(unit, RATE, Chain((plate,)))[2000 - reach : 2000 + reach + 1]
     np.testing.assert_allclose(found, long, atol=1e-3 * np.abs(long).max())
 
 
@@ -175,7 +176,7 @@ def test_content_that_folds_back_falls_with_the_square_of_the_frequency(
     top = np.sqrt(power[f > 0.4 * rate].mean()) * (0.45 * rate / (rate - 707.9)) ** 2
     own = np.sqrt(power[(f > 354.8) & (f < 707.9)].mean())
     expected = 20 * np.log10(1 + top / own)
-    told = measured_drop._check_aliasing(one)  # noqa: SLF001
+    told = measured_drop._check_aliasing(one, None)  # noqa: SLF001
     assert bool(told) == (expected > 0.1)
     if told:
         assert f"by {expected:.1f} dB" in told[0]
@@ -185,25 +186,6 @@ def test_content_that_folds_back_falls_with_the_square_of_the_frequency(
         draws = np.array([[factor * white, 0, 0, 0, 0]])
         noisy = replace(one, background=replace(one.background, draws=draws))
         assert bool(measured_drop._check_aliasing(noisy)) == expected  # noqa: SLF001
-
-
-def test_level_at_an_edge_is_that_of_a_line_with_its_uncertainty() -> None:
-    rng = np.random.default_rng(6)
-    level = 3 + 0.02 * np.arange(100) + rng.normal(scale=0.1, size=100)
-    for begin, end, edge in ((0, 60, 60), (40, 100, 40)):
-        # A tenth at both ends is left out: what settles.
-        place = np.arange(begin + 6, end - 6)
-        (slope, value), covariance = np.polyfit(place - edge, level[place], 1, cov=True)
-        del slope
-        found = calibration._level_at(level, begin, end, edge)  # noqa: SLF001
-        assert found == pytest.approx((value, np.sqrt(covariance[1, 1])))
-    # Of several steps: their own uncertainty, or the scatter where that is more.
-    for own in (0.01, 5.0):
-        sizes = [10.0, 11.0, 12.5]
-        mean, deviation = calibration._mean([(size, own) for size in sizes])  # noqa: SLF001
-        assert mean == pytest.approx(np.mean(sizes))
-        assert deviation == pytest.approx(max(own / np.sqrt(3), stats.sem(sizes)))
-    assert calibration._mean([(10.0, 0.2)]) == (10.0, 0.2)  # noqa: SLF001
 
 
 # Flanks: times of 30 cells, whose noise is known.
@@ -290,7 +272,7 @@ def test_table_holds_smoothed_shapes() -> None:
     np.testing.assert_allclose(found[:, 1:], expected[:, 1:], atol=0.03)
     np.testing.assert_allclose(found[:, 2:6], expected[:, 2:6], atol=2e-3)
     # A plate leaves a slow flank alone.
-    plated = flanks._table(interval, Plate(1600.0, 30.0))  # noqa: SLF001
+    plated = flanks._table(interval, Chain((Plate(1600.0, 30.0),)))  # noqa: SLF001
     end = flanks._columns(plated, np.array([7.9]), np.zeros(1))[:, :-1]  # noqa: SLF001
     np.testing.assert_allclose(end[0, 2], 7.9, atol=0.02)
 
@@ -352,7 +334,7 @@ def test_only_rough_flanks_fall() -> None:
 def test_scale_of_a_contact_is_its_peak_below_the_band_edge() -> None:
     force = half_sine(RATE, 0.1, int(0.22 * RATE)) + 40
     force[2700] += 300
-    (window,) = drops.find_windows(Signal.from_array(force, RATE))
+    (window,) = drops.search_drops(Signal.from_array(force, RATE)).windows
     found = contact.find_contact(window, force[window.start : window.stop])
     expected = uniform_filter1d(force - 40, round(RATE / 1250)).max()
     assert found.peak == pytest.approx(expected, rel=1e-3)

@@ -20,13 +20,15 @@ import thud
 from thud.level.assessment import assess_levels
 from thud.level.estimate import Contribution, Estimate
 from thud.level.levels import RECORDED_BAND
+from thud.recordings.assumptions import assumed_contributions
 from thud.recordings.band_noise import band_noise
 from thud.recordings.budgets import average_estimates, find_deviant, level_estimates
+from thud.recordings.config import Config, PlateConfig
 from thud.recordings.contact import cells_between, uniform_bounds
 from thud.recordings.filters import low_pass_attenuation, low_pass_force
 from thud.recordings.noise import Background
 from thud.recordings.outliers import find_outliers
-from thud.recordings.plate import Plate, check_plate, correct_plate
+from thud.recordings.plate import Plate, check_plate
 from thud.recordings.recorded_levels import (
     METHODS,
     DropLevels,
@@ -34,6 +36,7 @@ from thud.recordings.recorded_levels import (
     compare_methods,
     measure_levels,
 )
+from thud.recordings.response import Chain, correct_force
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -225,7 +228,8 @@ def test_noise_that_rises_towards_0_hz() -> None:
         drop, contact=replace(drop.contact, background=background, covariance=covariance)
     )
     edges = thud.get_bands()
-    mean, spread = band_noise([drop], edges)[0].T
+    mean, spread, quantized = band_noise([drop], edges)[0].T
+    assert not quantized.any()
     # The mean of energies that scatter by up to as much as they are; four deviations.
     scatter = np.std(energies, axis=0) / math.sqrt(count)
     np.testing.assert_array_less(np.abs(np.mean(energies, axis=0) - mean)[:4], 4 * scatter[:4])
@@ -434,7 +438,7 @@ def through_plate(
 @pytest.mark.slow
 def test_resonance_of_the_plate_is_taken_out(rate: float, plate: Plate) -> None:
     time, measured = through_plate(half_sine, rate, plate)
-    corrected, sentence = correct_plate(measured, rate, plate), plate.correction(rate)
+    corrected, sentence = correct_force(measured, rate, Chain((plate,))), plate.describe(rate)
     before = np.abs(thud.force_exposure_levels(measured, rate) - HALF_SINE)
     after = np.abs(thud.force_exposure_levels(corrected, rate) - HALF_SINE)
     assert before.max() > 0.3
@@ -454,7 +458,7 @@ def test_response_of_a_plate_is_that_of_a_mass_on_a_spring() -> None:
     np.testing.assert_allclose(plate.response(omega / 2 / np.pi), expected)
     # Kept up to twice the resonance, nothing from four times on, cos2 of the octave between.
     f = plate.frequency * np.array([0.1, 1.99, 2 * 2 ** (1 / 3), 2 * np.sqrt(2), 4, 9])
-    np.testing.assert_allclose(plate.passed(f), [1, 1, 0.75, 0.5, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(Chain((plate,)).passed(f), [1, 1, 0.75, 0.5, 0, 0], atol=1e-12)
     uncertain = replace(plate, frequency_uncertainty=1e-6)
     edge = thud.get_bands().upper
     step = replace(plate, frequency=1600 * (1 + 1e-6), quality=1e9)
@@ -466,27 +470,27 @@ def test_response_of_a_plate_is_that_of_a_mass_on_a_spring() -> None:
 
 def test_constant_force_passes_the_correction() -> None:
     for length in (100, 4097):
-        corrected = correct_plate(np.full(length, 7.0), 25600.0, Plate(1600, 30))
+        corrected = correct_force(np.full(length, 7.0), 25600.0, Chain((Plate(1600, 30),)))
         np.testing.assert_allclose(corrected, 7.0, rtol=1e-12)
 
 
 def test_end_of_a_record_does_not_reach_its_begin_in_the_correction() -> None:
     rate, plate = 24e3, Plate(1500, 20)
     rising = np.linspace(0, 100, 4800)
-    found = correct_plate(rising, rate, plate)
+    found = correct_force(rising, rate, Chain((plate,)))
     # F = F_m + F_m'/(w0 Q) between the ends, which are as if they were held.
     slope = (rising[1] - rising[0]) * rate
     expected = rising + slope / (2 * np.pi * 1500 * 20)
     np.testing.assert_allclose(found[1000:-1000], expected[1000:-1000], atol=1e-3)
-    held = correct_plate(np.pad(rising, 24_000, mode="edge"), rate, plate)[24_000:-24_000]
+    held = correct_force(np.pad(rising, 24_000, mode="edge"), rate, Chain((plate,)))[24_000:-24_000]
     np.testing.assert_allclose(found, held, atol=1e-3)
 
 
 def test_uncertain_resonance_makes_levels_uncertain() -> None:
     plate = Plate(1600, 30, frequency_uncertainty=0.01)
     _, measured = through_plate(half_sine, 51200.0, plate)
-    right = correct_plate(measured, 51200.0, plate)
-    wrong = correct_plate(measured, 51200.0, Plate(1600 * 1.01, 30))
+    right = correct_force(measured, 51200.0, Chain((plate,)))
+    wrong = correct_force(measured, 51200.0, Chain((Plate(1600 * 1.01, 30),)))
     change = thud.force_exposure_levels(wrong, 51200.0, "third") - thud.force_exposure_levels(
         right, 51200.0, "third"
     )
@@ -497,7 +501,7 @@ def test_uncertain_resonance_makes_levels_uncertain() -> None:
 
 def test_resonance_near_the_bands_is_refused() -> None:
     with pytest.raises(thud.InputError, match=naming("plate", "900 Hz", "1001 Hz")):
-        correct_plate(np.ones(100), 25600.0, Plate(900, 30))
+        correct_force(np.ones(100), 25600.0, Chain((Plate(900, 30),)))
 
 
 @pytest.mark.parametrize(
@@ -642,7 +646,7 @@ def test_mean_of_estimates_has_its_budget() -> None:
 def test_level_budget_has_calibration_and_plate() -> None:
     average = average_levels(measure_levels([make_drop(1.0, seed=i) for i in range(3)]))
     plate = np.full(5, 0.02)
-    levels = level_estimates(average, calibration=0.01, plate=plate)
+    levels = level_estimates(average, calibration=0.01, systematic={"plate": plate})
     names = [c.name for c in levels[0].contributions]
     assert names == [
         "repeatability", "noise", "method", "filter", "calibration", "plate",
@@ -655,12 +659,11 @@ def test_level_budget_has_calibration_and_plate() -> None:
         assert level.freedom > 2
 
 
-def test_plate_of_unstated_resonance_is_no_line_of_zero() -> None:
-    average = average_levels(measure_levels([make_drop(1.0)]))
+def test_plate_of_unstated_uncertainty_is_no_line_of_zero() -> None:
+    drops = [make_drop(1.0)]
     for uncertainty, stated in ((0.0, False), (0.01, True)):
-        plate = Plate(1600.0, 20.0, frequency_uncertainty=uncertainty)
-        (level, *_) = level_estimates(average, plate=plate.level_uncertainty())
-        assert ("plate" in [c.name for c in level.contributions]) == stated
+        config = Config(plate=PlateConfig(f0=1600.0, Q=20.0, f0_uncertainty=uncertainty))
+        assert ("plate" in assumed_contributions(drops, config)) == stated
 
 
 def with_levels(level: Estimate, band: int = 0, **others: Any) -> str:  # noqa: ANN401

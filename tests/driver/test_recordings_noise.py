@@ -331,7 +331,7 @@ def test_energy_of_the_noise_follows_its_formula() -> None:
     cell = np.searchsorted(edges, np.arange(count), "right") - 1
     covariance = contact.covariance[np.ix_(cell, cell)] + 3e-3 * rate / 2 * np.eye(count)
     found = band_noise([replace(drop, contact=contact)], bands)[0]
-    for (noise, deviation), lower, upper in zip(found, bands.lower, bands.upper, strict=True):
+    for (noise, deviation, _), lower, upper in zip(found, bands.lower, bands.upper, strict=True):
         rows = band_functionals(count, rate, lower, upper)
         form = rows.T @ rows
         expected = np.trace(form @ covariance)

@@ -11,6 +11,7 @@ import time
 import tomllib
 import tracemalloc
 import zlib
+from datetime import datetime, timedelta
 from functools import cache
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -1169,3 +1170,164 @@ def test_configurations_that_are_wrong_are_told(
     with pytest.raises(InputError, match=words) as caught:
         read_config(tmp_path / "lab.toml")
     assert "\n" not in str(caught.value)
+
+
+def german(value: float, decimals: int) -> str:
+    """Return a number with thousands points and a decimal comma."""
+    return f"{value:,.{decimals}f}".translate(str.maketrans(",.", ".,"))
+
+
+@pytest.mark.parametrize("separator", [";", "\t", "quoted"])
+def test_german_numbers_have_thousands_points(separator: str, tmp_path: Path) -> None:
+    force = half_sine(8000.0)
+    rows = [["Zeit [ms]", "Kraft [N]"]]
+    rows += [[german(i / 8, 3), german(value, 2)] for i, value in enumerate(force)]
+    if separator == "quoted":
+        lines = [",".join(f'"{cell}"' for cell in row) for row in rows]
+    else:
+        lines = [separator.join(row) for row in rows]
+    path = tmp_path / "german.csv"
+    path.write_text("Abtastrate: 8.000 Hz\n" + "\n".join(lines), encoding="utf-8")
+    signal, found = read_all(path)
+    assert signal.sample_rate == pytest.approx(8000)
+    assert "1.500,00" in path.read_text(encoding="utf-8")
+    np.testing.assert_allclose(found, force, atol=0.006)
+
+
+EXCEL = datetime(2026, 11, 23, 23, 59, 59, 980000)  # noqa: DTZ001 - spreadsheets have no time zone
+
+
+@pytest.mark.parametrize(
+    ("title", "shown"),
+    [
+        ("Datum;Kraft [kN]", "%d.%m.%Y %H:%M:%S,%f"),
+        ("Datum;Uhrzeit;Kraft [kN]", "%d.%m.%Y;%H:%M:%S,%f"),
+        ("Time;Force [kN]", "%H:%M:%S.%f"),
+        ("Date;Force [kN]", "%Y-%m-%d %H:%M:%S.%f"),
+        ("Timestamp;Force [kN]", "%Y-%m-%dT%H:%M:%S.%fZ"),
+        ("Date;Force [kN]", "%m/%d/%Y %I:%M:%S.%f %p"),
+        ("Date;Force [kN]", "%M:%S.%f"),
+    ],
+)
+def test_date_times_are_an_axis(title: str, shown: str, tmp_path: Path) -> None:
+    # Over midnight.
+    force = 1e-3 * half_sine(8000.0)
+    mark = "," if ",%f" in shown else "."
+    path = tmp_path / "excel.csv"
+    rows = (
+        f"{(EXCEL + timedelta(seconds=i / 8000)).strftime(shown)};{value:.6f}".replace(".", mark)
+        if mark == "," and "%d" not in shown
+        else (EXCEL + timedelta(seconds=i / 8000)).strftime(shown)
+        + f";{value:.6f}".replace(".", mark)
+        for i, value in enumerate(force)
+    )
+    path.write_text(title + "\n" + "\n".join(rows), encoding="utf-8")
+    signal, found = read_all(path)
+    assert signal.sample_rate == pytest.approx(8000, rel=1e-7)
+    assert any("date-times" in step for step in signal.steps)
+    np.testing.assert_allclose(found, 1e3 * force, atol=1e-3)
+
+
+def test_days_of_a_spreadsheet_are_an_axis(tmp_path: Path) -> None:
+    force = half_sine(8000.0)
+    path = tmp_path / "days.csv"
+
+    def write(digits: int, *, lost: int = 0) -> None:
+        rows = "\n".join(
+            f"{46349.5 + i / 8000 / 86400:.{digits}f};{value:.2f}"
+            for i, value in enumerate(force)
+            if not lost <= i < lost + 3 or not lost
+        )
+        path.write_text("Datum;Kraft [N]\n" + rows, encoding="utf-8")
+
+    write(11)
+    signal, found = read_all(path)
+    # 40 ms in steps of 0.9 us.
+    assert signal.sample_rate == pytest.approx(8000, rel=2e-5)
+    np.testing.assert_allclose(found, force, atol=0.006)
+    write(8)
+    with pytest.raises(InputError, match=naming("sample rate is not known", "too coarse")):
+        read_all(path)
+    signal, found = read_all(path, sample_rate=8000)
+    assert signal.sample_rate == 8000
+    write(11, lost=100)
+    with pytest.raises(InputError, match=naming("date-times", "not uniformly spaced")):
+        read_all(path)
+
+
+def test_damaged_date_times_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "excel.csv"
+    rows = [f"10:00:00.{i:03d};{value:.2f}" for i, value in enumerate(half_sine(8000.0))]
+    rows[20] = "soon;5"
+    path.write_text("Time;Force [N]\n" + "\n".join(rows), encoding="utf-8")
+    with pytest.raises(InputError, match=naming("line 22", "soon", "is not a time")):
+        read_all(path)
+
+
+def testlab(force: NDArray[np.float64], rate: float) -> dict[str, Any]:
+    return {
+        "x_values": {"start_value": 0.0, "increment": 1 / rate, "quantity": {"label": "s"}},
+        "y_values": {"values": 1e-3 * force, "quantity": {"label": "kN"}},
+    }
+
+
+@pytest.mark.parametrize(
+    "variables",
+    [
+        lambda f, t: {"ball_1_time_F": np.column_stack([t, f])},
+        lambda f, t: {"ball_1_time_F": f, "ball_1_time": t},
+        lambda f, t: {"ball_1_time_F": f, "ball_1_time_t": t},
+        lambda f, t: {"ball_1_time_F": {"time": t, "F": f}},
+        lambda f, t: {"t": t, "ball_1_time_F": f},
+        lambda f, t: {"ball_1_time_F": testlab(f, 1 / t[1])},
+        lambda f, t: {"ball_1_time_F": f, "Fs": 1 / t[1]},
+    ],
+)
+def test_times_of_matlab_variables_are_found(variables: Callable[..., Any], tmp_path: Path) -> None:
+    force = half_sine(8000.0)
+    time = np.arange(force.size) / 8000
+    scipy.io.savemat(tmp_path / "ball.mat", variables(force, time))
+    signal, found = read_all(tmp_path / "ball.mat")
+    assert signal.sample_rate == pytest.approx(8000)
+    np.testing.assert_allclose(found, force, atol=1e-9)
+
+
+def test_times_of_several_matlab_variables_are_their_own(tmp_path: Path) -> None:
+    force = half_sine(8000.0)
+    index = np.arange(force.size)
+    variables = {
+        f"ball{k}_{name}": value
+        for k in (1, 2)
+        for name, value in (("time", index / (8000 * k)), ("time_F", k * force))
+    }
+    scipy.io.savemat(tmp_path / "balls.mat", variables)
+    for k in (1, 2):
+        signal, found = read_all(tmp_path / "balls.mat", channel=f"ball{k}_time_F")
+        assert signal.sample_rate == pytest.approx(8000 * k)
+        np.testing.assert_allclose(found, k * force, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "calibration", "unit"),
+    [
+        ("float.wav", "1600", ""),
+        ("float.wav", "1600 N/FS", "FS"),
+        ("float.wav", "10 V/FS, 6.25 mV/N", "FS"),
+        ("float.wav", "1600 N/V", "V"),
+        ("float.wav", "4 pC/N, 0.15625 mV/pC", "V"),
+        ("pcm24.wav", "1600", ""),
+        ("german.csv", "1600", ""),
+    ],
+)
+def test_text_of_a_calibration_is_as_in_the_configuration(
+    name: str, calibration: str, unit: str, tmp_path: Path
+) -> None:
+    exact = half_sine(8000.0)
+    WRITERS[name](tmp_path / name, exact / FULL_SCALE, 8000.0, "V")
+    signal, force = read_all(tmp_path / name, calibration=calibration)
+    np.testing.assert_allclose(force, exact, atol=1e-3)
+    assert bool(unit) == any(step.endswith(f"the values are in {unit}.") for step in signal.steps)
+    lab = tmp_path / "lab.toml"
+    lab.write_text(f'calibration = "{calibration}"\n', encoding="utf-8")
+    _, force = read_all(tmp_path / name, calibration=read_config(lab).calibration)
+    np.testing.assert_allclose(force, exact, atol=1e-3)

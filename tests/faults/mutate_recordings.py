@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 import sys
 import tempfile
+from datetime import UTC, datetime, timedelta
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy.io
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "driver"))
 from recording_files import WRITERS, half_sine
@@ -94,7 +96,24 @@ def _originals() -> dict[str, bytes]:
         for name, write in WRITERS.items():
             sound = name.startswith("pcm")
             write(Path(folder, name), force / 5000 if sound else force, 8000.0, "N")
+        _write_others(Path(folder), force)
         return {path.name: path.read_bytes() for path in sorted(Path(folder).iterdir())}
+
+
+def _write_others(folder: Path, force: NDArray[np.float64]) -> None:
+    """Write load cells, columns of date and time, and a structure of Siemens Testlab."""
+    cells = np.column_stack([0.3 * force, 0.7 * force])
+    np.savetxt(folder / "cells.csv", cells, "%.3f", ";", header="fs = 8000\nF1 [N];F2 [N]")
+    begin = datetime(2026, 11, 23, 10, tzinfo=UTC)
+    times = [begin + timedelta(seconds=i / 8000) for i in range(force.size)]
+    rows = [
+        f"{time:%d.%m.%Y %H:%M:%S.%f};{value:.2f}" for time, value in zip(times, force, strict=True)
+    ]
+    (folder / "clock.csv").write_text("Datum;Kraft [N]\n" + "\n".join(rows))
+    days = 46349.5 + np.arange(force.size) / 8000 / 86400
+    np.savetxt(folder / "days.csv", np.column_stack([days, force]), "%.11f", ",")
+    values = {"x_values": {"increment": 1 / 8000}, "y_values": {"values": force}}
+    scipy.io.savemat(folder / "testlab.mat", {"ball_time_F": values})
 
 
 def attempt(chance: random.Random) -> tuple[str, str]:
@@ -103,7 +122,11 @@ def attempt(chance: random.Random) -> tuple[str, str]:
     rng = np.random.default_rng(chance.getrandbits(63))
     path.write_bytes(mutate(_originals()[path.name], rng))
     try:
-        signals = open_signals(path, calibration=5000.0 if path.name.startswith("pcm") else None)
+        signals = open_signals(
+            path,
+            calibration=5000.0 if path.name.startswith("pcm") else None,
+            channels="sum" if path.name.startswith("cells") else None,
+        )
         for signal in signals[:4]:
             for start in range(0, signal.n_sample, 2**20):
                 signal.read(start, min(signal.n_sample, start + 2**20))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from thud.base.checks import refuse
 from thud.base.display import draw_all
 from thud.base.tables import format_rows
 from thud.cli.command import (
@@ -38,24 +40,31 @@ def measure(options: argparse.Namespace) -> int:
     from thud.report import recording_files
 
     figures = not options.no_figures
-    files = results_of(options, Path(options.drops[0]).stem, [*options.drops, options.config])
+    files = results_of(
+        options, Path(options.recordings[0]).stem, [*options.recordings, options.config]
+    )
     files.require(recording_files.file_names(figures=figures))
     folder = files.folder
     # Measured drops are kept until the results are written.
     with Checkpoint(folder) as checkpoint:
         recording = read_recording(
-            options.drops,
+            options.recordings,
             height=options.height,
             mass=options.mass,
             height_uncertainty=options.height_uncertainty,
             mass_uncertainty=options.mass_uncertainty,
             source=options.source,
             channel=channel_of(options.channel),
+            channels=options.channels,
             unit=options.unit,
-            calibration=options.calibration,
+            calibration=_single(options.calibration),
             calibration_uncertainty=options.calibration_uncertainty,
             polarity=options.polarity,
             sample_rate=options.sample_rate,
+            drops=options.drops,
+            leave_out=_left_out(options) or None,
+            begin=options.begin,
+            end=options.end,
             low_pass=options.low_pass or None,
             config=options.config,
             progress=not options.quiet and sys.stderr.isatty(),
@@ -75,6 +84,8 @@ def measure(options: argparse.Namespace) -> int:
         for step in (*recording_files.messages(recording, "steps"), *recording.level_steps):
             print(f"  {step}")
         print(f"  {recording_files.verdict_text(recording)}")
+        if figures:
+            print(recording_files.missing_text(recording))
     messages = recording_files.messages(recording, "warnings")
     print_notes((*recording.own_warnings, *recording.outliers, *messages))
     if not options.quiet:
@@ -82,10 +93,27 @@ def measure(options: argparse.Namespace) -> int:
     return NOT_CONFORMING if options.check and not verdict else 0
 
 
+def _single(values: list[str] | None) -> list[str] | str | None:
+    """Return the values of a repeated option, and the value itself if there is one."""
+    return values[0] if values and len(values) == 1 else values
+
+
+def _left_out(options: argparse.Namespace) -> dict[str, str]:
+    """Return the numbers of the drops to be left out, with their reasons."""
+    numbers, reasons = options.leave_out or [], options.because or []
+    if len(reasons) == 1:
+        reasons *= len(numbers)
+    if len(reasons) != len(numbers):
+        refuse("--leave-out: a drop is left out without a reason", '--because "touched"')
+    return dict(zip(numbers, reasons, strict=True))
+
+
 MEASURE = Command(
     "levels, verdict and calibration report of recorded drops",
     (
-        argument("drops", nargs="+", metavar="FILE", help="recordings of one or more drops each"),
+        argument(
+            "recordings", nargs="+", metavar="FILE", help="recordings of one or more drops each"
+        ),
         argument("--source", choices=SOURCES, help="source of the limits (default: rubber_ball)"),
         argument("--mass", type=float, metavar="KG", help="mass of the source"),
         argument("--height", type=float, metavar="M", help="drop height"),
@@ -102,9 +130,18 @@ MEASURE = Command(
             "--config", metavar="LAB.toml", help="file on laboratory, instruments, calibration"
         ),
         argument("--channel", metavar="NAME|NUMBER", help="channel of the force"),
+        argument(
+            "--channels",
+            metavar="sum|F1+F2",
+            help="load cells whose forces are added: sum for all channels of force",
+        ),
         argument("--unit", help="unit of the recorded values, if the file does not state it"),
         argument(
-            "--calibration", metavar="N/UNIT", help='such as "250 N/V" or "4.1 pC/N, 10 mV/pC"'
+            "--calibration",
+            metavar="N/UNIT",
+            action="append",
+            help='such as 250, "250 N/V" or "4.1 pC/N, 10 mV/pC"; repeated: one for each of '
+            "--channels",
         ),
         argument(
             "--calibration-uncertainty",
@@ -121,6 +158,13 @@ MEASURE = Command(
             metavar="HZ",
             help="sample rate, if the file does not state it",
         ),
+        argument("--drops", metavar="NUMBERS", help='drops to be measured, such as "1-5,8"'),
+        argument("--leave-out", action="append", metavar="NUMBERS", help="drops to be left out"),
+        argument("--because", action="append", metavar="TEXT", help="why drops are left out"),
+        argument(
+            "--from", dest="begin", type=float, metavar="S", help="begin of the searched section"
+        ),
+        argument("--to", dest="end", type=float, metavar="S", help="end of the searched section"),
         argument(
             "--low-pass",
             action="store_true",
@@ -139,39 +183,76 @@ MEASURE = Command(
 )
 
 
+# Options of `calibrate` for a known force.
+OF_A_FORCE = ("mass", "force", "uncertainty", "unit", "time_constant", "time_constant_uncertainty")
+
+
 def run_calibrate(options: argparse.Namespace) -> int:
     """Print the configuration lines of a calibration record; return the exit code."""
     from thud.recordings.calibration import calibrate
+    from thud.recordings.plate_tap import calibrate_tap
 
+    if options.tap:
+        for name in OF_A_FORCE:
+            if getattr(options, name) is not None:
+                refuse(f"calibrate: --{name.replace('_', '-')} with --tap", "a known force or taps")
+        plate = calibrate_tap(options.record, channel=channel_of(options.channel))
+        print(plate.lines())
+        if not options.quiet:
+            print(f"# {plate}")
+        return 0
     result = calibrate(
         options.record,
         force=options.force,
         mass=options.mass,
         channel=channel_of(options.channel),
         unit=options.unit,
-        uncertainty=options.uncertainty,
+        uncertainty=options.uncertainty or 0.0,
+        time_constant=options.time_constant,
+        time_constant_uncertainty=options.time_constant_uncertainty or 0.0,
     )
     print(f'calibration = "{result.chain}"')
     print(f"calibration_uncertainty = {result.uncertainty:.2g}")
     if not options.quiet:
         print(f"# {result.origin}")
+        if result.time_constant:
+            print(f"# {result.time_constant}")
+    unknown = "uncertainty of the {} not stated: not included ({})"
+    if options.time_constant not in {None, math.inf} and not options.time_constant_uncertainty:
+        print_notes([unknown.format("time constant", "--time-constant-uncertainty")])
     if not options.uncertainty:
-        print_notes(["uncertainty of the known force not stated: not included (--uncertainty)"])
+        print_notes([unknown.format("known force", "--uncertainty")])
     return 0
 
 
 CALIBRATE = Command(
-    "calibration from a record of a known force applied to or removed from the plate",
+    "calibration from a record of a known force applied to or removed from the plate, or of taps",
     (
-        argument("record", metavar="FILE", help="record of the known force"),
+        argument("record", metavar="FILE", help="record of the known force or of the taps"),
+        argument(
+            "--tap",
+            action="store_true",
+            help="the record holds taps with a hammer: print the resonance of the plate",
+        ),
         argument("--mass", type=float, metavar="KG", help="mass that exerts the known force"),
         argument("--force", type=float, metavar="N", help="known force, if no mass is given"),
         argument(
             "--uncertainty",
             type=float,
-            default=0.0,
             metavar="FRACTION",
             help="relative standard uncertainty of the mass or force, such as 0.001",
+        ),
+        argument(
+            "--time-constant",
+            type=float,
+            metavar="S",
+            help="time constant of the amplifier, inf without droop (default: fitted)",
+        ),
+        argument(
+            "--time-constant-uncertainty",
+            type=float,
+            metavar="FRACTION",
+            help="relative standard uncertainty of a stated time constant, such as 0.02",
         ),
         argument("--channel", metavar="NAME|NUMBER", help="channel of the force"),
         argument("--unit", help="unit of the recorded values, if the file does not state it"),

@@ -22,6 +22,7 @@ from thud.impact.floor_impact import FloorImpact
 from thud.level.levels import get_bands
 from thud.plot.impact_figures import contact_force
 from thud.plot.style import FORCE_NAMES
+from thud.recordings.config import config_from
 from thud.recordings.read_recording import read_recording
 from thud.studies.model_verdict import assess_impact
 
@@ -104,11 +105,12 @@ def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answe
     """Return the answer of a recording.
 
     `path` is a copy of the file, `name` the name of the original file, and `settings` are keyword
-    arguments of `read_recording`.
+    arguments of `read_recording`, with a table for `config`.
     """
     start = time.perf_counter()
     try:
-        recording = read_recording(path, **settings)
+        config = config_from(settings.get("config", {}))
+        recording = read_recording(path, **{**settings, "config": config})
         drop = recording.drop_force()
         times, force = drop.time, drop.force
         contact = (times >= 0) & (times <= TIME_RANGE * recording.contact_time)

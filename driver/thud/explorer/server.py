@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
     Endpoint = Callable[[Request], Awaitable[Response]]
 
+# Keys of tables of the configuration of a recording that the page has.
+TABLES = {"plate": ("f0", "Q", "flat_limit"), "filter": ("kind", "order", "cutoff")}
 # Maximum size of a case and of a recording, bytes.
 MAX_CASE = 100_000
 MAX_RECORDING = 200_000_000
@@ -147,7 +149,11 @@ async def _measure(request: Request) -> Response:
     settings: dict[str, Any] = {
         key: _number(key, query[key]) for key in ("height", "mass") if key in query
     }
-    settings |= {key: query[key] for key in ("calibration", "unit") if key in query}
+    texts = ("calibration", "unit", "channels", "drops")
+    settings |= {key: query[key] for key in texts if key in query}
+    settings["config"] = {
+        table: values for table, keys in TABLES.items() if (values := _table(query, table, keys))
+    }
     if "channel" in query:
         settings["channel"] = channel_of(query["channel"])
     name = query.get("name", "recording.wav")
@@ -161,6 +167,14 @@ async def _measure(request: Request) -> Response:
                 await copy.write(chunk)
         reports = state.slow.run("recording", str(path), name, settings)
         return _Reports(reports, stack.pop_all())
+
+
+def _table(query: Mapping[str, str], table: str, keys: tuple[str, ...]) -> dict[str, Any]:
+    """Return the stated keys of a table of the configuration of a recording."""
+    stated = {key: query[f"{table}_{key}"] for key in keys if f"{table}_{key}" in query}
+    numbers = {key: _number(f"{table}: {key}", stated[key]) for key in stated if key != "kind"}
+    whole = {key: int(value) for key, value in numbers.items() if key == "order" and value % 1 == 0}
+    return stated | numbers | whole
 
 
 async def _download(request: Request) -> Response:

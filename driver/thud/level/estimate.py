@@ -26,12 +26,34 @@ class Contribution(Immutable):
         Degrees of freedom; infinite if not estimated from scatter (type B).
     counted : bool
         Whether the combined uncertainty includes it; false if the repeatability already does.
+    size : float
+        Stated or determined size of the source, such as half the width of an interval; NaN if it is
+        `uncertainty` times `divisor`.
+    unit : str
+        Unit of `size`.
+    divisor : float
+        Ratio of `size` to its standard uncertainty.
     """
 
     name: str
     uncertainty: float
     freedom: float = math.inf
     counted: bool = True
+    size: float = math.nan
+    unit: str = ""
+    divisor: float = 1.0
+
+    @property
+    def kind(self) -> str:
+        """``"A"`` if evaluated by statistics of observations, else ``"B"`` (JCGM 100, 0.7)."""
+        return "A" if math.isfinite(self.freedom) or self.name == "noise" else "B"
+
+    @property
+    def sensitivity(self) -> float:
+        """Change of the value per change of `size`; 1 if that is in the unit of the value."""
+        if math.isnan(self.size):
+            return 1.0
+        return self.uncertainty * self.divisor / self.size if self.size else math.nan
 
 
 @dataclass(frozen=True, eq=False)

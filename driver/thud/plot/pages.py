@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import html
 import json
+from pathlib import Path
 from string import Template
-from textwrap import fill, wrap
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
-from plotly.offline import get_plotlyjs
 
 from thud.base._schema import CLASS_LIMITS
 from thud.level.assessment import octave_limits
@@ -55,11 +55,9 @@ if TYPE_CHECKING:
     from thud.level.impact_result import ImpactResult
 
 
-# Line styles and markers of `thud.plot.style` by the names of plotly.
+# Line styles and markers of `thud.plot.style` by their names in ``curves.js``.
 _DASHES = ("solid", "dash", "dashdot", "dot", "longdashdot", "2px,2px", "longdash")
 _SYMBOLS = ("circle", "square", "triangle-up", "diamond", "triangle-down", "cross", "x")
-# Maximum number of characters in a line of a legend.
-_MAX_CHARACTERS = 30
 
 
 def html_page(
@@ -67,7 +65,7 @@ def html_page(
 ) -> str:
     """Return a page of title, text, table (header row first) and plots, the first of full width.
 
-    A click on the legend of the first plot hides the curve with the same index in all plots.
+    A click on the legend hides the curve with the same index in all plots.
     """
     head, *body = table
     return _PAGE.substitute(
@@ -75,19 +73,17 @@ def html_page(
         text=html.escape(text),
         head=_row(head, "th"),
         rows="\n".join(_row(row, "td") for row in body),
-        places="".join(f'<div id="plot{i}"></div>' for i in range(len(plots))),
-        count=len(plots[0]["data"]),
-        plots=json.dumps(plots),
-        plotly=get_plotlyjs(),
+        plots=json.dumps(plots).replace("<", r"\u003c"),
+        script=Path(__file__).with_name("curves.js").read_text(encoding="utf-8"),
     )
 
 
 def curve_style(i: int, label: str) -> dict[str, Any]:
     """Return name, line and marker of a curve by its index."""
     return {
-        "name": "<br>".join(html.escape(line) for line in wrap(label, _MAX_CHARACTERS)),
+        "name": label,
         "line": {"color": COLORS[i % len(COLORS)], "dash": styled(i, _DASHES)},
-        "marker": {"symbol": styled(i, _SYMBOLS), "size": 8},
+        "marker": {"symbol": styled(i, _SYMBOLS)},
     }
 
 
@@ -97,20 +93,10 @@ def curve_points(x: Iterable[Any], y: Iterable[float]) -> dict[str, list[Any]]:
 
 
 def plot_layout(x: str, y: str, kind: str = "linear", scale: str = "linear") -> dict[str, Any]:
-    """Return the layout of a plot, without colors, which the page sets."""
+    """Return the titles and the kinds of the axes of a plot."""
     return {
-        "xaxis": {"title": {"text": x}, "type": kind, "zeroline": False, "automargin": True},
-        "yaxis": {
-            "title": {"text": y.replace("\n", "<br>")},
-            "type": scale,
-            "zeroline": False,
-            "automargin": True,
-        },
-        "legend": {"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom"},
-        "margin": {"l": 10, "r": 10, "t": 30, "b": 10},
-        "font": {"family": "sans-serif", "size": 14},
-        "paper_bgcolor": "rgba(0,0,0,0)",
-        "plot_bgcolor": "rgba(0,0,0,0)",
+        "xaxis": {"title": {"text": x}, "type": kind},
+        "yaxis": {"title": {"text": y.replace("\n", "<br>")}, "type": scale},
     }
 
 
@@ -118,7 +104,6 @@ def _row(cells: Sequence[str], tag: str) -> str:
     return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
 
 
-# The colors of the page override the styles that Plotly writes into the plots.
 _PAGE = Template("""<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -142,20 +127,25 @@ th { vertical-align: bottom; max-width: 12em; overflow-wrap: break-word; }
 td { white-space: nowrap; }
 th:first-child, td:first-child { text-align: left; position: sticky; left: 0;
   background: var(--page); padding-left: 0; }
+.legend { display: flex; flex-wrap: wrap; gap: 0.4em 1.2em; margin-top: 1.5em; }
+.legend button { font: inherit; color: inherit; background: none; border: 0; padding: 0;
+  text-align: left; cursor: pointer; }
+.legend button[aria-pressed="false"] { opacity: 0.4; }
 .plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 28em), 1fr));
-  gap: 1em; margin-top: 1.5em; }
-.plots div:first-child { grid-column: 1 / -1; }
-.plots > div { height: 27em; min-width: 0; }
-@media (max-width: 60em) {
-  .plots > div:first-child { height: calc(24em + 2em * $count); }
-}
-.plots text:not(.hoverlayer *) { fill: var(--text) !important; }
-.plots .gridlayer path { stroke: var(--line) !important; }
-.plots [style*="fill: rgb(187, 187, 187)"] { fill: var(--band) !important; }
-.plots [style*="stroke: rgb(0, 0, 0)"] { stroke: var(--text) !important; }
-.plots .points [style*="fill: rgb(0, 0, 0)"] { fill: var(--text) !important; }
+  gap: 1em; margin-top: 1em; }
+.plots > div { height: 24em; min-width: 0; position: relative; }
+.plots > div:first-child { grid-column: 1 / -1; }
+.area { height: 100%; }
+.plots svg { display: block; }
+.plots .readout svg { display: inline; }
+.plots text { fill: var(--text); font-size: 13px; }
+.grid { stroke: var(--line); }
+.band { fill: var(--band); }
+.cursor { stroke: var(--text); }
+.readout { position: absolute; top: 8px; right: 10px; padding: 0.2em 0.5em; font-size: 0.9em;
+  background: var(--page); border: 1px solid var(--line); pointer-events: none; }
+.readout.left { right: auto; left: 6em; }
 </style>
-<script>$plotly</script>
 </head>
 <body>
 <h1>$title</h1>
@@ -166,15 +156,13 @@ th:first-child, td:first-child { text-align: left; position: sticky; left: 0;
 $rows
 </tbody>
 </table></div>
-<div class="plots">$places</div>
+<div class="legend"></div>
+<div class="plots"></div>
 <script>
-const options = {responsive: true, displayModeBar: false};
-$plots.forEach((plot, i) => Plotly.newPlot(`plot$${i}`, plot.data, plot.layout, options));
-document.getElementById("plot0").on("plotly_restyle", ([change, curves]) => {
-  for (const other of document.querySelectorAll(".plots > div:not(#plot0)")) {
-    Plotly.restyle(other, change, curves);
-  }
-});
+$script
+drawPlots(
+$plots
+);
 </script>
 </body>
 </html>
@@ -290,9 +278,6 @@ def _tolerance(source: LimitsSource) -> dict[str, Any]:
         "x": _names("octave"),
         "y": (upper - lower).tolist(),
         "base": lower.tolist(),
-        "hovertext": [f"{low:g} to {high:g} dB" for low, high in zip(lower, upper, strict=True)],
-        "hoverinfo": "name+text",
-        "marker": {"color": "#bbbbbb"},
         "showlegend": True,
     }
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 # Height without the legend, inch: a report has two figures side by side.
 HEIGHT = 2.15
-# Maximum number of drops drawn as lines; the range of more drops is filled.
+# Maximum number of drops, and of outliers, drawn as lines; the range of more drops is filled.
 MAX_LINES = 40
 # Margin of the filtered force around the drawn times, s: longer than the filter's response.
 FILTER_MARGIN = 2e-2
@@ -32,6 +32,7 @@ POINTS = 400
 # Backgrounds further below the lowest level than this, dB, are not drawn.
 MAX_DISTANCE = 20.0
 THIN: dict[str, Any] = {"color": "0.55", "linewidth": 0.5}
+OTHERS: dict[str, Any] = {"color": COLORS[2], "linewidth": 1.0, "linestyle": (0, (1, 1))}
 DEVIANT: dict[str, Any] = {"color": COLORS[1], "linewidth": 0.7, "linestyle": (0, (3, 1))}
 AVERAGE: dict[str, Any] = {"color": COLORS[0], "linewidth": 1.4}
 BARS: dict[str, Any] = {
@@ -56,6 +57,10 @@ def recording_forces(recording: Recording) -> Figure:
     _draw_drops(axes, 1e3 * time, forces, recording)
     if len(forces) > 1:
         axes.plot(1e3 * time, forces.mean(axis=0), label="average", **AVERAGE)
+    marked = _outliers(recording)
+    if marked.any() and not marked.all():
+        mean = forces[~marked].mean(axis=0)
+        axes.plot(1e3 * time, mean, label="without outliers", **OTHERS)
     axes.errorbar(
         1e3 * limits.value, 0, xerr=_bar(limits.estimate.expanded, 1e3), label="contact time",
         marker="o", markersize=2.5, **BARS,
@@ -146,9 +151,7 @@ def _draw_drops(
     axes: Axes, x: NDArray[np.float64], curves: NDArray[np.float64], recording: Recording
 ) -> None:
     """Draw the curves of the drops, shape (n_drop, n), or their range, and mark outliers."""
-    deviant = {outlier.name for outlier in recording.outliers}
-    marked = np.array([drop.name in deviant for drop in recording.drops])
-    count = len(curves)
+    marked, count = _outliers(recording), len(curves)
     if count > MAX_LINES:
         # A band without a level is NaN in all drops.
         axes.fill_between(
@@ -159,10 +162,18 @@ def _draw_drops(
         name = f"{count} drops" if count > 1 else "drop"
         for i, curve in enumerate(curves[~marked]):
             axes.plot(x, curve, label=name if i == 0 else None, **THIN)
-    for i, curve in enumerate(curves[marked]):
+    for i, curve in enumerate(curves[marked][:MAX_LINES]):
         number = int(marked.sum())
         name = "outlier" if number == 1 else f"{number} outliers"
+        if number > MAX_LINES:
+            name += f", {MAX_LINES} of them drawn"
         axes.plot(x, curve, label=name if i == 0 else None, **DEVIANT)
+
+
+def _outliers(recording: Recording) -> NDArray[np.bool_]:
+    """Return which drops are outliers, shape (n_drop,)."""
+    names = {outlier.name for outlier in recording.outliers}
+    return np.array([drop.name in names for drop in recording.drops])
 
 
 def _bar(expanded: NDArray[np.float64] | float, unit: float = 1.0) -> NDArray[np.float64]:

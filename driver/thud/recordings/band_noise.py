@@ -39,18 +39,19 @@ def band_functionals(count: int, rate: float, lower: float, upper: float) -> NDA
 
 
 def band_noise(drops: Sequence[Drop], bands: Bands) -> NDArray[np.float64]:
-    """Return energies of the noise within the gates in bands, N2 s, [n_drop, n_band, 2].
+    """Return energies of the noise within the gates in bands, N2 s, [n_drop, n_band, 3].
 
-    The last axis holds the expected energy of the noise, and the standard deviation of the force's
-    energy after its subtraction. Drops with equal rates share the functionals of the longest gate;
-    drops with equal gate lengths also share the products of functionals.
+    The last axis holds the expected energy of the noise, and the standard deviations of the force's
+    energy after its subtraction: by noise, and by quantization with a quiet background. Drops with
+    equal rates share the functionals of the longest gate; drops with equal gate lengths also share
+    the products of functionals.
     """
     groups: dict[float, dict[int, list[int]]] = {}
     for i, drop in enumerate(drops):
         count = drop.gate[1] - drop.gate[0]
         groups.setdefault(drop.sample_rate, {}).setdefault(count, []).append(i)
     edges = list(zip(bands.lower, bands.upper, strict=True))
-    energies = np.empty((len(drops), len(edges), 2))
+    energies = np.empty((len(drops), len(edges), 3))
     for rate, gates in groups.items():
         functionals = [band_functionals(max(gates), rate, *edge) for edge in edges]
         for count, indices in gates.items():
@@ -66,14 +67,15 @@ def _energies(
     functionals: Sequence[NDArray[np.float64]],
     edges: Sequence[tuple[float, float]],
 ) -> NDArray[np.float64]:
-    """Return the energies of drops with gates of one length, [n_drop, n_band, 2]."""
+    """Return the energies of drops with gates of one length, [n_drop, n_band, 3]."""
     contacts = [drop.contact for drop in drops]
     forces = np.array([drop.force[slice(*drop.gate)] for drop in drops])
     slow_covariance = np.array([contact.covariance for contact in contacts])
     white_variance = np.array(
         [contact.background.variances[0] * contact.sample_rate / 2 for contact in contacts]
     )
-    energies = np.empty((len(drops), len(edges), 2))
+    errors = [contact.quantization_errors for contact in contacts]
+    energies = np.empty((len(drops), len(edges), 3))
     for band, (rows, edge) in enumerate(zip(functionals, edges, strict=True)):
         values, summed = forces @ rows.T, contacts[0].summed(rows)
         covariance = white_variance[:, None, None] * (rows @ rows.T)
@@ -85,5 +87,11 @@ def _energies(
         middle = sum(edge) / 2
         density, spread = np.array([contact.background.density(middle) for contact in contacts]).T
         variance = np.maximum(variance, 2 * squares) + (noise * spread / density) ** 2
-        energies[:, band] = np.column_stack([noise, np.sqrt(variance)])
+        # An error e changes the energy by 2 (R f)' R e + |R e|**2.
+        changes = [error @ rows.T for error in errors]
+        quantized = [
+            float(((change + 2 * value) * change).sum(axis=1).std()) if len(change) else 0.0
+            for change, value in zip(changes, values, strict=True)
+        ]
+        energies[:, band] = np.column_stack([noise, np.sqrt(variance), quantized])
     return energies

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from thud.level.estimate import Contribution, Estimate
 from thud.level.levels import RECORDED_BAND, peak_count
+from thud.recordings.assumptions import ASSUMED
 from thud.recordings.outliers import SIGNIFICANCE, find_outliers
-from thud.recordings.recorded_levels import WITHIN_REPEATABILITY
+from thud.recordings.recorded_levels import NOISE, REPEATABILITY, noise_exceeds
 from thud.recordings.restitution import BOUNCES, IMPULSE, DropConditions
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -41,8 +42,8 @@ def average_estimates(estimates: Sequence[Estimate], *systematic: Contribution) 
     """Return the mean of one quantity over drops, without unknown values.
 
     The uncertainty of each estimate is its noise, which the repeatability of two or more drops
-    includes. Systematic contributions (calibration, drop height) are shared by all drops; the
-    average does not reduce them.
+    includes; the larger of both counts (`noise_exceeds`). Systematic contributions (calibration,
+    drop height) are shared by all drops; the average does not reduce them.
     """
     known = [estimate for estimate in estimates if math.isfinite(estimate.value)]
     if not known:
@@ -50,36 +51,51 @@ def average_estimates(estimates: Sequence[Estimate], *systematic: Contribution) 
     count = len(known)
     values = np.array([estimate.value for estimate in known])
     noise = float(np.sqrt(np.sum([estimate.uncertainty**2 for estimate in known]))) / count
-    contributions = [Contribution("noise", noise, counted=count == 1)]
+    contributions = [Contribution(NOISE, noise)]
     if count > 1:
         error = float(values.std(ddof=1)) / math.sqrt(count)
-        contributions.insert(0, Contribution("repeatability", error, count - 1))
+        exceeds = bool(noise_exceeds(error, noise, count))
+        contributions = [
+            Contribution(
+                REPEATABILITY, error, count - 1, counted=not exceeds, divisor=math.sqrt(count)
+            ),
+            Contribution(NOISE, noise, counted=exceeds),
+        ]
     return Estimate.from_budget(float(values.mean()), *contributions, *systematic)
 
 
 def level_estimates(
     levels: AverageLevels,
     calibration: float | None = None,
-    plate: NDArray[np.float64] | None = None,
+    systematic: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> tuple[Estimate, ...]:
     """Return average levels with their budgets, dB, shape (n_band,).
 
-    `calibration` is the relative standard uncertainty of the force, None if unknown; `plate` is the
-    standard uncertainty of the force plate's correction, dB, shape (n_band,), zero if not stated.
+    `calibration` is the relative standard uncertainty of the force, None if unknown; `systematic`
+    are further standard uncertainties that all drops share, dB, shape (n_band,), by name.
     """
     count = len(levels.names)
     contributions = dict(levels.contributions)
+    rectangular = ("method", "filter", "offset step", *ASSUMED)
+    sizes: dict[str, dict[str, Any]] = {name: {"divisor": math.sqrt(3)} for name in rectangular}
+    if count > 1:
+        sizes[REPEATABILITY] = {"divisor": math.sqrt(count)}
     if calibration is not None:
         contributions["calibration"] = np.full(len(levels.level), AMPLITUDE_DECIBEL * calibration)
-    if plate is not None and plate.any():
-        contributions["plate"] = plate
+        sizes["calibration"] = {"size": calibration}
+    contributions |= systematic or {}
+    counted: dict[str, NDArray[np.bool_]] = {}
+    if count > 1:
+        exceeds = noise_exceeds(contributions[REPEATABILITY], contributions[NOISE], count)
+        counted = {REPEATABILITY: ~exceeds, NOISE: exceeds}
     budgets = (
         [
             Contribution(
                 name,
                 float(values[band]),
-                count - 1 if name == "repeatability" else math.inf,
-                counted=count == 1 or name not in WITHIN_REPEATABILITY,
+                count - 1 if name == REPEATABILITY else math.inf,
+                counted=name not in counted or bool(counted[name][band]),
+                **sizes.get(name, {}),
             )
             for name, values in contributions.items()
         ]
@@ -140,14 +156,17 @@ def average_restitution(
     known = [drop for drop in drops if drop.restitutions]
     causes = dict.fromkeys(cause for drop in known for cause in drop.shared_effects)
     systematic = [
-        _mean_effect(cause, [drop.shared_effects.get(cause, 0.0) for drop in known])
+        _mean_effect(cause, [drop.shared_effects.get(cause, 0.0) for drop in known], conditions)
         for cause in causes
     ]
     comparable = [drop for drop in known if {IMPULSE, BOUNCES} <= set(drop.restitutions)]
     difference = _difference(comparable, conditions)
     if abs(difference.value) > difference.expanded:
         half_width = abs(difference.value)
-        systematic.append(Contribution("impulse against bounces", half_width / math.sqrt(3)))
+        contribution = half_width / math.sqrt(3)
+        systematic.append(
+            Contribution("impulse against bounces", contribution, divisor=math.sqrt(3))
+        )
     return average_estimates([drop.restitution for drop in known], *systematic), difference
 
 
@@ -158,15 +177,18 @@ def _difference(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
         impulse, bounces = (drop.restitutions[name] for name in (IMPULSE, BOUNCES))
         combined = math.hypot(impulse.uncertainty, bounces.uncertainty)
         differences.append(Estimate(impulse.value - bounces.value, combined))
-        shared = conditions.shared_effects(drop.restitutions, drop.impulse)
+        shared = conditions.shared_effects(
+            drop.restitutions, drop.impulse, drop.contact.quantization_impulse
+        )
         for cause, effect in shared[IMPULSE].items():
             effects.setdefault(cause, []).append(effect - shared[BOUNCES].get(cause, 0.0))
-    systematic = [_mean_effect(cause, values) for cause, values in effects.items()]
+    systematic = [_mean_effect(cause, values, conditions) for cause, values in effects.items()]
     return average_estimates(differences, *systematic)
 
 
-def _mean_effect(cause: str, effects: Sequence[float]) -> Contribution:
-    return Contribution(cause, abs(float(np.mean(effects))))
+def _mean_effect(cause: str, effects: Sequence[float], conditions: DropConditions) -> Contribution:
+    size, unit = conditions.uncertainties.get(cause, (math.nan, ""))
+    return Contribution(cause, abs(float(np.mean(effects))), size=size, unit=unit)
 
 
 def average_mass(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
@@ -179,13 +201,20 @@ def average_mass(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
     velocity_change = float(np.mean([drop.impulse.value for drop in known])) / value
     height_effect = value * conditions.speed / velocity_change * conditions.height_uncertainty
     height_effect /= 2 * conditions.height
+    impulses = [(drop.impulse.value, drop.contact.quantization_impulse) for drop in known]
+    impulse, quantization_impulse = np.mean(impulses, axis=0)
     systematic = {
         "calibration": value * conditions.calibration_uncertainty,
         "drop height": height_effect,
+        "quantization": value * float(quantization_impulse / impulse),
     }
     return average_estimates(
         [drop.effective_mass for drop in known],
-        *(Contribution(cause, value) for cause, value in systematic.items() if value),
+        *(
+            _mean_effect(cause, [effect], conditions)
+            for cause, effect in systematic.items()
+            if effect
+        ),
     )
 
 

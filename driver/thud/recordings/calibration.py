@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from thud.base.checks import refuse, require_number
 from thud.recordings.channel import shown_path
-from thud.recordings.force_units import ALLOWED, Calibration, find_unit, require_unit
+from thud.recordings.force_units import (
+    ALLOWED,
+    Calibration,
+    TimeConstant,
+    find_unit,
+    require_unit,
+)
 from thud.recordings.formats import read_channels
+from thud.recordings.load_steps import Rate, measure_steps
 from thud.recordings.restitution import GRAVITY
 from thud.recordings.signal import Signal
 from thud.recordings.signal_files import choose_channels, regular_file
@@ -21,17 +28,16 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# A record is reduced to about this many means, at least MIN_PLATEAU of them in a plateau.
+# A record is reduced to about this many means.
 MEANS = 4096
-MIN_PLATEAU = 8
 # Number of samples per read.
 BLOCK = 2**20
-# Fractions of the range of the level at which a step up, and a step down, is detected.
-UP, DOWN = 0.6, 0.4
-# Fraction of a plateau that is ignored at either end.
-SETTLING = 0.1
-# Maximum relative uncertainty of the step.
+# Maximum relative uncertainty of the step, and of a stated time constant.
 MAX_UNCERTAINTY = 0.1
+MAX_STATED = 0.5
+# Standard deviations from zero at which a droop is stated, and those of a bound with 95 %.
+SIGNIFICANT = 3.0
+BOUND = 1.645
 
 
 def calibrate(  # noqa: PLR0913 - the keys of the configuration
@@ -43,10 +49,13 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
     unit: str | None = None,
     gravity: float = GRAVITY,
     uncertainty: float = 0.0,
+    time_constant: float | None = None,
+    time_constant_uncertainty: float = 0.0,
 ) -> Calibration:
     """Return N per unit from a record of a known force put on or taken off the plate.
 
-    A line is fitted to the level on either side of each step, which removes offset and drift.
+    The force rests between the steps. Behind a charge amplifier the level then decays: its time
+    constant, offset and drift are fitted, and each step is free of the decay.
 
     Parameters
     ----------
@@ -62,17 +71,22 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
         Local acceleration of gravity, m/s2.
     uncertainty
         Relative standard uncertainty of the known force.
+    time_constant
+        Time constant of the amplifier, s, infinite if it does not droop; by default it is fitted.
+    time_constant_uncertainty
+        Relative standard uncertainty of the stated time constant.
 
     Returns
     -------
     Calibration
-        The uncertainty includes that of the step: from the residuals of the lines or from the
-        scatter of several steps, whichever is larger.
+        The uncertainty includes that of the step: from the residuals and the time constant, or
+        from the scatter of several steps, whichever is larger.
 
     Raises
     ------
     InputError
-        If force and mass are both stated or both missing, or the record has no clear step.
+        If force and mass are both stated or both missing, or the record has no clear step, or
+        its decay fits no time constant.
     """
     if (force is None) == (mass is None):
         refuse("calibrate(): state either force or mass", "force in N or mass in kg")
@@ -83,9 +97,17 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
             f"calibrate(): force = {newtons:g} N, uncertainty = {uncertainty:g}",
             "a positive force, 0 <= uncertainty < 1",
         )
-    name, symbol, samples, count = _source(record, channel, unit)
-    steps = _steps(_means(samples, count), name)
-    size, deviation = _mean(steps)
+    name, symbol, samples, count, sample_rate = open_source(record, channel, unit)
+    if not symbol:
+        refuse(f"{name}: the values are without a unit", f"unit = one of {ALLOWED}")
+    level = _means(samples, count)
+    # Seconds per mean.
+    interval = None if sample_rate is None else max(1, count // MEANS) / sample_rate
+    stated = None
+    if time_constant is not None:
+        stated = _stated_rate(time_constant, time_constant_uncertainty, interval, name)
+    steps = measure_steps(level, interval, name, stated)
+    size, deviation = float(steps.sizes.mean()), steps.uncertainty
     if deviation > MAX_UNCERTAINTY * size:
         refuse(
             f"{name}: the step is {size:.4g} {symbol} with an uncertainty of {deviation:.2g} "
@@ -93,29 +115,66 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
             f"an uncertainty up to {MAX_UNCERTAINTY:.0%}",
         )
     load = f"{newtons:.6g} N" if mass is None else f"{mass:g} kg"
+    number = len(steps.sizes)
     return Calibration(
         f"{newtons / size!r} N/{symbol}",
         math.hypot(deviation / size, uncertainty),
-        f"{len(steps)} step{'s' * (len(steps) > 1)} of {load} in {name}",
+        f"{number} step{'s' * (number > 1)} of {load} in {name}",
+        _time_constant(steps.rate, interval),
     )
 
 
-def _source(
-    record: Signal | str | os.PathLike[str], channel: int | str | None, unit: str | None
-) -> tuple[str, str, Callable[[int, int], NDArray[np.float64]], int]:
+def _stated_rate(value: float, uncertainty: float, interval: float | None, name: str) -> Rate:
+    """Return the rate per mean of a time constant, s, with a relative standard uncertainty."""
+    if value != math.inf:
+        require_number("calibrate(): time_constant", value)
+    require_number("calibrate(): time_constant_uncertainty", uncertainty)
+    if not value > 0 or not 0 <= uncertainty <= MAX_STATED:
+        refuse(
+            f"calibrate(): time_constant = {value:g} s, uncertainty = {uncertainty:g}",
+            f"a positive time, 0 <= uncertainty <= {MAX_STATED:g}",
+        )
+    if interval is None:
+        refuse(f"{name}: the sample rate is not known", "a column of times, or no time constant")
+    return Rate(interval / value, interval / value * uncertainty)
+
+
+def _time_constant(rate: Rate, interval: float | None) -> TimeConstant | None:
+    """Return the time constant of a rate per mean; None if the interval is unknown."""
+    if interval is None:
+        return None
+    highest = rate.value + BOUND * rate.uncertainty
+    minimum = interval / highest if highest > 0 else math.inf
+    if rate.value <= SIGNIFICANT * rate.uncertainty:
+        return TimeConstant(math.inf, 0.0, minimum)
+    return TimeConstant(interval / rate.value, rate.uncertainty / rate.value, minimum)
+
+
+class Source(NamedTuple):
+    """Values of one channel: name for messages, unit or "", samples, and their number and rate."""
+
+    name: str
+    unit: str
+    samples: Callable[[int, int], NDArray[np.float64]]
+    n_sample: int
+    sample_rate: float | None
+
+
+def open_source(
+    record: Signal | str | os.PathLike[str], channel: int | str | None, unit: str | None = None
+) -> Source:
+    """Return the values of a channel of a file, or of a signal, in their own unit."""
     if isinstance(record, Signal):
-        if unit is None:
-            refuse(f"{record.name}: the unit is not stated", f"unit = one of {ALLOWED}")
-        return record.name, require_unit(unit, record.name), record.read, record.n_sample
+        symbol = "" if unit is None else require_unit(unit, record.name)
+        return Source(record.name, symbol, record.read, record.n_sample, record.sample_rate)
     path = regular_file(record)
-    channels = choose_channels(read_channels(path), channel, shown_path(path))
+    name = shown_path(path)
+    channels = choose_channels(read_channels(path), channel, name)
     if len(channels) != 1:
-        refuse(f"{shown_path(path)}: {len(channels)} channels match", "channel = one of them")
-    selected = channels[0]
+        refuse(f"{name}: {len(channels)} channels match", "channel = one of them")
+    (selected,) = channels
     symbol = find_unit(selected.unit) if unit is None else require_unit(unit, path.name)
-    if not symbol:
-        refuse(f"{shown_path(path)}: the values are without a unit", f"unit = one of {ALLOWED}")
-    return shown_path(path), symbol, selected.samples, selected.n_sample
+    return Source(name, symbol, selected.samples, selected.n_sample, selected.sample_rate)
 
 
 def _means(samples: Callable[[int, int], NDArray[np.float64]], count: int) -> NDArray[np.float64]:
@@ -126,54 +185,3 @@ def _means(samples: Callable[[int, int], NDArray[np.float64]], count: int) -> ND
     blocks = (samples(start, min(start + step, stop)) for start in range(0, stop, step))
     means = [block.reshape(-1, width).mean(axis=1) for block in blocks]
     return np.concatenate([np.zeros(0), *means])
-
-
-def _steps(level: NDArray[np.float64], name: str) -> list[tuple[float, float]]:
-    """Return size and standard uncertainty of the steps of a level."""
-    if not np.isfinite(level).all():
-        refuse(f"{name}: a value is not finite", "real numbers")
-    # The extremes of a running median ignore knocks on the plate.
-    smooth = (
-        np.median(np.lib.stride_tricks.sliding_window_view(level, 5), axis=1)
-        if len(level) > MIN_PLATEAU
-        else np.zeros(1)
-    )
-    fraction = (level - smooth.min()) / (np.ptp(smooth) or 1.0)
-    edges, loaded = [0], bool(fraction[0] > UP)
-    for index, value in enumerate(fraction):
-        if (not loaded and value > UP) or (loaded and value < DOWN):
-            loaded = not loaded
-            edges.append(index)
-    edges.append(len(level))
-    if len(edges) < 3 or min(np.diff(edges)) < MIN_PLATEAU:  # noqa: PLR2004 - two plateaus
-        refuse(
-            f"{name}: has no clear step", "a record in which a known force is put on or taken off"
-        )
-    steps = []
-    for before, edge, after in zip(edges, edges[1:], edges[2:], strict=False):
-        (level_before, u_before), (level_after, u_after) = (
-            _level_at(level, *span, edge) for span in ((before, edge), (edge, after))
-        )
-        steps.append((abs(level_after - level_before), math.hypot(u_before, u_after)))
-    return steps
-
-
-def _level_at(level: NDArray[np.float64], begin: int, end: int, edge: int) -> tuple[float, float]:
-    """Return the level at an edge of a plateau, by a fitted line, and its standard uncertainty."""
-    settling = max(1, int(SETTLING * (end - begin)))
-    plateau = level[begin + settling : end - settling]
-    index = np.arange(begin + settling, end - settling) - edge
-    line = np.column_stack([np.ones(len(index)), index])
-    (value, slope), *_ = np.linalg.lstsq(line, plateau, rcond=None)
-    residual = plateau - line @ [value, slope]
-    variance = residual @ residual / (len(index) - 2)
-    covariance = variance * np.linalg.inv(line.T @ line)
-    return float(value), math.sqrt(covariance[0, 0])
-
-
-def _mean(steps: list[tuple[float, float]]) -> tuple[float, float]:
-    sizes, deviations = np.array(steps).T
-    count = len(sizes)
-    within = math.sqrt(float(deviations @ deviations)) / count
-    scatter = float(sizes.std(ddof=1)) / math.sqrt(count) if count > 1 else 0.0
-    return float(sizes.mean()), max(within, scatter)

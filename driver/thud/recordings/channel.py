@@ -53,6 +53,8 @@ class Channel:
         Date of the measurement, or empty.
     steps : tuple of str
         Processing when the file was read, a sentence each.
+    may_be_fractions : bool
+        Whether values without a unit may be fractions of full scale, as those of float audio.
     """
 
     name: str
@@ -64,6 +66,7 @@ class Channel:
     counts: float | None = None
     date: str = ""
     steps: tuple[str, ...] = ()
+    may_be_fractions: bool = False
 
 
 def shown_text(text: object) -> str:

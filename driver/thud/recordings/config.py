@@ -4,29 +4,51 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
+from datetime import date
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from thud.base.checks import refuse, refuse_unknown, require_choice, require_number, shown
+from thud.base.checks import (
+    refuse,
+    refuse_unknown,
+    require_choice,
+    require_number,
+    require_whole,
+    shown,
+)
 from thud.base.errors import InputError
 from thud.level.assessment import get_criteria
 from thud.level.levels import SOURCES
 from thud.recordings.channel import MIB, shown_path, shown_text
-from thud.recordings.force_units import Calibration, read_chain, require_unit
+from thud.recordings.choice import parse_numbers
+from thud.recordings.dates import read_date
+from thud.recordings.force_units import (
+    Calibration,
+    plain_number,
+    read_chain,
+    require_unit,
+)
+from thud.recordings.load_cells import require_channels
 from thud.recordings.plate import Plate, check_plate
 from thud.recordings.polarity import POLARITIES
+from thud.recordings.recorder_filter import KINDS, MAX_ORDER, RecorderFilter
+from thud.recordings.response import Chain
 from thud.recordings.restitution import DropConditions
 from thud.recordings.signal_files import regular_file
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
+    from pathlib import Path
 
     from thud.base._schema import LimitsSource
     from thud.recordings.plate import PlateCheck
 
 MAX_TEXT = 500
+# Formats and maximum size of a picture in the report, bytes.
+PICTURES = {".svg": "image/svg+xml", ".png": "image/png", ".jpg": "image/jpeg"}
+MAX_PICTURE = 300_000
 
 
 def _number(low: float, high: float, value: object, key: str) -> float:
@@ -43,10 +65,30 @@ def _text(value: object, key: str) -> str:
     return value
 
 
+def _whole(low: int, high: int, value: object, key: str) -> int:
+    require_whole(key, value, low, high)
+    return int(value)  # type: ignore[call-overload, no-any-return]
+
+
 def _texts(value: object, key: str) -> tuple[str, ...]:
     return tuple(
         _text(text, key) for text in (value if isinstance(value, list | tuple) else [value])
     )
+
+
+def _date(value: object, key: str) -> str:
+    """Return a date as text in ISO 8601; empty if not stated."""
+    if isinstance(value, date):
+        return value.isoformat()[:10]
+    read = read_date(_text(value, key)) if value else None
+    if value and read is None:
+        refuse(f"{key} = {shown(value)} is not allowed", 'a date, such as "2024-05-03"')
+    return read.date().isoformat() if read else ""
+
+
+def _day(value: object, key: str) -> str:
+    """Return the date of the measurement as text, in any form."""
+    return value.isoformat() if isinstance(value, date) else _text(value, key)
 
 
 def _choice(choices: Mapping[str, object] | tuple[str, ...], value: object, key: str) -> str:
@@ -68,6 +110,7 @@ def _channel(value: object, key: str) -> int | str:
 def _calibration(value: object, key: str) -> Calibration | str | float:
     if isinstance(value, Calibration):
         return value
+    value = plain_number(value)
     if not isinstance(value, str):
         return _number(-1e30, 1e30, value, key)
     try:
@@ -76,6 +119,14 @@ def _calibration(value: object, key: str) -> Calibration | str | float:
         message = f"{key}: {error}"
         raise InputError(message) from error
     return value
+
+
+def _calibrations(
+    value: object, key: str
+) -> Calibration | str | float | tuple[Calibration | str | float, ...]:
+    if not isinstance(value, list | tuple):
+        return _calibration(value, key)
+    return tuple(_calibration(entry, f"{key}, entry {i}") for i, entry in enumerate(value, 1))
 
 
 def _table(value: object, key: str) -> Mapping[str, object]:
@@ -95,6 +146,21 @@ def _linearity(value: object, key: str) -> tuple[tuple[float, float], ...]:
     if len(pairs) < 2:  # noqa: PLR2004
         refuse(f"{key} = {shown(value)} is not allowed", "[[applied, indicated], ...], N")
     return tuple(_pair(pair, key, "applied, indicated", 1e-3, 1e9) for pair in pairs)
+
+
+def _numbers(value: object, key: str) -> str:
+    text = _text(value, key)
+    parse_numbers(text, key)
+    return text
+
+
+def _reasons(value: object, key: str) -> dict[str, str]:
+    table = _table(value, key)
+    reasons = {_numbers(str(number), key): _text(reason, key) for number, reason in table.items()}
+    for number, reason in reasons.items():
+        if not reason.strip():
+            refuse(f"{key}: {number} has no reason", 'a reason, such as "touched"')
+    return reasons
 
 
 def _limits(value: object, key: str) -> dict[str, tuple[float, float]]:
@@ -124,6 +190,10 @@ class PlateConfig:
         Frequency, Hz, and quality factor of the first resonance, which will be corrected.
     f0_uncertainty : float or None
         Relative standard uncertainty of the frequency.
+    share : float
+        Share of this mode in the static response; 1 for a mass on a spring.
+    flat_limit : float or None
+        Frequency, Hz, up to which the response is flat within 2 %, if no resonance is stated.
     time_constant : float or None
         Time constant of the amplifier, s.
     full_scale : float or None
@@ -135,6 +205,8 @@ class PlateConfig:
     f0: float | None = _key(partial(_number, 1.0, 1e6))
     Q: float | None = _key(partial(_number, 0.5, 1e6))
     f0_uncertainty: float | None = _key(partial(_number, 0.0, 0.5))
+    share: float = _key(partial(_number, 0.001, 1.0), 1.0)
+    flat_limit: float | None = _key(partial(_number, 100.0, 1e6))
     time_constant: float | None = _key(partial(_number, 1e-3, 1e9))
     full_scale: float | None = _key(partial(_number, 1.0, 1e9))
     linearity: tuple[tuple[float, float], ...] = _key(_linearity, ())
@@ -144,11 +216,150 @@ def _plate(value: object, key: str) -> PlateConfig:
     if isinstance(value, PlateConfig):
         return value
     table = _checked(_table(value, key), PlateConfig, f"{key}: ")
-    if "f0_uncertainty" in table or ("f0" in table) != ("Q" in table):
-        for name in ("f0", "Q"):
-            if name not in table:
-                refuse(f"{key}: {name} is missing", "f0 and Q")
+    if {"f0", "Q", "f0_uncertainty", "share"} & set(table):
+        _require_keys(table, key, "f0", "Q")
+        if "flat_limit" in table:
+            refuse(f"{key}: f0 and flat_limit are both stated", "one of them")
     return PlateConfig(**table)
+
+
+def _require_keys(table: Mapping[str, object], key: str, *names: str) -> None:
+    for name in names:
+        if name not in table:
+            refuse(f"{key}: {name} is missing", " and ".join(names))
+
+
+@dataclass(frozen=True)
+class FilterConfig:
+    """The low-pass filter of the recorder or amplifier, which will be corrected.
+
+    Attributes
+    ----------
+    kind : str
+        ``"bessel"``, ``"butterworth"``, or ``"none"`` for a recorder whose response is flat in the
+        bands.
+    order : int or None
+        Order.
+    cutoff : float or None
+        Cutoff at -3 dB, Hz.
+    cutoff_uncertainty : float or None
+        Relative standard uncertainty of the cutoff.
+    """
+
+    kind: str = _key(partial(_choice, (*KINDS, "none")), "none")
+    order: int | None = _key(partial(_whole, 1, MAX_ORDER))
+    cutoff: float | None = _key(partial(_number, 1.0, 1e9))
+    cutoff_uncertainty: float | None = _key(partial(_number, 0.0, 0.5))
+
+
+def _filter(value: object, key: str) -> FilterConfig:
+    if isinstance(value, FilterConfig):
+        return value
+    table = _checked(_table(value, key), FilterConfig, f"{key}: ")
+    _require_keys(table, key, "kind")
+    if table["kind"] != "none":
+        _require_keys(table, key, "order", "cutoff")
+    return FilterConfig(**table)
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """An instrument of the measurement and its calibration certificate.
+
+    Attributes
+    ----------
+    name, serial, certificate : str
+        Name, serial number, and number of the certificate.
+    calibrated, due : str
+        Dates of the certificate and of the next calibration.
+    """
+
+    name: str = _key(_text, "")
+    serial: str = _key(_text, "")
+    certificate: str = _key(_text, "")
+    calibrated: str = _key(_date, "")
+    due: str = _key(_date, "")
+
+
+def _instruments(value: object, key: str) -> tuple[str | Instrument, ...]:
+    return tuple(
+        Instrument(**_checked(entry, Instrument, f"{key}: "))
+        if isinstance(entry, Mapping)
+        else entry
+        if isinstance(entry, Instrument)
+        else _text(entry, key)
+        for entry in (value if isinstance(value, list | tuple) else [value])
+    )
+
+
+@dataclass(frozen=True)
+class ReportConfig:
+    """What a report of a laboratory states besides its results (ISO/IEC 17025, 7.8).
+
+    Attributes
+    ----------
+    number : str
+        Number of the report, on each page.
+    address, client : tuple of str
+        Address of the laboratory; name and address of the client: a line each.
+    item, state : str
+        Description of the item, and its state at receipt.
+    received, issued : str
+        Dates of receipt of the item and of issue of the report.
+    place, procedure, deviations : str
+        Place and procedure of the measurement, and deviations from the procedure.
+    humidity, pressure : float or None
+        Relative humidity, %, and static pressure of the air, Pa.
+    accreditation : str
+        Text on the accreditation.
+    accreditation_mark : str
+        File of the accreditation mark: SVG, PNG or JPEG.
+    authorized_by : str
+        Person who authorizes the report.
+    """
+
+    number: str = _key(_text, "")
+    address: tuple[str, ...] = _key(_texts, ())
+    client: tuple[str, ...] = _key(_texts, ())
+    item: str = _key(_text, "")
+    state: str = _key(_text, "")
+    received: str = _key(_date, "")
+    issued: str = _key(_date, "")
+    place: str = _key(_text, "")
+    procedure: str = _key(_text, "")
+    deviations: str = _key(_text, "")
+    humidity: float | None = _key(partial(_number, 0.0, 100.0))
+    pressure: float | None = _key(partial(_number, 5e4, 1.2e5))
+    accreditation: str = _key(_text, "")
+    accreditation_mark: str = _key(_text, "")
+    authorized_by: str = _key(_text, "")
+
+
+@dataclass(frozen=True)
+class Properties:
+    """Properties of the ball that are stated, not assessed (ISO 10140-5, annex F).
+
+    Attributes
+    ----------
+    diameter, wall_thickness : float or None
+        Outer diameter and wall thickness, m.
+    hardness, surface : str
+        Hardness with its scale, and condition of the surface.
+    temperature : float or None
+        Temperature of the ball, degC, if not that of the air.
+    """
+
+    diameter: float | None = _key(partial(_number, 0.01, 10.0))
+    wall_thickness: float | None = _key(partial(_number, 1e-4, 1.0))
+    hardness: str = _key(_text, "")
+    surface: str = _key(_text, "")
+    temperature: float | None = _key(partial(_number, -273.15, 200.0))
+
+
+def _table_of(kind: type[Any], value: object, key: str) -> Any:  # noqa: ANN401 - of `kind`
+    if isinstance(value, kind):
+        return value
+    return kind(**_checked(_table(value, key), kind, f"{key}: "))
 
 
 @dataclass(frozen=True)
@@ -165,9 +376,13 @@ class Config:
         Source whose limits apply.
     temperature : float or None
         Temperature of ball and air, degC.
-    instruments : tuple of str
+    instruments : tuple of str or Instrument
         Instruments.
-    channel, unit, polarity, sample_rate, calibration
+    report : ReportConfig
+        What the report states besides the results.
+    properties : Properties
+        Properties of the ball that are stated, not assessed.
+    channel, channels, unit, polarity, sample_rate, calibration
         As for `open_signals`.
     calibration_uncertainty : float or None
         Relative standard uncertainty of the force; by default that of the `Calibration`.
@@ -177,6 +392,15 @@ class Config:
         Their standard uncertainties, kg and m.
     plate : PlateConfig or None
         The force plate.
+    filter : FilterConfig or None
+        The low-pass filter of the recorder.
+    drops : str or None
+        Numbers of the drops to be measured, such as ``"1-5, 8"``; all by default. They count over
+        all files.
+    leave_out : mapping
+        Numbers of drops to be left out, with the reason: ``{"3": "touched"}``.
+    begin, end : float or None
+        Section of each file that is searched for drops, s.
     low_pass : bool
         Whether levels are those of the force below 1.25 kHz.
     limits : mapping
@@ -186,13 +410,18 @@ class Config:
     laboratory: str = _key(_text, "")
     ball: str = _key(_text, "")
     serial: str = _key(_text, "")
-    date: str = _key(_text, "")
+    date: str = _key(_day, "")
     source: LimitsSource = _key(partial(_choice, SOURCES), SOURCES[0])
     temperature: float | None = _key(partial(_number, -273.15, 200.0))
-    instruments: tuple[str, ...] = _key(_texts, ())
+    instruments: tuple[str | Instrument, ...] = _key(_instruments, ())
+    report: ReportConfig = _key(partial(_table_of, ReportConfig), ReportConfig())
+    properties: Properties = _key(partial(_table_of, Properties), Properties())
     channel: int | str | None = _key(_channel)
+    channels: str | tuple[int | str, ...] | None = _key(require_channels)
     unit: str | None = _key(require_unit)
-    calibration: Calibration | str | float | None = _key(_calibration)
+    calibration: Calibration | str | float | tuple[Calibration | str | float, ...] | None = _key(
+        _calibrations
+    )
     calibration_uncertainty: float | None = _key(partial(_number, 0.0, 0.5))
     polarity: str | None = _key(partial(_choice, POLARITIES))
     sample_rate: float | None = _key(partial(_number, 1.0, 1e9))
@@ -201,6 +430,11 @@ class Config:
     mass_uncertainty: float | None = _key(partial(_number, 0.0, 100.0))
     height_uncertainty: float | None = _key(partial(_number, 0.0, 10.0))
     plate: PlateConfig | None = _key(_plate)
+    filter: FilterConfig | None = _key(_filter)
+    drops: str | None = _key(_numbers)
+    leave_out: Mapping[str, str] = field(default_factory=dict, metadata={"check": _reasons})
+    begin: float | None = _key(partial(_number, 0.0, 1e9))
+    end: float | None = _key(partial(_number, 0.0, 1e9))
     low_pass: bool = _key(_flag, default=False)
     limits: Mapping[str, tuple[float, float]] = field(
         default_factory=dict, metadata={"check": _limits}
@@ -212,7 +446,23 @@ class Config:
         plate = self.plate
         if plate is None or plate.f0 is None or plate.Q is None:
             return None
-        return Plate(plate.f0, plate.Q, frequency_uncertainty=plate.f0_uncertainty or 0.0)
+        return Plate(plate.f0, plate.Q, plate.f0_uncertainty or 0.0, plate.share)
+
+    @property
+    def recorder_filter(self) -> RecorderFilter | None:
+        """The filter to be corrected; an unknown uncertainty counts as zero."""
+        stated = self.filter
+        if stated is None or stated.order is None or stated.cutoff is None:
+            return None
+        kind: Any = stated.kind
+        return RecorderFilter(kind, stated.order, stated.cutoff, stated.cutoff_uncertainty or 0.0)
+
+    @property
+    def chain(self) -> Chain | None:
+        """The instruments whose responses are corrected."""
+        stated = (self.resonance, self.recorder_filter)
+        instruments = tuple(instrument for instrument in stated if instrument is not None)
+        return Chain(instruments) if instruments else None
 
     def conditions(self, calibration: float | None) -> DropConditions:
         """Return the conditions of the drops; an unknown uncertainty counts as zero."""
@@ -223,6 +473,19 @@ class Config:
             self.mass_uncertainty or 0.0,
             self.height_uncertainty or 0.0,
         )
+
+    def check_due(self, dates: Iterable[str]) -> list[str]:
+        """Return a warning for each instrument whose calibration was due before the measurement.
+
+        `dates` are those of the files, which count if no date is stated.
+        """
+        days = [read_date(text) for text in ([self.date] if self.date else dates)]
+        last = max((day.date().isoformat() for day in days if day), default="")
+        return [
+            f"{item.name}: its calibration was due on {item.due}, before the measurement"
+            for item in self.instruments
+            if isinstance(item, Instrument) and item.due and item.due < last
+        ]
 
     @property
     def plate_checks(self) -> tuple[PlateCheck, ...]:
@@ -236,6 +499,14 @@ class Config:
             full_scale=plate.full_scale,
             linearity=plate.linearity or None,
         )
+
+
+def config_from(table: Mapping[str, object], prefix: str = "") -> Config:
+    """Return the configuration of a table as in a file; messages begin with `prefix`.
+
+    Raise InputError if a key is unknown, or its value of the wrong type or out of range.
+    """
+    return Config(**_checked(table, Config, prefix))
 
 
 def read_config(path: str | os.PathLike[str]) -> Config:
@@ -255,7 +526,27 @@ def read_config(path: str | os.PathLike[str]) -> Config:
         refuse(
             f"{name}: is not valid TOML ({shown_text(error)})", 'lines such as unit = "V"', error
         )
-    return Config(**_checked(table, Config, f"{name}: "))
+    config = config_from(table, f"{name}: ")
+    mark = config.report.accreditation_mark
+    if not mark:
+        return config
+    path = file.parent / mark
+    picture(path)
+    return replace(config, report=replace(config.report, accreditation_mark=str(path)))
+
+
+def picture(path: Path) -> tuple[str, bytes]:
+    """Return media type and content of a picture; raise InputError if it cannot be used."""
+    kind = PICTURES.get(path.suffix.lower().replace(".jpeg", ".jpg"))
+    allowed = f"{', '.join(PICTURES)} up to {MAX_PICTURE // 1000} kB"
+    problem = f"report: accreditation_mark = {shown(str(path))} cannot be used"
+    try:
+        content = path.read_bytes() if kind and path.stat().st_size <= MAX_PICTURE else b""
+    except (OSError, ValueError) as error:
+        refuse(f"{problem} ({shown_text(error)})", allowed, error)
+    if not kind or not content:
+        refuse(f"{problem} ({'too large or empty' if kind else 'no picture'})", allowed)
+    return kind, content
 
 
 def checked_config(config: Config) -> Config:

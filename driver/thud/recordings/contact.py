@@ -12,17 +12,17 @@ from scipy.ndimage import convolve1d, uniform_filter1d
 
 from thud.base.immutable import Immutable
 from thud.level.estimate import Estimate
-from thud.level.levels import RECORDED_BAND
+from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.flanks import SMOOTHING, Flank, Posterior, find_touch
 from thud.recordings.noise import Background, fit_background
-from thud.recordings.plate import correct_plate
+from thud.recordings.response import correct_force
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.recordings.drops import Window
     from thud.recordings.noise import Cells
-    from thud.recordings.plate import Plate
+    from thud.recordings.response import Chain
 
 # Maximum length of the background on either side of the contact, s. A longer background lowers the
 # noise of the offset by less than 5 %.
@@ -47,12 +47,17 @@ CONTACT_CELL = 2e-4
 # more at low rates, at which the anti-aliasing filter is close to the octave of 500 Hz.
 GATE_SAMPLES = 8
 GATE_RATE = 10_000.0
-# Duration of the impulse response of a force plate's correction before and after the impulse, in
-# periods of the resonance.
-PLATE_PERIODS = 2.0
-# Error of begin and end due to content above the corrected frequencies, in periods of the
-# resonance.
-PLATE_ERROR = 0.03
+# Duration of the impulse response of a correction before and after the impulse, in periods of the
+# highest corrected frequency.
+CORRECTION_PERIODS = 4.0
+# Error of begin and end due to content above the corrected frequencies, in periods of the highest.
+CORRECTION_ERROR = 0.06
+# Number of positions of a background within a quantization step.
+N_PHASE = 16
+# Weights of neighboring samples that give values between the steps.
+NO_GRID = np.array([0.21, 0.58, 0.21])
+# Fraction of the peak at which a contact begins and ends (`thud.impact.contact_time`).
+BEGIN = 0.01
 # Errors of samples due to quantization and the filter of the recorder, as a fraction of the peak.
 SAMPLE_ERROR = 2e-4
 
@@ -107,6 +112,32 @@ class Contact(Immutable):
         first = self.span[0]
         return self.force[self.gate[0] - first : self.gate[1] - first]
 
+    @property
+    def quantization_errors(self) -> NDArray[np.float64]:
+        """Possible errors of the force in the gate by quantization, N, [n_phase, n]; empty if none.
+
+        They are those of the low-passed force for evenly spaced positions of the background
+        within its step. Noise lowers them like the error of the offset.
+        """
+        quantization = self.background.quantization
+        if not quantization.offset:
+            return np.empty((0, len(self.gated)))
+        time = np.arange(*self.gate) / self.sample_rate
+        is_contact = (time >= self.touch.value) & (time <= self.release.value)
+        # Without smoothing, forces that are multiples of the step would have no error.
+        smooth = np.convolve(low_pass(self.gated, self.sample_rate), NO_GRID, mode="same")
+        force = smooth * is_contact / quantization.step
+        phases = ((np.arange(N_PHASE) + 0.5) / N_PHASE - 0.5)[:, None]
+        errors = np.rint(force + phases) - force
+        return np.asarray(math.sqrt(12) * quantization.offset * errors)
+
+    @property
+    def quantization_impulse(self) -> float:
+        """Standard deviation of the impulse by quantization, N s."""
+        impulses = self.quantization_errors.sum(axis=1) / self.sample_rate
+        offset = self.background.quantization.offset * (self.end.value - self.begin.value)
+        return max(float(impulses.std()), offset) if impulses.size else 0.0
+
     def summed(self, functionals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return functionals of the samples of the gate, [k, n], summed in cells: [k, n_cell]."""
         bounds = np.rint(np.linspace(0, functionals.shape[1], len(self.covariance) + 1))
@@ -144,9 +175,9 @@ def _background_bounds(length: int, rate: float) -> NDArray[np.intp]:
     return indices[indices <= length]
 
 
-def _spread(rate: float, plate: Plate | None) -> int:
+def _spread(rate: float, chain: Chain | None) -> int:
     """Return the number of samples by which filters spread a flank."""
-    periods = int(PLATE_PERIODS * rate / plate.frequency / 2) if plate else 0
+    periods = int(CORRECTION_PERIODS * rate / chain.highest / 2) if chain else 0
     return int((GATE_RATE / rate) ** 2) + periods
 
 
@@ -182,8 +213,8 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
     (t0, s0), begin = edges.touch.edge_times()
     (t1, s1), end = edges.release.edge_times()
     t1 = -t1
-    plate_error = PLATE_ERROR / window.plate.frequency if window.plate else 0.0
-    margin = GATE_SAMPLES + _spread(rate, window.plate)
+    correction_error = CORRECTION_ERROR / window.chain.highest if window.chain else 0.0
+    margin = GATE_SAMPLES + _spread(rate, window.chain)
     gate = (
         max(int((t0 - 3 * s0) * rate) - margin, 0),
         min(int((t1 + 3 * s1) * rate) + margin + 1, len(force)),
@@ -198,14 +229,22 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
     time = np.arange(*span) / rate - middle
     removed = np.interp(time, (cells[0] + cells[1]) / 2, background.predict_mean(cells))
     removed += edges.offset
+    corrected = force[slice(*span)] - removed
+    errors = [
+        math.hypot(correction_error, _step_error(background, flank, rate))
+        for flank in (
+            corrected[max(int(begin[0] * rate), 0) - span[0] :],
+            corrected[: int(-end[0] * rate) + 1 - span[0]][::-1],
+        )
+    ]
     return Contact(
         Estimate(t0, s0),
         Estimate(t1, s1),
-        Estimate(begin[0], math.hypot(begin[1], plate_error)),
-        Estimate(-end[0], math.hypot(end[1], plate_error)),
+        Estimate(begin[0], math.hypot(begin[1], errors[0])),
+        Estimate(-end[0], math.hypot(end[1], errors[1])),
         background.peak,
         span,
-        force[slice(*span)] - removed,
+        corrected,
         removed,
         gate,
         covariance,
@@ -213,6 +252,19 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
         background,
         rate,
     )
+
+
+def _step_error(background: Background, flank: NDArray[np.float64], rate: float) -> float:
+    """Return the standard deviation of an edge by quantization, s.
+
+    The flank, N, begins at the edge. Where the background lies within a step, offset and samples
+    are uncertain by half a step and a step: the edge by the time that the force needs for both.
+    """
+    step, offset = background.quantization.step, background.quantization.offset
+    if not offset:
+        return 0.0
+    above = np.flatnonzero(flank > BEGIN * background.peak + 1.5 * step)
+    return offset / step * float(above[0] if above.size else flank.size) / rate
 
 
 def find_edges(
@@ -239,8 +291,11 @@ def find_edges(
         cells, mean = background_means(force, before_stop, after_start, rate, middle)
         if noise is None:
             noise = fit_background(cells, mean, peak)
-        background = Background(cells, mean, noise.draws, peak)
-        fixed = Background(cells, mean, noise.variances[None], peak)
+            draws, quantization = noise.draws.copy(), window.quantization
+            draws[:, 0] = np.maximum(draws[:, 0], quantization.density)
+            noise = Background(cells, mean, draws, peak, quantization)
+        background = Background(cells, mean, noise.draws, peak, noise.quantization)
+        fixed = Background(cells, mean, noise.variances[None], peak, noise.quantization)
         posteriors = []
         for sign, background_end, pulse_end, interval in (
             (1, before_stop, first, touch),
@@ -252,7 +307,7 @@ def find_edges(
                 sign * background_end, search, end, rate, fine=pass_index > 0
             )
             posteriors.append(
-                find_posterior(force, bounds, search, fixed, rate, middle, searches, window.plate)
+                find_posterior(force, bounds, search, fixed, rate, middle, searches, window.chain)
             )
         if pass_index + 1 < passes:
             touch, reverse = (
@@ -260,7 +315,7 @@ def find_edges(
             )
             release = (-reverse[1], -reverse[0])
             # Samples into which filters spread the flanks are no background.
-            spread = _spread(rate, window.plate)
+            spread = _spread(rate, window.chain)
             before_stop = max(int(touch[0] * rate) - spread, first // 2)
             after_start = min(int(release[1] * rate) + 1 + spread, (stop + len(force) + 1) // 2)
     return Edges(posteriors[0], posteriors[1], background, offset, (before_stop, after_start))
@@ -301,7 +356,7 @@ def find_posterior(  # noqa: PLR0913, PLR0917 - all of them describe one flank
     rate: float,
     middle: float,
     searches: int,
-    plate: Plate | None = None,
+    chain: Chain | None = None,
 ) -> Posterior:
     """Return the posterior of the touch within an interval, s, from cells with bounds in samples.
 
@@ -318,29 +373,30 @@ def find_posterior(  # noqa: PLR0913, PLR0917 - all of them describe one flank
     value = _means(smooth, bounds - bounds[0]) - mean
     # Weights of the samples in the smoothed means.
     count = np.diff(bounds)
-    kernel = SMOOTHING if plate is None else np.convolve(SMOOTHING, _response(plate, rate))
+    kernel = SMOOTHING if chain is None else np.convolve(SMOOTHING, _response(chain, rate))
     margin = len(kernel) // 2
     weights = np.zeros((len(count), bounds[-1] - bounds[0] + 2 * margin))
     weights[np.repeat(np.arange(len(count)), count), margin + np.arange(count.sum())] = 1
     weights = convolve1d(weights / count[:, None], kernel, mode="constant")
+    covariance += background.quantization.offset**2
     covariance += background.variances[0] * rate / 2 * weights @ weights.T
     covariance += (SAMPLE_ERROR * background.peak) ** 2 * np.eye(len(value))
     time = (cells[0] + cells[1]) / 2 + middle
     if reversed_:
         time, value, covariance = -time[::-1], value[::-1], covariance[::-1, ::-1]
     flank = Flank(
-        time, value, covariance, background.peak, 1 / rate, release=bool(reversed_), plate=plate
+        time, value, covariance, background.peak, 1 / rate, release=bool(reversed_), chain=chain
     )
     return find_touch(flank, *interval, searches)
 
 
 @lru_cache(maxsize=4)
-def _response(plate: Plate, rate: float) -> NDArray[np.float64]:
-    """Return the impulse response of a force plate's correction; the impulse is in the middle."""
-    length = int(PLATE_PERIODS * rate / plate.frequency)
+def _response(chain: Chain, rate: float) -> NDArray[np.float64]:
+    """Return the impulse response of a correction; the impulse is in the middle."""
+    length = int(CORRECTION_PERIODS * rate / chain.highest)
     impulse = np.zeros(2 * length + 1)
     impulse[length] = 1
-    return correct_plate(impulse, rate, plate)
+    return correct_force(impulse, rate, chain)
 
 
 def flank_bounds(

@@ -11,13 +11,14 @@ from scipy.ndimage import uniform_filter1d
 from tqdm import tqdm
 
 from thud.base.checks import refuse
+from thud.recordings.quantization import Quantization
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
-    from thud.recordings.plate import Plate
+    from thud.recordings.response import Chain
     from thud.recordings.signal import Signal
 
 # Pulses are searched in means over cells, each CELL seconds long, in pieces of PIECE cells. Pieces
@@ -45,6 +46,12 @@ MAX_GAP = 4
 MIN_HEIGHT = 0.03
 # Duration of a pulse above half its peak, s: contacts of balls and tyres last 12 to 40 ms.
 DURATIONS = (0.003, 0.06)
+# A pulse is neither a drop nor its bounce, but a tap, a knock or a step, if its peak is below this
+# fraction of that of the highest drop, or of the previous contact; or if the forces before and
+# after it differ by this fraction of its peak, and it is not one of two that overlap.
+MIN_DROP = 0.25
+MIN_BOUNCE = 0.15
+MAX_CHANGE = 0.3
 # Two peaks are two impacts if the force between them falls below this fraction of the lower peak.
 VALLEY = 0.3
 # A pulse whose peak reaches this fraction of the previous peak is a new drop. The limits of the
@@ -78,8 +85,10 @@ class Window:
         Windows of the bounces after the drop.
     warnings : tuple of str
         Possible faults of the pulse as a whole.
-    plate : Plate or None
-        Force plate whose resonance was corrected in the signal.
+    chain : Chain or None
+        Instruments whose responses were corrected in the signal.
+    quantization : Quantization
+        Errors of the recorded force by quantization.
     """
 
     name: str
@@ -89,7 +98,8 @@ class Window:
     contact: tuple[int, int]
     bounces: tuple[Window, ...] = ()
     warnings: tuple[str, ...] = ()
-    plate: Plate | None = None
+    chain: Chain | None = None
+    quantization: Quantization = field(default_factory=Quantization)
 
     @property
     def sample_rate(self) -> float:
@@ -104,30 +114,43 @@ class Window:
 
 @dataclass
 class _Pulse:
-    """One pulse: first and stop index in the signal, and its height, N."""
+    """One pulse: first and stop index in the signal, its height, N, and whether the force stays."""
 
     start: int
     stop: int
     peak: float
+    is_step: bool
     bounces: list[_Pulse] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
 
-def find_windows(signal: Signal, *, progress: bool = False) -> list[Window]:
-    """Return the windows of the drops in a signal, in order.
+@dataclass(frozen=True)
+class Search:
+    """Windows of the drops in a signal, in order, and a sentence on each pulse that is no drop."""
+
+    windows: list[Window]
+    ignored: tuple[str, ...]
+
+
+def search_drops(
+    signal: Signal, begin: float = 0.0, end: float = math.inf, *, progress: bool = False
+) -> Search:
+    """Return the drops in a signal between two times, s.
 
     The signal is read twice: in blocks for the search, then around each drop. Raise InputError if
     there is no impact, or the rate is too low.
     """
     rate, name = signal.sample_rate, signal.name
+    first_sample = min(int(begin * rate), signal.n_sample)
+    stop_sample = int(min(end * rate, signal.n_sample))
     if not rate >= MIN_RATE:
         refuse(f"{name}: sample_rate = {rate:g} Hz is too low", f"at least {MIN_RATE:g} Hz")
     pulses: list[_Pulse] = []
     width = max(1, round(rate * CELL))
-    for first, cells in _pieces(signal, progress=progress):
+    for first, cells in _pieces(signal, first_sample, stop_sample, progress=progress):
         # Pulses that the end of a piece may cut are left to the next piece; the last accepts all.
         accept_until = first + (len(cells) - OVERLAP // 2) * width
-        if first + len(cells) * width >= signal.n_sample:
+        if first + len(cells) * width >= stop_sample:
             accept_until = first + (len(cells) + OVERLAP) * width
         last = pulses[-1].stop if pulses else 0
         pulses += [
@@ -135,25 +158,29 @@ def find_windows(signal: Signal, *, progress: bool = False) -> list[Window]:
         ]
     highest = max((p.peak for p in pulses), default=0.0)
     pulses = [pulse for pulse in pulses if pulse.peak > MIN_HEIGHT * highest]
-    if not pulses:
+    drops, ignored = _assign_bounces(pulses, rate)
+    if not drops:
         refuse(f"{name}: no impact", "a pulse of 12 to 40 ms that rises above the noise")
-    return list(_windows(signal, pulses))
+    windows = list(_windows(signal, drops, pulses, first_sample, stop_sample))
+    return Search(windows, tuple(f"{text} is no drop" for text in ignored))
 
 
-def _pieces(signal: Signal, *, progress: bool) -> Iterator[tuple[int, NDArray[np.float64]]]:
+def _pieces(
+    signal: Signal, first_sample: int, stop_sample: int, *, progress: bool
+) -> Iterator[tuple[int, NDArray[np.float64]]]:
     """Yield the index of the first sample and the cell means of each piece of a signal."""
     width = max(1, round(signal.sample_rate * CELL))
     cells = np.empty(0)
-    first_cell = 0
+    first = first_sample
     bar = tqdm(
-        total=signal.n_sample, unit="sample", unit_scale=True, desc=signal.name,
+        total=stop_sample - first_sample, unit="sample", unit_scale=True, desc=signal.name,
         disable=not progress,
     )  # fmt: skip
     block = 4_096 * width
     n_collected = 0
     means: list[NDArray[np.float64]] = []
-    for start in range(0, signal.n_sample, block):
-        stop = min(start + block, signal.n_sample)
+    for start in range(first_sample, stop_sample, block):
+        stop = min(start + block, stop_sample)
         force = signal.read(start, stop)
         n_in_cells = len(force) // width * width
         means.append(force[:n_in_cells].reshape(-1, width).mean(1))
@@ -161,10 +188,10 @@ def _pieces(signal: Signal, *, progress: bool) -> Iterator[tuple[int, NDArray[np
             means.append(force[n_in_cells:].mean(keepdims=True))
         n_collected += math.ceil(len(force) / width)
         bar.update(stop - start)
-        if n_collected + len(cells) >= PIECE or stop == signal.n_sample:
+        if n_collected + len(cells) >= PIECE or stop == stop_sample:
             cells = np.concatenate([cells, *means])
-            yield first_cell * width, cells
-            first_cell += max(len(cells) - OVERLAP, 0)
+            yield first, cells
+            first += max(len(cells) - OVERLAP, 0) * width
             cells, means, n_collected = cells[-OVERLAP:], [], 0
     bar.close()
 
@@ -219,7 +246,8 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]
         stop = _find_edge(corrected, high, 1, FOOT * peak) + 1 + MARGIN
         warning = _double_peak_warning(corrected[max(group[0], earliest) : group[-1] + 1])
         span = first + start * width, first + stop * width
-        pulses.append(_Pulse(*span, peak, warnings=[warning] if warning else []))
+        is_step = not warning and abs(backgrounds[1] - backgrounds[0]) > MAX_CHANGE * peak
+        pulses.append(_Pulse(*span, peak, is_step, warnings=[warning] if warning else []))
     return pulses
 
 
@@ -250,18 +278,25 @@ def _double_peak_warning(envelope: NDArray[np.float64]) -> str:
     return ""
 
 
-def _windows(signal: Signal, pulses: list[_Pulse]) -> Iterator[Window]:
+def _assign_bounces(pulses: list[_Pulse], rate: float) -> tuple[list[_Pulse], list[str]]:
+    """Return the drops with their bounces, and a sentence on each pulse that is neither."""
     drops: list[_Pulse] = []
+    ignored: list[str] = []
     flight = MAX_FLIGHT
     before: _Pulse | None = None
+    highest = max((pulse.peak for pulse in pulses if not pulse.is_step), default=0.0)
     for pulse in pulses:
-        gap = np.inf if before is None else (pulse.start - before.stop) / signal.sample_rate
+        gap = np.inf if before is None else (pulse.start - before.stop) / rate
         bounced = (
             before is not None
             and gap < 1.02 * flight
             and pulse.peak < NEW_DROP * before.peak
             and gap > MIN_FLIGHT
         )
+        lowest = MIN_BOUNCE * before.peak if bounced and before else MIN_DROP * highest
+        if pulse.is_step or pulse.peak < lowest:
+            ignored.append(f"a pulse of {pulse.peak:.0f} N at {pulse.start / rate:.2f} s")
+            continue
         if bounced:
             drops[-1].bounces.append(pulse)
             flight = gap
@@ -269,17 +304,28 @@ def _windows(signal: Signal, pulses: list[_Pulse]) -> Iterator[Window]:
             drops.append(pulse)
             flight = MAX_FLIGHT
         before = pulse
+    return drops, ignored
+
+
+def _windows(
+    signal: Signal,
+    drops: list[_Pulse],
+    pulses: list[_Pulse],
+    first_sample: int,
+    stop_sample: int,
+) -> Iterator[Window]:
+    """Yield the windows of drops, which end before the pulses next to them."""
     indices = {id(p): k for k, p in enumerate(pulses)}
 
     def cut(pulse: _Pulse, name: str) -> Window:
         k = indices[id(pulse)]
         guard = round(2 * CELL * signal.sample_rate)
-        low = pulses[k - 1].stop + guard if k else 0
-        high = pulses[k + 1].start - guard if k + 1 < len(pulses) else signal.n_sample
+        low = pulses[k - 1].stop + guard if k else first_sample
+        high = pulses[k + 1].start - guard if k + 1 < len(pulses) else stop_sample
         low = max(low, pulse.start - round(BEFORE * signal.sample_rate))
-        high = min(high, pulse.stop + round(AFTER * signal.sample_rate), signal.n_sample)
-        low, high = min(low, pulse.start), max(high, min(pulse.stop, signal.n_sample))
-        contact = (pulse.start - low, min(pulse.stop, signal.n_sample) - low)
+        high = min(high, pulse.stop + round(AFTER * signal.sample_rate), stop_sample)
+        low, high = min(low, pulse.start), max(high, min(pulse.stop, stop_sample))
+        contact = (pulse.start - low, min(pulse.stop, stop_sample) - low)
         return Window(name, signal, low, high, contact, (), tuple(pulse.warnings))
 
     for k, drop in enumerate(drops, start=1):

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.recordings.drops import Window
+    from thud.recordings.signal import Signal
 
 # Minimum length of the background on either side, s and samples.
 MIN_BACKGROUND = 1e-3
@@ -26,6 +27,8 @@ CLIPPED_FRACTION = 0.999
 # Minimum jump into or out of the equal samples of a dropout, as a fraction of the peak force: no
 # flank rises as much between two samples at 20 kHz.
 MIN_JUMP = 0.04
+# Minimum jump in quantization steps.
+MIN_STEPS = 3.5
 # Minimum number of equal samples of a dropout.
 MIN_FROZEN = 3
 # Maximum total length of dropouts that are repaired, s.
@@ -50,8 +53,8 @@ def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[
         if warning.startswith("two impacts"):
             refuse(f"{name}: {warning}", "one impact, with background before and after it")
     force = window.force
-    _refuse_clipped(window, force)
-    return _fill(window, force)
+    refuse_clipped(window, force)
+    return fill_dropouts(window, force)
 
 
 def min_background(rate: float) -> int:
@@ -65,7 +68,8 @@ def _runs(force: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp
     return starts, np.diff(np.append(starts, len(force)))
 
 
-def _refuse_clipped(window: Window, record: NDArray[np.float64]) -> None:
+def refuse_clipped(window: Window, record: NDArray[np.float64]) -> None:
+    """Raise InputError if the top of a recorded force, N, is clipped."""
     first, stop = window.contact
     force = record[first:stop]
     starts, lengths = _runs(force)
@@ -92,10 +96,13 @@ def _refuse_clipped(window: Window, record: NDArray[np.float64]) -> None:
         )
 
 
-def _fill(
-    window: Window, force: NDArray[np.float64]
+def fill_dropouts(
+    window: Window, force: NDArray[np.float64], peak: float | None = None
 ) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
-    """Return the force with dropouts interpolated, notes, and warnings."""
+    """Return the force with dropouts interpolated, notes, and warnings.
+
+    A jump of a dropout is relative to the peak, N: that of the force, if None.
+    """
     first, stop = window.contact
     rate = window.sample_rate
     margin = int(MIN_BACKGROUND * rate)
@@ -110,9 +117,13 @@ def _fill(
     before = np.abs(pulse[starts] - pulse[np.maximum(starts - 1, 0)])
     ends = starts + lengths - 1
     after = np.abs(pulse[np.minimum(ends + 1, len(pulse) - 1)] - pulse[ends])
-    limit = MIN_JUMP * pulse.max()
+    limit = MIN_JUMP * (pulse.max() if peak is None else peak)
+    limit = max(limit, MIN_STEPS * window.quantization.step)
     zero = (force[first:stop][starts] == 0) & (before > limit) & (after > limit)
-    frozen = (lengths >= MIN_FROZEN) & ((before > limit) | (after > limit))
+    # A constant background next to a steep flank is no dropout: it has one jump.
+    is_background = np.abs(pulse[starts]) < limit / 2
+    jumps = (before > limit).astype(int) + (after > limit)
+    frozen = (lengths >= MIN_FROZEN) & (jumps > is_background)
     lost = np.flatnonzero(zero | frozen)
     total = int(lengths[lost].sum())
     if not total:
@@ -131,3 +142,14 @@ def _fill(
         (f"{summary} were filled by linear interpolation",),
         (f"the contact has {summary}",),
     )
+
+
+def read_repaired(
+    signal: Signal, begin: int, repaired: NDArray[np.float64], start: int, stop: int
+) -> NDArray[np.float64]:
+    """Return a force, N, from start to before stop, with repaired samples from `begin` on."""
+    force = signal.read(start, stop)
+    first, last = max(start, begin), min(stop, begin + len(repaired))
+    if first < last:
+        force[first - start : last - start] = repaired[first - begin : last - begin]
+    return force

@@ -16,7 +16,7 @@ from thud.impact.contact_time import AVERAGING_WIDTH, THRESHOLD, average_within
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.recordings.plate import Plate
+    from thud.recordings.response import Chain
 
 # A flank is a sum of shapes, t in ms since the touch: a jump, a jump that a filter spreads over a
 # sampling interval, powers t**n, a steep rise 1 - exp(-t / RISE_TIME), a parabola, and a random
@@ -109,7 +109,7 @@ SMOOTHING = np.array([0.25, 0.5, 0.25])
 TICK = 1e-3
 BEFORE = 2.0
 AFTER = 13.0
-# Margin of the table on either side, ms: the response of the plate wraps around the ends.
+# Margin of the table on either side, ms: the response of the correction wraps around the ends.
 GUARD = 4.0
 # Times after the touch at which draws are evaluated, ms.
 DELAY = np.concatenate([np.linspace(0, 0.5, 51), np.linspace(0.55, 4, 70)])
@@ -131,8 +131,8 @@ class Flank:
         Peak force, N.
     interval : float
         Sampling interval, s.
-    plate : Plate or None
-        Force plate whose resonance was corrected.
+    chain : Chain or None
+        Instruments whose responses were corrected.
     """
 
     time: NDArray[np.float64]
@@ -141,7 +141,7 @@ class Flank:
     peak: float
     interval: float
     release: bool
-    plate: Plate | None = None
+    chain: Chain | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,7 +230,7 @@ def find_touch(flank: Flank, low: float, high: float, searches: int) -> Posterio
             factor, np.eye(len(relative_force)), lower=True, check_finite=False
         )
         whitening.append(inverse)
-    table = _table(1e3 * flank.interval, flank.plate)
+    table = _table(1e3 * flank.interval, flank.chain)
     kinds = np.arange(len(KINDS))
     for search in range(searches):
         time = np.linspace(low, high, N_TIME)
@@ -308,16 +308,16 @@ def _normal_draws(count: int) -> NDArray[np.float64]:
 
 
 @lru_cache(maxsize=4)
-def _table(interval: float, plate: Plate | None) -> NDArray[np.float64]:
+def _table(interval: float, chain: Chain | None) -> NDArray[np.float64]:
     """Return the smoothed shapes of a flank at ticks around the touch: [n_tick, n_column]."""
     ticks = np.arange(-round((BEFORE + GUARD) / TICK), round((AFTER + GUARD) / TICK))
     tau = np.asarray(TICK * ticks, dtype=np.float64)
     total = np.zeros((len(tau), SPREADS.shape[1]))
     for weight, shift in zip(SMOOTHING, (-1, 0, 1), strict=True):
         total += weight * _shapes(tau + shift * interval, interval)
-    if plate is not None:
+    if chain is not None:
         frequency = np.asarray(np.fft.rfftfreq(len(tau), 1e-3 * TICK), dtype=np.float64)
-        spectrum = np.fft.rfft(total, axis=0) * plate.passed(frequency)[:, None]
+        spectrum = np.fft.rfft(total, axis=0) * chain.passed(frequency)[:, None]
         total = np.fft.irfft(spectrum, len(tau), axis=0)
     guard = round(GUARD / TICK)
     # A view would keep the guard in memory.

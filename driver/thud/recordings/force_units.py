@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -34,6 +34,7 @@ EXAMPLES = "such as 250 (N per unit), '250 N/V', '4.1 pC/N, 10 mV/pC', '10 V/FS,
 FACTOR = re.compile(
     r"(?P<value>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<top>[^\s/]+)\s*/\s*(?P<bottom>.+)"
 )
+T = TypeVar("T")
 # Maximum number of factors in a chain, and range of N per unit.
 MAX_FACTORS = 8
 SIZES = (1e-30, 1e30)
@@ -45,6 +46,31 @@ class Factor(NamedTuple):
     value: float
     top: str
     bottom: str
+
+
+class TimeConstant(NamedTuple):
+    """Time constant of an amplifier, s, from a record of a known force.
+
+    Attributes
+    ----------
+    value : float
+        Time constant, s; infinite if the record shows no droop.
+    uncertainty : float
+        Its relative standard uncertainty.
+    minimum : float
+        Value, s, above which it lies with a probability of 95 %.
+    """
+
+    value: float
+    uncertainty: float
+    minimum: float
+
+    def __str__(self) -> str:
+        """Return a sentence for reports."""
+        if math.isinf(self.value):
+            return f"no droop: a time constant above {self.minimum:.2g} s"
+        exact = f", standard uncertainty {100 * self.uncertainty:.2g} %" * (self.uncertainty > 0)
+        return f"droop with a time constant of {self.value:.4g} s{exact}, taken off"
 
 
 @dataclass(frozen=True)
@@ -60,11 +86,14 @@ class Calibration:
         Relative standard uncertainty; None if unknown.
     origin : str
         Where the calibration comes from, for reports.
+    time_constant : TimeConstant or None
+        Time constant of the amplifier, if the calibration comes from a record of a known force.
     """
 
     chain: str
     uncertainty: float | None = None
     origin: str = ""
+    time_constant: TimeConstant | None = None
 
     def __post_init__(self) -> None:
         """Raise InputError if the chain or the uncertainty are not allowed."""
@@ -115,6 +144,26 @@ def read_chain(text: object) -> list[Factor]:
     if not 1 <= len(factors) <= MAX_FACTORS:
         refuse(f"calibration: {len(factors)} factors", f"1 to {MAX_FACTORS}, {EXAMPLES}")
     return factors
+
+
+def plain_number(calibration: T) -> T | float:
+    """Return a calibration, as a number if it is the text of one."""
+    try:
+        return float(calibration) if isinstance(calibration, str) else calibration
+    except ValueError:
+        return calibration
+
+
+def unit_of_chain(chain: str) -> str:
+    """Return the base unit from which a chain converts to newtons; empty if it is not clear.
+
+    >>> unit_of_chain("4.1 pC/N, 10 mV/pC")
+    'V'
+    """
+    factors = read_chain(chain)
+    units = {unit for factor in factors for unit in (factor.top, factor.bottom)} - {"N"}
+    ends = [unit for unit in units if _follow(unit, factors, None) is not None]
+    return ends[0] if len(ends) == 1 else ""
 
 
 def newtons_per_unit(

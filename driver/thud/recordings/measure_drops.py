@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from concurrent.futures import BrokenExecutor
 from contextlib import AbstractContextManager, ExitStack, nullcontext
@@ -15,11 +16,21 @@ from tqdm import tqdm
 from thud.base.checks import refuse
 from thud.base.errors import NumericalError
 from thud.base.processes import no_interrupt_in_processes, process_pool
+from thud.recordings.assumptions import with_assumptions
 from thud.recordings.checkpoint import Checkpoint
-from thud.recordings.drops import find_windows
+from thud.recordings.choice import choose, require_chosen
+from thud.recordings.drops import search_drops
+from thud.recordings.load_cells import repair_cells
 from thud.recordings.measured_drop import measure_drop
-from thud.recordings.plate import correct_window
-from thud.recordings.ringing import check_ringing
+from thud.recordings.quantization import find_quantization
+from thud.recordings.response import correct_window
+from thud.recordings.ringing import find_ringing, is_in_record
+from thud.recordings.same_drops import (
+    Record,
+    refuse_copy,
+    refuse_same_drops,
+    refuse_simultaneous_channels,
+)
 
 if TYPE_CHECKING:
     import os
@@ -51,10 +62,11 @@ class Origin:
     drops: int
 
     @classmethod
-    def of(cls, signal: Signal, drops: int) -> Origin:
-        """Return the origin of a number of drops of a signal."""
+    def of(cls, signal: Signal, drops: int, notes: tuple[str, ...]) -> Origin:
+        """Return the origin of a number of drops of a signal, with notes on others."""
         names = (field.name for field in fields(cls)[:-1])
-        return cls(**{name: getattr(signal, name) for name in names}, drops=drops)
+        origin = cls(**{name: getattr(signal, name) for name in names}, drops=drops)
+        return replace(origin, steps=(*origin.steps, *notes))
 
 
 def measure_signals(
@@ -68,12 +80,14 @@ def measure_signals(
     """Return the drops of signals, their origins, and the relative uncertainty of the force.
 
     The uncertainty is the largest of all signals, None if it is unknown for any of them. The
-    arguments are those of `read_recording`. Raise InputError if there are no signals, or a drop
-    cannot be measured.
+    arguments are those of `read_recording`. Raise InputError if there are no signals, a drop
+    cannot be measured, or two signals record the same drop.
     """
-    drops: list[Drop] = []
+    records: list[Record] = []
+    searched: list[tuple[str, list[Window]]] = []
     origins: list[Origin] = []
     uncertainties: list[float | None] = []
+    count = 0
     # BLAS threads slow down the many small matrix products.
     if isinstance(checkpoint, Checkpoint):
         opened: AbstractContextManager[Checkpoint] = nullcontext(checkpoint)
@@ -83,18 +97,30 @@ def measure_signals(
         for signal in signals:
             if config.calibration_uncertainty is not None:
                 signal = replace(signal, calibration_uncertainty=config.calibration_uncertainty)  # noqa: PLW2901
+            refuse_copy(signal, records)
             # The processes start during the search for drops.
             if signal.path and signal.n_sample > MIN_DURATION * signal.sample_rate:
                 processes.start()
-            windows = find_windows(signal, progress=progress)
-            drops += _measure(windows, config, stored, processes, progress=progress)
+            search = search_drops(
+                signal, config.begin or 0.0, config.end or math.inf, progress=progress
+            )
+            windows, left_out = choose(search.windows, count + 1, config.drops, config.leave_out)
+            count += len(search.windows)
+            refuse_simultaneous_channels(search.windows, searched)
+            searched.append((signal.path, search.windows))
+            measured = _measure(windows, config, stored, processes, progress=progress)
+            notes = (*search.ignored, *left_out)
+            records.append(Record(signal.name, signal.path, signal.checksum, tuple(measured)))
             uncertainties.append(signal.calibration_uncertainty)
-            origins.append(Origin.of(signal, len(windows)))
-    if not drops:
+            origins.append(Origin.of(signal, len(windows), notes))
+    if not records:
         refuse("there are no recordings", "one file or more")
+    require_chosen(count, sum(len(r.drops) for r in records), config.drops, config.leave_out)
+    refuse_same_drops(records)
     known = [uncertainty for uncertainty in uncertainties if uncertainty is not None]
     uncertainty = max(known) if len(known) == len(uncertainties) else None
-    return tuple(drops), tuple(origins), uncertainty
+    drops = tuple(drop for record in records for drop in record.drops)
+    return drops, tuple(origins), uncertainty
 
 
 def _measure(
@@ -106,6 +132,8 @@ def _measure(
     progress: bool,
 ) -> list[Drop]:
     """Return the drops in the windows of one signal, including those of the checkpoint."""
+    if not windows:
+        return []
     signal = windows[0].signal
     measured = checkpoint.open(signal, config)
     remaining = [window for window in windows if window.start not in measured]
@@ -166,17 +194,25 @@ class _Processes(ExitStack):
 
 
 def measure_window(window: Window, config: Config) -> Drop:
-    """Return the drop in a window, after correction of the resonance of the force plate."""
+    """Return the drop in a window, after correction of the responses of the instruments."""
     steps, warnings = tuple[str, ...](), tuple[str, ...]()
-    plate = config.resonance
-    if plate is not None:
-        window, steps, warnings = correct_window(window, plate)
+    window = replace(window, quantization=find_quantization(window))
+    if window.signal.cells:
+        window, steps, warnings = repair_cells(window)
+    chain, plate, recorded = config.chain, config.resonance, window
+    if chain is not None:
+        window, notes, remarks = correct_window(window, chain)
+        steps, warnings = (*steps, *notes), (*warnings, *remarks)
     drop = measure_drop(window, config.conditions(window.signal.calibration_uncertainty))
     # A copy without the cached factors of the background, which are no longer needed.
     contact = replace(drop.contact, background=replace(drop.contact.background))
-    return replace(
+    ringing = find_ringing(contact, chain)
+    drop = replace(
         drop,
         contact=contact,
         steps=(*steps, *drop.steps),
-        warnings=(*warnings, *drop.warnings, *check_ringing(contact, plate)),
+        warnings=(*warnings, *drop.warnings, *([str(ringing)] if ringing else [])),
+        ringing=ringing,
+        plate_recorded=None if plate is None else is_in_record(recorded, contact, plate),
     )
+    return with_assumptions(drop, config)

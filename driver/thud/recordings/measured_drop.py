@@ -6,8 +6,8 @@ Derivations: docs/recordings_theory.md.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,14 +18,19 @@ from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.contact import Contact, estimate_limits, find_contact
 from thud.recordings.faults import min_background, repair
 from thud.recordings.noise import Noise
+from thud.recordings.offset_step import find_offset_step, step_errors
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.restitution import BOUNCES, GRAVITY, DropConditions
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
     from thud.recordings.drops import Window
+    from thud.recordings.response import Chain
+    from thud.recordings.ringing import Ringing
 
 # Number of draws of noise for its effect on the maximum.
 PEAK_DRAWS = 32
@@ -42,6 +47,8 @@ MIN_CONTACT_RATIO = 4.0
 # Maximum factor between the restitution by flight and the ratio of the peaks. Beyond it a pulse is
 # no bounce, because the force follows the velocity.
 MAX_BOUNCE_RATIO = 3.0
+# Deviation of the offset by quantization, as a fraction of the peak, that raises a warning.
+MAX_OFFSET = 5e-4
 # Minimum drift and hum that are noted, in standard deviations.
 MIN_DEVIATIONS = 3.0
 # Quantities of `QUANTITIES` that are estimated for each drop.
@@ -69,8 +76,8 @@ class Drop(Immutable):
     contact_time, restitution, peak_force, impulse, effective_mass : Estimate
         Units: s (`thud.impact.contact_time`), 1, N (below 1.25 kHz), N s and kg. NaN if unknown.
     shared_effects : dict of str to float
-        Change of the restitution by one standard uncertainty of calibration, mass and drop height,
-        which all drops share and the uncertainty of the restitution excludes.
+        Change of the restitution by one standard uncertainty of calibration, mass, drop height and
+        quantized background, which all drops share and the uncertainty of the restitution excludes.
     restitution_method : str
         ``"impulse"``, ``"bounces"``, ``"impulse and bounces"`` or ``""``.
     restitutions : dict of str to Estimate
@@ -84,6 +91,13 @@ class Drop(Immutable):
         Processing of the signal, and possible faults, a sentence each.
     contact : Contact
         Times, background and gate of the contact.
+    offset_step : float
+        Change of the offset during the contact, N; zero if there is none.
+    ringing : Ringing or None
+        Ringing of the plate after the contact.
+    plate_recorded : bool or None
+        Whether the resonance of the stated plate is in the record; None if unclear, or none is
+        stated.
     """
 
     name: str
@@ -105,6 +119,9 @@ class Drop(Immutable):
     steps: tuple[str, ...]
     warnings: tuple[str, ...]
     contact: Contact
+    offset_step: float = 0.0
+    ringing: Ringing | None = None
+    plate_recorded: bool | None = None
 
     @property
     def time(self) -> NDArray[np.float64]:
@@ -147,7 +164,14 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
             f"{1e3 * contact_time.uncertainty:.2g} ms",
             f"an uncertainty up to 1/{MIN_CONTACT_RATIO:g} of it",
         )
-    impulse = _impulse(contact)
+    offset_step = find_offset_step(contact)
+    if offset_step:
+        changed = (
+            f"the offset changes by {offset_step:.3g} N during the contact; its effect is in the "
+            "uncertainty"
+        )
+        warnings += (changed,)
+    impulse = _with_step(_impulse(contact), np.sum, offset_step, contact, 1 / contact.sample_rate)
     # The first flight gives the restitution; without the height two flights are compared.
     landings = _landings(window, contact, 1 if conditions.height else 2)
     if conditions.height and landings:
@@ -164,7 +188,7 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
     ends = [contact.end, *(end for _, end in landings)]
     flights = [_between(end, begin) for end, (begin, _) in zip(ends, landings, strict=False)]
     methods, unknown = conditions.restitutions(impulse, contact_time, flights)
-    restitution, shared = conditions.mean(methods, impulse)
+    restitution, shared = conditions.mean(methods, impulse, contact.quantization_impulse)
     rate, first = window.sample_rate, contact.span[0]
     return Drop(
         name=window.name,
@@ -178,13 +202,20 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
         shared_effects=shared,
         restitution_method=" and ".join(methods),
         restitutions=methods,
-        peak_force=_peak(contact),
+        peak_force=_with_step(_peak(contact), _largest, offset_step, contact),
+        offset_step=offset_step,
         impulse=impulse,
         effective_mass=conditions.effective_mass(impulse, contact_time, methods.get(BOUNCES)),
         noise=_noise(contact),
         bounces=tuple(begin.value - contact.touch.value for begin, _ in landings),
         steps=(*steps, *_removed(contact)),
-        warnings=(*window.warnings, *warnings, *_check_aliasing(contact), *unknown),
+        warnings=(
+            *window.warnings,
+            *warnings,
+            *_check_aliasing(contact, window.chain),
+            *_check_step(window, contact),
+            *unknown,
+        ),
         contact=contact,
     )
 
@@ -224,6 +255,25 @@ def _impulse(contact: Contact) -> Estimate:
     return Estimate(float((ones @ contact.gated)[0]), math.sqrt(variance))
 
 
+def _with_step(
+    estimate: Estimate,
+    quantity: Callable[..., Any],
+    step: float,
+    contact: Contact,
+    factor: float = 1.0,
+) -> Estimate:
+    """Return an estimate whose uncertainty includes that of the instant of an offset step."""
+    if not step:
+        return estimate
+    errors = quantity(step_errors(step, len(contact.gated)), axis=1)
+    half_width = factor * float(np.abs(errors).max())
+    return replace(estimate, uncertainty=math.hypot(estimate.uncertainty, half_width / 3**0.5))
+
+
+def _largest(errors: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
+    return np.asarray(np.abs(errors).max(axis=axis))
+
+
 def _peak(contact: Contact) -> Estimate:
     """Return the maximum of the force below 1.25 kHz, N, corrected for the bias due to noise.
 
@@ -239,7 +289,8 @@ def _peak(contact: Contact) -> Estimate:
     maxima = [low_pass(force + noise, contact.sample_rate).max() for noise in draws]
     bias = max(float(np.mean(maxima) - low.max()), 0.0)
     variance = density * min(RECORDED_BAND, contact.sample_rate / 2) + bias**2
-    variance += contact.covariance[cell, cell]
+    # The top stays within a step for some time: its error is that of the offset again.
+    variance += contact.covariance[cell, cell] + 2 * contact.background.quantization.offset**2
     return Estimate(float(low.max()) - bias, math.sqrt(variance))
 
 
@@ -264,10 +315,23 @@ def _removed(contact: Contact) -> tuple[str, ...]:
     return tuple(steps)
 
 
-def _check_aliasing(contact: Contact) -> tuple[str, ...]:
+def _check_step(window: Window, contact: Contact) -> tuple[str, ...]:
+    """Return a warning if the background of a coarse record lies within a quantization step."""
+    step, offset = window.quantization.step, contact.background.quantization.offset
+    if offset < MAX_OFFSET * contact.peak:
+        return ()
+    warning = (
+        f"the record has steps of {step:.3g} N, and the background lies within one of them: the "
+        f"offset is uncertain by {offset:.2g} N; measure with a smaller range"
+    )
+    return (warning,)
+
+
+def _check_aliasing(contact: Contact, chain: Chain | None) -> tuple[str, ...]:
     """Return a warning if content above half the rate may alias into the octave of 500 Hz.
 
-    The amplitude of a pulse with kinks is assumed to fall as 1/f**2 above half the rate.
+    The amplitude of a pulse with kinks is assumed to fall as 1/f**2 above half the rate; stated
+    instruments reduce it further.
     """
     rate = contact.sample_rate
     lower, upper = OCTAVE_500
@@ -279,6 +343,8 @@ def _check_aliasing(contact: Contact) -> tuple[str, ...]:
     octave_power = power[(frequency > lower) & (frequency < upper)].mean()
     top = max(power[frequency > ALIASED_FRACTION * rate].mean() - 3 * noise, 0.0)
     folded = top * (0.45 * rate / (rate - upper)) ** 4
+    if chain is not None:
+        folded *= abs(chain.response(np.array([rate - upper]))[0]) ** 2
     error = 20 * math.log10(1 + math.sqrt(folded / octave_power))
     if error < MAX_ALIASING_ERROR:
         return ()

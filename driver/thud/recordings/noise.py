@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
@@ -12,6 +12,7 @@ from scipy.special import chdtri, ndtri
 from scipy.stats import qmc
 
 from thud.base.immutable import Immutable
+from thud.recordings.quantization import Quantization
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -123,13 +124,14 @@ class Background(Immutable):
     `cells` are begins and ends of cells, s, and `mean`, [n_cell], their mean forces, N. Each row of
     `draws`, [n_draw, 5], has the densities of white, pink and brown noise, N2/Hz, and the variances
     of hum of 50 and of 60 Hz, N2; if they are known, there is one row. The peak force, N, scales
-    the priors.
+    the priors. The predictions exclude the errors by `quantization`.
     """
 
     cells: Cells
     mean: NDArray[np.float64]
     draws: NDArray[np.float64]
     peak: float
+    quantization: Quantization = field(default_factory=Quantization)
 
     @property
     def variances(self) -> NDArray[np.float64]:

@@ -1,18 +1,15 @@
-"""The force plate: correction of its first resonance, and the requirements of the standard."""
+"""The force plate: response of its first resonance, and the requirements of the standard."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.fft import next_fast_len
 
 from thud.base.checks import refuse, refuse_value, require_number
 from thud.level.levels import get_bands
-from thud.recordings.faults import repair
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,8 +17,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
-    from thud.recordings.drops import Window
-    from thud.recordings.signal import Signal
 
 # Requirements of the standard on a force plate: a flat response between these frequencies, Hz, and
 # up to this force, N, and linearity within this relative tolerance, which is used for flatness too.
@@ -31,27 +26,27 @@ TOLERANCE = 0.02
 # Minimum ratio 1/r of resonance and highest band edge: an error of 1 % of the resonance causes an
 # error of 2 r**2 / (1 - r**2) = 2 % of the force at this edge, the tolerance of the standard.
 MIN_RATIO = math.sqrt(2)
-# Ratio of maximum corrected frequency and resonance: there the correction amplifies the noise by 3.
-MAX_CORRECTED = 2.0
-# Length of the margin for ringing on either side of a section: periods per quality factor.
+# Duration of the ringing of a plate: periods per quality factor.
 RINGING = 2.0
 
 
 @dataclass(frozen=True)
 class Plate:
-    """A force plate as a mass on a spring, whose deformation is measured.
+    """A force plate whose first mode of vibration is excited by the force on it.
 
-    Attributes are the frequency of the first resonance, Hz, its quality factor, and the relative
-    standard uncertainty of the frequency.
+    Attributes are the frequency of the first resonance, Hz, its quality factor, the relative
+    standard uncertainty of the frequency, and the share of the mode in the static response: 1 for a
+    mass on a spring, whose deformation is measured.
     """
 
     frequency: float
     quality: float
     frequency_uncertainty: float = 0.0
+    share: float = 1.0
 
     def __post_init__(self) -> None:
         """Raise InputError for impossible values."""
-        for name in ("frequency", "quality", "frequency_uncertainty"):
+        for name in ("frequency", "quality", "frequency_uncertainty", "share"):
             require_number(f"plate: {name}", getattr(self, name))
         if self.frequency <= 0:
             refuse_value("plate: frequency", self.frequency, "frequency > 0, Hz")
@@ -59,36 +54,52 @@ class Plate:
             refuse_value("plate: quality", self.quality, "quality > 0")
         if not 0 <= self.frequency_uncertainty < 1:
             refuse_value("plate: frequency_uncertainty", self.frequency_uncertainty, "0 to 1")
+        if not 0 < self.share <= 1:
+            refuse_value("plate: share", self.share, "share > 0, up to 1")
 
     def response(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Return the ratio of measured and applied force, at frequencies in Hz."""
         ratio = frequency / self.frequency
-        return np.asarray(1 / (1 - ratio**2 + 1j * ratio / self.quality))
+        return np.asarray(1 + self.share * (1 / (1 - ratio**2 + 1j * ratio / self.quality) - 1))
 
-    def passed(self, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the fraction of the force after the correction, at frequencies in Hz."""
-        octaves = np.log2(np.maximum(frequency, 1e-9) / (MAX_CORRECTED * self.frequency))
-        return np.asarray(np.cos(np.pi / 2 * np.clip(octaves, 0, 1)) ** 2)
+    @property
+    def highest(self) -> float:
+        """Highest corrected frequency, Hz: above the resonance the response falls to 1/3 there."""
+        return self.frequency * math.sqrt(1 + self.share / (4 / 3 - self.share))
 
-    def correction(self, sample_rate: float) -> str:
-        """Describe the correction by `correct_plate` at a sample rate, Hz."""
-        highest = min(MAX_CORRECTED * self.frequency, sample_rate / 2)
+    @property
+    def decay(self) -> float:
+        """Duration of the ringing, s."""
+        return RINGING * self.quality / self.frequency
+
+    def describe(self, sample_rate: float) -> str:
+        """Describe the correction at a sample rate, Hz."""
+        highest = min(self.highest, sample_rate / 2)
         gain = 1 / abs(self.response(np.array([highest]))[0])
         return (
             f"force plate: resonance of {self.frequency:.4g} Hz, quality {self.quality:g}, "
             f"corrected up to {highest:.4g} Hz; noise there times {gain:.2g}"
         )
 
+    def require_above(self, edge: float) -> None:
+        """Raise InputError if the resonance is below 1.41 times the highest edge of bands, Hz."""
+        if self.frequency < MIN_RATIO * edge:
+            refuse(
+                f"plate: the resonance, {self.frequency:.4g} Hz, is too close to the bands, which "
+                f"reach up to {edge:.4g} Hz, for a correction",
+                f"{MIN_RATIO * edge:.4g} Hz or more",
+            )
+
     def level_uncertainty(self, bands: BandSet = "octave") -> NDArray[np.float64]:
         """Return the standard uncertainty of corrected levels due to that of the resonance, dB.
 
         At the upper edge of each band, r times the resonance, a relative error of the resonance
-        changes the force by 2 r**2 / (1 - r**2) times as much.
+        changes the response of the mode by 2 r**2 / (1 - r**2) times as much.
         """
         square = (get_bands(bands).upper / self.frequency) ** 2
-        return np.asarray(
-            20 / math.log(10) * 2 * square / np.abs(1 - square) * self.frequency_uncertainty
-        )
+        mode = self.share / (1 - square)
+        change = 2 * square / (1 - square) * mode / (1 - self.share + mode)
+        return np.asarray(20 / math.log(10) * np.abs(change) * self.frequency_uncertainty)
 
 
 @dataclass(frozen=True)
@@ -101,75 +112,6 @@ class PlateCheck:
     requirement: str
     met: bool | None
     reason: str
-
-
-def correct_plate(
-    force: NDArray[np.float64], sample_rate: float, plate: Plate, bands: BandSet = "third"
-) -> NDArray[np.float64]:
-    """Return the force that was applied to a plate, N, shape (n_sample,), from the measured one.
-
-    F = F_m + F_m' / (w0 Q) + F_m'' / w0**2, by the Fourier transform. This is exact up to twice the
-    resonance; above, it would only amplify noise, and is reduced to zero within an octave. The
-    measured force, N, has background at both ends; the rate is in Hz. Raise InputError if the
-    resonance is below 1.41 times the highest edge of the bands.
-    """
-    edge = get_bands(bands).upper[-1]
-    if plate.frequency < MIN_RATIO * edge:
-        refuse(
-            f"plate: the resonance, {plate.frequency:.4g} Hz, is too close to the bands, which "
-            f"reach up to {edge:.4g} Hz, for a correction",
-            f"{MIN_RATIO * edge:.4g} Hz or more",
-        )
-    # The impulse response decays within some periods of the highest corrected frequency.
-    margin = math.ceil(20 * sample_rate / (MAX_CORRECTED * plate.frequency))
-    padded = np.pad(force, margin, mode="edge")
-    length = next_fast_len(len(padded) + margin, real=True)
-    frequency = np.asarray(np.fft.rfftfreq(length, 1 / sample_rate), dtype=np.float64)
-    # The transform is periodic: without the first value, its ends meet without a step.
-    origin = padded[0]
-    spectrum = np.fft.rfft(padded - origin, length) / plate.response(frequency)
-    spectrum *= plate.passed(frequency)
-    corrected: NDArray[np.float64] = (
-        np.fft.irfft(spectrum, length)[margin : margin + len(force)] + origin
-    )
-    return corrected
-
-
-def correct_window(window: Window, plate: Plate) -> tuple[Window, tuple[str, ...], tuple[str, ...]]:
-    """Return a window of the force that was applied to a plate, the processing, and warnings.
-
-    Raise InputError if the pulse is cut off, clipped or doubled, or has long dropouts.
-    """
-    # Faults must be found in the recorded force; the correction would make a dropout ring.
-    force, steps, warnings = repair(window)
-    repaired = replace(
-        window.signal, samples=partial(_read_repaired, window.signal, window.start, force)
-    )
-    applied = replace(
-        window.signal, samples=partial(_read_corrected, repaired, plate), full_scale=None
-    )
-    bounces = tuple(replace(bounce, signal=applied, plate=plate) for bounce in window.bounces)
-    steps += (plate.correction(window.sample_rate),)
-    return replace(window, signal=applied, bounces=bounces, plate=plate), steps, warnings
-
-
-def _read_corrected(signal: Signal, plate: Plate, start: int, stop: int) -> NDArray[np.float64]:
-    rate = signal.sample_rate
-    margin = math.ceil(RINGING * plate.quality * rate / plate.frequency)
-    first, last = max(start - margin, 0), min(stop + margin, signal.n_sample)
-    corrected = correct_plate(signal.read(first, last), rate, plate)
-    return corrected[start - first : stop - first]
-
-
-def _read_repaired(
-    signal: Signal, begin: int, repaired: NDArray[np.float64], start: int, stop: int
-) -> NDArray[np.float64]:
-    """Return a force, N, from start to before stop, with repaired samples from `begin` on."""
-    force = signal.read(start, stop)
-    first, last = max(start, begin), min(stop, begin + len(repaired))
-    if first < last:
-        force[first - start : last - start] = repaired[first - begin : last - begin]
-    return force
 
 
 def check_plate(

@@ -13,7 +13,7 @@ from thud.recordings.recording import Recording
 from thud.recordings.signal_files import open_signals
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping, Sequence
 
     from thud.base._schema import LimitsSource
     from thud.recordings.checkpoint import Checkpoint
@@ -28,11 +28,16 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     mass_uncertainty: float | None = None,
     source: LimitsSource | None = None,
     channel: int | str | None = None,
+    channels: str | Sequence[int | str] | None = None,
     unit: str | None = None,
-    calibration: float | str | None = None,
+    calibration: float | str | Sequence[float | str] | None = None,
     calibration_uncertainty: float | None = None,
     polarity: str | None = None,
     sample_rate: float | None = None,
+    drops: str | None = None,
+    leave_out: Mapping[str, str] | None = None,
+    begin: float | None = None,
+    end: float | None = None,
     low_pass: bool | None = None,
     config: Config | str | os.PathLike[str] | None = None,
     progress: bool = False,
@@ -53,10 +58,16 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
         Their standard uncertainties, m and kg.
     source
         Source whose limits apply, ``"rubber_ball"`` or ``"tyre"``.
-    channel, unit, calibration, polarity, sample_rate
+    channel, channels, unit, calibration, polarity, sample_rate
         As for `open_signals`.
     calibration_uncertainty
         Relative standard uncertainty of the force.
+    drops
+        Numbers of the drops to be measured, such as ``"1-5, 8"``. They count over all files.
+    leave_out
+        Numbers of drops to be left out, with the reason: ``{"3": "touched"}``.
+    begin, end
+        Section of each file that is searched for drops, s.
     low_pass
         Whether levels are those of the force below 1.25 kHz, as in the paper.
     config
@@ -83,12 +94,17 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     settings = config if isinstance(config, Config) else read_config(config) if config else Config()
     stated: dict[str, Any] = {
         "height": height, "mass": mass, "height_uncertainty": height_uncertainty,
-        "mass_uncertainty": mass_uncertainty, "source": source, "channel": channel, "unit": unit,
+        "mass_uncertainty": mass_uncertainty, "source": source, "channel": channel,
+        "channels": channels, "unit": unit,
         "calibration": calibration, "calibration_uncertainty": calibration_uncertainty,
         "polarity": polarity, "sample_rate": sample_rate, "low_pass": low_pass,
+        "drops": drops, "leave_out": leave_out, "begin": begin, "end": end,
     }  # fmt: skip
     stated = {key: value for key, value in stated.items() if value is not None}
     require_whole("workers", workers, 1, MAX_THREADS)
+    # Either choice of channels overrides both of the configuration.
+    if stated.keys() & {"channel", "channels"}:
+        settings = replace(settings, channel=None, channels=None)
     settings = replace(settings, **stated)
     files = [paths] if isinstance(paths, str | os.PathLike) else paths
     signals = (
@@ -97,6 +113,7 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
         for signal in open_signals(
             path,
             channel=settings.channel,
+            channels=settings.channels,
             unit=settings.unit,
             calibration=settings.calibration,
             polarity=settings.polarity,

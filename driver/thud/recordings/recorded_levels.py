@@ -7,18 +7,20 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import stdtrit
 
 from thud.base.checks import refuse, require_choice
 from thud.base.immutable import Immutable
 from thud.level.levels import force_exposure_levels, get_bands
 from thud.recordings.band_noise import band_noise
 from thud.recordings.filters import filter_levels, low_pass_attenuation, low_pass_force
-from thud.recordings.outliers import SIGNIFICANCE, Outlier, find_outliers
+from thud.recordings.offset_step import step_errors
+from thud.recordings.outliers import EXPANDED, SIGNIFICANCE, Outlier, find_outliers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from thud.base._schema import BandSet
     from thud.recordings.measured_drop import Drop
@@ -32,8 +34,8 @@ BACKGROUND = (6.0, 15.0)
 MARGIN = 3e-3
 # Change of a level per relative change of an energy, dB.
 ENERGY_DECIBEL = 10 / math.log(10)
-# Contributions that are independent between drops: the repeatability includes them.
-WITHIN_REPEATABILITY = ("noise",)
+# Contribution that is independent between drops: their scatter includes it.
+NOISE, REPEATABILITY = "noise", "repeatability"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +57,8 @@ class DropLevels(Immutable):
         ``"background"``: less than 6 dB above it, the level is an upper bound; ``"rate"``: NaN,
         the sample rate is too low for the band.
     contributions : dict of ndarray, shape (n_band,)
-        Standard uncertainties, dB: noise, method, filter.
+        Standard uncertainties, dB: noise, method, filter, offset step, and quantization if the
+        background lies within a step.
     steps : tuple of str
         Processing, a sentence each.
     """
@@ -94,7 +97,8 @@ class AverageLevels(Immutable):
         Standard deviation of the drops' levels, dB; NaN for a single drop.
     contributions : dict of ndarray, shape (n_band,)
         Standard uncertainties of the average, dB. The repeatability, with ``n_drop - 1`` degrees of
-        freedom, includes the noise, which is independent between drops.
+        freedom, includes the noise, which is independent between drops; `noise_exceeds` tells
+        which of the two counts.
     outliers : tuple of Outlier
         Drops that differ from the others.
     """
@@ -137,12 +141,12 @@ def measure_levels(
 def _drop_levels(
     drop: Drop, bands: BandSet, method: str, noise: NDArray[np.float64], *, low_pass: bool
 ) -> DropLevels:
-    """Return the levels of a drop from the energies of its noise, [n_band, 2]."""
+    """Return the levels of a drop from the energies of its noise, [n_band, 3]."""
     force, steps = _gated(drop, low_pass=low_pass)
     rate, edges = drop.sample_rate, get_bands(bands)
     exact = _levels(force, rate, bands, "exact")
     measured = exact if method == "exact" else _levels(force, rate, bands, method)
-    expected, deviation = noise.T
+    expected, deviation, offset = noise.T
     with np.errstate(divide="ignore"):
         background = 10 * np.log10(expected)
     level, flag = _corrected(measured, background)
@@ -150,12 +154,28 @@ def _drop_levels(
         "noise": ENERGY_DECIBEL * deviation / 10 ** (level / 10),
         "method": np.abs(measured - exact) / math.sqrt(3),
         "filter": low_pass_attenuation(edges.upper, rate) / math.sqrt(3) * low_pass,
+        "offset step": _step_uncertainty(drop, bands),
     }
+    if offset.any():
+        contributions["quantization"] = ENERGY_DECIBEL * offset / 10 ** (level / 10)
     steps = (*steps, f"levels: {_DESCRIPTIONS[method]}", *_background_steps(edges.nominal, flag))
     return DropLevels(
         drop.name, bands, method, level, _root_sum(contributions), measured, background, flag,
         contributions, steps,
     )  # fmt: skip
+
+
+def _step_uncertainty(drop: Drop, bands: BandSet) -> NDArray[np.float64]:
+    """Return the standard uncertainty due to a step of the offset during the contact, dB."""
+    if not drop.offset_step:
+        return np.zeros(len(get_bands(bands).nominal))
+    force = drop.force[slice(*drop.gate)]
+    exact = _levels(force, drop.sample_rate, bands, "exact")
+    changed = [
+        _levels(force + error, drop.sample_rate, bands, "exact")
+        for error in step_errors(drop.offset_step, len(force))
+    ]
+    return np.asarray(np.abs(np.array(changed) - exact).max(axis=0) / math.sqrt(3))
 
 
 def compare_methods(
@@ -186,24 +206,40 @@ def average_levels(estimates: Sequence[DropLevels]) -> AverageLevels:
     weights = 10 ** (drops / 10)
     weights /= weights.sum(axis=0)
     contributions = {}
-    for name in first.contributions:
-        weighted = weights * np.array([e.contributions[name] for e in estimates])
-        independent = name in WITHIN_REPEATABILITY
+    none = np.zeros(len(level))
+    for name in dict.fromkeys(name for e in estimates for name in e.contributions):
+        weighted = weights * np.array([e.contributions.get(name, none) for e in estimates])
         contributions[name] = (
-            np.sqrt((weighted**2).sum(axis=0)) if independent else weighted.sum(axis=0)
+            np.sqrt((weighted**2).sum(axis=0)) if name == NOISE else weighted.sum(axis=0)
         )
     if count > 1:
         error = energies.std(axis=0, ddof=1) / math.sqrt(count)
         error *= ENERGY_DECIBEL / 10 ** (level / 10)
-        contributions = {"repeatability": error, **contributions}
-    counted = {
-        n: c for n, c in contributions.items() if count == 1 or n not in WITHIN_REPEATABILITY
-    }
+        contributions = {REPEATABILITY: error, **contributions}
+        exceeds = noise_exceeds(error, contributions[NOISE], count)
+        counted = {
+            **contributions,
+            REPEATABILITY: np.where(exceeds, 0.0, error),
+            NOISE: np.where(exceeds, contributions[NOISE], 0.0),
+        }
+    else:
+        counted = contributions
     return AverageLevels(
         first.bands, first.method, tuple(e.name for e in estimates), drops, level, background,
         _root_sum(counted), flag, drops.std(axis=0, ddof=1) if count > 1 else unknown,
         contributions, _level_outliers(estimates, drops),
     )  # fmt: skip
+
+
+def noise_exceeds(scatter: ArrayLike, noise: ArrayLike, count: int) -> NDArray[np.bool_]:
+    """Whether the expanded uncertainty of a mean by noise exceeds that by scatter.
+
+    Both are standard uncertainties of the mean over a number of drops, above 1; the scatter has one
+    degree of freedom less. The scatter includes the noise, but may be small by chance.
+    """
+    return np.asarray(
+        EXPANDED * np.asarray(noise) > stdtrit(count - 1, 0.975) * np.asarray(scatter)
+    )
 
 
 _DESCRIPTIONS = {

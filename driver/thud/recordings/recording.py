@@ -16,6 +16,7 @@ from thud.base.extras import data_frame, require_extra
 from thud.case.case import Case
 from thud.level.assessment import assess_levels
 from thud.level.impact_result import DropForce
+from thud.recordings.assumptions import assumed_contributions, assumption_warnings
 from thud.recordings.budgets import check_restitution, drop_estimates, find_deviant, level_estimates
 from thud.recordings.config import Config, checked_config
 from thud.recordings.filters import describe_low_pass
@@ -247,10 +248,13 @@ class Recording(Displayed):
         warnings += [
             f"force plate: {check.reason}" for check in config.plate_checks if check.met is False
         ]
-        plate = config.resonance
+        warnings += config.check_due(origin.date for origin in self.origins)
+        warnings += assumption_warnings(self.drops, config)
+        plate, stated = config.resonance, config.recorder_filter
         missing = {
             "calibration": self.calibration_uncertainty is None,
             "resonance of the plate": plate is not None and not plate.frequency_uncertainty,
+            "cutoff of the filter": stated is not None and not stated.cutoff_uncertainty,
             "mass": config.mass is not None and config.mass_uncertainty is None,
             "drop height": config.height is not None and config.height_uncertainty is None,
         }
@@ -333,11 +337,10 @@ class Recording(Displayed):
 
     def level_estimates(self, bands: BandSet = "octave") -> tuple[Estimate, ...]:
         """Return the average levels with their uncertainty budgets, dB, shape (n_band,)."""
-        plate = self.config.resonance
         return level_estimates(
             self.average(bands),
             self.calibration_uncertainty,
-            plate.level_uncertainty(bands) if plate else None,
+            assumed_contributions(self.drops, self.config, bands),
         )
 
     def assess(

@@ -15,6 +15,11 @@ if TYPE_CHECKING:
 # Gravity, m/s2, the default of the models.
 GRAVITY = Drop.gravity
 IMPULSE, BOUNCES = "impulse", "bounces"
+# Maximum time between the end of the measured contact and the release, s, and maximum height by
+# which the center of a ball is lower or higher at the release than at first touch, m: finite
+# elements, modal ball and shell have up to 0.5 ms, and -2 to 4 mm.
+SLOW_RELEASE = 5e-4
+DEFORMATION = 4e-3
 
 
 @dataclass(frozen=True)
@@ -39,6 +44,15 @@ class DropConditions:
     def speed(self) -> float:
         """Velocity at first touch, m/s; NaN if the drop height is unknown."""
         return math.sqrt(2 * GRAVITY * self.height) if self.height else math.nan
+
+    @property
+    def uncertainties(self) -> dict[str, tuple[float, str]]:
+        """Standard uncertainty and its unit by the cause of a shared effect."""
+        return {
+            "calibration": (self.calibration_uncertainty, ""),
+            "mass": (self.mass_uncertainty, "kg"),
+            "drop height": (self.height_uncertainty, "m"),
+        }
 
     def restitutions(
         self, impulse: Estimate, contact_time: Estimate, flights: Sequence[Estimate]
@@ -67,9 +81,12 @@ class DropConditions:
         return methods, ()
 
     def shared_effects(
-        self, methods: dict[str, Estimate], impulse: Estimate
+        self, methods: dict[str, Estimate], impulse: Estimate, quantization_impulse: float = 0.0
     ) -> dict[str, dict[str, float]]:
-        """Return the change of each restitution due to one standard uncertainty of each cause."""
+        """Return the change of each restitution due to one standard uncertainty of each cause.
+
+        `quantization_impulse` is that of the impulse by quantization of the background, N s.
+        """
         effects: dict[str, dict[str, float]] = {}
         relative_speed_uncertainty = (
             self.height_uncertainty / (2 * self.height) if self.height else 0.0
@@ -80,13 +97,21 @@ class DropConditions:
                 "calibration": ratio * self.calibration_uncertainty,
                 "mass": -ratio * self.mass_uncertainty / (self.mass or math.nan),
                 "drop height": -(1 + methods[IMPULSE].value) * relative_speed_uncertainty,
+                "slow release": GRAVITY * SLOW_RELEASE / self.speed / math.sqrt(3),
+                "quantization": ratio * quantization_impulse / impulse.value,
             }
         if BOUNCES in methods:
-            effects[BOUNCES] = {"drop height": -methods[BOUNCES].value * relative_speed_uncertainty}
+            value = methods[BOUNCES].value
+            # A flight from a height d: t_f = 2 v1/g + d/v1.
+            lift = GRAVITY * DEFORMATION / (2 * value * self.speed**2)
+            effects[BOUNCES] = {
+                "drop height": -value * relative_speed_uncertainty,
+                "deformed ball": lift / math.sqrt(3),
+            }
         return effects
 
     def mean(
-        self, methods: dict[str, Estimate], impulse: Estimate
+        self, methods: dict[str, Estimate], impulse: Estimate, quantization_impulse: float = 0.0
     ) -> tuple[Estimate, dict[str, float]]:
         """Return the weighted mean over the methods, and the shared effects on this mean.
 
@@ -95,7 +120,7 @@ class DropConditions:
         """
         if not methods:
             return Estimate.unknown(), {}
-        effects = self.shared_effects(methods, impulse)
+        effects = self.shared_effects(methods, impulse, quantization_impulse)
         deviations = {name: max(estimate.uncertainty, 1e-12) for name, estimate in methods.items()}
         weights = {
             name: 1 / (deviations[name] ** 2 + sum(effect**2 for effect in effects[name].values()))

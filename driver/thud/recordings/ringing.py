@@ -1,17 +1,21 @@
-"""Ringing of the force plate after a contact, if its resonance is not corrected."""
+"""Resonance of the force plate in a record: ringing, and whether a stated plate is in it."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.fft import next_fast_len
+from scipy.optimize import least_squares
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.recordings.contact import Contact
+    from thud.recordings.drops import Window
     from thud.recordings.plate import Plate
+    from thud.recordings.response import Chain
 
 # Trial decay times of a ringing to 1/e, s.
 DECAYS = np.array([0.002, 0.004, 0.008, 0.016, 0.032])
@@ -26,63 +30,146 @@ MAX_FREQUENCY = 0.3
 MIN_ENERGY = 25.0
 # Minimum ratio to the energy before the contact: a tone that is there already is no ringing.
 MIN_INCREASE = 4.0
-# Minimum amplitude for a warning, as a fraction of the peak: without and with a stated plate.
+# Minimum amplitude for a warning, as a fraction of the peak: without and with a correction.
 MIN_AMPLITUDE = (3e-4, 1e-3)
 # Minimum quality factor, pi times the number of oscillations within the decay time.
 MIN_QUALITY = 3.0
+# Length of the fitted ringing, in decay times.
+LENGTH = 4.0
+# Maximum relative difference between a stated resonance and the ringing that confirms it.
+MATCH = 0.03
+# Frequencies below and above a resonance, as fractions of it, with which its energy is compared.
+SIDES = [(0.6, 0.8), (1.25, 1.5)]
+# Minimum ratio of the energies of pulse and noise for this comparison, and minimum logarithm of the
+# ratio of energies: 4 dB.
+MIN_SIGNAL = 4.0
+CLEAR = 0.9
 
 
-def check_ringing(contact: Contact, plate: Plate | None = None) -> tuple[str, ...]:
-    """Return a warning if the plate keeps ringing after the contact.
+@dataclass(frozen=True)
+class Ringing:
+    """A free oscillation of the plate after a contact.
+
+    Attributes are its frequency, Hz, its quality factor, its amplitude, N, and whether the response
+    of a stated plate was corrected.
+    """
+
+    frequency: float
+    quality: float
+    amplitude: float
+    corrected: bool
+
+    def __str__(self) -> str:
+        """Return a warning."""
+        effect = "affects levels, peaks and contact time"
+        if self.corrected:
+            effect = "differs from that in [plate]"
+        return (
+            f"the plate keeps ringing after the contact, at {self.frequency:.0f} Hz with "
+            f"{self.amplitude:.2g} N: its resonance {effect}; state it in [plate]: "
+            f"f0 = {self.frequency:.0f}, Q = {self.quality:.2g}"
+        )
+
+
+def find_ringing(contact: Contact, chain: Chain | None = None) -> Ringing | None:
+    """Return the ringing of the plate after a contact, None if there is none.
 
     A matched filter searches a free oscillation A exp(-t/d) cos(2 pi f t + p) after the gate, for
     the decay times d and all frequencies f. The density of the noise is that of the background,
-    times the gain of the plate's correction.
+    times the gain of the correction. Frequency and quality are those of the oscillation of least
+    squares.
     """
     rate, first = contact.sample_rate, contact.span[0]
     pause = int(PAUSE * rate)
     after = contact.force[contact.gate[1] - first + pause :]
     before = contact.force[: max(contact.gate[0] - first - pause, 0)][::-1]
     if len(after) < MIN_LENGTH * rate:
-        return ()
-    frequency, energy = _matched(after, contact, plate)
+        return None
+    frequency, energy = _matched(after, contact, chain)
     k, index = np.unravel_index(np.argmax(energy), energy.shape)
     resonance, decay = float(frequency[index]), float(DECAYS[k])
-    quality = np.pi * resonance * decay
     if not (MIN_FREQUENCY <= resonance <= MAX_FREQUENCY * rate and energy[k, index] > MIN_ENERGY):
-        return ()
-    if quality < MIN_QUALITY:
-        return ()
+        return None
+    if np.pi * resonance * decay < MIN_QUALITY:
+        return None
     if len(before) >= MIN_LENGTH * rate:
-        frequency_before, energy_before = _matched(before, contact, plate)
+        frequency_before, energy_before = _matched(before, contact, chain)
         nearest = int(np.argmin(np.abs(frequency_before - resonance)))
         tone = energy_before[k, max(nearest - 1, 0) : nearest + 2].max()
         if energy[k, index] < MIN_INCREASE * tone:
-            return ()
+            return None
     density, _ = contact.background.density(resonance)
-    density *= float(_gain(plate, np.array([resonance]))[0]) if plate else 1.0
+    density *= float(chain.noise_gain(np.array([resonance]))[0]) if chain else 1.0
     window = np.exp(-2 * np.arange(len(after)) / rate / decay).sum()
     amplitude = 2 * np.sqrt(energy[k, index] * density * rate / 2 / window)
-    if amplitude < MIN_AMPLITUDE[plate is not None] * contact.peak:
-        return ()
-    # Interpolation between the frequencies of the transform: the vertex of a parabola.
-    low, top, high = np.log(energy[k, index - 1 : index + 2])
-    resonance += (frequency[1] - frequency[0]) * (low - high) / (2 * (low - 2 * top + high))
-    effect = "differs from that in [plate]" if plate else "affects levels, peaks and contact time"
-    warning = (
-        f"the plate keeps ringing after the contact, at {resonance:.0f} Hz with {amplitude:.2g} N: "
-        f"its resonance {effect}; state it in [plate]"
+    if amplitude < MIN_AMPLITUDE[chain is not None] * contact.peak:
+        return None
+    resonance, quality = _fitted(after[: int(LENGTH * decay * rate)], rate, resonance, decay)
+    return Ringing(resonance, quality, float(amplitude), chain is not None)
+
+
+def _fitted(
+    force: NDArray[np.float64], rate: float, frequency: float, decay: float
+) -> tuple[float, float]:
+    """Return resonance, Hz, and quality factor of the free oscillation of least squares."""
+    time = np.arange(len(force)) / rate
+
+    def residual(shape: NDArray[np.float64]) -> NDArray[np.float64]:
+        wave = np.exp((2j * np.pi * shape[0] - 1 / shape[1]) * time)
+        waves = np.column_stack([wave.real, wave.imag])
+        amplitudes = np.linalg.lstsq(waves, force)[0]
+        return np.asarray(force - waves @ amplitudes)
+
+    start = np.array([frequency, decay])
+    bounds = (0.8 * start[0], 0.25 * start[1]), (1.25 * start[0], 4 * start[1])
+    frequency, decay = least_squares(residual, start, bounds=bounds, x_scale=start).x
+    # The free oscillation of a damped mode is slower than its resonance.
+    resonance = float(np.hypot(frequency, 1 / (2 * np.pi * decay)))
+    return resonance, float(np.pi * resonance * decay)
+
+
+def is_in_record(recorded: Window, contact: Contact, plate: Plate) -> bool | None:
+    """Return whether the resonance of a stated plate is in the recorded force; None if unclear.
+
+    It is if the recorded force rings at its frequency. Else the energy of the pulse near the
+    resonance is compared with that below and above it: where the plate resonates, the recorded
+    force has more, and the corrected force as much; where it does not, the corrected force has
+    less. This is unclear if noise hides the difference.
+    """
+    force = recorded.force[slice(*contact.span)] - contact.removed
+    raw = replace(contact, force=force)
+    ringing = find_ringing(raw)
+    tolerance = max(MATCH, 3 * plate.frequency_uncertainty)
+    if ringing and abs(ringing.frequency / plate.frequency - 1) < tolerance:
+        return True
+    edges = np.array(
+        [[max(1 - 0.5 / plate.quality, 0.9), min(1 + 0.5 / plate.quality, 1.1)], *SIDES]
     )
-    return (warning,)
-
-
-def _gain(plate: Plate, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the gain of the noise density by a plate's correction, at least 1."""
-    return np.asarray(np.maximum(1 / np.abs(plate.response(frequency)) ** 2, 1.0))
+    edges *= plate.frequency
+    if edges.max() > contact.sample_rate / 2:
+        return None
+    excess = []
+    for pulse in (raw, contact):
+        length = max(
+            len(pulse.gated), int(8 * plate.quality * contact.sample_rate / plate.frequency)
+        )
+        spectrum = np.abs(np.fft.rfft(pulse.gated, length) / contact.sample_rate) ** 2
+        frequency = np.fft.rfftfreq(length, 1 / contact.sample_rate)
+        energies = [
+            spectrum[(frequency >= low) & (frequency <= high)].mean() for low, high in edges
+        ]
+        if pulse is raw:
+            noise = contact.background.density(plate.frequency)[0] / 2
+            noise *= len(pulse.gated) / contact.sample_rate
+            if min(energies) < MIN_SIGNAL * noise:
+                return None
+        excess.append(abs(np.log(energies[0] / np.sqrt(energies[1] * energies[2]))))
+    difference = excess[0] - excess[1]
+    return None if abs(difference) < CLEAR else bool(difference > 0)
 
 
 def _matched(
-    force: NDArray[np.float64], contact: Contact, plate: Plate | None
+    force: NDArray[np.float64], contact: Contact, chain: Chain | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return frequencies, Hz, and the ratio of energy and noise by decay time and frequency."""
     rate = contact.sample_rate
@@ -92,7 +179,7 @@ def _matched(
     power = np.abs(np.fft.rfft(windows * force, length)[:, 1:]) ** 2
     white, pink, brown = contact.background.variances[:3]
     density = white + pink / frequency + brown / frequency**2
-    if plate is not None:
-        density *= _gain(plate, frequency)
+    if chain is not None:
+        density *= chain.noise_gain(frequency)
     noise = density * rate / 2 * (windows**2).sum(axis=1)[:, None]
     return frequency, np.asarray(power / noise)

@@ -48,6 +48,8 @@ class Signal(Immutable):
         Processing when the file was read, a sentence each.
     warnings : tuple of str
         Possible faults, a sentence each.
+    cells : tuple of Signal
+        Load cells whose sum this is.
     samples : callable
         Returns the force, N, shape (stop - start,), of the samples from start to before stop.
     """
@@ -63,6 +65,7 @@ class Signal(Immutable):
     calibration_uncertainty: float | None = None
     steps: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    cells: tuple[Signal, ...] = ()
 
     @classmethod
     def from_array(cls, force: ArrayLike, sample_rate: float, name: str = "recording") -> Signal:

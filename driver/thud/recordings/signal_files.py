@@ -5,12 +5,16 @@ from __future__ import annotations
 import errno
 import os
 import stat
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from thud.base.checks import refuse, require_choice, require_kind, require_number, shown
+from thud.base.errors import InputError
 from thud.recordings.channel import MIB, MIN_SAMPLES, Channel, shown_path, shown_text
 from thud.recordings.force_units import (
     ALLOWED,
@@ -19,17 +23,28 @@ from thud.recordings.force_units import (
     Calibration,
     find_unit,
     newtons_per_unit,
+    plain_number,
     require_unit,
+    unit_of_chain,
 )
 from thud.recordings.formats import read_channels
+from thud.recordings.load_cells import (
+    HINT,
+    SUM,
+    add_signals,
+    check_signs,
+    refuse_directions,
+    require_channels,
+)
 from thud.recordings.polarity import POLARITIES, check_peak, find_sign, scan
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    import numpy as np
     from numpy.typing import NDArray
+
+    AnyCalibration = float | str | Calibration
 
 # Minimum and maximum sample rate, Hz: the octave of 500 Hz needs 1.42 kHz and room for a filter.
 RATES = (2500.0, 1e8)
@@ -42,8 +57,9 @@ def open_signals(  # noqa: PLR0913 - the keys of the configuration
     path: str | os.PathLike[str],
     *,
     channel: int | str | None = None,
+    channels: str | Sequence[int | str] | None = None,
     unit: str | None = None,
-    calibration: float | str | Calibration | None = None,
+    calibration: AnyCalibration | Sequence[AnyCalibration] | None = None,
     polarity: str | None = None,
     sample_rate: float | None = None,
 ) -> list[Signal]:
@@ -56,10 +72,14 @@ def open_signals(  # noqa: PLR0913 - the keys of the configuration
     channel
         Number, from 1 (in tables that of the column), or name; by default all channels in units of
         force, or the only channel.
+    channels
+        Channels of load cells under one plate, whose forces are added: ``"sum"`` for all channels
+        in units of force (all channels, if none is), ``"F1+F2+F3+F4"``, or a list.
     unit
         Unit of the recorded values, if the file does not state it or is wrong.
     calibration
-        N per unit, a chain of factors such as ``"4.1 pC/N, 10 mV/pC"``, or a `Calibration`.
+        N per unit, a chain of factors such as ``"4.1 pC/N, 10 mV/pC"``, or a `Calibration`; with
+        `channels` also a list with one for each of them.
     polarity
         Sign of a compression in the file, ``"positive"`` or ``"negative"``; by default that of
         the larger peak.
@@ -81,13 +101,67 @@ def open_signals(  # noqa: PLR0913 - the keys of the configuration
     stated_unit = None if unit is None else require_unit(unit, "recording")
     if sample_rate is not None:
         require_number("sample_rate", sample_rate)
-    stated = _Stated(stated_unit, calibration, polarity, sample_rate)
+    if channel is not None and channels is not None:
+        refuse("recording: both channel and channels are stated", "one of them")
     file = regular_file(path)
-    channels = read_channels(file)
-    return [
-        _signal(file, entry, stated, several=len(channels) > 1)
-        for entry in choose_channels(channels, channel, shown_path(file))
-    ]
+    name = shown_path(file)
+    entries = read_channels(file)
+    if channels is not None:
+        cells = _choose_cells(entries, require_channels(channels), name)
+        each = _calibrations(calibration, len(cells), name)
+        stated = [_Stated(stated_unit, entry, polarity, sample_rate) for entry in each]
+        return [_sum(file, cells, stated)]
+    chosen = choose_channels(entries, channel, name)
+    each = _calibrations(calibration, 1, name)
+    result = _Stated(stated_unit, each[0], polarity, sample_rate)
+    try:
+        return [_signal(file, entry, result, several=len(entries) > 1) for entry in chosen]
+    except InputError as error:
+        if len(chosen) == 1:
+            raise
+        message = f"{error}; if several channels are forces: {HINT}"
+        raise InputError(message) from error
+
+
+def _calibrations(
+    calibration: AnyCalibration | Sequence[AnyCalibration] | None, count: int, name: str
+) -> Sequence[AnyCalibration | None]:
+    """Return a calibration for each of a number of channels."""
+    if isinstance(calibration, str) or not isinstance(calibration, Sequence):
+        return [plain_number(calibration)] * count
+    if len(calibration) != count:
+        refuse(
+            f"{name}: {len(calibration)} calibrations for {count} channel{'s' * (count > 1)}",
+            "one calibration, or one for each entry of channels",
+        )
+    return [plain_number(entry) for entry in calibration]
+
+
+def _choose_cells(
+    entries: list[Channel], channels: str | tuple[int | str, ...], name: str
+) -> list[Channel]:
+    """Return the channels of load cells; raise InputError if the selection is ambiguous."""
+    if isinstance(channels, tuple):
+        cells = [choose_channels(entries, channel, name)[0] for channel in channels]
+        if len({cell.number for cell in cells}) < len(cells):
+            refuse(f"{name}: channels = {shown(channels)} names one channel twice", "each once")
+        return cells
+    forces = [entry for entry in entries if _is_force(entry)]
+    cells = forces or entries
+    if len({cell.unit for cell in cells}) > 1 and not forces:
+        listed = ", ".join(f"{shown_text(cell.name)!r}" for cell in cells[:20])
+        refuse(
+            f'{name}: channels = "{SUM}" would add channels in different units',
+            f"names of channels, some of {listed}",
+        )
+    if len(cells) < 2:  # noqa: PLR2004 - a sum
+        refuse(f'{name}: channels = "{SUM}" finds {len(cells)} channel of force', "two or more")
+    refuse_directions([shown_text(cell.name) for cell in cells], name)
+    return cells
+
+
+def _is_force(channel: Channel) -> bool:
+    return UNITS.get(find_unit(channel.unit), ("",))[0] == "N"
 
 
 def regular_file(path: str | os.PathLike[str]) -> Path:
@@ -142,11 +216,11 @@ def choose_channels(channels: list[Channel], channel: int | str | None, name: st
         for entry in channels[:20]
     )
     if channel is None:
-        forces = [entry for entry in channels if UNITS.get(find_unit(entry.unit), ("",))[0] == "N"]
+        forces = [entry for entry in channels if _is_force(entry)]
         if not forces and len(channels) > 1:
             refuse(
                 f"{name}: has {len(channels)} channels, none of them in a unit of force",
-                f"channel = one of {choices}",
+                f'channel = one of {choices}; or channels = "{SUM}" for load cells of one plate',
             )
         return forces or channels
     matching = [entry for entry in channels if channel in {entry.number, entry.name}]
@@ -171,13 +245,64 @@ class _Stated:
     """What the user states about the values in a file."""
 
     unit: str | None
-    calibration: float | str | Calibration | None
+    calibration: AnyCalibration | None
     polarity: str | None
     sample_rate: float | None
 
 
 def _signal(path: Path, channel: Channel, stated: _Stated, *, several: bool) -> Signal:
-    """Return the signal of a channel; raise InputError if its rate or unit is unknown."""
+    """Return the signal of a channel with the sign of a compression."""
+    signal, scale, assumed = _scaled(path, channel, stated, several=several)
+    extremes = scan(channel.samples, channel.n_sample, signal.name)
+    sign, changed = find_sign(extremes, scale, stated.polarity, signal.name)
+    return replace(
+        signal,
+        samples=partial(_read_scaled, channel.samples, sign * scale),
+        steps=(*signal.steps, *changed),
+        warnings=check_peak(extremes, sign * scale, signal.name, assumed=assumed),
+    )
+
+
+def _sum(path: Path, channels: list[Channel], stated: list[_Stated]) -> Signal:
+    """Return the sum of load cells with the sign of a compression.
+
+    A single load cell may be lifted, so that the sum decides on the sign.
+    """
+    scaled = [
+        _scaled(path, channel, entry, several=True)
+        for channel, entry in zip(channels, stated, strict=True)
+    ]
+    polarity = stated[0].polarity
+    signs = [POLARITIES[polarity] * float(np.sign(s)) if polarity else 1.0 for _, s, _ in scaled]
+    readers = [
+        partial(_read_scaled, channel.samples, sign * scale)
+        for channel, sign, (_, scale, _) in zip(channels, signs, scaled, strict=True)
+    ]
+    cells = [
+        replace(cell, samples=reader) for reader, (cell, _, _) in zip(readers, scaled, strict=True)
+    ]
+    titles = [shown_text(channel.name) or str(channel.number) for channel in channels]
+    name = f"{shown_path(Path(path.name))}, {' + '.join(titles)}"
+    total = add_signals(cells, name)
+    extremes = scan(total.read, total.n_sample, name)
+    sign, changed = find_sign(extremes, 1.0, None, name) if polarity is None else (1.0, ())
+    if sign < 0:
+        cells = [replace(cell, samples=partial(_read_scaled, cell.samples, sign)) for cell in cells]
+        total = add_signals(cells, name)
+    assumed = any(entry for _, _, entry in scaled)
+    warnings = check_peak(extremes, sign, name, assumed=assumed)
+    warnings += check_signs(total, extremes.peak(sign))
+    note = f"The forces of {len(cells)} load cells were added."
+    return replace(total, steps=(*total.steps, *changed, note), warnings=warnings)
+
+
+def _scaled(
+    path: Path, channel: Channel, stated: _Stated, *, several: bool
+) -> tuple[Signal, float, bool]:
+    """Return a channel in N, its N per value, and whether its unit is assumed.
+
+    Raise InputError if its rate or unit is unknown.
+    """
     name = shown_path(Path(path.name))
     if several:
         name += f", {shown_text(channel.name) or f'channel {channel.number}'}"
@@ -190,27 +315,29 @@ def _signal(path: Path, channel: Channel, stated: _Stated, *, several: bool) -> 
     )
     # Integers are read as fractions of full scale.
     scale = factor * channel.counts if channel.counts and unit == "counts" else factor
-    extremes = scan(channel.samples, channel.n_sample, name)
-    sign, changed = find_sign(extremes, scale, stated.polarity, name)
-    return Signal(
+    signal = Signal(
         name=name,
         path=str(path),
         sample_rate=rate,
         n_sample=channel.n_sample,
-        samples=partial(_read_scaled, channel.samples, sign * scale),
+        samples=partial(_read_scaled, channel.samples, scale),
         full_scale=abs(scale) if channel.counts else None,
         date=shown_text(channel.date),
         calibration=description,
         calibration_uncertainty=uncertainty,
-        steps=(*channel.steps, *steps, *replaced, *changed),
-        warnings=check_peak(extremes, sign * scale, name, assumed=unit == ASSUMED),
+        steps=(*channel.steps, *steps, *replaced),
     )
+    return signal, scale, unit == ASSUMED
 
 
 def _rate(channel: Channel, stated: _Stated, name: str) -> tuple[float, tuple[str, ...]]:
     rate = channel.sample_rate if stated.sample_rate is None else float(stated.sample_rate)
     if rate is None:
-        refuse(f"{name}: the sample rate is not known", "sample_rate in Hz, or a column of times")
+        reason = "".join(f" ({step.rstrip('.')})" for step in channel.steps if "coarse" in step)
+        refuse(
+            f"{name}: the sample rate is not known{reason}",
+            "sample_rate in Hz, or a column of times",
+        )
     if not RATES[0] <= rate <= RATES[1]:
         refuse(f"{name}: the sample rate is {rate:.6g} Hz", f"{RATES[0]:g} to {RATES[1]:g} Hz")
     if channel.sample_rate in {None, rate}:
@@ -237,6 +364,11 @@ def _unit(channel: Channel, stated: _Stated, name: str) -> tuple[str, tuple[str,
     if not channel.unit and stated.calibration is None:
         return ASSUMED, ("The file states no unit; the values are assumed to be in N.",)
     if channel.unit or isinstance(stated.calibration, str | Calibration):
+        calibration = stated.calibration
+        chain = calibration.chain if isinstance(calibration, Calibration) else str(calibration)
+        unit = "" if channel.unit else unit_of_chain(chain)
+        if unit and (unit != "FS" or channel.may_be_fractions):
+            return unit, (f"The file states no unit; by the calibration the values are in {unit}.",)
         description = f"in {shown_text(channel.unit)!r}" if channel.unit else "without a unit"
         refuse(f"{name}: the values are {description}", f"unit = one of {ALLOWED}")
     return "", ()

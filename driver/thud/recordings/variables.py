@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from itertools import takewhile
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ from thud.base.checks import refuse
 from thud.recordings.channel import MIN_SAMPLES, Channel
 from thud.recordings.header_aliases import (
     DATE,
+    TIME,
     TIME_UNITS,
     UNIT,
     find_rate,
@@ -43,23 +45,33 @@ def channels_of_variables(values: dict[str, NDArray[np.generic]], name: str) -> 
         for i in range(matrix.shape[1])
     ]
     times = {key: column for key, _, column in columns if is_time(_split(key)[1])}
+    times |= {
+        key: column
+        for key, index, column in columns
+        if _split(key)[1].rpartition("_")[2].casefold() in TIME and not index and _rises(column)
+    }
+    # The first column of a matrix may hold the times of the others.
+    own_times = {key: column for key, index, column in columns if index == "[1]" and _rises(column)}
     channels = []
     for number, (key, index, column) in enumerate(columns, start=1):
-        if key in times and len(columns) > 1:
+        if (key in times and len(columns) > 1) or (key in own_times and index == "[1]"):
             continue
         group, title = _split(key)
         header = [
             (_split(other)[1], text_of(value))
             for other, value in sorted(values.items(), key=lambda item: -item[0].count("/"))
-            if np.size(value) == 1 and group.startswith(_split(other)[0])
+            if np.size(value) == 1 and _applies(_split(other)[0], group)
         ]
-        time = next(
-            (t for t in times if len(times[t]) == len(column) and _split(t)[0] == group), None
-        )
+        named = [t for t in times if len(times[t]) == len(column) and _split(t)[0] == group]
+        # Of several times, those with the longest common begin of the name.
+        time = max(named, key=partial(_common_length, key), default=None)
         siblings = [(_split(k)[1], text_of(v)) for k, v in values.items() if _split(k)[0] == group]
         # Times override a rate in the header of an outer group.
         rate, steps = find_rate(header if time is None else siblings), tuple[str, ...]()
-        if rate is None and time is not None:
+        if key in own_times:
+            _, step, steps = uniform_grid(own_times[key], f"{name}: {key}")
+            rate = 1 / step
+        elif rate is None and time is not None:
             scale = TIME_UNITS.get(split_title(_split(time)[1])[1].casefold(), 1.0)
             _, step, steps = uniform_grid(times[time] * scale, f"{name}: {time}")
             rate = 1 / step
@@ -69,7 +81,9 @@ def channels_of_variables(values: dict[str, NDArray[np.generic]], name: str) -> 
                 number=number,
                 n_sample=len(column),
                 samples=partial(read_array, column),
-                unit=split_title(title)[1] or find_word(header, UNIT),
+                unit=split_title(title)[1]
+                or find_word(header, UNIT)
+                or text_of(values.get(f"{group}quantity/label", np.array(""))),
                 sample_rate=rate,
                 date=find_word(header, DATE),
                 steps=steps,
@@ -78,6 +92,28 @@ def channels_of_variables(values: dict[str, NDArray[np.generic]], name: str) -> 
     if not channels:
         refuse(f"{name}: has no vector of {MIN_SAMPLES} or more real numbers", "a recorded channel")
     return channels
+
+
+def _applies(owner: str, group: str) -> bool:
+    """Whether the header of a group applies to another one.
+
+    Siemens Testlab exports have the step in ``x_values`` and the samples in ``y_values``.
+    """
+    siblings = {group, group.removesuffix("y_values/") + "x_values/"}
+    return group.startswith(owner) or (group.endswith("y_values/") and owner in siblings)
+
+
+def _common_length(name: str, other: str) -> int:
+    """Return the length of the common begin of two names."""
+    return sum(
+        1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(name, other, strict=False))
+    )
+
+
+def _rises(column: NDArray[np.float64]) -> bool:
+    """Whether a column rises uniformly enough to be times."""
+    rise = np.diff(column)
+    return bool((rise > 0).all() and rise.max() < 2 * rise.min())
 
 
 def _split(key: str) -> tuple[str, str]:

@@ -10,14 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from thud.base.checks import refuse
 from thud.base.files import read_input
 from thud.base.immutable import Immutable
 from thud.level.assessment import VERDICTS
-from thud.report.contents import FORMAT, read_date
-from thud.report.rows import Style, criterion_row, criterion_style, limits_of, number
+from thud.recordings.dates import read_date
+from thud.report.contents import FORMAT
+from thud.report.rows import Style, criterion_style, limits_of, number, value_text
 
 if TYPE_CHECKING:
     import os
@@ -30,8 +31,11 @@ YEAR = timedelta(days=365.25)
 SIGNIFICANCE = 0.05
 # Minimum number of reports for a trend: a line fits any two.
 MIN_REPORTS = 3
-# Maximum time between the last report and the reported date of a limit, years.
-MAX_YEARS = 100.0
+# Minimum number of values for control limits, and the mean moving range of two values of a normal
+# distribution in standard deviations (ISO 7870-2, chart of individuals).
+MIN_VALUES, MOVING_RANGE = 5, 2 / math.sqrt(math.pi)
+# Warning and action limits: distance from the mean in standard deviations.
+WARNING, ACTION = 2.0, 3.0
 # Maximum number of reports in the table: the first and the most recent ones.
 MAX_COLUMNS = 8
 # Marks of values in the table by verdict.
@@ -42,7 +46,7 @@ MAX_SIZE = 2**28
 KEYS = ("ball", "serial", "source", "date", "verdict", "criteria")
 CRITERION_KEYS = (
     "name", "unit", "band", "value", "uncertainty", "expanded_uncertainty", "upper_bound", "lower",
-    "upper", "limits_of_standard", "margin", "verdict", "spread", "background", "contributions",
+    "upper", "verdict",
 )  # fmt: skip
 
 
@@ -59,8 +63,8 @@ class Trend(Immutable):
     time, value : ndarray, shape (2,)
         Times of the first and the last value, years since the first report, and the line there.
     reached, earliest, latest : float
-        Time at which the line reaches a limit, and its interval (95 %), years since the first
-        report; NaN if there is no such time or the trend is not significant.
+        Time between first and last value at which the line reaches a limit, and its interval
+        (95 %), years since the first report; NaN if there is none or the trend is not significant.
     """
 
     slope: float
@@ -71,6 +75,19 @@ class Trend(Immutable):
     reached: float = math.nan
     earliest: float = math.nan
     latest: float = math.nan
+
+
+@dataclass(frozen=True)
+class ControlLimits:
+    """Mean and standard deviation of a criterion, by the moving range of consecutive values."""
+
+    mean: float
+    deviation: float
+
+    def beyond(self, values: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
+        """Return 1 or -1 for values above or below the mean by a factor of deviations, else 0."""
+        distance = values - self.mean
+        return np.where(np.abs(distance) > factor * self.deviation, np.sign(distance), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +133,33 @@ class History:
             for (entries, columns), is_fitted in zip(series, fitted, strict=True)
         ]
 
+    def control_limits(self) -> list[ControlLimits | None]:
+        """Return the control limits of each criterion; None with fewer than five values."""
+        return [_control_limits(self._known(entries)[1]) for entries in self.criteria()]
+
+    def temperatures(self) -> list[float | None]:
+        """Return the recorded temperature of each report, degC; None if it is not stated."""
+        values = (report.get("temperature") for report in self.reports)
+        return [value if _is_number(value) else None for value in values]
+
+    def calibrations(self) -> list[datetime]:
+        """Return the dates of the calibrations of instruments, between first and last report.
+
+        They are the dates of the certificates; a report whose calibration factor differs from that
+        of the report before it counts as a calibration, too.
+        """
+        dates = set()
+        previous: list[str] | None = None
+        for date, report in zip(self.dates, self.reports, strict=True):
+            items = [item for item in report.get("instruments", []) if isinstance(item, dict)]
+            dates |= {read_date(str(item.get("calibrated", ""))) for item in items}
+            files = [file for file in report.get("files", []) if isinstance(file, dict)]
+            factors = sorted({str(file.get("calibration", "")) for file in files})
+            if previous is not None and factors != previous:
+                dates.add(date)
+            previous = factors
+        return sorted(date for date in dates if date and self.dates[0] <= date <= self.dates[-1])
+
     def _known(
         self, entries: list[dict[str, Any]]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -132,47 +176,80 @@ class History:
         """Return rows of text: values by date, change per year and date of the limit."""
         criteria, last = self.criteria(), len(self.dates) - 1
         styles = [criterion_style(entries[0]) for entries in criteria]
-        columns = [("", *(style.title for style in styles), "verdict")]
+        temperatures = [_degrees(value) for value in self.temperatures()]
+        columns = [("", *(style.title for style in styles), "Temperature, °C", "verdict")]
         for i in range(last + 1):
             if 0 < i <= last + 1 - MAX_COLUMNS:
                 continue
             column = [entries[i] for entries in criteria]
-            cells = (criterion_row(entry)[1] + MARKS[entry["verdict"]] for entry in column)
+            cells = (value_text(entry) + MARKS[entry["verdict"]] for entry in column)
             day = self.dates[i].date().isoformat()
-            columns.append((day, *cells, self.reports[i]["verdict"]))
-        pairs = list(zip(styles, self.trends(), strict=True))
-        columns.append(("per year", *(_slope(style, trend) for style, trend in pairs), ""))
-        columns.append(("limit on", *(self._limit(trend) for _, trend in pairs), ""))
+            columns.append((day, *cells, temperatures[i], self.reports[i]["verdict"]))
+        trends = self.trends()
+        slopes = (_slope(style, trend) for style, trend in zip(styles, trends, strict=True))
+        columns.append(("per year", *slopes, "", ""))
+        columns.append(("limit on", *(self._limit(trend) for trend in trends), "", ""))
         return list(zip(*columns, strict=True))
 
     def warnings(self) -> list[str]:
-        """Return a warning for each criterion with a significant trend."""
+        """Return a warning for each significant trend, and for values beyond control limits."""
+        known = [value for value in self.temperatures() if value is not None]
+        ends = dict.fromkeys(_degrees(value) for value in (min(known), max(known))) if known else {}
+        temperature = f" (temperature {' to '.join(ends)} °C)" if known else ""
         warnings = []
-        for entries, trend in zip(self.criteria(), self.trends(), strict=True):
-            if trend is None or not trend.significant:
-                continue
+        for entries, trend, limits in zip(
+            self.criteria(), self.trends(), self.control_limits(), strict=True
+        ):
             style = criterion_style(entries[0])
-            text = f"{style.title}: changes by {_slope(style, trend).rstrip(' *')} per year"
-            date = self._date_text(trend.reached)
-            if date:
-                ends = [self._date_text(end) or "later" for end in (trend.earliest, trend.latest)]
-                verb = "reached" if trend.reached < self.years[-1] else "reaches"
-                text += f"; {verb} a limit on {date} (95 %: {ends[0]} to {ends[1]})"
-            warnings.append(text)
+            if trend is not None and trend.significant:
+                slope = _slope(style, trend).rstrip(" *")
+                text = f"{style.title}: changes by {slope} per year{temperature}"
+                date = self._date_text(trend.reached)
+                if date:
+                    start = self._date_text(trend.earliest) or "before the first report"
+                    end = self._date_text(trend.latest) or "after the last report"
+                    text += f"; reached a limit on {date} (95 %: {start} to {end})"
+                warnings.append(text)
+            if limits is not None:
+                warnings += self._control_warnings(style, entries, limits)
+        return warnings
+
+    def _control_warnings(
+        self, style: Style, entries: list[dict[str, Any]], limits: ControlLimits
+    ) -> list[str]:
+        years, values, _ = self._known(entries)
+        beyond = zip(years, limits.beyond(values, ACTION), strict=True)
+        dates = [self._date_text(year) for year, side in beyond if side]
+        warnings = []
+        if dates:
+            warnings.append(
+                f"{style.title}: beyond the action limits ({ACTION:g} σ) on {', '.join(dates)}"
+            )
+        if abs(limits.beyond(values[-3:], WARNING).sum()) > 1:
+            warnings.append(
+                f"{style.title}: two of the last three values lie beyond one warning limit "
+                f"({WARNING:g} σ)"
+            )
         return warnings
 
     def _limit(self, trend: Trend | None) -> str:
         return "–" if trend is None else self._date_text(trend.reached) or "–"
 
     def _date_text(self, years: float) -> str:
-        """Return the date of a time, years, as text; empty if unknown or too far away."""
-        last = float(self.years[-1])
-        if not -MAX_YEARS < years - last < MAX_YEARS:
-            return ""
-        try:
-            return self.date(years).date().isoformat()
-        except OverflowError:
-            return ""
+        """Return the date of a time, years, as text; empty if outside the dates of the reports."""
+        known = 0.0 <= years <= self.years[-1]
+        return self.date(years).date().isoformat() if known else ""
+
+
+def _degrees(value: float | None) -> str:
+    return "–" if value is None else number(value, 1)
+
+
+def _control_limits(values: NDArray[np.float64]) -> ControlLimits | None:
+    if len(values) < MIN_VALUES:
+        return None
+    deviation = float(np.abs(np.diff(values)).mean()) / MOVING_RANGE
+    return ControlLimits(float(values.mean()), deviation) if deviation else None
 
 
 def read_history(
@@ -270,10 +347,7 @@ def _is_complete(report: dict[str, Any]) -> bool:
         and all(_is_number(entry[key]) for key in ("lower", "upper"))
         and all(
             entry[key] is None or _is_number(entry[key])
-            for key in (
-                "value", "uncertainty", "expanded_uncertainty", "band", "margin", "spread",
-                "background",
-            )
+            for key in ("value", "uncertainty", "expanded_uncertainty", "band")
         )
         and all(isinstance(entry[key], str) for key in ("name", "unit"))
         and entry["verdict"] in VERDICTS
@@ -308,7 +382,7 @@ def _trend(
 
     def factor(probability: float) -> float:
         """Return the half width of an interval relative to 1/sqrt(sum of weights)."""
-        quantile = student.ppf(1 - probability / 2, [count - 2, np.inf])
+        quantile = stdtrit([count - 2, np.inf], 1 - probability / 2)
         return float(max(quantile[0] * scatter, quantile[1] if stated else 0.0))
 
     expanded = factor(0.05) / math.sqrt(spread)
@@ -321,7 +395,10 @@ def _trend(
     times = (math.nan, math.nan, math.nan)
     if significant:
         limit = limits[1] if slope > 0 else limits[0]
-        times = _crossing(limit - mean, slope, factor(0.05), weight.sum(), spread)
+        crossing = _crossing(limit - mean, slope, factor(0.05), weight.sum(), spread)
+        # A line says nothing beyond its values.
+        if time[0] <= middle + crossing[0] <= time[-1]:
+            times = crossing
     return Trend(slope, expanded, significant, ends, line, *(middle + instant for instant in times))
 
 

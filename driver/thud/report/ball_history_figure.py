@@ -9,7 +9,16 @@ import numpy as np
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.ticker import MultipleLocator
 
-from thud.plot.style import COLORS, GRAY, WIDTH, legend_above, new_figure, own_style
+from thud.plot.style import (
+    COLORS,
+    GRAY,
+    WIDTH,
+    escape_label,
+    legend_above,
+    new_figure,
+    own_style,
+)
+from thud.report.ball_history import ACTION, WARNING
 from thud.report.rows import NOT_KNOWN, criterion_style, limits_of
 
 if TYPE_CHECKING:
@@ -24,6 +33,12 @@ MARKS = {
     "inconclusive": ("s", "white"),
     "does not conform": ("X", COLORS[1]),
 }
+# Lines of the control limits, by their distance in standard deviations, and of calibrations.
+CONTROL: dict[float, dict[str, Any]] = {
+    WARNING: {"color": COLORS[4], "linewidth": 0.8, "linestyle": ":"},
+    ACTION: {"color": COLORS[1], "linewidth": 0.8, "linestyle": "-."},
+}
+CALIBRATION: dict[str, Any] = {"color": COLORS[2], "linewidth": 0.8, "linestyle": (0, (6, 2))}
 # Margin before the first and after the last report: fraction of the time between them, and minimum.
 MARGIN, MIN_MARGIN = 0.06, timedelta(days=15)
 
@@ -33,16 +48,32 @@ def draw_history(history: History) -> Figure:
     """Draw each criterion of a ball by the date of its reports.
 
     The allowed range is grey, bars are expanded uncertainties (95 %), markers show the verdict, and
-    lines the significant trends.
+    lines the significant trends, control limits and calibrations. The last panel has the recorded
+    temperatures.
     """
     criteria, trends = history.criteria(), history.trends()
-    rows = -(-len(criteria) // 2)
+    control, temperatures = history.control_limits(), history.temperatures()
+    has_temperature = any(value is not None for value in temperatures)
+    count = len(criteria) + has_temperature
+    rows = -(-count // 2)
     figure = new_figure(0.5 + 1.15 * rows, 2 * WIDTH)
     panels = figure.subplots(rows, 2, sharex=True, squeeze=False).T.ravel()
-    for axes, entries, trend in zip(panels, criteria, trends, strict=False):
+    for axes, entries, trend, limits in zip(panels, criteria, trends, control, strict=False):
         _draw_criterion(axes, history, entries, trend)
-    for axes in panels[len(criteria) :]:
+        if limits is not None:
+            unit = criterion_style(entries[0]).unit
+            for factor, line in CONTROL.items():
+                for sign in (-1, 1):
+                    y = (limits.mean + sign * factor * limits.deviation) / unit
+                    axes.axhline(y, **line)
+    if has_temperature:
+        _draw_temperature(panels[len(criteria)], history)
+    for axes in panels[:count]:
+        for date in history.calibrations():
+            axes.axvline(date, **CALIBRATION)
+    for axes in panels[count:]:
         axes.remove()
+    panels[count - 1].tick_params(labelbottom=True)
     figure.align_ylabels()
     margin = max(MARGIN * (history.dates[-1] - history.dates[0]), MIN_MARGIN)
     first = panels[0]
@@ -50,7 +81,7 @@ def draw_history(history: History) -> Figure:
     locator = AutoDateLocator(minticks=3, maxticks=6)  # type: ignore[no-untyped-call]
     first.xaxis.set_major_locator(locator)
     first.xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]
-    _add_legend(first, trends)
+    _add_legend(first, trends, history)
     return figure
 
 
@@ -88,7 +119,16 @@ def _draw_criterion(
     axes.set_ylabel(style.title.replace(", ", ",\n"))
 
 
-def _add_legend(axes: Axes, trends: list[Trend | None]) -> None:
+def _draw_temperature(axes: Axes, history: History) -> None:
+    pairs = zip(history.dates, history.temperatures(), strict=True)
+    known = [(date, value) for date, value in pairs if value is not None]
+    dates, values = zip(*known, strict=True)
+    axes.plot(dates, values, color="black", linestyle="none", marker="o", markersize=3.5)
+    axes.margins(y=0.2)
+    axes.set_ylabel("Temperature,\n°C")
+
+
+def _add_legend(axes: Axes, trends: list[Trend | None], history: History) -> None:
     axes.fill_between([], [], color=GRAY, linewidth=0, label="allowed")
     for verdict, (marker, color) in MARKS.items():
         axes.errorbar(
@@ -97,4 +137,9 @@ def _add_legend(axes: Axes, trends: list[Trend | None]) -> None:
         )  # fmt: skip
     if any(trend is not None and trend.significant for trend in trends):
         axes.plot([], [], color=COLORS[0], linewidth=1, linestyle="--", label="trend")
-    legend_above(axes)
+    if any(limits is not None for limits in history.control_limits()):
+        for (factor, line), name in zip(CONTROL.items(), ("warning", "action"), strict=True):
+            axes.plot([], [], label=f"{name} limits ({factor:g} σ)", **line)
+    if history.calibrations():
+        axes.plot([], [], label="calibration", **CALIBRATION)
+    legend_above(axes, title=escape_label(history.title)).get_title().set_fontweight("bold")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from datetime import datetime
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +12,8 @@ from thud.base.bridge import version
 from thud.level.assessment import get_criteria
 from thud.level.estimate import CONFIDENCE
 from thud.level.levels import BANDWIDTHS, get_bands
+from thud.recordings.config import Instrument
+from thud.recordings.dates import read_date
 from thud.recordings.measured_drop import ESTIMATES
 
 if TYPE_CHECKING:
@@ -20,12 +22,32 @@ if TYPE_CHECKING:
     from thud.base._schema import BandSet, LimitsSource
     from thud.level.assessment import Criterion
     from thud.level.estimate import Estimate
+    from thud.recordings.config import Config
+    from thud.recordings.measure_drops import Origin
     from thud.recordings.measured_drop import Drop
     from thud.recordings.recording import Recording
 
 FORMAT = "thud calibration report 1"
-DATE_FORMATS = ("%d.%m.%Y", "%Y/%m/%d", "%Y:%m:%d", "%d-%b-%y", "%d-%b-%Y", "%d %b %Y")
-TIME_FORMATS = ("", " %H:%M:%S", " %H:%M")
+# What ISO/IEC 17025:2017, 7.8.2 and 7.8.3, asks of a report, by the key that states it.
+FIELDS = {
+    "number": "number of the report",
+    "laboratory": "laboratory",
+    "address": "address of the laboratory",
+    "client": "client",
+    "ball": "ball",
+    "serial": "serial number",
+    "item": "description of the item",
+    "state": "state of the item",
+    "received": "date of receipt",
+    "date": "date of the measurement",
+    "issued": "date of issue",
+    "place": "place",
+    "procedure": "procedure",
+    "temperature": "temperature",
+    "humidity": "humidity",
+    "pressure": "air pressure",
+    "authorized_by": "person who authorizes it",
+}
 
 
 def report_data(recording: Recording, source: LimitsSource | None = None) -> dict[str, Any]:
@@ -44,7 +66,15 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
         "serial": config.serial,
         "date": _dates([config.date] if config.date else [o.date for o in recording.origins]),
         "temperature": config.temperature,
-        "instruments": list(config.instruments),
+        "instruments": [
+            vars(item if isinstance(item, Instrument) else Instrument(item))
+            for item in config.instruments
+        ],
+        "report": {
+            **vars(config.report),
+            "accreditation_mark": Path(config.report.accreditation_mark).name,
+        },
+        "properties": vars(config.properties),
         "mass": config.mass,
         "height": config.height,
         "mass_uncertainty": config.mass_uncertainty,
@@ -61,7 +91,8 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
         "plate": [vars(check) for check in config.plate_checks],
         "steps": list(recording.level_steps),
         "warnings": list(recording.own_warnings),
-        "outliers": [vars(outlier) for outlier in recording.outliers],
+        "outliers": [{**vars(outlier), "message": str(outlier)} for outlier in recording.outliers],
+        "without_outliers": _without_outliers(recording),
         "files": [
             {
                 "name": origin.name,
@@ -88,25 +119,6 @@ def criteria_data(recording: Recording, source: LimitsSource | None = None) -> l
     verdict = recording.assess(source)
     finite: list[dict[str, Any]] = _finite(_criteria(recording, verdict.source, verdict.criteria))
     return finite
-
-
-def read_date(text: str) -> datetime | None:
-    """Return a date written in ISO 8601 or one of the other known formats; None if in none.
-
-    >>> read_date("03.05.2024").date().isoformat()
-    '2024-05-03'
-    """
-    line = " ".join(text.split())
-    try:
-        return datetime.fromisoformat(line).replace(tzinfo=None)
-    except ValueError:
-        pass
-    for form in (date + time for date in DATE_FORMATS for time in TIME_FORMATS):
-        try:
-            return datetime.strptime(line, form)  # noqa: DTZ007 - files state no time zone
-        except ValueError:
-            continue
-    return None
 
 
 def _dates(texts: Iterable[str]) -> str:
@@ -154,10 +166,46 @@ def _criteria(
                 "spread": spreads.get(f"{i}" if is_level else criterion.name),
                 "background": float(average.background[i]) if is_level else None,
                 "flag": str(average.flag[i]) if is_level else "",
-                "contributions": [vars(part) for part in estimate.contributions],
+                "contributions": [
+                    {**vars(part), "kind": part.kind, "sensitivity": part.sensitivity}
+                    for part in estimate.contributions
+                ],
             }
         )
     return rows
+
+
+def missing_fields(config: Config, origins: Iterable[Origin]) -> list[str]:
+    """Return what ISO/IEC 17025 asks of a report and neither laboratory nor files have stated."""
+    stated = {**vars(config.report), **vars(config)}
+    stated["date"] = config.date or any(origin.date for origin in origins)
+    missing = [title for key, title in FIELDS.items() if stated[key] in ("", (), None, False)]
+    certified = [isinstance(item, Instrument) and item.certificate for item in config.instruments]
+    if not certified:
+        missing.append("instruments")
+    elif not all(certified):
+        missing.append("certificates of instruments")
+    return missing
+
+
+def _without_outliers(recording: Recording) -> dict[str, Any] | None:
+    """Return the means over the drops that are no outliers; None if no drop is an outlier."""
+    names = {outlier.name for outlier in recording.outliers}
+    kept = [i for i, drop in enumerate(recording.drops) if drop.name not in names]
+    if not names or not kept:
+        return None
+    drops = [recording.drops[i] for i in kept]
+    energies = 10 ** (recording.average().drops[kept] / 10)
+    means = {
+        name: [getattr(drop, name).value for drop in drops]
+        for name in ("contact_time", "restitution", "peak_force")
+    }
+    known = {name: [v for v in values if math.isfinite(v)] for name, values in means.items()}
+    return {
+        "drops": len(kept),
+        "levels": (10 * np.log10(energies.mean(axis=0))).tolist(),
+        **{name: float(np.mean(values)) if values else None for name, values in known.items()},
+    }
 
 
 def _levels(recording: Recording, bands: BandSet) -> dict[str, Any]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import io
 from typing import TYPE_CHECKING, Any
 
-import h5netcdf  # noqa: F401 - without it xarray fails only when it writes
+import h5netcdf
+import h5py
 import numpy as np
-import xarray as xr
 
 from thud.base._schema import QUANTITIES
 from thud.recordings.measured_drop import ESTIMATES
@@ -33,15 +34,34 @@ PROVENANCE = (
 
 
 def netcdf(data: dict[str, Any]) -> bytes:
-    """Return a report as the content of a NetCDF file."""
-    return bytes(recording_dataset(data).to_netcdf(engine="h5netcdf"))
+    """Return drops, levels and files of a report as the content of a NetCDF file.
+
+    `data` is the result of `thud.report.contents.report_data`. xarray, which could write it too,
+    takes a second to import.
+    """
+    content = io.BytesIO()
+    with h5netcdf.File(content, "w") as file:
+        lengths = {"drop": len(data["drops"]), "file": len(data["files"])}
+        lengths |= {bands: len(levels["band"]) for bands, levels in data["levels"].items()}
+        file.dimensions = lengths
+        for name, (dimensions, values, attributes) in _variables(data).items():
+            is_text = values.dtype == object
+            variable = file.create_variable(
+                name, dimensions, h5py.string_dtype() if is_text else values.dtype, data=values
+            )
+            variable.attrs.update(attributes)
+        file.attrs.update(_attributes(data))
+    return content.getvalue()
 
 
-def recording_dataset(data: dict[str, Any]) -> xr.Dataset:
-    """Return drops, levels and files from the result of `thud.report.contents.report_data`."""
+def _variables(data: dict[str, Any]) -> dict[str, tuple[tuple[str, ...], NDArray[Any], Any]]:
+    """Return dimensions, values and attributes of each variable."""
     drops, files = data["drops"], data["files"]
     onset = {"units": "s", "long_name": "time of first touch in the file"}
-    variables: dict[str, Any] = {"onset": ("drop", _numbers(d["onset"] for d in drops), onset)}
+    variables: dict[str, Any] = {
+        "drop": (("drop",), _texts(drop["name"] for drop in drops), {}),
+        "onset": (("drop",), _numbers(d["onset"] for d in drops), onset),
+    }
     for name in ESTIMATES:
         for key, suffix, prefix in (
             ("value", "", ""),
@@ -50,23 +70,22 @@ def recording_dataset(data: dict[str, Any]) -> xr.Dataset:
             values = _numbers(drop[name][key] for drop in drops)
             quantity = QUANTITIES[name]
             attributes = {"units": quantity.unit or "1", "long_name": prefix + quantity.meaning}
-            variables[name + suffix] = ("drop", values, attributes)
-    coordinates: dict[str, Any] = {"drop": ("drop", _texts(drop["name"] for drop in drops))}
+            variables[name + suffix] = (("drop",), values, attributes)
     for bands, levels in data["levels"].items():
         attributes = {"units": "Hz", "long_name": "nominal frequency"}
-        coordinates[bands] = (bands, np.array(levels["band"]), attributes)
+        variables[bands] = ((bands,), np.array(levels["band"]), attributes)
         for key, (name, meaning) in LEVELS.items():
             attributes = {"units": "dB", "long_name": meaning}
-            variables[f"{bands}_{name}"] = (bands, _numbers(levels[key]), attributes)
+            variables[f"{bands}_{name}"] = ((bands,), _numbers(levels[key]), attributes)
         flag = {"long_name": "corrected for the background, upper bound, or no level"}
-        variables[f"{bands}_flag"] = (bands, _texts(levels["flag"]), flag)
+        variables[f"{bands}_flag"] = ((bands,), _texts(levels["flag"]), flag)
         attributes = {"units": "dB", "long_name": "force exposure level of each drop"}
         of_drops = np.array([_numbers(row) for row in levels["drops"]])
         variables[f"{bands}_drop_level"] = (("drop", bands), of_drops, attributes)
     for key, meaning in FILES.items():
         attributes = {"long_name": f"{meaning} of the file"}
-        variables[f"file_{key}"] = ("file", _texts(file[key] for file in files), attributes)
-    return xr.Dataset(variables, coordinates, _attributes(data))
+        variables[f"file_{key}"] = (("file",), _texts(file[key] for file in files), attributes)
+    return variables
 
 
 def _attributes(data: dict[str, Any]) -> dict[str, Any]:
@@ -87,7 +106,8 @@ def _attributes(data: dict[str, Any]) -> dict[str, Any]:
         )
         for kind in ("steps", "warnings")
     }
-    result = {**known, "instruments": "\n".join(data["instruments"]), **notes}
+    instruments = "\n".join(", ".join(filter(None, item.values())) for item in data["instruments"])
+    result = {**known, "instruments": instruments, **notes}
     return {k: _plain(value) if isinstance(value, str) else value for k, value in result.items()}
 
 

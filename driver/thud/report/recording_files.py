@@ -6,17 +6,17 @@ import csv
 import io
 import math
 import warnings
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from thud.base.bridge import version
-from thud.base.display import draw_all, warn_if_not_drawn
+from thud.base.display import warn_if_not_drawn
 from thud.base.errors import InputError, ReportWarning
 from thud.base.extras import require_extra
 from thud.level.assessment import VERDICTS
 from thud.level.estimate import Estimate
 from thud.level.levels import get_bands
-from thud.report.contents import criteria_data, report_data
+from thud.report import write
+from thud.report.contents import criteria_data, missing_fields, report_data
 from thud.report.notes import group_by_kind
 from thud.report.rows import HEAD, NOT_KNOWN, criterion_rows
 from thud.report.write import HTML, JSON, PDF, json_bytes, page_contents, write_files
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from thud.base.files import Results
     from thud.recordings.recording import Recording
 
-# Columns of the page that the printed table omits.
-_HIDDEN = ("Spread", "Background")
+# Columns of the page that the printed table has.
+_SHOWN = ("Criterion", "Value", "U (95 %)", "Limits", "Margin", "Verdict")
 # Verdicts of several criteria.
 _PLURALS = {VERDICTS[0]: "conform", VERDICTS[1]: "do not conform"}
 DATASET = "recording.nc"
@@ -73,8 +73,8 @@ def messages(recording: Recording, kind: str) -> list[str]:
 
 
 def table(recording: Recording) -> list[tuple[str, ...]]:
-    """Return the criteria as rows of text, without spread and background."""
-    shown = [i for i, title in enumerate(HEAD) if title not in _HIDDEN]
+    """Return the criteria as rows of text, without the columns that only the page has."""
+    shown = [i for i, title in enumerate(HEAD) if title in _SHOWN]
     rows = criterion_rows(criteria_data(recording))
     return [tuple(row[i] for i in shown) for row in rows]
 
@@ -99,6 +99,12 @@ def verdict_text(recording: Recording) -> str:
     )
     note = " Limits marked * are those of the laboratory." if has_own_limits else ""
     return f"{sentence} at 95 %: {count_verdicts(d.result for d in assessment.criteria)}.{note}"
+
+
+def missing_text(recording: Recording) -> str:
+    """Return what the report does not state although ISO/IEC 17025 asks for it, in a line."""
+    missing = ", ".join(missing_fields(recording.config, recording.origins)) or "nothing"
+    return f"  Missing in the report (ISO/IEC 17025:2017, 7.8): {missing}"
 
 
 def count_verdicts(results: Iterable[str]) -> str:
@@ -188,12 +194,8 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
         **_dataset(data, results.folder),
     }
     if figures and _has_matplotlib():
-        # Matplotlib is slow to import.
-        from thud.plot.save_figures import figure_files
-
-        drawings = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
-        contents |= page_contents(data, list(drawings.values()), results.folder)
-        contents |= figure_files(drawings)
+        drawings = write.figures(recording)
+        contents |= page_contents(recording, data, drawings, results.folder) | drawings
     write_files(results, data, contents, file_names())
 
 

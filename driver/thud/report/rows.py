@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
@@ -18,8 +19,13 @@ STYLES = {
     "drop_height": ("Drop height, m", 1.0, 3),
 }
 HEAD = (
-    "Criterion", "Value", "U (95 %)", "Limits", "Margin", "Spread", "Background", "Verdict",
+    "Criterion", "Value", "U (95 %)", "Limits", "Margin", "P (outside)", "Spread", "Background",
+    "Verdict",
 )  # fmt: skip
+# Significant digits of an uncertainty, and the width below which it is shown as zero.
+DIGITS, MIN_WIDTH = 2, 1e-6
+# Maximum of the degrees of freedom that are shown: above, Student's t differs by less than 0.1 %.
+MAX_FREEDOM = 1000.0
 
 
 class Style(NamedTuple):
@@ -44,22 +50,44 @@ def criterion_style(criterion: dict[str, Any]) -> Style:
 
 
 def criterion_row(criterion: dict[str, Any]) -> tuple[str, ...]:
-    """Return a criterion of a report as texts, in the columns of `HEAD`."""
-    style = criterion_style(criterion)
-    value, margin = criterion["value"], criterion["margin"]
-    bound = "at most " if criterion["upper_bound"] else ""
+    """Return a criterion of a report as texts, in the columns of `HEAD`.
+
+    Value and margin have the decimals of U with two significant digits (JCGM 100, 7.2.6).
+    """
+    style, expanded = rounded_style(criterion), expanded_text(criterion)
     ends = [f"{end / style.unit:g}".replace("-", "−") for end in limits_of(criterion)]
     mark = "" if criterion["limits_of_standard"] else " *"
+    spread = criterion["spread"]
+    has_budget = expanded[-1].isdigit()
     return (
         style.title,
-        bound * (value is not None) + style.text(value),
-        expanded_text(criterion),
+        value_text(criterion),
+        expanded,
         " to ".join(dict.fromkeys(ends)) + mark,
-        style.text(margin, "–"),
-        _width(style, criterion["spread"], "–"),
-        style.text(criterion["background"], "–"),
+        style.text(criterion["margin"], "–"),
+        risk_text(criterion["probability"]) if has_budget else "–",
+        "–" if spread is None else width_text(spread / style.unit),
+        criterion_style(criterion).text(criterion["background"], "–"),
         criterion["verdict"],
     )
+
+
+def value_text(criterion: dict[str, Any]) -> str:
+    """Return the value of a criterion with the decimals of its expanded uncertainty, as text."""
+    is_bound = criterion["upper_bound"] and criterion["value"] is not None
+    return "at most " * is_bound + rounded_style(criterion).text(criterion["value"])
+
+
+def risk_text(probability: float | None) -> str:
+    """Return the probability that the true value lies outside the limits, as text.
+
+    >>> risk_text(0.9871), risk_text(1.0)
+    ('1.3 %', '< 0.01 %')
+    """
+    if probability is None:
+        return "–"
+    percent = 100 * (1 - probability)
+    return "< 0.01 %" if percent < 0.01 else f"{percent:.{2 if percent < 1 else 1}f} %"  # noqa: PLR2004
 
 
 def criterion_rows(criteria: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
@@ -78,7 +106,37 @@ def expanded_text(criterion: dict[str, Any]) -> str:
         return "–"
     if not criterion["contributions"]:
         return "not stated"
-    return _width(criterion_style(criterion), criterion["expanded_uncertainty"], NOT_KNOWN)
+    expanded = criterion["expanded_uncertainty"]
+    return NOT_KNOWN if expanded is None else width_text(expanded / criterion_style(criterion).unit)
+
+
+def rounded_style(criterion: dict[str, Any]) -> Style:
+    """Return the format of a criterion with the decimals of its expanded uncertainty."""
+    style = criterion_style(criterion)
+    expanded = (criterion["expanded_uncertainty"] or 0.0) / style.unit
+    return style._replace(decimals=_decimals(expanded)) if expanded > MIN_WIDTH else style
+
+
+def width_text(width: float) -> str:
+    """Return the width of an interval with two significant digits as text.
+
+    >>> width_text(0.0996), width_text(1234.0)
+    ('0.10', '1200')
+    """
+    return number(width, _decimals(width)) if width > MIN_WIDTH else "0"
+
+
+def _decimals(width: float) -> int:
+    """Return the number of decimals that leaves two significant digits of a width."""
+    exponent = math.floor(math.log10(float(f"{width:.{DIGITS - 1}e}")))
+    return DIGITS - 1 - exponent
+
+
+def freedom_text(freedom: float | None) -> str:
+    """Return degrees of freedom as text, truncated (JCGM 100, G.4.1); None: infinite."""
+    if freedom is None:
+        return "∞"
+    return f"> {MAX_FREEDOM:g}" if freedom > MAX_FREEDOM else str(math.floor(freedom))
 
 
 def number(value: float, decimals: int) -> str:
@@ -87,9 +145,4 @@ def number(value: float, decimals: int) -> str:
     >>> number(-1.004, 1)
     '−1.0'
     """
-    return f"{value:z.{decimals}f}".replace("-", "−")
-
-
-def _width(style: Style, value: float | None, unknown: str) -> str:
-    """Return the width of an interval as text, with one decimal more than a value."""
-    return style._replace(decimals=style.decimals + 1).text(value, unknown)
+    return f"{round(value, decimals):z.{max(decimals, 0)}f}".replace("-", "−")

@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING, Any
 from thud.base.display import draw_all
 from thud.base.errors import ReportWarning
 from thud.base.files import Results, content_of
+from thud.recordings.config import picture
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable, Mapping, Sequence
-
-    from matplotlib.figure import Figure
+    from collections.abc import Iterable, Mapping
 
     from thud.recordings.recording import Recording
 
@@ -29,7 +28,7 @@ def write_report(
 ) -> list[Path]:
     """Write ``report.json``, ``report.html`` and ``report.pdf`` and return their paths.
 
-    The page is one sheet of A4; lists that are too long for it are complete in ``report.json``.
+    The page is printed on sheets of A4; very long lists are complete in ``report.json`` only.
 
     Parameters
     ----------
@@ -57,8 +56,10 @@ def write_report(
     from thud.report.contents import report_data
 
     folder, data = Path(directory), report_data(recording)
-    figures = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
-    contents = {JSON: json_bytes(data), **page_contents(data, list(figures.values()), folder)}
+    contents = {
+        JSON: json_bytes(data),
+        **page_contents(recording, data, figures(recording), folder),
+    }
     return write_files(Results(folder, "measure", replace=replace), data, contents)
 
 
@@ -67,18 +68,34 @@ def json_bytes(data: dict[str, Any]) -> bytes:
     return (json.dumps(data, indent=1, allow_nan=False) + "\n").encode()
 
 
+def figures(recording: Recording) -> dict[str, bytes]:
+    """Return the figures of a recording as SVG, by file name; warn of those not drawn."""
+    # Matplotlib is slow to import.
+    from thud.plot.save_figures import figure_files
+
+    drawn = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
+    return figure_files(drawn)
+
+
 def page_contents(
-    data: dict[str, Any], figures: Sequence[Figure], folder: Path
+    recording: Recording, data: dict[str, Any], drawings: Mapping[str, bytes], folder: Path
 ) -> dict[str, bytes]:
     """Return the page as HTML and, if possible, PDF, by file name.
 
-    Warn if there is no PDF, or no font for some characters; `folder` is named in the warning.
+    `drawings` are the figures as SVG. Warn if there is no PDF, or no font for some characters;
+    `folder` is named in the warning.
     """
     from thud.report.fonts import missing_characters
     from thud.report.page import laboratory_text, report_page
     from thud.report.pdf import NEEDED, html_to_pdf
 
-    page = report_page(data, figures, hashlib.sha256(json_bytes(data)).hexdigest())
+    mark = recording.config.report.accreditation_mark
+    page = report_page(
+        data,
+        [content.decode() for content in drawings.values()],
+        hashlib.sha256(json_bytes(data)).hexdigest(),
+        picture(Path(mark)) if mark else None,
+    )
     contents = {HTML: page.encode()}
     try:
         contents[PDF] = html_to_pdf(page)

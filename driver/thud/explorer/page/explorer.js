@@ -98,9 +98,8 @@ function onChange() {
 async function measure(file) {
   if (file.size > about.max_recording) return showMessage(`${file.name} is larger than ${about.max_recording / 1e6} MB; allowed: less`);
   const query = new URLSearchParams({ name: file.name });
-  for (const key of ["height", "mass", "calibration", "unit", "channel"]) {
-    const value = byId(`recording_${key}`).value;
-    if (value) query.set(key, value);
+  for (const field of document.querySelectorAll("[id^=recording_]")) {
+    if (field.value) query.set(field.id.slice("recording_".length), field.value);
   }
   try {
     const answer = await runTask(`Measuring ${file.name}`, `measure?${query}`, file, new AbortController(), { showNow: true });

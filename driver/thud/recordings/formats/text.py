@@ -30,6 +30,14 @@ from thud.recordings.channel import (
     shown_path,
     shown_text,
 )
+from thud.recordings.date_times import (
+    DAY,
+    are_days,
+    continued,
+    is_date,
+    seconds_of_day,
+    step_of_date_times,
+)
 from thud.recordings.force_units import find_unit
 from thud.recordings.header_aliases import (
     DATE,
@@ -81,8 +89,9 @@ ALLOWED = (
 class _Table:
     """Layout of a file: header, titles and columns of numbers.
 
-    The numbers begin at line `first`, have `width` columns, and `used` are the numeric ones. With
-    `has_commas` the only column has decimal commas.
+    The numbers begin at line `first`, have `width` columns, and `used` are the numeric ones;
+    `clock` is the column of date and time, if there is one. With `has_commas` the only column has
+    decimal commas.
     """
 
     name: str
@@ -93,6 +102,7 @@ class _Table:
     first: int = 1
     width: int = 0
     used: list[int] = field(default_factory=list)
+    clock: int | None = None
     has_commas: bool = False
 
     def cells(self, line: str) -> list[str]:
@@ -164,9 +174,12 @@ def _read_header(lines: Iterator[str], table: _Table) -> None:
         table.separator = find_separator(text)
         cells = table.cells(line)
         used = [i for i, cell in enumerate(cells) if is_number(cell)]
-        # Further columns may hold words, such as a state.
-        if used[:1] == [0] and len(used) > len(cells) / 2:
+        clocks = [i for i, cell in enumerate(cells) if seconds_of_day(cell) is not None]
+        dates = sum(map(is_date, cells)) + len(clocks)
+        # Dates precede the numbers, and further columns may hold words, such as a state.
+        if used[:1] == [dates] and len(used) > (len(cells) - dates) / 2:
             table.first, table.width, table.used = len(above) + 1, len(cells), used
+            table.clock = clocks[0] if clocks else None
             _sort_header(above, table)
             if table.separator == "," and _is_one_column(text, table):
                 table.separator, table.width, table.used = ";", 1, [0]
@@ -203,6 +216,9 @@ def _sort_header(above: list[str], table: _Table) -> None:
         cells = [title.strip()] if table.width == 1 else split_line(title, table.separator)
         words = plain(split_title(re.split(PAIR, text, maxsplit=1)[0])[0])
         is_pair = words in RATE | STEP | DATE | UNIT and table.width < 3  # noqa: PLR2004
+        if words in DATE and i + 1 == len(texts):
+            # Dates have several numbers, titles have not.
+            is_pair &= len(re.findall(r"\d+", text)) > 1
         is_near = i >= len(texts) - MAX_TITLES and len(cells) == table.width and not is_pair
         if is_near and not any(map(is_number, cells)):
             table.titles.append(cells)
@@ -220,6 +236,7 @@ def _read_numbers(lines: Iterator[str], table: _Table) -> dict[int, NDArray[np.f
     if table.width > MAX_COLUMNS:
         refuse(f"{table.name}: {table.width} columns", f"up to {MAX_COLUMNS}")
     blocks: list[NDArray[np.float64]] = []
+    clock: list[float] = []
     number, count = table.first, 0
     word_columns = sorted({*range(table.width)} - {*table.used})
     while block := list(itertools.islice(lines, BLOCK)):
@@ -228,6 +245,8 @@ def _read_numbers(lines: Iterator[str], table: _Table) -> dict[int, NDArray[np.f
         values = _convert(block, table)
         if values is None:
             values = _convert_each(block, number, table)
+        if table.clock is not None:
+            clock += _read_clock(block, number, table)
         blocks.append(values)
         number, count = number + len(block), count + values.size
         if count > MAX_NUMBERS:
@@ -235,7 +254,26 @@ def _read_numbers(lines: Iterator[str], table: _Table) -> dict[int, NDArray[np.f
                 f"{table.name}: more than {MAX_NUMBERS / 1e6:.1f} million numbers as text",
                 "longer recordings as WAV, RF64, FLAC, HDF5 or TDMS",
             )
-    return {i: np.concatenate([block[:, k] for block in blocks]) for k, i in enumerate(table.used)}
+    columns = {
+        i: np.concatenate([block[:, k] for block in blocks]) for k, i in enumerate(table.used)
+    }
+    if table.clock is not None:
+        columns[table.clock] = continued(np.array(clock))
+    return columns
+
+
+def _read_clock(block: list[str], first: int, table: _Table) -> list[float]:
+    """Return times of day, s, from the column of date and time."""
+    times = []
+    for number, line in enumerate(block, first):
+        if not strip_comment(line):
+            continue
+        cell = table.cells(line)[table.clock or 0]
+        time = seconds_of_day(cell)
+        if time is None:
+            refuse(f"{table.name}: line {number}: {shown_text(cell)!r} is not a time", ALLOWED)
+        times.append(time)
+    return times
 
 
 def _require_words(block: list[str], first: int, word_columns: list[int], table: _Table) -> None:
@@ -298,13 +336,23 @@ def _channels(table: _Table, values: dict[int, NDArray[np.float64]]) -> list[Cha
     titles, units = _titles(table, table.width)
     rate = find_rate(table.header, table.decimal.mark if table.decimal.line else "")
     steps: tuple[str, ...] = ()
+    if table.clock is not None:
+        numeric.remove(table.clock)
     time = next((i for i in numeric if is_time(titles[i]) or _is_time_unit(units[i])), None)
-    if time is None and len(numeric) > 1 and (rate is None or _are_times(values[numeric[0]])):
+    may_be_untitled = time is None and table.clock is None and len(numeric) > 1
+    if may_be_untitled and (rate is None or _are_times(values[numeric[0]])):
         time = numeric[0]
-    if time is not None and len(numeric) > 1:
+    step = None
+    if time is not None and (len(numeric) > 1 or table.clock is not None):
         numeric.remove(time)
         scale = TIME_UNITS.get(units[time].casefold(), 1.0)
-        _, step, steps = uniform_grid(values[time] * scale, table.name)
+        if not units[time] and are_days(values[time]):
+            step, steps = _date_time_step(values[time], DAY, table.name)
+        else:
+            _, step, steps = uniform_grid(values[time] * scale, table.name)
+    elif table.clock is not None:
+        step, steps = _date_time_step(values[table.clock], 1.0, table.name)
+    if step is not None:
         if rate is not None and abs(step * rate - 1) > SAME_RATE:
             refuse(
                 f"{table.name}: {rate:.6g} Hz by its header and {1 / step:.6g} Hz by its times",
@@ -324,6 +372,16 @@ def _channels(table: _Table, values: dict[int, NDArray[np.float64]]) -> list[Cha
         )
         for i in numeric
     ]
+
+
+def _date_time_step(
+    times: NDArray[np.float64], unit: float, name: str
+) -> tuple[float | None, tuple[str, ...]]:
+    """Return the step of date-times, s, and notes; `unit` is that of the times, s."""
+    step = step_of_date_times(times, name)
+    if step is None:
+        return None, ("The date-times are too coarse to show the sample rate.",)
+    return unit * step, (f"The sample rate is that of the date-times, {1 / (unit * step):.7g} Hz.",)
 
 
 def _are_times(column: NDArray[np.float64]) -> bool:

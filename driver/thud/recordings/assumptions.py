@@ -1,0 +1,176 @@
+"""Assumptions on the instruments of a recording, with their sizes for the uncertainty budget."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.fft import next_fast_len
+
+from thud.level.levels import get_bands, low_pass
+from thud.recordings.plate import TOLERANCE, Plate
+from thud.recordings.recorder_filter import assumed_filter
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from thud.base._schema import BandSet
+    from thud.recordings.config import Config
+    from thud.recordings.measured_drop import Drop
+
+    Gain = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+# Frequency up to which a plate is assumed to be flat if nothing is stated, Hz (ISO 10140-5).
+ASSUMED_FLAT = 1000.0
+# Effect on an octave above which an assumption is a warning, dB.
+MIN_WARNED = 0.1
+# Length of the spectrum of a pulse, in lengths of the pulse: the lowest band holds three lines.
+PADDING = 16
+
+
+# Contributions of instruments that are not stated: rectangular distributions.
+ASSUMED_PLATE, ASSUMED_FILTER = ASSUMED = "plate, assumed", "recorder filter, assumed"
+
+
+def assumed_contributions(
+    drops: Sequence[Drop], config: Config, bands: BandSet = "octave"
+) -> dict[str, NDArray[np.float64]]:
+    """Return standard uncertainties due to the instruments by cause, dB, shape (n_band,).
+
+    An instrument that is not stated may change a level by any amount between zero and the given
+    size: a rectangular distribution with this half-width.
+    """
+    contributions = {}
+    plate, stated = config.resonance, config.recorder_filter
+    if plate is not None:
+        contributions["plate"] = plate.level_uncertainty(bands)
+    if stated is not None:
+        shifted = stated.shifted()
+        contributions["recorder filter"] = np.abs(
+            level_change(drops, lambda f: np.abs(shifted.response(f) / stated.response(f)), bands)
+        )
+    assumed = {
+        ASSUMED_PLATE: _plate_gain(drops, config),
+        ASSUMED_FILTER: _filter_gain(drops, config),
+    }
+    for name, gain in assumed.items():
+        if gain is not None:
+            contributions[name] = np.abs(level_change(drops, gain, bands)) / math.sqrt(3)
+    return {name: values for name, values in contributions.items() if values.any()}
+
+
+def assumption_warnings(drops: Sequence[Drop], config: Config) -> tuple[str, ...]:
+    """Return a warning for each assumption on the instruments that matters."""
+    result = []
+    contributions = assumed_contributions(drops, config)
+
+    def size(name: str) -> str:
+        half_widths = math.sqrt(3) * contributions.get(name, np.zeros(1))
+        band = int(np.nanargmax(half_widths))
+        return f"up to {half_widths[band]:.2f} dB at {get_bands('octave').nominal[band]:g} Hz"
+
+    plate = config.resonance
+    rings = any(drop.ringing for drop in drops)
+    assumed = []
+    if plate is None and not rings and _flat_limit(config) is None:
+        assumed.append(
+            f"the force plate is flat within {100 * TOLERANCE:g} % up to {ASSUMED_FLAT:g} Hz "
+            f"([plate]; {size(ASSUMED_PLATE)})"
+        )
+    if config.filter is None:
+        assumed.append(
+            "the filter of the recorder is at a quarter of the sample rate or above "
+            f"([filter]; {size(ASSUMED_FILTER)})"
+        )
+    if assumed:
+        result.append(f"not stated, and assumed for levels and peak: {'; '.join(assumed)}")
+    if plate is None and rings:
+        result.append(
+            "the resonance of the force plate is not stated: its estimated effect, "
+            f"{size(ASSUMED_PLATE)}, is in the uncertainty"
+        )
+    seen = [drop.plate_recorded for drop in drops]
+    if plate is not None and True not in seen:
+        change = level_change(drops, lambda f: np.abs(plate.response(f)), "octave")
+        if False in seen:
+            result.append(
+                f"the record does not show the stated resonance of {plate.frequency:.4g} Hz: its "
+                f"correction, {size(ASSUMED_PLATE)}, is in the uncertainty; check [plate]"
+            )
+        elif np.nanmax(np.abs(change)) > MIN_WARNED:
+            result.append(
+                f"the record neither shows nor excludes the stated resonance of "
+                f"{plate.frequency:.4g} Hz: its correction, {np.nanmax(np.abs(change)):.2f} dB at "
+                "500 Hz, depends on [plate] alone"
+            )
+    return tuple(result)
+
+
+def with_assumptions(drop: Drop, config: Config) -> Drop:
+    """Return a drop whose peak has the uncertainty due to instruments that are not stated."""
+    variance = drop.peak_force.uncertainty**2
+    force, rate = drop.contact.gated, drop.sample_rate
+    for gain in (_plate_gain([drop], config), _filter_gain([drop], config)):
+        if gain is not None:
+            length = next_fast_len(PADDING * len(force), real=True)
+            factor = gain(np.asarray(np.fft.rfftfreq(length, 1 / rate), dtype=np.float64))
+            changed = np.fft.irfft(np.fft.rfft(force, length) * factor, length)[: len(force)]
+            change = (
+                low_pass(np.pad(changed, 2), rate).max() - low_pass(np.pad(force, 2), rate).max()
+            )
+            variance += change**2 / 3
+    return replace(drop, peak_force=replace(drop.peak_force, uncertainty=math.sqrt(variance)))
+
+
+def level_change(
+    drops: Sequence[Drop], gain: Gain, bands: BandSet = "octave"
+) -> NDArray[np.float64]:
+    """Return the change of the mean level of drops by a gain of the force, dB, shape (n_band,)."""
+    edges = get_bands(bands)
+    before, after = np.zeros((2, len(edges.nominal)))
+    for rate in {drop.sample_rate for drop in drops}:
+        forces = [drop.contact.gated for drop in drops if drop.sample_rate == rate]
+        length = next_fast_len(PADDING * max(map(len, forces)), real=True)
+        energy = np.sum([np.abs(np.fft.rfft(force, length)) ** 2 for force in forces], axis=0)
+        frequency = np.asarray(np.fft.rfftfreq(length, 1 / rate), dtype=np.float64)
+        first, stop = np.searchsorted(frequency, [edges.lower, edges.upper])
+        for sums, energies in ((before, energy), (after, energy * gain(frequency) ** 2)):
+            below = np.concatenate([[0.0], np.cumsum(energies)]) / (rate * length)
+            sums += below[stop] - below[first]  # noqa: PLW2901 - in place
+    with np.errstate(invalid="ignore"):  # a band above half the rate
+        return np.asarray(10 * np.log10(after / before))
+
+
+def _flat_limit(config: Config) -> float | None:
+    return None if config.plate is None else config.plate.flat_limit
+
+
+def _plate_gain(drops: Sequence[Drop], config: Config) -> Gain | None:
+    """Return the gain of the resonance that the levels may hold or lack; None if there is none."""
+    plate = config.resonance
+    if plate is not None:
+        seen = [drop.plate_recorded for drop in drops]
+        is_doubtful = False in seen and True not in seen
+    else:
+        is_doubtful = True
+        ringing = [drop.ringing for drop in drops if drop.ringing]
+        if ringing:
+            plate = Plate(*np.median([[r.frequency, r.quality] for r in ringing], axis=0))
+        else:
+            # A mass on a spring that is TOLERANCE off at this frequency.
+            limit = _flat_limit(config) or ASSUMED_FLAT
+            plate = Plate(limit * math.sqrt(1 + 1 / TOLERANCE), 100.0)
+    resonance = plate
+    return (lambda f: np.abs(resonance.response(f))) if is_doubtful else None
+
+
+def _filter_gain(drops: Sequence[Drop], config: Config) -> Gain | None:
+    """Return the gain of the filter that is assumed if none is stated."""
+    if config.filter is not None:
+        return None
+    assumed = assumed_filter(min(drop.sample_rate for drop in drops))
+    return lambda f: np.abs(assumed.response(f))

@@ -1,0 +1,69 @@
+"""Choice of the drops that are measured."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from thud.base.checks import refuse, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from thud.recordings.drops import Window
+
+MAX_NUMBER = 1_000_000
+
+
+def parse_numbers(text: str, key: str) -> list[range]:
+    """Return the ranges of numbers in a text such as ``"1-5, 8"``; raise InputError if none."""
+    parts = [re.fullmatch(r"(\d+)(?:\s*-\s*(\d+))?", part.strip()) for part in text.split(",")]
+    ranges = [
+        range(int(part[1]), int(part[2] or part[1]) + 1) if part and len(part[0]) < 20 else range(0)  # noqa: PLR2004
+        for part in parts
+    ]
+    if not all(ranges) or any(r.start < 1 or r.stop > MAX_NUMBER for r in ranges):
+        refuse(f"{key} = {shown(text)} is not allowed", 'numbers of drops from 1, such as "1-5, 8"')
+    return ranges
+
+
+def choose(
+    windows: Sequence[Window], first: int, drops: str | None, leave_out: Mapping[str, str]
+) -> tuple[list[Window], tuple[str, ...]]:
+    """Return the chosen windows, and a sentence on each one that is left out.
+
+    The windows have the numbers from `first` on. `drops` are the numbers of those to be measured,
+    all if None; `leave_out` are numbers of others, with the reason.
+    """
+    chosen: list[Window] = []
+    notes: list[str] = []
+    reasons = {
+        number: reason
+        for text, reason in leave_out.items()
+        for numbers in parse_numbers(text, "leave_out")
+        for number in numbers
+    }
+    included = None if drops is None else parse_numbers(drops, "drops")
+    for number, window in enumerate(windows, start=first):
+        reason = reasons.get(number, "")
+        if not reason and included and not any(number in numbers for numbers in included):
+            reason = f"only {drops} were chosen"
+        if not reason:
+            chosen.append(window)
+            continue
+        time = (window.start + window.contact[0]) / window.sample_rate
+        notes.append(f"drop {number} at {time:.2f} s was left out: {reason}")
+    return chosen, tuple(notes)
+
+
+def require_chosen(
+    count: int, chosen: int, drops: str | None, leave_out: Mapping[str, str]
+) -> None:
+    """Raise InputError if a number exceeds that of the drops, or none of the drops is chosen."""
+    stated = {"leave_out": ",".join(leave_out), "drops": drops or ""}
+    for key, text in stated.items():
+        highest = max((r.stop - 1 for r in parse_numbers(text, key)), default=0) if text else 0
+        if highest > count:
+            refuse(f"{key}: there is no drop {highest}", f"numbers from 1 to {count}")
+    if not chosen:
+        refuse("every drop is left out", "at least one drop")

@@ -1,0 +1,155 @@
+"""Sum of the channels of load cells under one plate."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.base.checks import refuse, shown
+from thud.recordings.faults import fill_dropouts, read_repaired, refuse_clipped
+from thud.recordings.polarity import MIN_PEAK_RATIO, scan
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from thud.recordings.drops import Window
+    from thud.recordings.signal import Signal
+
+SUM = "sum"
+# Maximum number of channels that are added.
+MAX_CELLS = 64
+EXAMPLES = '"sum", "F1+F2+F3+F4" or a list of names or numbers'
+HINT = 'channels = "sum" for load cells under one plate, or channel = the force'
+# A direction at the end of a name: Fx, Force_Y, z1.
+AXIS = re.compile(r"(?:^|[^a-z])f?(?P<axis>[xyz])\d*$")
+# Minimum peak of the opposite sign, as a fraction of the peak of the sum, that raises a warning.
+MIN_OPPOSITE = 0.05
+# Maximum deviation of a channel from the sum of the others, as a fraction, if it is their sum.
+MAX_DEVIATION = 0.05
+
+
+def require_channels(value: object, key: str = "channels") -> str | tuple[int | str, ...]:
+    """Return ``"sum"`` or names and numbers of channels; raise InputError if they are neither.
+
+    >>> require_channels("F1 + F2 + 3")
+    ('F1', 'F2', 3)
+    """
+    if isinstance(value, str):
+        if value.strip().casefold() == SUM:
+            return SUM
+        names: Sequence[object] = [
+            int(name) if name.isdecimal() else name for name in map(str.strip, value.split("+"))
+        ]
+    else:
+        names = value if isinstance(value, list | tuple) else ()
+    allowed = 1 < len(names) <= MAX_CELLS and all(
+        isinstance(name, int | str) and not isinstance(name, bool) and name for name in names
+    )
+    if not allowed or len(set(names)) < len(names):
+        refuse(f"{key} = {shown(value)} is not allowed", f"{EXAMPLES}, 2 to {MAX_CELLS} different")
+    return tuple(name for name in names if isinstance(name, int | str))
+
+
+def refuse_directions(names: Sequence[str], file: str) -> None:
+    """Raise InputError if channels to be added have names of different directions."""
+    matches = [AXIS.search(name.rpartition("/")[2].strip().casefold()) for name in names]
+    if len({match["axis"] for match in matches if match}) > 1:
+        listed = ", ".join(names)
+        refuse(
+            f'{file}: channels = "{SUM}" would add forces of different directions, {listed}',
+            "the names of the vertical forces, such as channels = 'z1+z2+z3+z4'",
+        )
+
+
+def add_signals(cells: Sequence[Signal], name: str) -> Signal:
+    """Return the sum of signals of equal rate and length."""
+    first = cells[0]
+    for cell in cells[1:]:
+        if (cell.n_sample, cell.sample_rate) != (first.n_sample, first.sample_rate):
+            refuse(
+                f"{cell.name}: {cell.n_sample} samples at {cell.sample_rate:g} Hz, "
+                f"{first.n_sample} at {first.sample_rate:g} Hz in {first.name}",
+                "channels that were recorded together",
+            )
+    uncertainties = [cell.calibration_uncertainty for cell in cells]
+    known = [uncertainty for uncertainty in uncertainties if uncertainty is not None]
+    return replace(
+        first,
+        name=name,
+        samples=partial(_read_sum, tuple(cells)),
+        full_scale=None,
+        calibration="; ".join(dict.fromkeys(cell.calibration for cell in cells)),
+        # The reference of all calibrations is usually the same.
+        calibration_uncertainty=max(known) if len(known) == len(cells) else None,
+        steps=tuple(dict.fromkeys(step for cell in cells for step in cell.steps)),
+        warnings=(),
+        cells=tuple(cells),
+    )
+
+
+def check_signs(total: Signal, peak: float) -> tuple[str, ...]:
+    """Return a warning for each cell whose force is mostly negative; the peak is that of the sum.
+
+    Raise InputError if all samples of a cell are equal.
+    """
+    warnings = []
+    for cell in total.cells:
+        extremes = scan(cell.read, cell.n_sample, cell.name)
+        up, down = extremes.peak(1.0), extremes.peak(-1.0)
+        if down > max(MIN_PEAK_RATIO * up, MIN_OPPOSITE * peak):
+            warnings.append(
+                f"{cell.name}: the peak is {-down:.4g} N in a sum of {peak:.4g} N; the sign of "
+                "this load cell may be wrong"
+            )
+    return tuple(warnings)
+
+
+def _read_sum(cells: tuple[Signal, ...], start: int, stop: int) -> NDArray[np.float64]:
+    total = cells[0].read(start, stop)
+    for cell in cells[1:]:
+        total += cell.read(start, stop)
+    return total
+
+
+def repair_cells(window: Window) -> tuple[Window, tuple[str, ...], tuple[str, ...]]:
+    """Return a window whose dropouts are filled in each load cell, notes, and warnings.
+
+    Raise InputError if a cell is clipped or has long dropouts, or a cell is the sum of the others.
+    """
+    cells = window.signal.cells
+    forces = [cell.read(window.start, window.stop) for cell in cells]
+    first, stop = window.contact
+    peak = float(np.ptp(np.sum(forces, axis=0)[first:stop]))
+    steps, warnings = tuple[str, ...](), tuple[str, ...]()
+    filled = []
+    for cell, force in zip(cells, forces, strict=True):
+        section = replace(window, name=cell.name, signal=cell)
+        refuse_clipped(section, force)
+        values, notes, remarks = fill_dropouts(section, force, peak)
+        filled.append(values)
+        steps += tuple(f"{cell.name}: {note}" for note in notes)
+        warnings += tuple(f"{cell.name}: {remark}" for remark in remarks)
+    _refuse_total(window, [force[first:stop] for force in filled])
+    repaired = partial(read_repaired, window.signal, window.start, np.sum(filled, axis=0))
+    signal = replace(window.signal, samples=repaired, cells=())
+    return replace(window, signal=signal), steps, warnings
+
+
+def _refuse_total(window: Window, forces: Sequence[NDArray[np.float64]]) -> None:
+    """Raise InputError if a channel is the sum of the others, which would count twice."""
+    if len(forces) < 3:  # noqa: PLR2004 - two cells may have equal forces
+        return
+    total = np.sum(forces, axis=0)
+    for cell, force in zip(window.signal.cells, forces, strict=True):
+        others = total - force
+        if np.ptp(others - force) < MAX_DEVIATION * np.ptp(others):
+            refuse(
+                f"{cell.name}: is the sum of the other channels, which would count twice",
+                "channels without it, or channel = this one",
+            )

@@ -1,0 +1,471 @@
+"""Resonance of a force plate from taps with a hammer."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy.fft import next_fast_len
+from scipy.optimize import least_squares
+from scipy.special import chdtrc, stdtrit
+
+from thud.base.checks import refuse
+from thud.recordings.calibration import open_source
+from thud.recordings.load_steps import NORMAL
+from thud.recordings.plate import Plate
+
+if TYPE_CHECKING:
+    import os
+
+    from numpy.typing import NDArray
+
+    from thud.recordings.signal import Signal
+
+# Maximum number of samples of a record, and minimum sample rate, Hz.
+MAX_SAMPLES = 2**24
+MIN_RATE = 2000.0
+# Cells, s, in which taps are searched. The range of the level in a tap exceeds MIN_RISE times the
+# usual one, and MIN_HEIGHT of the largest; between two taps it does not for QUIET, s.
+CELL = 1e-3
+MIN_RISE = 4.0
+MIN_HEIGHT = 0.1
+QUIET = 0.03
+# Longest time from the peak of a tap to the end of the contact and to that of its section, s.
+CONTACT = 6e-3
+AFTER = 0.5
+# The contact ends where the level differs from the decaying resonance by this fraction of the peak
+# or by this many standard deviations of the noise, and a margin, s.
+MIN_CONTACT = 0.01
+NOISE_LEVEL = 4.0
+MARGIN = 2e-4
+# Trial decay times to 1/e, s.
+DECAYS = np.array([0.001, 0.002, 0.004, 0.008, 0.016, 0.032, 0.064])
+# Minimum frequency of a resonance, Hz, and its maximum as a fraction of the sample rate.
+MIN_FREQUENCY = 200.0
+MAX_FREQUENCY = 0.4
+# Minimum ratio of the energy of a resonance to that of the noise. Minimum quality factor.
+MIN_ENERGY = 60.0
+MIN_QUALITY = 2.0
+# Maximum number of resonances, and minimum amplitude as a fraction of the highest.
+MAX_MODES = 4
+MIN_AMPLITUDE = 0.01
+# Resonances are the same if their frequencies differ by less, and the noise is taken from this
+# relative distance around them.
+SAME = 0.05
+AROUND = 0.3
+MIN_NEAR = 12
+# Background: degree of the drift, its time scale, s, and frequencies of hum, Hz.
+DEGREE = 2
+TIME_SCALE = 0.1
+HUM = (50.0, 60.0)
+BACKGROUND = DEGREE + 1 + 2 * len(HUM)
+# Length of a fit in decay times and in samples.
+DECAY_TIMES = 10.0
+MIN_LENGTH = 100
+# An antiresonance is possible where the spectrum is below POSSIBLE of its maxima within a factor of
+# NEAR on both sides, unless these are below CLEAR times the noise, in all taps. It is one if it is
+# below ZERO in each at frequencies that scatter by less than SAME_ZERO, although the spectra
+# differ: the logarithms of their decreases by more than DIFFERENT.
+POSSIBLE = 0.6
+ZERO = 0.4
+NEAR = 1.3
+CLEAR = 5.0
+SAME_ZERO = 0.01
+DIFFERENT = 0.1
+# Number of frequencies within a factor of NEAR.
+POINTS = 128
+# Maximum relative uncertainty of the frequency.
+MAX_UNCERTAINTY = 0.05
+# Probability below which the taps differ by more than their noise.
+SIGNIFICANT = 0.05
+
+
+@dataclass(frozen=True)
+class TappedPlate:
+    """Resonance of a force plate from taps.
+
+    Attributes
+    ----------
+    frequency, quality : float
+        Natural frequency, Hz, and quality factor.
+    frequency_uncertainty, quality_uncertainty : float
+        Their relative standard uncertainties.
+    count : int
+        Number of taps.
+    others : tuple of float
+        Frequencies of further resonances, Hz, the strongest first.
+    share : float or None
+        Share of the resonance in the static response, from an antiresonance; None without one.
+    share_uncertainty : float
+        Standard uncertainty of the share; 0 if it is None.
+    minimum_share : float
+        Minimum of the share: no antiresonance is nearer.
+    name : str
+        Name of the record.
+    """
+
+    frequency: float
+    quality: float
+    frequency_uncertainty: float
+    quality_uncertainty: float
+    count: int
+    others: tuple[float, ...]
+    share: float | None
+    share_uncertainty: float
+    minimum_share: float
+    name: str
+
+    def lines(self) -> str:
+        """Return the lines of a configuration, the table ``[plate]``."""
+        return (
+            f"[plate]\nf0 = {self.frequency:.6g}\nQ = {self.quality:.4g}\n"
+            f"f0_uncertainty = {self.frequency_uncertainty:.2g}"
+        ) + (f"\nshare = {self.share:.3g}" if self.share is not None else "")
+
+    def __str__(self) -> str:
+        """Return a sentence for reports."""
+        taps = f"{self.count} tap{'s' * (self.count > 1)} in {self.name}"
+        text = f"{taps}: Q within {100 * self.quality_uncertainty:.2g} % (standard uncertainty)"
+        text += (
+            f"; share in the static response {self.minimum_share:.2f} to 1"
+            if self.share is None
+            else f"; share within {self.share_uncertainty:.2g} (standard uncertainty)"
+        )
+        if self.others:
+            text += f"; also resonances at {', '.join(f'{other:.4g}' for other in self.others)} Hz"
+        return text
+
+
+class _Tap(NamedTuple):
+    """Index of the peak of a tap, stop index of its section, and its height."""
+
+    top: int
+    stop: int
+    height: float
+
+
+class _Mode(NamedTuple):
+    """Natural frequency, Hz, quality factor, their relative uncertainties, and static response."""
+
+    frequency: float
+    quality: float
+    frequency_uncertainty: float
+    quality_uncertainty: float
+    response: float
+
+
+class _Fit(NamedTuple):
+    """Decaying oscillations: frequency, Hz, and logarithm of the decay rate, 1/s, of each.
+
+    The factors are those of the columns; the noise is the standard deviation of the residual.
+    """
+
+    rates: NDArray[np.float64]
+    factors: NDArray[np.float64]
+    noise: float
+    modes: list[_Mode]
+
+
+def calibrate_tap(
+    record: Signal | str | os.PathLike[str], *, channel: int | str | None = None
+) -> TappedPlate:
+    """Return the resonance of a force plate from a record of one or more taps with a hammer.
+
+    Decaying oscillations are fitted to what follows each tap. The resonance is the one with the
+    largest static response.
+
+    Parameters
+    ----------
+    record
+        File, or a signal, in any unit.
+    channel
+        Number or name of the channel of a file.
+
+    Returns
+    -------
+    TappedPlate
+        Mean of the taps. The uncertainty is that of the noise or, if the taps differ by more, from
+        their scatter.
+
+    Raises
+    ------
+    InputError
+        If the record has no tap, or no resonance stands out.
+    """
+    source = open_source(record, channel)
+    if source.sample_rate is None or not source.sample_rate >= MIN_RATE:
+        refuse(f"{source.name}: the sample rate is unknown or low", f"{MIN_RATE:g} Hz or more")
+    if source.n_sample > MAX_SAMPLES:
+        refuse(f"{source.name}: {source.n_sample} samples", f"up to {MAX_SAMPLES} samples")
+    level, rate = source.samples(0, source.n_sample), source.sample_rate
+    if not np.isfinite(level).all():
+        refuse(f"{source.name}: a value is not finite", "real numbers")
+    taps = _find_taps(level, rate, source.name)
+    fits = [_fit_tap(level, tap, rate) for tap in taps]
+    rings = [modes for modes in fits if modes]
+    if not rings:
+        refuse(
+            f"{source.name}: no resonance stands out after {len(taps)} tap{'s' * (len(taps) > 1)}",
+            "a tap of a hard hammer after which the plate rings",
+        )
+    # Weaker taps may show another resonance first.
+    strongest = max((modes[0] for modes in rings), key=lambda mode: mode.response).frequency
+    nearest = [min(modes, key=lambda mode: abs(mode.frequency - strongest)) for modes in rings]
+    firsts = [mode for mode in nearest if abs(mode.frequency / strongest - 1) < SAME]
+    tops = [tap.top for tap, modes in zip(taps, fits, strict=True) if modes]
+    frequency, u_frequency = _mean(
+        [math.log(mode.frequency) for mode in firsts],
+        [mode.frequency_uncertainty for mode in firsts],
+    )
+    quality, u_quality = _mean(
+        [math.log(mode.quality) for mode in firsts], [mode.quality_uncertainty for mode in firsts]
+    )
+    if not u_frequency <= MAX_UNCERTAINTY:
+        refuse(
+            f"{source.name}: the resonance near {strongest:.4g} Hz is known to "
+            f"{100 * u_frequency:.2g} % only",
+            f"an uncertainty up to {MAX_UNCERTAINTY:.0%}",
+        )
+    others = max(rings, key=len)
+    plate = Plate(math.exp(frequency), math.exp(quality))
+    return TappedPlate(
+        plate.frequency,
+        plate.quality,
+        u_frequency,
+        u_quality,
+        len(firsts),
+        tuple(m.frequency for m in others if abs(m.frequency / strongest - 1) >= SAME),
+        *_share(level, tops, rate, plate),
+        source.name,
+    )
+
+
+def _share(
+    level: NDArray[np.float64], tops: list[int], rate: float, plate: Plate
+) -> tuple[float | None, float, float]:
+    """Return the share of a resonance in the static response or None, its uncertainty and minimum.
+
+    With the share s the response, 1 + s (H - 1), is zero at f0 / sqrt(1 - s). The inverse of H
+    ends the ringing: what remains of a tap is as short as the contact, and its spectrum is zero
+    there. The spectrum of the contact has zeros too, which move with its duration.
+    """
+    half = round(CONTACT * rate)
+    highest_frequency = MAX_FREQUENCY * rate
+    count = int(math.log(highest_frequency / plate.frequency) / math.log(NEAR) * POINTS)
+    grid = plate.frequency * NEAR ** (np.arange(-POINTS, count) / POINTS)
+    transform = np.exp(-2j * np.pi / rate * np.outer(grid, np.arange(2 * half)))
+    sizes, depths = [], []
+    for top in tops:
+        section = level[max(top - half, 0) : top + round(AFTER * rate)]
+        if top < half or len(section) < 4 * half or count <= POINTS:
+            continue
+        length = next_fast_len(2 * len(section), real=True)
+        frequency = np.asarray(np.fft.rfftfreq(length, 1 / rate), dtype=np.float64)
+        inverse = (frequency < highest_frequency) / plate.response(frequency)
+        spectrum = np.fft.rfft(section - np.median(section[: half // 2]), length) * inverse
+        # The tap itself, and as much of what follows.
+        applied = np.fft.irfft(spectrum, length)[: 4 * half].reshape(2, 2 * half)
+        size, noise = np.abs(transform @ applied.T).T
+        sizes.append(size)
+        depths.append(_depth(size, noise))
+    if not depths:
+        return None, 0.0, 0.0
+    # A zero of the plate is one in each tap.
+    depth = np.array(depths)
+    highest = np.nan_to_num(depth).max(axis=0)
+    above = grid[POINTS:-POINTS]
+    possible = np.flatnonzero(highest < POSSIBLE)
+    first = int(possible[0]) if possible.size else len(above) - 1
+    minimum = 1 - (plate.frequency / float(above[first])) ** 2
+    stop = first + int(np.argmax(highest[first:] >= POSSIBLE))
+    inside = depth[:, first:stop]
+    if len(depth) == 1 or stop == first or not inside.min(axis=1).max() < ZERO:
+        return None, 0.0, minimum
+    zeros = above[first + np.argmin(inside, axis=1)]
+    zero, scatter = float(zeros.mean()), float(zeros.std(ddof=1) / zeros.mean())
+    beyond = min(int(np.searchsorted(grid, NEAR * zero)), len(grid) - 1)
+    slopes = np.log([size[beyond] / size[0] for size in sizes])
+    if scatter > SAME_ZERO or slopes.std(ddof=1) < DIFFERENT:
+        return None, 0.0, minimum
+    rest = (plate.frequency / zero) ** 2
+    return 1 - rest, 2 * rest * scatter / math.sqrt(len(zeros)), minimum
+
+
+def _depth(size: NDArray[np.float64], noise: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the ratio of a spectrum and its neighbors on both sides; NaN where noise hides it."""
+    window = np.lib.stride_tricks.sliding_window_view
+    sides = window(size, POINTS + 1).max(axis=1)
+    sides = np.minimum(sides[:-POINTS], sides[POINTS:])
+    noise = np.sqrt(window(noise**2, 2 * POINTS + 1).mean(axis=1))
+    return np.where(sides > CLEAR * noise, size[POINTS:-POINTS] / sides, np.nan)
+
+
+def _mean(values: list[float], deviations: list[float]) -> tuple[float, float]:
+    """Return the mean of values and its standard uncertainty."""
+    count = len(values)
+    mean, within = float(np.mean(values)), math.sqrt(sum(u**2 for u in deviations)) / count
+    if count == 1 or not min(deviations) > 0:
+        return mean, within
+    square = sum(((value - mean) / u) ** 2 for value, u in zip(values, deviations, strict=True))
+    if chdtrc(count - 1, square) >= SIGNIFICANT:
+        return mean, within
+    factor = float(stdtrit(count - 1, 0.975)) / NORMAL
+    return mean, factor * float(np.std(values, ddof=1)) / math.sqrt(count)
+
+
+def _find_taps(level: NDArray[np.float64], rate: float, name: str) -> list[_Tap]:
+    """Return the taps of a record; raise InputError if there is none."""
+    width = round(CELL * rate)
+    count = len(level) // width
+    height = np.ptp(level[: count * width].reshape(count, width), axis=1)
+    noise, highest = (float(np.median(height)), float(height.max())) if count else (0.0, 0.0)
+    above = np.flatnonzero(height > max(MIN_RISE * noise, MIN_HEIGHT * highest))
+    if not above.size:
+        refuse(f"{name}: no tap", "a record in which a hammer taps the plate")
+    quiet = round(QUIET / CELL)
+    begins = width * above[np.diff(above, prepend=-quiet - 1) > quiet]
+    taps = []
+    for begin, following in zip(begins, [*begins[1:], len(level) + width], strict=True):
+        before = level[max(0, begin - round(QUIET * rate)) : begin]
+        offset = float(np.median(before)) if before.size else 0.0
+        contact = level[begin : begin + round(CONTACT * rate)] - offset
+        peak = int(np.argmax(np.abs(contact)))
+        stop = min(following - width, begin + round(AFTER * rate), len(level))
+        taps.append(_Tap(int(begin) + peak, int(stop), abs(float(contact[peak]))))
+    return taps
+
+
+def _fit_tap(level: NDArray[np.float64], tap: _Tap, rate: float) -> list[_Mode]:
+    """Return the resonances after a tap, that with the largest static response first."""
+    latest = tap.top + round(CONTACT * rate)
+    start = latest
+    modes: list[_Mode] = []
+    for _ in range(3):
+        fit = _fit_decay(level[start : tap.stop], rate, (start - tap.top) / rate)
+        if fit is None:
+            break
+        modes = fit.modes
+        # Continued back, the decay ends where the contact does.
+        time = np.arange(tap.top - start, latest - start) / rate
+        deviation = np.abs(level[tap.top : latest] - _columns(fit.rates, time) @ fit.factors)
+        limit = max(MIN_CONTACT * tap.height, NOISE_LEVEL * fit.noise)
+        contact = np.flatnonzero(deviation > limit)
+        earlier = tap.top + int(contact[-1] if contact.size else 0) + max(1, round(MARGIN * rate))
+        if earlier >= start:
+            break
+        start = earlier
+    return modes
+
+
+def _fit_decay(level: NDArray[np.float64], rate: float, delay: float) -> _Fit | None:
+    """Fit decaying oscillations to a level that begins at a delay, s, after a tap."""
+    fit = None
+    rates, used = np.zeros((0, 2)), level
+    while len(rates) < MAX_MODES and len(used) >= MIN_LENGTH:
+        trial = _strongest(used - _solve(rates, used, rate)[0], rate)
+        if trial is None or (np.abs(rates[:, 0] / trial[0] - 1) < SAME).any():
+            break
+        rates = np.vstack([rates, trial])
+        length = round(DECAY_TIMES / math.exp(rates[:, 1].min()) * rate)
+        used = level[: max(length, MIN_LENGTH)]
+        scale = np.column_stack([np.exp(rates[:, 1]), np.ones(len(rates))])
+        rates = least_squares(_residual, rates.ravel(), x_scale=scale.ravel(), args=(used, rate))
+        rates = rates.x.reshape(-1, 2)
+        found = _describe(rates, used, rate, delay)
+        if found is None:
+            break
+        fit = found
+    return fit
+
+
+def _residual(
+    rates: NDArray[np.float64], level: NDArray[np.float64], rate: float
+) -> NDArray[np.float64]:
+    return level - _solve(rates.reshape(-1, 2), level, rate)[0]
+
+
+def _solve(
+    rates: NDArray[np.float64], level: NDArray[np.float64], rate: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the level of decaying oscillations that is closest to a level, and its factors."""
+    columns = _columns(rates, np.arange(len(level)) / rate)
+    factors = np.asarray(np.linalg.lstsq(columns, level, rcond=None)[0], dtype=np.float64)
+    return columns @ factors, factors
+
+
+def _columns(rates: NDArray[np.float64], time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the columns of a background and of decaying oscillations at times, s."""
+    columns = [(time / TIME_SCALE) ** power for power in range(DEGREE + 1)]
+    steady = [(frequency, -np.inf) for frequency in HUM]
+    for frequency, log_decay in [*steady, *rates]:
+        decaying = np.exp(-np.exp(log_decay) * time)
+        phase = 2 * np.pi * frequency * time
+        columns += [decaying * np.cos(phase), decaying * np.sin(phase)]
+    return np.column_stack(columns)
+
+
+def _strongest(level: NDArray[np.float64], rate: float) -> tuple[float, float] | None:
+    """Return frequency, Hz, and logarithm of the decay rate of the strongest oscillation.
+
+    A matched filter searches A exp(-t/d) cos(2 pi f t + p); the usual energy is that of the noise.
+    """
+    windows = np.exp(-np.arange(len(level)) / rate / DECAYS[:, None])
+    length = next_fast_len(2 * len(level), real=True)
+    frequency = np.fft.rfftfreq(length, 1 / rate)
+    energy = np.abs(np.fft.rfft(windows * level, length)) ** 2 / (windows**2).sum(axis=1)[:, None]
+    energy = energy[:, (frequency >= MIN_FREQUENCY) & (frequency <= MAX_FREQUENCY * rate)]
+    k, index = np.unravel_index(np.argmax(energy), energy.shape)
+    if not energy[k, index] > MIN_ENERGY * np.median(energy[k]):
+        return None
+    first = int(np.searchsorted(frequency, MIN_FREQUENCY))
+    return float(frequency[first + index]), -math.log(DECAYS[k])
+
+
+def _describe(
+    rates: NDArray[np.float64], level: NDArray[np.float64], rate: float, delay: float
+) -> _Fit | None:
+    """Return a fit with its resonances; None if one of them is none."""
+    fitted, factors = _solve(rates, level, rate)
+    time = np.arange(len(level)) / rate
+    columns, waves = _columns(rates, time), factors[BACKGROUND:].reshape(-1, 2)
+    slopes = []
+    for k, ((_, log_decay), (cosine, sine)) in enumerate(zip(rates, waves, strict=True)):
+        pair = columns[:, BACKGROUND + 2 * k : BACKGROUND + 2 * k + 2]
+        slopes += [
+            2 * np.pi * time * (pair @ [sine, -cosine]),
+            -math.exp(log_decay) * time * (pair @ [cosine, sine]),
+        ]
+    jacobian = np.column_stack([*slopes, columns])
+    scale = np.linalg.norm(jacobian, axis=0)
+    inverse = np.linalg.pinv(jacobian / scale) / scale[:, None]
+    residual = level - fitted
+    power = np.abs(np.fft.rfft(residual)) ** 2 / len(level)
+    frequencies = np.fft.rfftfreq(len(level), 1 / rate)
+    modes = []
+    for k, (frequency, log_decay) in enumerate(rates):
+        decay = math.exp(min(log_decay, 50.0))
+        natural = math.hypot(frequency, decay / (2 * math.pi))
+        quality = math.pi * natural / decay
+        if not (MIN_FREQUENCY <= natural <= MAX_FREQUENCY * rate and quality > MIN_QUALITY):
+            return None
+        # Of colored noise that around the resonance counts.
+        near = power[np.abs(frequencies / natural - 1) < AROUND]
+        # An oscillation takes two values from the residual, the other columns one each.
+        noise = math.sqrt(
+            float(near.sum()) / (near.size - 2)
+            if near.size >= MIN_NEAR
+            else float(residual @ residual) / (len(level) - jacobian.shape[1])
+        )
+        deviation = noise * np.linalg.norm(inverse[2 * k : 2 * k + 2], axis=1)
+        amplitude = float(np.hypot(*waves[k])) * math.exp(decay * delay)
+        u_frequency = float(deviation[0]) / natural
+        u_quality = math.hypot(u_frequency, float(deviation[1]))
+        modes.append(_Mode(natural, quality, u_frequency, u_quality, amplitude / natural))
+    if min(mode.response * mode.frequency for mode in modes) < MIN_AMPLITUDE * max(
+        mode.response * mode.frequency for mode in modes
+    ):
+        return None
+    modes.sort(key=lambda mode: -mode.response)
+    return _Fit(rates, factors, math.sqrt(float(power.mean())), modes)

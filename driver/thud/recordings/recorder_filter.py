@@ -1,0 +1,93 @@
+"""The low-pass filter of a recorder or amplifier before sampling."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from scipy.signal import bessel, butter, freqs_zpk
+
+from thud.base.checks import refuse, refuse_value, require_choice, require_number, require_whole
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+KINDS = ("bessel", "butterworth")
+MAX_ORDER = 12
+# Response at the highest corrected frequency: there the correction amplifies the noise by 3.
+LOWEST_RESPONSE = 1 / 3
+# Duration of the response to an impulse, in periods of the cutoff.
+DECAY = 8.0
+# If no filter is stated, it is assumed to be at worst a Bessel filter of this order whose cutoff is
+# this fraction of the sample rate.
+ASSUMED_ORDER = 4
+ASSUMED_CUTOFF = 0.25
+
+
+@dataclass(frozen=True)
+class RecorderFilter:
+    """A low-pass filter before sampling.
+
+    Attributes are ``"bessel"`` or ``"butterworth"``, the order, the cutoff at -3 dB, Hz, and the
+    relative standard uncertainty of the cutoff.
+    """
+
+    kind: Literal["bessel", "butterworth"]
+    order: int
+    cutoff: float
+    cutoff_uncertainty: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Raise InputError for impossible values."""
+        require_choice("filter: kind", self.kind, KINDS)
+        require_whole("filter: order", self.order, 1, MAX_ORDER)
+        require_number("filter: cutoff", self.cutoff)
+        if self.cutoff <= 0:
+            refuse_value("filter: cutoff", self.cutoff, "cutoff > 0, Hz")
+
+    def response(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Return the ratio of output and input, at frequencies in Hz."""
+        if self.kind == "bessel":
+            zpk = bessel(self.order, self.cutoff, analog=True, output="zpk", norm="mag")
+        else:
+            zpk = butter(self.order, self.cutoff, analog=True, output="zpk")
+        return np.asarray(freqs_zpk(*zpk, worN=frequency)[1])
+
+    @property
+    def highest(self) -> float:
+        """Highest corrected frequency, Hz."""
+        frequency = self.cutoff * np.geomspace(1, 8, 400)
+        falling = np.abs(self.response(frequency))[::-1]
+        return float(np.interp(LOWEST_RESPONSE, falling, frequency[::-1]))
+
+    @property
+    def decay(self) -> float:
+        """Duration of the response to an impulse, s."""
+        return DECAY / self.cutoff
+
+    def describe(self, sample_rate: float) -> str:
+        """Describe the correction at a sample rate, Hz."""
+        highest = min(self.highest, sample_rate / 2)
+        return (
+            f"{self.kind.capitalize()} filter of order {self.order}, -3 dB at {self.cutoff:.4g} Hz,"
+            f" corrected up to {highest:.4g} Hz"
+        )
+
+    def require_above(self, edge: float) -> None:
+        """Raise InputError if the response is below 1/3 at the highest edge of bands, Hz."""
+        if self.highest < edge:
+            refuse(
+                f"filter: the cutoff, {self.cutoff:.4g} Hz, is too low for the bands, which reach "
+                f"up to {edge:.4g} Hz: the response falls to 1/3 at {self.highest:.4g} Hz",
+                f"{self.cutoff * edge / self.highest:.4g} Hz or more",
+            )
+
+    def shifted(self) -> RecorderFilter:
+        """Return the filter with a cutoff that is higher by its standard uncertainty."""
+        return replace(self, cutoff=self.cutoff * (1 + self.cutoff_uncertainty))
+
+
+def assumed_filter(sample_rate: float) -> RecorderFilter:
+    """Return the filter with the strongest attenuation that is assumed if none is stated."""
+    return RecorderFilter("bessel", ASSUMED_ORDER, ASSUMED_CUTOFF * sample_rate)

@@ -1,0 +1,134 @@
+"""Correction of recorded forces for the responses of force plate and recorder."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from scipy.fft import next_fast_len
+
+from thud.level.levels import get_bands
+from thud.recordings.faults import read_repaired, repair
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from thud.base._schema import BandSet
+    from thud.recordings.drops import Window
+    from thud.recordings.signal import Signal
+
+# Minimum response by which a spectrum is divided.
+MIN_RESPONSE = 0.05
+
+
+class Response(Protocol):
+    """Response of one instrument between force and record."""
+
+    @property
+    def highest(self) -> float:
+        """Highest corrected frequency, Hz."""
+        ...
+
+    @property
+    def decay(self) -> float:
+        """Duration of the response to an impulse, s."""
+        ...
+
+    def response(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Return the ratio of measured and applied force, at frequencies in Hz."""
+        ...
+
+    def describe(self, sample_rate: float) -> str:
+        """Describe the correction at a sample rate, Hz."""
+        ...
+
+    def require_above(self, edge: float) -> None:
+        """Raise InputError if bands up to an edge, Hz, cannot be corrected."""
+        ...
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Instruments in series whose responses are corrected: force plate, filter of the recorder."""
+
+    instruments: tuple[Response, ...]
+
+    @property
+    def highest(self) -> float:
+        """Highest corrected frequency, Hz."""
+        return min(instrument.highest for instrument in self.instruments)
+
+    @property
+    def decay(self) -> float:
+        """Duration of the response to an impulse, s."""
+        return max(instrument.decay for instrument in self.instruments)
+
+    def response(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Return the ratio of measured and applied force, at frequencies in Hz."""
+        responses = [instrument.response(frequency) for instrument in self.instruments]
+        return np.asarray(np.prod(responses, axis=0))
+
+    def passed(self, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the fraction of the force after the correction, at frequencies in Hz."""
+        octaves = np.log2(np.maximum(frequency, 1e-9) / self.highest)
+        return np.asarray(np.cos(np.pi / 2 * np.clip(octaves, 0, 1)) ** 2)
+
+    def noise_gain(self, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the gain of the noise density by the correction, at least 1."""
+        return np.asarray(np.maximum(1 / np.abs(self.response(frequency)) ** 2, 1.0))
+
+
+def correct_force(
+    force: NDArray[np.float64], sample_rate: float, chain: Chain, bands: BandSet = "third"
+) -> NDArray[np.float64]:
+    """Return the applied force, N, shape (n_sample,), from the measured one, by Fourier transform.
+
+    This is exact up to the highest corrected frequency; above, it would only amplify noise, and is
+    reduced to zero within an octave. The measured force, N, has background at both ends; the rate
+    is in Hz. Raise InputError if a response does not allow a correction up to the highest edge of
+    the bands.
+    """
+    for instrument in chain.instruments:
+        instrument.require_above(get_bands(bands).upper[-1])
+    # The impulse response decays within some periods of the highest corrected frequency.
+    margin = math.ceil(20 * sample_rate / chain.highest)
+    padded = np.pad(force, margin, mode="edge")
+    length = next_fast_len(len(padded) + margin, real=True)
+    frequency = np.asarray(np.fft.rfftfreq(length, 1 / sample_rate), dtype=np.float64)
+    response = chain.response(frequency)
+    response *= np.maximum(MIN_RESPONSE / np.abs(response), 1)
+    # The transform is periodic: without the first value, its ends meet without a step.
+    origin = padded[0]
+    spectrum = np.fft.rfft(padded - origin, length) / response * chain.passed(frequency)
+    corrected: NDArray[np.float64] = (
+        np.fft.irfft(spectrum, length)[margin : margin + len(force)] + origin
+    )
+    return corrected
+
+
+def correct_window(window: Window, chain: Chain) -> tuple[Window, tuple[str, ...], tuple[str, ...]]:
+    """Return a window of the applied force, the processing, and warnings.
+
+    Raise InputError if the pulse is cut off, clipped or doubled, or has long dropouts.
+    """
+    # Faults must be found in the recorded force; the correction would make a dropout ring.
+    force, steps, warnings = repair(window)
+    repaired = replace(
+        window.signal, samples=partial(read_repaired, window.signal, window.start, force)
+    )
+    applied = replace(
+        window.signal, samples=partial(_read_corrected, repaired, chain), full_scale=None
+    )
+    bounces = tuple(replace(bounce, signal=applied, chain=chain) for bounce in window.bounces)
+    steps += tuple(instrument.describe(window.sample_rate) for instrument in chain.instruments)
+    return replace(window, signal=applied, bounces=bounces, chain=chain), steps, warnings
+
+
+def _read_corrected(signal: Signal, chain: Chain, start: int, stop: int) -> NDArray[np.float64]:
+    margin = math.ceil(chain.decay * signal.sample_rate)
+    first, last = max(start - margin, 0), min(stop + margin, signal.n_sample)
+    corrected = correct_force(signal.read(first, last), signal.sample_rate, chain)
+    return corrected[start - first : stop - first]

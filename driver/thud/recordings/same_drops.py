@@ -1,0 +1,217 @@
+"""Records of the same drops, which must not be averaged (docs/recordings_reading.md)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+from scipy.signal import correlate
+
+from thud.base.checks import refuse
+from thud.recordings.load_cells import HINT
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from thud.recordings.drops import Window
+    from thud.recordings.measured_drop import Drop
+    from thud.recordings.signal import Signal
+
+# Noise is compared above about 1 / SMOOTH, without hum: a moving mean is subtracted three times.
+SMOOTH = 1e-3
+# Minimum correlation of the noise of two records of one drop, and its minimum in standard
+# deviations of a correlation by chance. Noise is assumed to reach up to BANDWIDTH, Hz.
+MIN_CORRELATION = 0.5
+MIN_SCORE = 6.0
+BANDWIDTH = 5e3
+# Maximum shift between the touches of two records of one drop, s, and samples.
+MAX_SHIFT = 3e-4
+MAX_SHIFT_SAMPLES = 3
+# Maximum difference of forces in the contact, in standard deviations of the noise of both records,
+# and for constant backgrounds, as a fraction of the peak.
+MAX_DIFFERENCE = 3.0
+MAX_ROUNDING = 1e-6
+# Maximum relative difference of impulse over peak of two records of one drop: noise changes both.
+MAX_RATIO_CHANGE = 0.03
+# Maximum relative difference of the rates of two records of one drop, by the rounding of times.
+SAME_RATE = 1e-4
+# Simultaneous records: maximum difference of instants, s, minimum difference of the scales, for
+# records with one pulse and with several, and maximum deviation from a common shape.
+MAX_DELAY = 2e-4
+MIN_SCALE_CHANGE = (0.1, 0.03)
+MAX_SHAPE_DEVIATION = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """Measured drops of one signal."""
+
+    name: str
+    path: str
+    checksum: str
+    drops: tuple[Drop, ...]
+
+
+def refuse_copy(signal: Signal, others: Sequence[Record]) -> None:
+    """Raise InputError if a file, or an array, was measured before."""
+    for other in others:
+        is_same_channel = signal.name == other.name or signal.path != other.path
+        if signal.checksum == other.checksum and is_same_channel:
+            refuse(
+                f"{signal.name}: is the same record as {other.name}"
+                if signal.name != other.name
+                else f"{signal.name}: is given twice",
+                "each record once: repeatability is the scatter of different drops",
+            )
+
+
+def refuse_simultaneous_channels(
+    windows: Sequence[Window], others: Sequence[tuple[str, Sequence[Window]]]
+) -> None:
+    """Raise InputError if another channel of a file has a drop at the same instant.
+
+    `others` are the path and the windows of other channels.
+    """
+    signal = windows[0].signal
+    spans = _spans(windows)
+    for path, other in others:
+        if path != signal.path or not path:
+            continue
+        begin, end = _spans(other)
+        if ((spans[0][:, None] < end) & (spans[1][:, None] > begin)).any():
+            refuse(
+                f"{signal.name}: has drops at the same instants as {other[0].signal.name}; "
+                "simultaneous forces are never averaged",
+                HINT,
+            )
+
+
+def _spans(windows: Sequence[Window]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return begins and ends of contacts, s."""
+    rate = windows[0].signal.sample_rate
+    starts = np.array([window.start for window in windows])
+    contacts = np.array([window.contact for window in windows])
+    return (starts + contacts[:, 0]) / rate, (starts + contacts[:, 1]) / rate
+
+
+def refuse_same_drops(records: Sequence[Record]) -> None:
+    """Raise InputError if two records hold the same drop, or simultaneous forces."""
+    if len(records) > 1:
+        _refuse_equal_noise(records)
+    for k, record in enumerate(records):
+        for other in records[:k]:
+            if record.path != other.path and _are_simultaneous(record.drops, other.drops):
+                refuse(
+                    f"{record.name}: has the drops of {other.name} at the same instants, at a "
+                    "different scale; simultaneous forces are never averaged",
+                    f"one file with all channels and {HINT}",
+                )
+
+
+def _refuse_equal_noise(records: Sequence[Record]) -> None:
+    numbers = np.repeat(np.arange(len(records)), [len(record.drops) for record in records])
+    drops = [drop for record in records for drop in record.drops]
+    # Impulse over peak depends neither on scale nor on instant.
+    ratio = np.array([drop.impulse.value / drop.peak_force.value for drop in drops])
+    order = np.argsort(ratio)
+    stops = np.searchsorted(ratio[order], ratio[order] * (1 + MAX_RATIO_CHANGE))
+    sections = [_Section(drop) for drop in drops]
+    for k, i in enumerate(order):
+        for j in order[k + 1 : stops[k]]:
+            is_equal = math.isclose(drops[i].sample_rate, drops[j].sample_rate, rel_tol=SAME_RATE)
+            if numbers[i] == numbers[j] or not is_equal:
+                continue
+            first, second = sorted((int(i), int(j)))
+            if _is_same(sections[first], sections[second]):
+                refuse(
+                    f"{drops[second].name}: is the same drop as {drops[first].name}: its noise "
+                    "is the same",
+                    "each drop once: repeatability is the scatter of different drops",
+                )
+
+
+class _Section:
+    """Background before a drop without hum and slow noise, N, and its contact."""
+
+    def __init__(self, drop: Drop) -> None:
+        self.drop = drop
+        rate = drop.sample_rate
+        raw = drop.contact.force + drop.contact.removed
+        noise = raw[: drop.gate[0]]
+        width = max(3, round(SMOOTH * rate))
+        for _ in range(3):
+            noise = noise - uniform_filter1d(noise, width, mode="nearest")
+        self.raw = raw
+        self.noise = noise
+        self.deviation = float(noise.std()) if noise.size else 0.0
+        self.is_constant = self.deviation < MAX_ROUNDING * drop.peak_force.value
+
+
+def _is_same(one: _Section, other: _Section) -> bool:
+    """Whether two records of drops, of equal rate, have the same noise."""
+    rate = one.drop.sample_rate
+    limit = MAX_SHIFT_SAMPLES + int(MAX_SHIFT * rate)
+    length = min(len(one.noise), len(other.noise))
+    if one.is_constant != other.is_constant:
+        return False
+    if one.is_constant:
+        differences = [_difference(one, other, shift) for shift in range(-limit, limit + 1)]
+        return min(differences) < MAX_ROUNDING * one.drop.peak_force.value
+    # Both end at the gates of the drops.
+    a, b = one.noise[len(one.noise) - length :], other.noise[len(other.noise) - length :]
+    product = correlate(a, b) / max(length * one.deviation * other.deviation, 1e-300)
+    middle = length - 1
+    near = product[max(middle - limit, 0) : middle + limit + 1]
+    best = int(np.argmax(near))
+    count = min(length, length / rate * BANDWIDTH)
+    if near[best] < max(MIN_CORRELATION, MIN_SCORE / np.sqrt(max(count, 1.0))):
+        return False
+    shift = best - min(middle, limit)
+    noise = math.hypot(one.deviation, other.deviation)
+    return _difference(one, other, -shift) < MAX_DIFFERENCE * noise
+
+
+def _difference(one: _Section, other: _Section, shift: int) -> float:
+    """Return the standard deviation of the difference of two contacts at the best scale, N.
+
+    `shift` is the sample of the other gate at the begin of the first one.
+    """
+    first, stop = one.drop.gate
+    a = one.raw[first:stop]
+    start = other.drop.gate[0] + shift
+    b = other.raw[max(start, 0) : start + len(a)]
+    if start < 0 or len(b) < len(a):
+        return float("inf")
+    shapes = np.column_stack([b, np.ones(len(b))])
+    solution, *_ = np.linalg.lstsq(shapes, a, rcond=None)
+    return float((a - shapes @ solution).std())
+
+
+def _are_simultaneous(one: Sequence[Drop], other: Sequence[Drop]) -> bool:
+    """Whether drops have equal instants and shapes but different scales."""
+    if len(one) != len(other):
+        return False
+    instants, others = (
+        np.array([drop.onset + time for drop in drops for time in (0.0, *drop.bounces)])
+        for drops in (one, other)
+    )
+    if len(instants) != len(others) or np.abs(instants - others).max() > MAX_DELAY:
+        return False
+    minimum = MIN_SCALE_CHANGE[len(instants) > 1]
+    return all(
+        abs(np.log(a.peak_force.value / b.peak_force.value)) > minimum and _have_shape(a, b)
+        for a, b in zip(one, other, strict=True)
+    )
+
+
+def _have_shape(one: Drop, other: Drop) -> bool:
+    """Whether two contacts have the same shape, except for noise."""
+    time = np.linspace(0, one.contact_time.value, 64)
+    a, b = (np.interp(time, d.time, d.force) / d.peak_force.value for d in (one, other))
+    noise = (d.noise.deviation / d.peak_force.value for d in (one, other))
+    return float((a - b).std()) < math.hypot(MAX_SHAPE_DEVIATION, *noise)

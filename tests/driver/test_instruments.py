@@ -1,0 +1,222 @@
+"""Plate and filter of a recorder: corrected where stated, in the budget where not."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.signal
+from conftest import naming
+from synthetic import make_drop
+
+import thud
+from thud.recordings.assumptions import assumed_contributions, level_change
+from thud.recordings.config import Config, FilterConfig, PlateConfig, checked_config
+from thud.recordings.plate import Plate
+from thud.recordings.recorder_filter import RecorderFilter, assumed_filter
+from thud.recordings.response import Chain, Response
+from thud.recordings.signal import Signal
+
+RATE = 48_000.0
+TIME = np.arange(-4800, 9600) / RATE
+# A pulse of 20 ms with content up to some kHz: its flanks have kinks.
+PULSE = np.where((TIME >= 0) & (TIME < 0.02), 1500 * np.sin(np.pi * TIME / 0.02), 0.0)
+STATED: dict[str, Any] = {
+    "mass": 2.5,
+    "height": 1.0,
+    "mass_uncertainty": 0.002,
+    "height_uncertainty": 0.002,
+    "calibration_uncertainty": 0.002,
+}
+FLAT = {"plate": PlateConfig(flat_limit=1e5), "filter": FilterConfig("none")}
+
+
+def felt(response: Response) -> np.ndarray:
+    """Return the pulse after an instrument, by its response to the pulse's spectrum."""
+    length = 2**17
+    frequency = np.fft.rfftfreq(length, 1 / RATE)
+    spectrum = np.fft.rfft(PULSE, length) * response.response(frequency)
+    return np.asarray(np.fft.irfft(spectrum, length)[: len(PULSE)])
+
+
+def measured(force: np.ndarray, noise: float = 0.5, **config: Any) -> thud.Recording:  # noqa: ANN401
+    """Return the recording of a force with white noise, N."""
+    noisy = force + np.random.default_rng(1).normal(scale=noise, size=len(force))
+    return thud.Recording.from_signals(
+        [Signal.from_array(noisy, RATE, "pulse")], Config(**STATED, **config)
+    )
+
+
+def names(recording: thud.Recording) -> list[str]:
+    """Return the contributions to the level of 500 Hz."""
+    return [term.name for term in recording.level_estimates()[-1].contributions]
+
+
+@pytest.mark.parametrize(
+    ("instrument", "stated"),
+    [
+        (Plate(1100.0, 8.0), {"plate": PlateConfig(f0=1100.0, Q=8.0, f0_uncertainty=0.001)}),
+        (
+            Plate(1300.0, 10.0, share=0.4),
+            {"plate": PlateConfig(f0=1300.0, Q=10.0, f0_uncertainty=0.001, share=0.4)},
+        ),
+        (RecorderFilter("bessel", 4, 1250.0), {"filter": FilterConfig("bessel", 4, 1250.0, 0.001)}),
+        (
+            RecorderFilter("butterworth", 4, 625.0),
+            {"filter": FilterConfig("butterworth", 4, 625.0, 0.001)},
+        ),
+    ],
+)
+def test_stated_instrument_is_undone(instrument: Response, stated: dict[str, Any]) -> None:
+    truth = measured(PULSE, 1e-3, **FLAT).levels()
+    force = felt(instrument)
+    assert abs(measured(force, 1e-3, **FLAT).levels() - truth)[-1] > 0.2
+    # The filter leaves no more than half of the energy of the kinks in the gate.
+    corrected = measured(force, 1e-3, **{**FLAT, **stated})
+    np.testing.assert_allclose(corrected.levels(), truth, atol=0.02)
+    assert any("corrected up to" in step for step in corrected.steps)
+
+
+def test_filters_are_those_of_scipy() -> None:
+    frequency = np.array([10.0, 500.0, 1000.0, 2400.0])
+    for kind, design in (
+        ("bessel", lambda: scipy.signal.bessel(4, 2 * np.pi * 1000, analog=True, norm="mag")),
+        ("butterworth", lambda: scipy.signal.butter(4, 2 * np.pi * 1000, analog=True)),
+    ):
+        expected = scipy.signal.freqs(*design(), worN=2 * np.pi * frequency)[1]
+        found = RecorderFilter(kind, 4, 1000.0)  # type: ignore[arg-type]
+        np.testing.assert_allclose(found.response(frequency), expected, rtol=1e-9)
+        assert abs(found.response(np.array([found.highest]))[0]) == pytest.approx(1 / 3, abs=0.003)
+
+
+def test_unstated_resonance_that_rings_is_in_the_budget_with_its_whole_effect() -> None:
+    plate = Plate(1100.0, 25.0)
+    force = felt(plate)
+    truth = measured(PULSE, **FLAT).levels()[-1]
+    recording = measured(force, filter=FilterConfig("none"))
+    (ringing,) = (drop.ringing for drop in recording.drops)
+    assert ringing is not None
+    assert ringing.frequency == pytest.approx(1100, rel=0.005)
+    assert ringing.quality == pytest.approx(25, rel=0.15)
+    level = recording.level_estimates()[-1]
+    assert "plate, assumed" in names(recording)
+    assert abs(level.value - truth) > 1
+    assert abs(level.value - truth) < level.expanded
+    assert any("f0 = 1" in warning for warning in recording.warnings)
+
+
+def test_unstated_plate_is_assumed_as_flat_as_the_standard_demands() -> None:
+    recording = measured(PULSE, filter=FilterConfig("none"))
+    (warning,) = (text for text in recording.warnings if "[plate]" in text)
+    assert "up to 1000 Hz" in warning
+    found = assumed_contributions(recording.drops, recording.config)["plate, assumed"]
+    # A mass on a spring 2 % too high at 1 kHz: 2 % (f/1 kHz)2, here between 0.35 and 0.71 kHz.
+    low, high = (20 * math.log10(1 + 0.02 * f**2) / math.sqrt(3) for f in (0.355, 0.708))
+    assert low < found[-1] < high
+    assert "plate, assumed" not in assumed_contributions(
+        recording.drops, Config(plate=PlateConfig(f0=5000.0, Q=30.0), filter=FilterConfig("none"))
+    )
+
+
+def test_stated_plate_that_is_not_in_the_record_is_told() -> None:
+    stated = PlateConfig(f0=2000.0, Q=20.0, f0_uncertainty=0.005)
+    right = measured(felt(Plate(2000.0, 20.0)), plate=stated, filter=FilterConfig("none"))
+    wrong = measured(PULSE, plate=stated, filter=FilterConfig("none"))
+    hidden = measured(PULSE, 20.0, plate=stated, filter=FilterConfig("none"))
+    assert [r.drops[0].plate_recorded for r in (right, wrong, hidden)] == [True, False, None]
+    truth = measured(PULSE, **FLAT).levels()[-1]
+    level = wrong.level_estimates()[-1]
+    assert 0.3 < truth - level.value < level.expanded
+    for recording, words in ((right, ""), (wrong, "does not show"), (hidden, "neither shows")):
+        assert any("2000 Hz" in text and words in text for text in recording.warnings) == bool(
+            words
+        )
+
+
+def test_unstated_filter_is_assumed_by_the_rate() -> None:
+    slow = Signal.from_array(PULSE[::19], RATE / 19, "slow")
+    config = Config(**STATED, plate=PlateConfig(flat_limit=1e5))
+    recording = thud.Recording.from_signals([slow], config)
+    assert any("[filter]" in warning for warning in recording.warnings)
+    effect = level_change(
+        recording.drops, lambda f: np.abs(assumed_filter(RATE / 19).response(f)), "octave"
+    )
+    found = assumed_contributions(recording.drops, config)["recorder filter, assumed"]
+    np.testing.assert_allclose(found, -effect / math.sqrt(3))
+    assert 0.3 < -effect[-1] < 2
+    fast = measured(PULSE, plate=PlateConfig(flat_limit=1e5))
+    assert any("0.00 dB" in warning for warning in fast.warnings if "[filter]" in warning)
+    assert not any("[filter]" in warning for warning in measured(PULSE, **FLAT).warnings)
+    assert assumed_contributions(fast.drops, fast.config)["recorder filter, assumed"][-1] < 0.01
+
+
+def with_step(size: float, instant: float = 0.008, **config: Any) -> thud.Recording:  # noqa: ANN401
+    """Return the recording of a pulse whose offset changes after the touch, N and s."""
+    return measured(SMOOTH + size * (instant < TIME), **FLAT, **config)
+
+
+SMOOTH = 1500 * np.sin(np.pi * np.clip(TIME / 0.02, 0, 1)) ** 1.3
+
+
+@pytest.mark.parametrize("size", [15.0, -60.0])
+def test_step_of_the_offset_is_in_the_uncertainty(size: float) -> None:
+    truth = measured(SMOOTH, **FLAT)
+    for instant in (0.002, 0.01, 0.017):
+        recording = with_step(size, instant)
+        (drop,) = recording.drops
+        assert drop.offset_step == pytest.approx(size, abs=0.5)
+        assert any("the offset changes" in warning for warning in recording.warnings)
+        for level, right in zip(recording.level_estimates(), truth.levels(), strict=True):
+            assert abs(level.value - right) < 1.1 * level.expanded
+        for name in ("peak_force", "impulse"):
+            estimate, right = getattr(drop, name), getattr(truth.drops[0], name)
+            assert abs(estimate.value - right.value) < estimate.expanded
+            assert estimate.uncertainty > 5 * right.uncertainty
+
+
+@pytest.mark.parametrize("kind", ["quiet", "hum", "drift", "tremor", "droop 0.2 s", "droop 2 s"])
+def test_other_backgrounds_are_no_step(kind: str) -> None:
+    force = SMOOTH.copy()
+    if kind == "hum":
+        force += 60 * np.sin(2 * np.pi * 50 * TIME + 0.4)
+    elif kind == "drift":
+        force += 100 * TIME
+    elif kind == "tremor":
+        force += 20 * np.sin(2 * np.pi * 6 * TIME + 1)
+    elif kind.startswith("droop"):
+        tau = float(kind.split()[1])
+        force += scipy.signal.lfilter([-1 / tau / RATE], [1, -1 + 1 / tau / RATE], force)
+    recording = measured(force, **FLAT)
+    assert recording.drops[0].offset_step == 0
+    assert not recording.average().contributions["offset step"].any()
+
+
+def test_gain_of_two_is_six_decibels_in_every_band() -> None:
+    change = level_change([make_drop(1.0)], lambda f: np.full(len(f), 2.0), "third")
+    np.testing.assert_allclose(change, 20 * math.log10(2))
+
+
+@pytest.mark.parametrize(
+    ("config", "words"),
+    [
+        ({"filter": {"kind": "bessel", "order": 4}}, ("filter: cutoff", "missing")),
+        ({"filter": {"order": 4}}, ("filter: kind", "missing")),
+        ({"filter": {"kind": "elliptic"}}, ("filter: kind", "bessel")),
+        ({"filter": {"kind": "bessel", "order": 40, "cutoff": 1e3}}, ("order", "1 to 12")),
+        ({"plate": {"share": 0.4}}, ("plate: f0", "missing")),
+        ({"plate": {"f0": 1500.0, "Q": 9.0, "flat_limit": 700.0}}, ("f0 and flat_limit",)),
+        ({"plate": {"f0": 1500.0, "Q": 9.0, "share": 0.0}}, ("share", "0.001")),
+    ],
+)
+def test_tables_of_instruments_are_checked(config: dict[str, Any], words: tuple[str, ...]) -> None:
+    with pytest.raises(thud.InputError, match=naming(*words)):
+        checked_config(Config(**config))
+
+
+def test_filter_below_the_bands_is_refused() -> None:
+    with pytest.raises(thud.InputError, match=naming("cutoff", "300 Hz", "707.9 Hz")):
+        measured(PULSE, filter=FilterConfig("butterworth", 6, 300.0))
+    chain = Chain((Plate(1100.0, 8.0), RecorderFilter("bessel", 4, 900.0)))
+    assert chain.highest == min(part.highest for part in chain.instruments)

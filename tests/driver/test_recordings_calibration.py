@@ -1,0 +1,412 @@
+"""Calibration from a known force behind an amplifier that droops, and from a tap on the plate."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from conftest import naming
+from scipy import stats
+from scipy.signal import cont2discrete, lfilter
+
+from thud import InputError, cli
+from thud.recordings import load_steps
+from thud.recordings.calibration import calibrate
+from thud.recordings.config import read_config
+from thud.recordings.plate_tap import TappedPlate, calibrate_tap
+from thud.recordings.signal import Signal
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conftest import ErrorsOf
+    from numpy.typing import NDArray
+
+    from thud.recordings.force_units import Calibration
+
+RATE = 1000.0
+FORCE = 250.0
+
+
+def high_pass(level: NDArray[np.float64], time_constant: float) -> NDArray[np.float64]:
+    """Return the exact response of a first-order high-pass to lines between the samples."""
+    if math.isinf(time_constant):
+        return level
+    decay = math.exp(-1 / RATE / time_constant)
+    gain = (1 - decay) * time_constant * RATE
+    return np.asarray(lfilter([gain, -gain], [1, -decay], level))
+
+
+def load(ends: list[float], ramp: float, duration: float) -> NDArray[np.float64]:
+    """Return a weight, 1, that is put on and taken off from these times on within a ramp, s."""
+    time = np.arange(0, duration, 1 / RATE)
+    turns = [(-1) ** k * np.clip((time - end) / ramp, 0, 1) for k, end in enumerate(ends)]
+    return np.asarray(sum(turns), dtype=np.float64)
+
+
+def recorded(  # noqa: PLR0913 - what differs between records
+    time_constant: float,
+    seed: int,
+    *,
+    single: bool = False,
+    rest: float = 5.0,
+    ramp: float = 0.5,
+    noise: float = 0.01,
+) -> NDArray[np.float64]:
+    """Return the record of a step of 1 V with offset, drift and noise."""
+    ends = [5.0] if single else [5.0, 5.0 + rest]
+    level = high_pass(load(ends, ramp, 5 + rest + 5 * (not single)), time_constant)
+    rng = np.random.default_rng(seed)
+    return level + rng.normal(0, noise, level.size) + 0.3 + 3e-6 * np.arange(level.size)
+
+
+def calibrated(level: NDArray[np.float64], **stated: float) -> tuple[Calibration, float]:
+    """Return the calibration, and its relative error for a step of 1 V."""
+    found = calibrate(Signal.from_array(level, RATE), force=FORCE, unit="V", **stated)
+    return found, float(found.chain.split()[0]) / FORCE - 1
+
+
+@pytest.mark.parametrize("single", [False, True])
+@pytest.mark.parametrize("ramp", [0.1, 1.0])
+@pytest.mark.parametrize("time_constant", [30.0, 10.0, 5.0, 2.0])
+def test_droop_of_the_amplifier_is_taken_off(
+    time_constant: float, ramp: float, *, single: bool
+) -> None:
+    found, error = calibrated(recorded(time_constant, 3, single=single, ramp=ramp))
+    assert found.uncertainty is not None
+    assert found.uncertainty < 0.004
+    assert abs(error) < 3.5 * found.uncertainty
+    droop = found.time_constant
+    assert droop is not None
+    assert droop.uncertainty < 0.1
+    assert abs(droop.value / time_constant - 1) < 3.5 * droop.uncertainty
+    assert droop.minimum < droop.value
+    assert "droop with a time constant of" in str(droop)
+
+
+def test_record_without_droop_remains_exact() -> None:
+    found, error = calibrated(recorded(math.inf, 1))
+    assert found.uncertainty is not None
+    assert abs(error) < 3.5 * found.uncertainty
+    # Two levels of 7 s and one of 3.5 s, 0.01 V of noise: 0.0002 V without drift and droop.
+    assert found.uncertainty < 0.0015
+    assert found.time_constant is not None
+    assert math.isinf(found.time_constant.value)
+    assert 100 < found.time_constant.minimum < 1e5
+    assert str(found.time_constant).startswith("no droop: a time constant above ")
+
+
+@pytest.mark.parametrize("time_constant", [math.inf, 10.0, 2.0])
+@pytest.mark.parametrize("single", [False, True])
+def test_error_is_as_large_as_the_stated_uncertainty(time_constant: float, *, single: bool) -> None:
+    """Of 40 normal errors 0 to 6 lie outside 95 %, with a probability of 99.6 %."""
+    outside = 0
+    for seed in range(40):
+        found, error = calibrated(recorded(time_constant, seed, single=single, ramp=0.7))
+        assert found.uncertainty is not None
+        outside += abs(error) > 1.96 * found.uncertainty
+    assert outside <= 6
+
+
+def test_weight_that_was_on_before_the_record_is_taken_off() -> None:
+    level = high_pass(load([1.0, 12.0], 0.3, 20.0), 8.0)[4000:]
+    level += np.random.default_rng(1).normal(0, 0.003, level.size)
+    found, error = calibrated(level)
+    assert found.uncertainty is not None
+    assert found.origin.startswith("1 step")
+    assert abs(error) < 3.5 * found.uncertainty < 0.02
+
+
+def test_hand_that_presses_the_weight_does_not_count() -> None:
+    time = np.arange(0, 15, 1 / RATE)
+    steps = [
+        (time > end) * (1 - np.exp(-np.maximum(time - end, 0) / 0.15))
+        + 0.4 * np.exp(-(((time - end - 0.3) / 0.15) ** 2))
+        for end in (5.0, 10.0)
+    ]
+    level = high_pass(steps[0] - steps[1], 5.0)
+    found, error = calibrated(level + np.random.default_rng(1).normal(0, 0.005, time.size))
+    assert found.uncertainty is not None
+    assert abs(error) < 3.5 * found.uncertainty < 0.01
+
+
+def test_time_constant_may_be_stated() -> None:
+    level = recorded(10.0, 2, single=True)
+    fitted, _ = calibrated(level)
+    exact, error = calibrated(level, time_constant=10.0)
+    vague, other = calibrated(level, time_constant=10.3, time_constant_uncertainty=0.03)
+    assert exact.uncertainty is not None
+    assert vague.uncertainty is not None
+    assert fitted.uncertainty is not None
+    assert exact.uncertainty <= vague.uncertainty <= 1.01 * fitted.uncertainty
+    assert abs(error) < 3.5 * exact.uncertainty
+    assert abs(other) < 3.5 * vague.uncertainty
+    assert exact.time_constant is not None
+    assert exact.time_constant.value == pytest.approx(10.0)
+    assert "uncertainty" not in str(exact.time_constant)
+    with pytest.raises(InputError, match=naming("exponential")):
+        calibrated(recorded(10.0, 2), time_constant=15.0)
+    with pytest.raises(InputError, match=naming("exponential")):
+        calibrated(recorded(5.0, 2), time_constant=math.inf)
+
+
+@pytest.mark.parametrize(
+    ("stated", "words"),
+    [
+        ({"time_constant": 0.0}, naming("time_constant", "0 s")),
+        ({"time_constant": math.nan}, naming("time_constant", "nan")),
+        (
+            {"time_constant": 5.0, "time_constant_uncertainty": 0.6},
+            naming("time_constant", "0.6"),
+        ),
+        (
+            {"time_constant": 5.0, "time_constant_uncertainty": math.inf},
+            naming("time_constant_uncertainty", "inf"),
+        ),
+    ],
+)
+def test_impossible_time_constants(stated: dict[str, float], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        calibrated(recorded(10.0, 2), **stated)
+
+
+@pytest.mark.parametrize("second", [20.0, 5.0, 1.0])
+def test_two_time_constants_are_refused(second: float) -> None:
+    level = high_pass(recorded(10.0, 1, noise=0.0) - 0.3, second)
+    level += np.random.default_rng(1).normal(0, 0.01, level.size)
+    with pytest.raises(InputError, match=naming("exponential")):
+        calibrated(level)
+
+
+def test_slow_second_time_constant_counts_as_uncertainty() -> None:
+    """Seconds of 10 and 30 s are hardly distinguished from one of 7.5 s, 1 % off."""
+    level = high_pass(recorded(10.0, 4, noise=0.0) - 0.3, 30.0)
+    found, error = calibrated(level + np.random.default_rng(6).normal(0, 0.01, level.size))
+    assert found.uncertainty is not None
+    assert abs(error) < 2 * found.uncertainty
+    assert found.uncertainty > 0.003
+
+
+def test_creep_is_refused() -> None:
+    time = np.arange(0, 15, 1 / RATE)
+    creep = [np.log1p(np.maximum(time - end, 0) / 0.5) for end in (5.0, 10.0)]
+    with pytest.raises(InputError, match=naming("exponential")):
+        calibrated(recorded(math.inf, 1)[: time.size] + 0.01 * (creep[0] - creep[1]))
+
+
+def test_change_of_the_drift_is_fitted_and_counts_as_uncertainty() -> None:
+    level = recorded(math.inf, 1)
+    still, _ = calibrated(level)
+    moving, error = calibrated(level + 0.05 * np.linspace(0, 1, level.size) ** 2)
+    assert still.uncertainty is not None
+    assert moving.uncertainty is not None
+    assert abs(error) < 3.5 * still.uncertainty
+    assert moving.uncertainty > 2 * still.uncertainty
+
+
+def test_fast_droop_is_refused() -> None:
+    with pytest.raises(InputError, match=naming("recording", "decays")):
+        calibrated(recorded(1.0, 1))
+
+
+def test_command_states_the_time_constant(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    level = recorded(5.0, 1)
+    rows = "\n".join(f"{k / RATE:.3f},{one:.6f}" for k, one in enumerate(level))
+    (tmp_path / "weight.csv").write_text(f"Time [s],Force [V]\n{rows}\n")
+    arguments = ["calibrate", str(tmp_path / "weight.csv"), "--force", "250"]
+    assert cli.main([*arguments, "--uncertainty", "0.001"]) == 0
+    shown = capsys.readouterr()
+    lines = tomllib.loads(shown.out)
+    assert float(lines["calibration"].split()[0]) == pytest.approx(FORCE, rel=0.004)
+    assert re.search(r"# droop with a time constant of [45]\.\d+ s, standard", shown.out)
+    assert not shown.err
+    assert cli.main([*arguments, "--time-constant", "5"]) == 0
+    shown = capsys.readouterr()
+    assert "time constant of 5 s, taken off" in shown.out
+    assert "--time-constant-uncertainty" in shown.err
+    assert "(--uncertainty)" in shown.err
+
+
+def test_time_constant_needs_a_time_scale(tmp_path: Path) -> None:
+    np.savetxt(tmp_path / "weight.csv", recorded(10.0, 1), header="Force [V]", comments="")
+    found = calibrate(tmp_path / "weight.csv", force=FORCE)
+    assert float(found.chain.split()[0]) == pytest.approx(FORCE, rel=0.004)
+    assert found.time_constant is None
+    with pytest.raises(InputError, match=naming("weight.csv", "sample rate")):
+        calibrate(tmp_path / "weight.csv", force=FORCE, time_constant=10.0)
+
+
+def test_step_is_that_of_least_squares_with_its_uncertainty() -> None:
+    """Two levels and a common drift of second degree, if the amplifier is stated not to droop."""
+    rng = np.random.default_rng(6)
+    index = np.arange(100)
+    level = 3 + 0.02 * index + (index >= 50) + rng.normal(scale=0.1, size=100)
+    plateaus = [load_steps.Plateau(5, 45), load_steps.Plateau(56, 96)]
+    found, misfit = load_steps._fit_steps(level, plateaus, 4, load_steps.Rate(0, 0))  # noqa: SLF001
+    used = np.r_[5:45, 56:96]
+    columns = np.column_stack([used >= 50, np.ones(80), used, used**2])
+    factors, (square,), *_ = np.linalg.lstsq(columns, level[used])
+    # What still decays takes one more degree of freedom.
+    variance = np.linalg.inv(columns.T @ columns)[0, 0] * square / 75
+    assert found.sizes == pytest.approx([factors[0]])
+    assert found.uncertainty == pytest.approx(np.sqrt(variance) * stats.t(75).ppf(0.975) / 1.96)
+    assert (misfit, found.rate) == (0, (0, 0))
+
+
+# --- taps
+
+
+def tapped(  # noqa: PLR0913 - what differs between records
+    modes: list[tuple[float, float, float]],
+    seed: int,
+    *,
+    count: int = 1,
+    duration: float = 1e-3,
+    noise: float = 0.002,
+    rate: float = 20_000.0,
+    hum: float = 0.0,
+) -> Signal:
+    """Return taps on a plate with modes: frequency, Hz, quality, share in the static response.
+
+    The response to a force that is linear between the samples is exact.
+    """
+    rng = np.random.default_rng(seed)
+    time = np.arange(0, 0.1 + 0.4 * count, 1 / rate)
+    force = np.zeros(time.size)
+    for k in range(count):
+        begin = 0.1 + 0.4 * k + rng.uniform(0, 0.01)
+        phase = np.clip((time - begin) / (duration * rng.uniform(0.8, 1.2)), 0, 1)
+        force += rng.uniform(0.7, 1) * np.sin(np.pi * phase) ** 1.5
+    level = (1 - sum(share for *_, share in modes)) * force
+    for frequency, quality, share in modes:
+        omega = 2 * np.pi * frequency
+        system = ([omega**2], [1, omega / quality, omega**2])
+        numerator, denominator, _ = cont2discrete(system, 1 / rate, "foh")
+        level += share * lfilter(numerator.ravel(), denominator, force)
+    level += noise * rng.normal(size=time.size) + 0.1 + hum * np.sin(2 * np.pi * 50 * time)
+    return Signal.from_array(level, rate)
+
+
+def deviations(found: TappedPlate, frequency: float, quality: float) -> tuple[float, float]:
+    """Return the errors of frequency and quality in standard uncertainties."""
+    return (
+        math.log(found.frequency / frequency) / found.frequency_uncertainty,
+        math.log(found.quality / quality) / found.quality_uncertainty,
+    )
+
+
+@pytest.mark.parametrize("hum", [0.0, 0.02])
+@pytest.mark.parametrize("rate", [10_000.0, 51_200.0])
+@pytest.mark.parametrize("count", [1, 3])
+@pytest.mark.parametrize(("frequency", "quality"), [(900.0, 10.0), (1600.0, 60.0)])
+def test_taps_show_the_resonance_of_the_plate(
+    frequency: float, quality: float, count: int, rate: float, hum: float
+) -> None:
+    record = tapped([(frequency, quality, 1.0)], 1, count=count, rate=rate, hum=hum)
+    found = calibrate_tap(record)
+    assert found.count == count
+    assert not found.others
+    assert found.share is None
+    assert found.frequency_uncertainty < 2e-4
+    assert found.quality_uncertainty < 0.01
+    assert np.abs(deviations(found, frequency, quality)).max() < 4
+
+
+def test_errors_of_taps_are_as_large_as_stated() -> None:
+    """Of 60 normal errors 0 to 8 lie outside 95 %, with a probability of 99.7 %."""
+    errors = [
+        deviations(calibrate_tap(tapped([(1100.0, 30.0, 1.0)], k, noise=0.01)), 1100, 30)
+        for k in range(30)
+    ]
+    assert np.count_nonzero(np.abs(errors) > 1.96) <= 8
+
+
+def test_taps_that_differ_count_by_their_scatter() -> None:
+    one, other = (tapped([(frequency, 30.0, 1.0)], 1, count=2) for frequency in (1100.0, 1122.0))
+    level = np.concatenate([one.read(0, one.n_sample), other.read(0, other.n_sample)])
+    found = calibrate_tap(Signal.from_array(level, one.sample_rate))
+    assert found.count == 4
+    assert found.frequency == pytest.approx(1111, rel=1e-3)
+    # The standard deviation of the mean, 6.4 Hz, times 3.18/1.96 for four taps.
+    assert found.frequency_uncertainty == pytest.approx(6.35 / 1111 * 3.18 / 1.96, rel=0.02)
+
+
+def test_second_resonance_is_stated() -> None:
+    found = calibrate_tap(tapped([(1100.0, 30.0, 0.7), (2300.0, 40.0, 0.3)], 1, duration=5e-4))
+    assert np.abs(deviations(found, 1100, 30)).max() < 4
+    assert found.others == pytest.approx([2300], rel=1e-3)
+    assert "also resonances at 2300 Hz" in str(found)
+
+
+def test_share_of_a_small_mode_follows_from_the_antiresonance() -> None:
+    """Five taps of different duration; one alone might have this zero itself."""
+    record = tapped([(900.0, 40.0, 0.3)], 1, count=5)
+    found = calibrate_tap(record)
+    assert found.share == pytest.approx(0.3, abs=max(3 * found.share_uncertainty, 0.005))
+    assert found.share_uncertainty < 0.02
+    assert found.minimum_share <= 0.3
+    assert tomllib.loads(found.lines())["plate"]["share"] == pytest.approx(found.share, rel=2e-3)
+    alone = calibrate_tap(tapped([(900.0, 40.0, 0.3)], 1))
+    assert alone.share is None
+    assert 0 <= alone.minimum_share <= 0.3
+    assert "share in the static response" in str(alone)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_zeros_of_the_hammer_are_not_those_of_the_plate(seed: int) -> None:
+    found = calibrate_tap(tapped([(1100.0, 30.0, 1.0)], seed, count=4, duration=1.2e-3))
+    assert found.share is None
+    assert found.minimum_share < 1
+    short = calibrate_tap(tapped([(1100.0, 30.0, 1.0)], seed, duration=3e-4, rate=51_200.0))
+    assert 0.85 < short.minimum_share < 1
+
+
+@pytest.mark.parametrize(
+    ("level", "rate", "words"),
+    [
+        (np.zeros(20_000), 20_000.0, naming("recording", "no tap")),
+        (np.zeros(0), 20_000.0, naming("recording", "no tap")),
+        (np.random.default_rng(1).normal(size=20_000), 20_000.0, naming("recording", "no tap")),
+        (np.zeros(20_000), 1000.0, naming("sample rate", "2000 Hz")),
+        (
+            np.repeat([0.0, 1.0], [9_990, 10_010])
+            + np.random.default_rng(1).normal(0, 0.01, 20_000),
+            20_000.0,
+            naming("recording", "no resonance"),
+        ),
+    ],
+)
+def test_records_without_a_resonance(level: NDArray[np.float64], rate: float, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        calibrate_tap(Signal.from_array(level, rate))
+
+
+def test_command_prints_the_lines_of_the_plate(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], errors_of: ErrorsOf
+) -> None:
+    record = tapped([(1100.0, 30.0, 1.0)], 1, count=2)
+    level = record.read(0, record.n_sample)
+    path = tmp_path / "tap.csv"
+    rows = "\n".join(f"{k / record.sample_rate:.5f},{one:.6f}" for k, one in enumerate(level))
+    path.write_text(f"Time [s],Level\n{rows}\n")
+    assert cli.main(["calibrate", "--tap", str(path)]) == 0
+    shown = capsys.readouterr()
+    (tmp_path / "lab.toml").write_text(shown.out)
+    plate = read_config(tmp_path / "lab.toml").plate
+    assert plate is not None
+    assert plate.f0 == pytest.approx(1100, rel=1e-3)
+    assert plate.Q is not None
+    assert abs(plate.Q - 30) < 0.6
+    assert plate.f0_uncertainty is not None
+    assert 1e-6 < plate.f0_uncertainty < 1e-3
+    assert "# 2 taps in " in shown.out
+    assert not shown.err
+    assert re.search(
+        naming("--mass", "--tap"), errors_of("calibrate", "--tap", str(path), "--mass", "5")
+    )

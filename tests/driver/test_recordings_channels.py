@@ -1,0 +1,297 @@
+"""Load cells in channels, and records of the same drops."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+import soundfile
+from conftest import naming
+from recording_files import half_sine as unit_pulse
+from scipy import stats
+from synthetic import half_sine, make_drop
+
+import thud
+from thud.base.errors import InputError
+from thud.level.estimate import Estimate
+from thud.recordings.budgets import average_estimates, level_estimates
+from thud.recordings.config import Config, read_config
+from thud.recordings.load_cells import add_signals, require_channels
+from thud.recordings.recorded_levels import average_levels, measure_levels, noise_exceeds
+from thud.recordings.signal import Signal
+from thud.recordings.signal_files import open_signals
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+RATE = 16_000
+SHARES = (0.2, 0.32, 0.14, 0.34)
+NAMES = ["F1", "F2", "F3", "F4"]
+
+
+def record(
+    seed: int, *, count: int = 2, noise: float = 1.0, share: float = 1.0, before: float = 0.1
+) -> NDArray[np.float64]:
+    """Return drops that differ by some thousandths, with a bounce each, N."""
+    length = round((before + 1.5 * count) * RATE)
+    force = np.zeros(length)
+    for k in range(count):
+        begin, factor = before + 1.5 * k + 0.013 * k**2, 1 + 0.002 * k
+        force += half_sine(RATE, begin, length, 1500 * factor, 0.02 / factor)
+        force += half_sine(RATE, begin + 0.68 + 0.003 * k, length, 1150 * factor, 0.02)
+    return share * force + np.random.default_rng(seed).normal(scale=noise, size=length)
+
+
+def cells() -> list[NDArray[np.float64]]:
+    """Return the forces of four load cells, N."""
+    return [record(i, share=share) for i, share in enumerate(SHARES)]
+
+
+def write_table(
+    path: Path, columns: Sequence[NDArray[np.float64]], names: Sequence[str], unit: str = "N"
+) -> Path:
+    head = ",".join(["Time [s]", *(f"{name} [{unit}]" for name in names)])
+    time = np.arange(len(columns[0])) / RATE
+    np.savetxt(path, np.column_stack([time, *columns]), "%.7g", ",", header=head, comments="")
+    return path
+
+
+def write_wav(path: Path, columns: Sequence[NDArray[np.float64]]) -> Path:
+    with path.open("w+b") as file:
+        soundfile.write(file, np.column_stack(columns), RATE, "PCM_24", format="WAV")
+    return path
+
+
+@pytest.mark.parametrize(
+    "channels", ["sum", " Sum ", "F1+F2+F3+F4", "F4 + 2+3+4", ["F1", "F2", 4, "f4"]]
+)
+def test_load_cells_are_added(channels: Any, tmp_path: Path) -> None:  # noqa: ANN401
+    path = write_table(tmp_path / "cells.csv", cells(), NAMES)
+    (signal,) = open_signals(path, channels=channels)
+    np.testing.assert_allclose(signal.read(0, signal.n_sample), sum(cells()), atol=1e-3)
+    assert signal.steps[-1] == "The forces of 4 load cells were added."
+    assert not signal.warnings
+    found = thud.read_recording(path, channels=channels)
+    (whole,) = open_signals(write_table(tmp_path / "sum.csv", [sum(cells())], ["F"]))
+    expected = thud.Recording.from_signals([whole], Config())
+    np.testing.assert_allclose(found.levels(), expected.levels(), atol=1e-3)
+
+
+def test_each_load_cell_has_its_calibration(tmp_path: Path) -> None:
+    chains = ["10 V/FS, 2 mV/N", "10 V/FS, 4 mV/N", "10 V/FS, 5 mV/N", 2500.0]
+    scales = (5000.0, 2500.0, 2000.0, 2500.0)
+    path = write_wav(
+        tmp_path / "cells.wav", [f / scale for f, scale in zip(cells(), scales, strict=True)]
+    )
+    (signal,) = open_signals(path, channels="sum", calibration=chains)
+    force = signal.read(0, signal.n_sample)
+    np.testing.assert_allclose(force, sum(cells()), atol=1e-2)
+    # A charge amplifier inverts, and the sum decides on the sign.
+    inverted = [f"-{chain}" if isinstance(chain, str) else -chain for chain in chains]
+    (signal,) = open_signals(path, channels=[1, 2, 3, 4], calibration=inverted)
+    np.testing.assert_array_equal(signal.read(0, signal.n_sample), force)
+    assert any("negative" in step for step in signal.steps)
+    (signal,) = open_signals(path, channels="sum", calibration=inverted, polarity="positive")
+    np.testing.assert_array_equal(signal.read(0, signal.n_sample), force)
+    with pytest.raises(InputError, match=naming("2 calibrations for 4 channels")):
+        open_signals(path, channels="sum", calibration=chains[:2])
+    with pytest.raises(InputError, match=naming("2 calibrations for 1 channel")):
+        open_signals(path, channel=1, calibration=chains[:2])
+
+
+def test_configuration_and_keywords_select_channels(tmp_path: Path) -> None:
+    path = write_table(tmp_path / "cells.csv", cells(), NAMES, "V")
+    lab = tmp_path / "lab.toml"
+    lab.write_text('channels = "F1+F2+F3+F4"\ncalibration = ["1 N/V", 1, "1", "0.001 N/mV"]\n')
+    config = read_config(lab)
+    assert config.channels == tuple(NAMES)
+    assert config.calibration == ("1 N/V", 1.0, 1.0, "0.001 N/mV")
+    total = thud.read_recording(path, config=lab)
+    peak = total.peak_force
+    assert peak == pytest.approx(1500, rel=0.01)
+    one = thud.read_recording(path, config=lab, channel="F4", calibration="1 N/V")
+    assert one.peak_force == pytest.approx(SHARES[3] * peak, rel=0.01)
+    with pytest.raises(InputError, match=naming("both channel and channels")):
+        open_signals(path, channel=1, channels="sum")
+    lab.write_text('channels = ["F1"]\n')
+    with pytest.raises(InputError, match=naming("lab.toml", "channels", "is not allowed")):
+        read_config(lab)
+
+
+@pytest.mark.parametrize("channels", ["", "F1", "F1+F1", [], ["F1"], 3, [1, True], ["F1", ""]])
+def test_senseless_channels_are_refused(channels: object) -> None:
+    with pytest.raises(InputError, match=naming("channels", "is not allowed")):
+        require_channels(channels)
+
+
+def test_channels_to_be_added_must_be_forces(tmp_path: Path) -> None:
+    force, noise = record(0), record(1, share=0.0)
+    path = write_table(tmp_path / "one.csv", [force], ["F"])
+    with pytest.raises(InputError, match=naming('"sum" finds 1 channel of force')):
+        open_signals(path, channels="sum")
+    # One force among other channels needs no choice.
+    path = tmp_path / "mixed.csv"
+    table = np.column_stack([np.arange(len(force)) / RATE, force, noise, noise])
+    np.savetxt(path, table, "%.7g", ",", header="t [s],F [N],trigger [V],a [g]", comments="")
+    assert thud.read_recording(path).peak_force == pytest.approx(1500, rel=0.01)
+    with pytest.raises(InputError, match=naming("matches 0 channels")):
+        open_signals(path, channels="F+G")
+    with pytest.raises(InputError, match=naming("names one channel twice")):
+        open_signals(path, channels="F+2")
+    path = write_table(tmp_path / "axes.csv", cells()[:3], ["Fx", "Fy", "Fz"])
+    with pytest.raises(InputError, match=naming("different directions")):
+        open_signals(path, channels="sum")
+    path = write_table(tmp_path / "total.csv", [*cells(), sum(cells())], [*NAMES, "Fz"])
+    with pytest.raises(InputError, match=naming("Fz", "is the sum of the other channels")):
+        thud.read_recording(path, channels="sum")
+
+
+def test_faults_of_single_load_cells_are_found(tmp_path: Path) -> None:
+    first, *others = cells()
+    path = write_table(tmp_path / "clipped.csv", [np.minimum(first, 200), *others], NAMES)
+    with pytest.raises(InputError, match=naming("F1", "clipped at 200 N")):
+        thud.read_recording(path, channels="sum")
+    path = write_table(tmp_path / "dead.csv", [np.zeros(len(first)), *others], NAMES)
+    with pytest.raises(InputError, match=naming("F1", "all samples are 0")):
+        thud.read_recording(path, channels="sum")
+    path = write_table(tmp_path / "inverted.csv", [-first, *others], NAMES)
+    (message,) = open_signals(path, channels="sum")[0].warnings
+    assert "F1" in message
+    assert "sign of this load cell may be wrong" in message
+    lost = first.copy()
+    lost[round(0.11 * RATE) : round(0.11 * RATE) + 8] = 0.0
+    path = write_table(tmp_path / "dropout.csv", [lost, *others], NAMES)
+    found = thud.read_recording(path, channels="sum")
+    assert any("F1: 1 dropouts of 0.5 ms" in step for step in found.steps)
+    expected = thud.read_recording(write_table(path, cells(), NAMES), channels="sum")
+    np.testing.assert_allclose(found.levels(), expected.levels(), atol=0.02)
+
+
+def test_channels_of_unequal_length_are_refused() -> None:
+    signals = [Signal.from_array(unit_pulse(RATE)[i:], RATE, f"F{i}") for i in range(2)]
+    with pytest.raises(InputError, match=naming("F1", "samples", "recorded together")):
+        add_signals(signals, "sum")
+
+
+def test_simultaneous_channels_are_refused(tmp_path: Path) -> None:
+    path = write_table(tmp_path / "cells.csv", cells(), NAMES)
+    with pytest.raises(InputError, match=naming("at the same instants", 'channels = "sum"')):
+        thud.read_recording(path)
+    # One drop on each of two plates.
+    first, second = record(0, count=1), record(1, count=1)
+    empty = record(2, count=1, share=0.0)
+    plates = [np.append(first, empty), np.append(empty, second)]
+    assert len(thud.read_recording(write_table(path, plates, NAMES[:2])).drops) == 2
+    # A fault of one channel is named with the choice.
+    path = write_table(tmp_path / "lifted.csv", [record(0), record(1, share=0.0)], NAMES[:2])
+    with pytest.raises(
+        InputError, match=naming("F2", 'if several channels are forces: channels = "sum"')
+    ):
+        thud.read_recording(path)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_simultaneous_files_are_refused(count: int, tmp_path: Path) -> None:
+    paths = [
+        write_wav(tmp_path / f"F{i + 1}.wav", [record(i, count=count, share=share) / 2000])
+        for i, share in enumerate(SHARES)
+    ]
+    with pytest.raises(
+        InputError, match=naming("F2.wav", "drops of F1.wav at the same instants", "one file")
+    ):
+        thud.read_recording(paths, calibration=2000)
+
+
+def write_part(path: Path, force: NDArray[np.float64], kind: str, start: float) -> Path:
+    piece = force[round(start * RATE) :]
+    if path.suffix == ".csv":
+        return write_table(path, [np.round(piece + 20, 1)], ["F"])
+    with path.open("w+b") as file:
+        soundfile.write(file, piece / 2000, RATE, kind, format=path.suffix[1:].upper())
+    return path
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "start", "noise"),
+    [
+        ("copy.wav", "PCM_24", 0.0, 1.0),
+        ("cut.wav", "PCM_24", 0.043, 0.05),
+        ("half.wav", "PCM_24", 1.2, 1.0),
+        ("coarse.wav", "PCM_16", 0.0, 0.05),
+        ("packed.flac", "PCM_16", 0.05, 15.0),
+        ("table.csv", "", 0.01, 0.05),
+    ],
+)
+def test_records_of_the_same_drops_are_refused(
+    name: str, kind: str, start: float, noise: float, tmp_path: Path
+) -> None:
+    force = record(7, noise=noise)
+    given = {"calibration": 2000} if not name.endswith("csv") else {}
+    first = write_part(tmp_path / f"first{Path(name).suffix}", force, kind or "PCM_24", 0.0)
+    copy = write_part(tmp_path / name, force, kind, start)
+    if not start and kind == "PCM_16":
+        first = write_part(tmp_path / "first.wav", force, "PCM_24", 0.0)
+    with pytest.raises(InputError, match=r"is the same (record|drop) as first"):
+        thud.read_recording([first, copy], **given)
+    other = write_part(tmp_path / f"other{Path(name).suffix}", record(8, noise=noise), kind, start)
+    assert len(thud.read_recording([first, other], **given).drops) >= 3
+
+
+def test_hum_and_tones_do_not_make_drops_equal(tmp_path: Path) -> None:
+    paths = []
+    for seed in range(4):
+        force = record(seed, noise=0.3)
+        time = np.arange(len(force)) / RATE
+        force += 40 * np.sin(2 * np.pi * 50 * time) + 15 * np.sin(2 * np.pi * 250 * time)
+        # Interference that a shift brings into phase; drops are not alike to 1 N.
+        force += 2 * np.sin(2 * np.pi * 4300 * time + seed)
+        force *= 1 + 0.003 * seed
+        paths.append(write_wav(tmp_path / f"drop_{seed}.wav", [force / 2000]))
+    assert len(thud.read_recording(paths, calibration=2000).drops) == 8
+
+
+def test_a_file_is_given_once(tmp_path: Path) -> None:
+    path = write_wav(tmp_path / "drop.wav", [record(0) / 2000])
+    with pytest.raises(InputError, match=naming("drop.wav: is given twice", "each record once")):
+        thud.read_recording([path, path], calibration=2000)
+    signal = Signal.from_array(record(0), RATE, "array")
+    with pytest.raises(InputError, match=naming("array: is given twice")):
+        thud.Recording.from_signals([signal, signal], Config())
+
+
+@pytest.mark.parametrize("count", [2, 3, 5])
+def test_repeatability_is_not_below_the_noise(count: int) -> None:
+    noise = 1.0
+    values = np.random.default_rng(count).normal(scale=noise, size=(20_000, count))
+    within = 0
+    for drops in values[:4000]:
+        mean = average_estimates([Estimate(float(value), noise) for value in drops])
+        assert mean.expanded >= 1.95 * noise / math.sqrt(count)
+        within += abs(mean.value) <= mean.expanded
+    # By scatter or noise, whichever is larger, at least 95 %, less three binomial deviations.
+    assert within / 4000 > 0.95 - 3 * math.sqrt(0.95 * 0.05 / 4000)
+    # Equal drops: only the noise is known.
+    mean = average_estimates([Estimate(5.0, noise)] * count)
+    assert mean.uncertainty == pytest.approx(noise / math.sqrt(count))
+    assert mean.freedom == math.inf
+
+
+def test_noise_counts_in_bands_where_it_exceeds_the_scatter() -> None:
+    assert noise_exceeds([0.1, 1.0], [0.2, 0.2], 5).tolist() == [
+        stats.t.ppf(0.975, 4) * 0.1 < 1.96 * 0.2, False,
+    ]  # fmt: skip
+    (entry,) = measure_levels([make_drop(3.0, seed=1)])
+    average = average_levels([entry, entry, entry])
+    noise = entry.contributions["noise"] / math.sqrt(3)
+    np.testing.assert_allclose(average.contributions["noise"], noise)
+    np.testing.assert_allclose(average.uncertainty, noise)
+    for estimate, expected in zip(level_estimates(average), noise, strict=True):
+        counted = {part.name: part.counted for part in estimate.contributions}
+        assert counted["noise"]
+        assert not counted["repeatability"]
+        assert estimate.expanded == pytest.approx(1.96 * expected, rel=1e-3)

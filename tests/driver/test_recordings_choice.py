@@ -1,0 +1,121 @@
+"""Which pulses are drops, and which drops are measured."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import naming
+
+import thud
+from thud.recordings.choice import parse_numbers
+from thud.recordings.drops import Search, search_drops
+from thud.recordings.signal import Signal
+
+RATE = 8_000.0
+
+
+def half_sine(time: np.ndarray, begin: float, peak: float, duration: float = 0.02) -> np.ndarray:
+    """Return a half sine, N, that begins at a time, s."""
+    phase = (time - begin) / duration
+    return np.where((phase > 0) & (phase < 1), peak * np.sin(np.pi * phase), 0.0)
+
+
+def three_drops(seconds: float = 16.0, bounces: int = 2) -> tuple[np.ndarray, np.ndarray]:
+    """Return time, s, and force, N, of drops at 5, 8.5 and 12 s with their bounces."""
+    time = np.arange(int(seconds * RATE)) / RATE
+    force = np.random.default_rng(4).normal(scale=1.0, size=len(time))
+    for begin in (5.0, 8.5, 12.0):
+        touch, flight = begin, 0.7
+        for k in range(bounces + 1):
+            force += half_sine(time, touch, 1500 * 0.8**k)
+            touch, flight = touch + 0.02 + flight, 0.8 * flight
+    return time, force
+
+
+def footstep(time: np.ndarray, begin: float, weight: float = 800.0) -> np.ndarray:
+    """Return the force of a step of 0.6 s, with the blow of the heel, N."""
+    phase = np.clip((time - begin) / 0.6, 0, 1)
+    roll = weight * np.sin(np.pi * phase) ** 0.5 * (1 - 0.25 * np.sin(np.pi * phase) ** 8)
+    return np.asarray(roll + half_sine(time, begin, 0.6 * weight, 0.025))
+
+
+def disturbed(kind: str) -> Search:
+    """Return the search in a record with a disturbance before the drops."""
+    time, force = three_drops()
+    if kind == "footsteps":
+        force += footstep(time, 1.0) + footstep(time, 2.1)
+    elif kind == "handling":
+        random = np.random.default_rng(9)
+        for begin in random.uniform(0.5, 4, 20):
+            force += half_sine(time, begin, random.uniform(20, 150), random.uniform(0.005, 0.04))
+    elif kind == "man steps off":
+        force += 800 * np.clip((2.0 - time) / 0.15, 0, 1)
+    elif kind == "taps":
+        for begin in (1.0, 2.0, 7.7, 11.0):
+            force += half_sine(time, begin, 60 if begin < 2 else 150, 0.006)
+    elif kind == "tap between bounces":
+        force += half_sine(time, 5.3, 120, 0.008)
+    return search_drops(Signal.from_array(force, RATE, "record"))
+
+
+@pytest.mark.parametrize(
+    "kind", ["none", "footsteps", "handling", "man steps off", "taps", "tap between bounces"]
+)
+def test_only_drops_are_drops(kind: str) -> None:
+    search = disturbed(kind)
+    assert [len(window.bounces) for window in search.windows] == [2, 2, 2]
+    for window, begin in zip(search.windows, (5.0, 8.5, 12.0), strict=True):
+        touch = (window.start + window.contact[0]) / RATE
+        assert touch == pytest.approx(begin, abs=0.004)
+        landing = (window.bounces[0].start + window.bounces[0].contact[0]) / RATE
+        assert landing == pytest.approx(begin + 0.72, abs=0.004)
+    if kind in {"taps", "tap between bounces"}:
+        assert any("is no drop" in text for text in search.ignored)
+
+
+def measured(**choice: Any) -> thud.Recording:  # noqa: ANN401
+    """Return the recording of the three drops with a choice."""
+    from thud.recordings.config import Config
+
+    _, force = three_drops()
+    return thud.Recording.from_signals([Signal.from_array(force, RATE, "r")], Config(**choice))
+
+
+def test_drops_are_chosen_by_number_and_time() -> None:
+    every = measured()
+    onsets = [drop.onset for drop in every.drops]
+    assert [round(onset, 2) for onset in onsets] == [5.0, 8.5, 12.0]
+    for choice, kept in (
+        ({"drops": "1, 3"}, [0, 2]),
+        ({"drops": "2-3"}, [1, 2]),
+        ({"leave_out": {"2": "touched"}}, [0, 2]),
+        ({"begin": 7.0}, [1, 2]),
+        ({"end": 11.0}, [0, 1]),
+        ({"begin": 7.0, "end": 11.0}, [1]),
+    ):
+        recording = measured(**choice)
+        assert [drop.onset for drop in recording.drops] == pytest.approx([onsets[k] for k in kept])
+    left = measured(leave_out={"2": "touched"})
+    assert any("drop 2 at 8.50 s was left out: touched" in step for step in left.steps)
+
+
+@pytest.mark.parametrize(
+    ("choice", "words"),
+    [
+        ({"drops": "1-"}, ("drops", "1-5, 8")),
+        ({"drops": "0"}, ("drops", "from 1")),
+        ({"drops": "5"}, ("drops", "no drop 5", "1 to 3")),
+        ({"leave_out": {"2": " "}}, ("leave_out", "2", "no reason")),
+        ({"leave_out": {"4": "cut"}}, ("leave_out", "no drop 4")),
+        ({"leave_out": {"1-3": "cut"}}, ("every drop is left out",)),
+    ],
+)
+def test_impossible_choice_is_refused(choice: dict[str, Any], words: tuple[str, ...]) -> None:
+    with pytest.raises(thud.InputError, match=naming(*words)):
+        measured(**choice)
+
+
+def test_numbers_are_ranges() -> None:
+    assert [list(r) for r in parse_numbers("1-3, 8", "drops")] == [[1, 2, 3], [8]]

@@ -1,0 +1,197 @@
+"""Quantization of recordings: its step, the offset of a quiet background, and their effects."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from synthetic import half_sine
+
+import thud
+from thud.level.levels import force_exposure_levels
+from thud.recordings.band_noise import band_noise
+from thud.recordings.budgets import average_mass
+from thud.recordings.config import Config
+from thud.recordings.drops import find_windows
+from thud.recordings.measure_drops import measure_window
+from thud.recordings.quantization import find_quantization, find_step, offset_deviation
+from thud.recordings.recording import Recording
+from thud.recordings.restitution import GRAVITY
+from thud.recordings.signal import Signal
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from thud.recordings.measured_drop import Drop
+
+RATE = 48_000.0
+PEAK, DURATION = 1500.0, 0.02
+SPEED = math.sqrt(2 * GRAVITY)
+RESTITUTION = 0.75
+IMPULSE = 2 * PEAK * DURATION / np.pi
+ABOVE = DURATION * (1 - 2 * np.arcsin(0.01) / np.pi)
+MASS = IMPULSE / (SPEED * (1 + RESTITUTION) + GRAVITY * ABOVE)
+
+
+def record(
+    step: float, noise: float, seed: int, *, count: int = 1, rate: float = RATE
+) -> NDArray[np.float64]:
+    """Return half sines on an offset, with noise, rounded to a step, N."""
+    rng = np.random.default_rng(seed)
+    length = round((0.2 + 1.5 * count) * rate)
+    force = rng.uniform(-50, 50) + rng.normal(scale=noise, size=length)
+    for k in range(count):
+        force += half_sine(rate, 0.1 + 1.5 * k + rng.uniform(0, 1e-3), length, PEAK, DURATION)
+    return np.rint(force / step) * step
+
+
+def measured(force: NDArray[np.float64], rate: float = RATE) -> Recording:
+    config = Config(
+        mass=MASS, height=1.0, mass_uncertainty=0, height_uncertainty=0, calibration_uncertainty=0
+    )
+    return Recording.from_signals([Signal.from_array(force, rate, "scope")], config)
+
+
+def one_drop(force: NDArray[np.float64]) -> Drop:
+    (window,) = find_windows(Signal.from_array(force, RATE, "scope"))
+    return measure_window(window, Config(height=1.0, mass=MASS))
+
+
+@pytest.mark.parametrize("step", [0.03, 1.0, 15.625, 156.25])
+def test_step_is_the_smallest_difference(step: float) -> None:
+    force = record(step, 0.01, 0)
+    assert find_step(force) == pytest.approx(step)
+    assert find_step(force + 7.3) == pytest.approx(step)
+    # As floats of 32 bit, and as text with few digits.
+    assert find_step(force.astype(np.float32).astype(float)) == pytest.approx(step, rel=1e-2)
+    assert find_step(np.round(1.0043 * force, 3)) == pytest.approx(1.0043 * step, rel=0.05)
+
+
+def test_continuous_values_have_no_step() -> None:
+    force = half_sine(RATE, 0.1, 10_000)
+    assert find_step(np.zeros(0)) == find_step(np.zeros(9)) == 0.0
+    assert find_step(force) == 0.0
+    assert find_step(half_sine(2500.0, 0.1, 800)) == 0.0
+    assert find_step(force + np.random.default_rng(0).normal(size=force.size)) == 0.0
+    # 24 bit on 20 kN are finer than matters.
+    assert find_step(record(20_000 / 2**23, 0.001, 0)) == 0.0
+
+
+def test_constant_background_is_one_step_wide() -> None:
+    # Rectangular; a background close to the edge of the step would sometimes leave it.
+    assert offset_deviation(np.full(4800, 3.0), 2.0) == pytest.approx(2 / math.sqrt(12), rel=0.15)
+    assert offset_deviation(np.full(4800, 3.0), 0.0) == 0.0
+    # Either value half the time: in the middle between both, whatever the noise.
+    both = np.tile([0.0, 2.0], 2400)
+    assert offset_deviation(both, 2.0) < 0.02
+    # Noise of a step and more averages the steps.
+    noise = np.rint(np.random.default_rng(1).normal(0.3, 1.0, 4800))
+    assert offset_deviation(noise, 1.0) == 0.0
+
+
+def test_offset_lies_within_its_deviation() -> None:
+    rng = np.random.default_rng(5)
+    scores = []
+    for _ in range(400):
+        true, noise = rng.uniform(-0.5, 0.5), 10 ** rng.uniform(-3, -0.4)
+        background = np.rint(rng.normal(true, noise, 2000))
+        deviation = offset_deviation(background, 1.0)
+        scores.append((background.mean() - true) / math.hypot(deviation, noise / math.sqrt(2000)))
+    # A rectangular error is never more than sqrt(3) deviations, a known one 1.96 in 95 %.
+    assert np.mean(np.abs(scores) < 1.96) > 0.93
+    assert np.mean(np.square(scores)) == pytest.approx(1.0, abs=0.35)
+
+
+def test_noise_that_covers_the_step_needs_no_budget() -> None:
+    drop = one_drop(record(15.625, 12.0, 3))
+    assert find_quantization(
+        find_windows(Signal.from_array(record(15.625, 12.0, 3), RATE))[0]
+    ).offset == 0.0  # fmt: skip
+    assert not len(drop.contact.quantization_errors)
+    assert drop.contact.quantization_impulse == 0.0
+    assert not band_noise([drop], thud.get_bands())[:, :, 2].any()
+    assert not any("steps of" in warning for warning in drop.warnings)
+
+
+def test_coarse_record_has_its_budget() -> None:
+    recording = measured(record(15.625, 0.5, 4, count=3))
+    assert any("steps of 15.6 N" in warning for warning in recording.warnings)
+    for estimate in recording.level_estimates():
+        part = next(part for part in estimate.contributions if part.name == "quantization")
+        assert part.counted
+        assert part.freedom == math.inf
+    # The drops share the error of the offset, which does not average out.
+    single = measured(record(15.625, 0.5, 4))
+    parts = [
+        next(p.uncertainty for p in r.estimates["restitution"].contributions if "quant" in p.name)
+        for r in (single, recording)
+    ]
+    assert parts[1] == pytest.approx(parts[0], rel=0.1)
+    offset = 15.625 / math.sqrt(12) * ABOVE / (MASS * SPEED)
+    assert parts[0] == pytest.approx(offset, rel=0.25)
+
+
+def test_effective_mass_has_the_quantization_of_the_impulse() -> None:
+    force = record(15.625, 0.5, 4)
+    force[40_000:] += np.rint(half_sine(RATE, 0.05, force.size - 40_000) / 20) * 15.625
+    drop = one_drop(force)
+    conditions = Config(height=1.0).conditions(None)
+    mass = average_mass([drop], conditions)
+    (part,) = (part for part in mass.contributions if part.name == "quantization")
+    relative = drop.contact.quantization_impulse / drop.impulse.value
+    assert part.uncertainty == pytest.approx(mass.value * relative)
+
+
+def test_constant_background_next_to_a_steep_flank_is_no_dropout() -> None:
+    time = np.arange(2400) / 8000 - 0.1
+    x = np.clip(time / DURATION, 0, 1)
+    force = np.rint(PEAK * np.sin(np.pi * x**0.8) / 15.625) * 15.625
+    (window,) = find_windows(Signal.from_array(force, 8000.0))
+    drop = measure_window(window, Config())
+    assert not any("dropout" in text for text in (*drop.steps, *drop.warnings))
+
+
+def test_few_digits_are_coarser_at_the_peak() -> None:
+    force = half_sine(RATE, 0.1, 10_000)
+    digits = np.array([float(f"{value:.2g}") for value in force])
+    (window,) = find_windows(Signal.from_array(digits, RATE))
+    assert find_quantization(window).step == pytest.approx(100.0)
+    assert find_quantization(replace(window, signal=Signal.from_array(force, RATE))).step == 0.0
+
+
+def test_load_cells_add_their_steps() -> None:
+    cells = [Signal.from_array(record(step, 0.01, 1), RATE, "F") for step in (5.0, 12.0)]
+    (window,) = find_windows(replace(cells[0], cells=tuple(cells)))
+    alone = [find_quantization(replace(window, signal=cell)) for cell in cells]
+    both = find_quantization(window)
+    assert both.step == pytest.approx(12.0)
+    assert both.offset == pytest.approx(math.hypot(*(one.offset for one in alone)))
+    assert both.density == pytest.approx(sum(one.density for one in alone))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("bits", "scale"), [(8, 2e3), (12, 2e4), (10, 2e3), (16, 2e4), (24, 2e3)])
+@pytest.mark.parametrize("noise", [0.05, 0.3, 1.0])
+def test_quantities_lie_in_their_intervals(bits: int, scale: float, noise: float) -> None:
+    # Noise in steps; no step needs more than 0.5 N of noise to be found.
+    step = 2 * scale / 2**bits
+    fine = half_sine(1e6, 1e-3, 22_000, PEAK, DURATION)
+    levels = force_exposure_levels(fine, 1e6)
+    inside = []
+    for seed in range(20):
+        recording = measured(record(step, max(noise * step, 0.05), seed))
+        errors = [
+            (abs(estimate.value - level), estimate.expanded)
+            for estimate, level in zip(recording.level_estimates(), levels, strict=True)
+            if not estimate.upper_bound
+        ]
+        for name, value in (("contact_time", ABOVE), ("restitution", RESTITUTION)):
+            estimate = recording.estimates[name]
+            errors.append((abs(estimate.value - value), estimate.expanded))
+        inside += [error <= expanded for error, expanded in errors]
+        # None is far off.
+        assert all(error <= 2.5 * expanded + 1e-3 for error, expanded in errors)
+    assert np.mean(inside) > 0.92
