@@ -21,6 +21,8 @@ module thud_error
       integer :: code = numerical_failure
       !> Message that names key or position, value and allowed range.
       character(len=:), allocatable :: message
+      !> Whether the time steps are too long; shorter ones may succeed.
+      logical :: has_coarse_steps = .false.
    end type error_type
 
 contains

@@ -21,7 +21,7 @@ module thud_case
    private
 
    public :: case_type, check_case, check_name, get_active_fields, get_fields, get_floor_number, get_model_number
-   public :: new_case
+   public :: keep_impact_only, new_case
 
    !> Input of one run.
    type :: case_type
@@ -79,6 +79,15 @@ contains
       call new_models(case%models)
       call new_floors(case%floors)
    end subroutine new_case
+
+   !> Leaves out free modes, compression and unknowns, which an impact does not use.
+   pure subroutine keep_impact_only(case)
+      type(case_type), intent(inout) :: case
+
+      case%has_modes = .false.
+      case%has_compression = .false.
+      case%has_unknowns = .false.
+   end subroutine keep_impact_only
 
    !> Index of the chosen model.
    pure function get_model_number(case) result(number)

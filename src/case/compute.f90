@@ -15,7 +15,7 @@ module thud_compute
    use thud_plate, only: plate_type
    use thud_progress, only: let_first_thread_report
    use thud_receiver, only: is_rigid, receiver_type
-   use thud_resolved_drop, only: solve_drop
+   use thud_resolved_drop, only: get_drop_cost, solve_drop
    use thud_room, only: check_below, get_room_bands, get_room_level, room_level_type
    use thud_sampling, only: get_sample_count
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
@@ -130,7 +130,8 @@ contains
       n_thread = 1
       associate (model => case%models(get_model_number(case))%model)
          !$ if (case%has_floor .and. .not. is_forked()) n_thread = min(2, omp_get_max_threads())
-         if (n_thread > 1) n_thread = merge(2, 1, model%get_cost(case%ball, case%sampling) > min_thread_cost)
+         if (n_thread > 1) n_thread = merge(2, 1, &
+            get_drop_cost(model, case%ball, case%drop, case%sampling) > min_thread_cost)
       end associate
       if (n_thread == 1) then
          call compute_impact(case, scope, impact, error)
@@ -190,7 +191,7 @@ contains
       if (.not. allocated(on_floor%floor_velocity)) deallocate (on_floor)
    end subroutine drop_on_floor
 
-   !> Approximate computing time of a case's drop and levels on one core.
+   !> Approximate computing time of a case's drop, with its verification, and levels on one core.
    function get_cost(case) result(cost)
       type(case_type), intent(in) :: case
       !> The time, s; for an invalid case the time of its check.
@@ -202,11 +203,11 @@ contains
       call check_case(case, error)
       if (allocated(error)) return
       associate (model => case%models(get_model_number(case))%model)
-         cost = cost + model%get_cost(case%ball, case%sampling)
+         cost = cost + get_drop_cost(model, case%ball, case%drop, case%sampling)
          if (.not. (case%has_floor .and. model%couples())) return
          call case%floors(get_floor_number(case))%model%get_receiver(receiver, error)
          if (allocated(error) .or. is_rigid(receiver)) return
-         cost = cost + 1.0e-3_wp + model%get_cost(case%ball, case%sampling, receiver)
+         cost = cost + 1.0e-3_wp + get_drop_cost(model, case%ball, case%drop, case%sampling, receiver)
       end associate
    end function get_cost
 

@@ -14,10 +14,7 @@ module thud_contact_source
    implicit none (type, external)
    private
 
-   public :: coarse_step_error, contact_source_type, is_coarse_step
-
-   !> Beginning of the message of steps that are too long.
-   character(len=*), parameter :: coarse_step = '&sampling: substeps is too low for this source'
+   public :: coarse_step_error, contact_source_type
 
    !> Equations of motion of the source.
    type, abstract, extends(ode_type) :: contact_source_type
@@ -163,16 +160,9 @@ contains
 
       shown = finding
       if (index(finding, 'NaN') + index(finding, 'Infinity') > 0) shown = 'the motion grows without bound'
-      error = numerical_error(coarse_step//': '//shown &
+      error = numerical_error('&sampling: substeps is too low for this source: '//shown &
          //'; allowed: more substeps, a higher sample_rate, or a softer or heavier source')
+      error%has_coarse_steps = .true.
    end function coarse_step_error
-
-   !> Whether an error is one of steps that are too long.
-   pure function is_coarse_step(error) result(yes)
-      type(error_type), intent(in) :: error
-      logical :: yes
-
-      yes = index(error%message, coarse_step) == 1
-   end function is_coarse_step
 
 end module thud_contact_source

@@ -7,7 +7,7 @@ module thud_coupled_impact
    use thud_coupled_step, only: coupled_state_type, get_relative_state, take_coupled_step
    use thud_drop, only: drop_type
    use thud_error, only: error_type, input_error
-   use thud_force_history, only: clear_flight, force_history_type
+   use thud_force_history, only: add_model_quantity, clear_flight, force_history_type
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_receiver, only: can_strike, new_receiver_motion, receiver_type
@@ -229,10 +229,7 @@ contains
       call clear_flight(history)
       history%floor_work = impact%motion%work
       history%peak_force = impact%peak_force
-      history%model_quantity_name = [character(len=len(history%model_quantity_name)) :: &
-         history%model_quantity_name, 'contacts']
-      history%model_quantity_unit = [character(len=len(history%model_quantity_unit)) :: history%model_quantity_unit, '']
-      history%model_quantity = [history%model_quantity, real(impact%n_contact, wp)]
+      call add_model_quantity(history, 'contacts', '', real(impact%n_contact, wp))
       if (.not. source%cap_mass_per_deflection > 0.0_wp) return
       ! Inertia of the cap that lies on the floor.
       n = size(history%component_name)

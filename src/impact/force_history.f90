@@ -5,12 +5,13 @@ module thud_force_history
    use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
    use thud_motion, only: motion_type
+   use thud_power, only: not_a_number
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: check_samples, clear_flight, continue_to_zero, force_count, force_history_type, force_names, holds_impulse
-   public :: max_residual, new_force_history, numerical_error_type
+   public :: add_model_quantity, check_samples, clear_flight, continue_to_zero, force_count, force_history_type
+   public :: force_names, holds_impulse, max_residual, new_force_history, numerical_error_type
 
    !> Residual of the balances of impulse and energy above which all models except the finite elements return an error; it
    !> is below 1e-9 at the default step.
@@ -28,14 +29,14 @@ module thud_force_history
    !> Length of the name of a force component.
    integer, parameter :: name_length = 24
 
-   !> Errors due to the resolution.
+   !> Errors due to the resolution; NaN if they are not known.
    type :: numerical_error_type
       !> Whether they could be estimated.
       logical :: known = .false.
       !> Errors of the octave levels of the force on the floor, dB.
-      real(wp) :: octave(octave_count) = 0.0_wp
+      real(wp) :: octave(octave_count) = not_a_number
       !> Errors of contact time, s, restitution, and peak force, N.
-      real(wp) :: contact_time = 0.0_wp, restitution = 0.0_wp, peak_force = 0.0_wp
+      real(wp) :: contact_time = not_a_number, restitution = not_a_number, peak_force = not_a_number
    end type numerical_error_type
 
    !> Force of one impact, and numbers that describe it.
@@ -152,6 +153,18 @@ contains
       end associate
       history%exact_contact_time = (last - 1 + fraction)/history%sample_rate - history%touch_time
    end subroutine continue_to_zero
+
+   !> Adds a scalar quantity of the model.
+   pure subroutine add_model_quantity(history, name, unit, value)
+      type(force_history_type), intent(inout) :: history
+      !> Name and SI unit.
+      character(len=*), intent(in) :: name, unit
+      real(wp), intent(in) :: value
+
+      history%model_quantity_name = [character(len=name_length) :: history%model_quantity_name, name]
+      history%model_quantity_unit = [character(len=len(history%model_quantity_unit)) :: history%model_quantity_unit, unit]
+      history%model_quantity = [history%model_quantity, value]
+   end subroutine add_model_quantity
 
    !> A history of zero force, all arrays allocated and zero.
    pure function new_force_history(sample_rate, n_sample, component_name, model_history_name) result(history)

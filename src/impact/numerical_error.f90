@@ -5,7 +5,7 @@ module thud_numerical_error
    use thud_constants, only: pi
    use thud_error, only: error_type
    use thud_force_exposure, only: get_force_exposure_levels
-   use thud_force_history, only: force_history_type, numerical_error_type
+   use thud_force_history, only: add_model_quantity, force_history_type, numerical_error_type
    use thud_kinds, only: wp
    implicit none (type, external)
    private
@@ -73,14 +73,16 @@ contains
       type(force_history_type), intent(inout) :: history
       real(wp) :: level(octave_count)
       type(error_type), allocatable :: error
+      integer :: i
 
       call get_force_exposure_levels(finer%floor_force, finer%sample_rate, get_octaves(), 'exact', level, error)
       if (allocated(error)) return
-      history%model_quantity_name = [character(len=len(history%model_quantity_name)) :: history%model_quantity_name, &
-         finer_quantities]
-      history%model_quantity_unit = [character(len=len(history%model_quantity_unit)) :: history%model_quantity_unit, &
-         spread('dB', 1, octave_count), 's', '', 'N']
-      history%model_quantity = [history%model_quantity, level, get_contact_time(finer), finer%restitution, finer%peak_force]
+      do i = 1, octave_count
+         call add_model_quantity(history, finer_quantities(i), 'dB', level(i))
+      end do
+      call add_model_quantity(history, finer_quantities(octave_count + 1), 's', get_contact_time(finer))
+      call add_model_quantity(history, finer_quantities(octave_count + 2), '', finer%restitution)
+      call add_model_quantity(history, finer_quantities(octave_count + 3), 'N', finer%peak_force)
    end subroutine add_verification
 
    !> The contact time, resolved between steps if possible.

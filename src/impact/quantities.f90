@@ -97,7 +97,7 @@ module thud_quantities
 
 contains
 
-   !> Values of the quantities of an impact, SI units: [history_quantity_count].
+   !> Values of the quantities of an impact, SI units, NaN for unknown errors: [history_quantity_count].
    function get_quantities(history) result(values)
       type(force_history_type), intent(in) :: history
       real(wp) :: values(history_quantity_count)

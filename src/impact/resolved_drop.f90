@@ -2,7 +2,8 @@
 !> levels of the octaves agree. The difference is the stated numerical error.
 module thud_resolved_drop
    use thud_ball, only: ball_type
-   use thud_drop, only: drop_type
+   use thud_constants, only: pi
+   use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, signal_base
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
@@ -13,7 +14,7 @@ module thud_resolved_drop
    implicit none (type, external)
    private
 
-   public :: solve_drop
+   public :: get_drop_cost, solve_drop
 
    !> Error of an octave level above which a finer resolution is tried, dB.
    real(wp), parameter :: max_error = 0.2_wp
@@ -85,6 +86,53 @@ contains
       end subroutine solve_at
 
    end subroutine solve_drop
+
+   !> Approximate computing time of one drop with its numerical error on one core: levels 0 and 1, and the verification.
+   !> Whether higher levels are computed depends on the result; their time is not included.
+   function get_drop_cost(model, ball, drop, sampling, receiver) result(cost)
+      !> The model with its options, checked.
+      class(source_model_type), intent(in) :: model
+      type(ball_type), intent(in) :: ball
+      type(drop_type), intent(in) :: drop
+      type(sampling_type), intent(in) :: sampling
+      !> The structure under the source (default: a rigid floor).
+      type(receiver_type), intent(in), optional :: receiver
+      !> The time, s.
+      real(wp) :: cost
+      class(source_model_type), allocatable :: resolved
+      type(sampling_type) :: resolved_sampling
+      type(force_history_type) :: contact, coarse
+      integer :: level
+
+      ! Only models that use the wall have such a modulus.
+      if (model%get_paper_modulus() > 0.0_wp) contact = estimate_contact(ball, drop)
+      cost = 0.0_wp
+      do level = 0, merge(2, 1, sampling%verify)
+         allocate (resolved, source=model)
+         resolved_sampling = sampling
+         call resolved%set_level(ball, level, resolved_sampling, coarse)
+         if (allocated(contact%model_history)) then
+            cost = cost + resolved%get_cost(ball, resolved_sampling, receiver, contact%contact_time)
+         else
+            cost = cost + resolved%get_cost(ball, resolved_sampling, receiver)
+         end if
+         deallocate (resolved)
+         coarse = contact
+      end do
+   end function get_drop_cost
+
+   !> Contact time and contact radius of a linear shell under a point load (Reissner 1946), for estimates of cost.
+   function estimate_contact(ball, drop) result(history)
+      type(ball_type), intent(in) :: ball
+      type(drop_type), intent(in) :: drop
+      type(force_history_type) :: history
+      real(wp) :: stiffness, deflection
+
+      stiffness = 4*ball%youngs_modulus*ball%wall_thickness**2/(ball%outer_radius*sqrt(3*(1 - ball%poisson_ratio**2)))
+      deflection = min(ball%outer_radius, get_impact_velocity(drop)*sqrt(ball%mass/stiffness))
+      history%contact_time = pi*sqrt(ball%mass/stiffness)
+      allocate (history%model_history(1, 1), source=sqrt(deflection*(2*ball%outer_radius - deflection)))
+   end function estimate_contact
 
    !> Whether an error is an interrupt.
    pure function is_interrupt(error) result(yes)

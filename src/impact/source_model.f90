@@ -93,22 +93,28 @@ contains
       extents = 0
    end function get_snapshot_shape
 
-   !> Approximate computing time of a drop on one core, s; by default that of a model with one or two degrees of freedom.
-   function get_cost(ball, options, sampling, receiver) result(cost)
+   !> Approximate computing time of a drop at one resolution, that of the options, on one core, s; by default that of a model
+   !> with one or two degrees of freedom.
+   function get_cost(ball, options, sampling, receiver, contact_time) result(cost)
       type(ball_type), intent(in) :: ball
       !> The options, checked.
       class(source_model_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       !> The structure under the source (default: a rigid floor).
       type(receiver_type), intent(in), optional :: receiver
+      !> Expected contact time, s (default: `typical_contact`).
+      real(wp), intent(in), optional :: contact_time
       !> The time, s.
       real(wp) :: cost
+      real(wp) :: time
 
-      cost = 3.0e-4_wp
+      time = typical_contact
+      if (present(contact_time)) time = contact_time
+      cost = 1.5e-4_wp
       if (present(receiver)) then
-         cost = cost + get_step_count(sampling)*(1.4e-6_wp + 4.3e-9_wp*get_pole_count(receiver))
+         cost = cost + get_step_count(sampling)*(9.3e-7_wp + 2.9e-9_wp*get_pole_count(receiver))
       else
-         cost = cost + get_step_count(sampling, typical_contact)*2.2e-7_wp
+         cost = cost + get_step_count(sampling, time)*1.5e-7_wp
       end if
    end function get_cost
 

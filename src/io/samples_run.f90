@@ -2,7 +2,7 @@
 !> that the memory does not grow with the table.
 module thud_samples_run
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
-   use thud_case, only: case_type
+   use thud_case, only: case_type, keep_impact_only
    use thud_case_text, only: get_case_text
    use thud_compute, only: get_assessed_force
    use thud_constants, only: version
@@ -62,10 +62,7 @@ contains
 
       call load_case(path, case, error, unchecked=.true.)
       if (allocated(error)) return
-      ! Samples have no free modes, no compression and no unknowns.
-      case%has_modes = .false.
-      case%has_compression = .false.
-      case%has_unknowns = .false.
+      call keep_impact_only(case)
       if (.not. case%has_impact) error = input_error(path//': &model is missing; allowed: samples of a case ' &
          //'with a source model')
       if (allocated(error)) return
@@ -194,7 +191,8 @@ contains
          if (any(table%names == 'force') .or. any(table%names == 'method')) exit
          text = text//get_span_row('level, '//get_band_name(octaves(i))//' Hz octave', tally%span(i + 1, :), 2, 'dB')
       end do
-      text = text//get_span_row('contact time', 1.0e3_wp*tally%span(1, :), 3, 'ms')
+      text = text//get_span_row('contact time', 1.0e3_wp*tally%span(1, :), 3, 'ms') &
+         //'  The samples state no numerical errors; a run of a single case states its own.'//newline
    end subroutine format_tally
 
 end module thud_samples_run

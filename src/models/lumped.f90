@@ -1,11 +1,12 @@
 !> Impact of a source of a few masses: integrates in time from first touch until the source has left for good, samples the
 !> forces, and checks the balances of impulse and energy.
 module thud_lumped
-   use thud_contact_source, only: coarse_step_error, contact_source_type, is_coarse_step
+   use thud_contact_source, only: coarse_step_error, contact_source_type
    use thud_coupled_impact, only: solve_coupled
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error
-   use thud_force_history, only: check_samples, clear_flight, force_history_type, max_residual, new_force_history
+   use thud_force_history, only: add_model_quantity, check_samples, clear_flight, force_history_type, max_residual, &
+      new_force_history
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_receiver, only: is_rigid, receiver_type
@@ -22,7 +23,8 @@ module thud_lumped
 
 contains
 
-   !> Force history of one drop; the steps are halved until they are not too coarse for the source.
+   !> Force history of one drop; the steps are halved until they are not too coarse for the source. Then the history states
+   !> their length.
    subroutine solve_lumped(source, drop, sampling, component_name, history, error, receiver, n_step, model_history_name)
       !> The source before first touch.
       class(contact_source_type), intent(in) :: source
@@ -51,10 +53,11 @@ contains
          allocate (moving, source=source)
          call integrate()
          if (.not. allocated(error)) exit
-         if (.not. is_coarse_step(error) .or. halving == max_halvings) return
+         if (.not. error%has_coarse_steps .or. halving == max_halvings) return
          deallocate (error, moving)
          steps = 2*steps
       end do
+      if (halving > 0) call add_model_quantity(history, 'shortened_time_step', 's', 1/(sampling%sample_rate*steps))
       call check_contact_samples(sampling, history%contact_time, error)
       if (.not. allocated(error)) call check_samples(history, error)
 

@@ -169,17 +169,18 @@ contains
       yes = .false.
    end function couples
 
-   !> Approximate time of one drop on one core, s.
-   function get_cost(ball, options, sampling, receiver) result(cost)
+   !> Approximate time of a drop at one resolution on one core, s.
+   function get_cost(ball, options, sampling, receiver, contact_time) result(cost)
       type(ball_type), intent(in) :: ball
       class(measured_modes_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(receiver_type), intent(in), optional :: receiver
+      real(wp), intent(in), optional :: contact_time
       real(wp) :: cost
       real(wp) :: rate
 
       rate = max(sampling%sample_rate, checks_per_period*maxval(options%frequency%values(:options%frequency%count)))
-      cost = 1.0e-3_wp + min(sampling%duration, typical_contact)*rate*options%frequency%count*3.0e-8_wp
+      cost = 5.0e-4_wp + min(sampling%duration, typical_contact)*rate*options%frequency%count*1.5e-8_wp
    end function get_cost
 
    !> One mode from its measured values.

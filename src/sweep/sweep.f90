@@ -6,7 +6,7 @@ module thud_sweep
    use thud_band, only: band_type, get_level_bands, octave_count
    use thud_batch_samples, only: fill_samples, suits_batch
    use thud_blocked_drop, only: blocked_type, solve_blocked
-   use thud_case, only: case_type, check_case, get_active_fields
+   use thud_case, only: case_type, check_case, get_active_fields, keep_impact_only
    use thud_column, only: column_type
    use thud_compute, only: assess_floor, drop_on_floor, get_assessed_force, get_cost, scope_type
    use thud_ensemble, only: are_alike, new_projections, projections_type, solve_ensemble
@@ -91,10 +91,13 @@ contains
       !> A sweep of an earlier call, whose matrices are reused if they fit, or an empty sweep.
       type(sweep_type), intent(inout) :: sweep
       type(projections_type) :: wanted
+      type(case_type) :: sample
 
       call get_level_bands(case%bands, sweep%bands, sweep%first_band)
       sweep%levels = levels
-      sweep%cost = get_cost(case)
+      sample = case
+      if (size(columns) > 0) sample%sampling%verify = .false.
+      sweep%cost = get_cost(sample)
       if (size(columns) > 0 .and. suits_batch(case, columns)) sweep%cost = batch_cost*get_step_count(case%sampling, &
          typical_contact)
       sweep%floor_column = get_floor_columns(case, sweep%bands(sweep%first_band:))
@@ -177,10 +180,8 @@ contains
 
          thread_case = case
          allocate (fields, source=get_active_fields(thread_case))
-         ! Samples have no free modes, no compression, no unknowns and no verification.
-         thread_case%has_modes = .false.
-         thread_case%has_compression = .false.
-         thread_case%has_unknowns = .false.
+         call keep_impact_only(thread_case)
+         ! No table has its numbers.
          thread_case%sampling%verify = .false.
          blocked = sweep%blocked
          !$omp do schedule(dynamic)

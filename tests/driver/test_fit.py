@@ -101,6 +101,25 @@ def test_finite_element_loss_factor_from_noisy_force() -> None:
         assert fit.standard_errors[name] < 0.01 * value
 
 
+def test_search_keeps_the_automatic_elements_of_its_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Searched(Exception):  # noqa: N818 - no error
+        pass
+
+    def search_nothing(pairs: list[tuple[thud.Case, object]], *_: object, **__: object) -> None:
+        raise Searched([case.model for case, _ in pairs])
+
+    monkeypatch.setattr("thud.studies.fit.search", search_nothing)
+    start = {"youngs_modulus": 2.2e6, "height": 0.9}
+    target = thud.solve(model=COARSE)
+    for case in (thud.Case(model=thud.FiniteElement()), thud.Case(model=COARSE)):
+        with pytest.raises(Searched) as searched:
+            thud.fit(target, start, case)
+        elements = thud.solve(with_values(case, start)).model_quantities
+        (model,) = searched.value.args[0]
+        assert model.radial_elements == elements["radial_elements"]
+        assert model.polar_elements == elements["polar_elements"] >= 16
+
+
 def test_time_of_first_touch_is_found_between_samples() -> None:
     impact = thud.solve(TRUTH)
     late = 0.0123456

@@ -45,7 +45,9 @@ def test_command_writes_files_and_prints_a_table(
     assert cli.main([name, str(tmp_path / "study.toml"), "-o", str(tmp_path / "out")]) == 0
     written = names_in(tmp_path / "out")
     assert written == sorted([".thud", "study.nc", "study.svg", *more])
-    assert words in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert words in shown
+    assert "The samples state no numerical errors" in shown
     if more:
         lines = (tmp_path / "out" / more[0]).read_text().splitlines()
         assert lines[0] == "output,parameter,first_order,first_order_interval,total,total_interval"

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 import thud
+from thud.explorer.answer import answer_case
+from thud.studies.model_verdict import _Source
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -45,6 +48,54 @@ def test_error_of_the_default_is_small_and_not_shown(case_file: CaseFile, run: R
     assert impact.warnings == ()
     shown = run(case_file("&ball / &drop / &model name = 'modal_ball' /")).stdout
     assert "numerical error" not in shown
+
+
+def test_results_have_no_unknown_error(case_file: CaseFile, run: Run, tmp_path: Path) -> None:
+    run(case_file("&ball / &drop / &model /"), "--output", "results")
+    summary = tmp_path / "results/summary.nml"
+    lines = summary.read_text().splitlines(keepends=True)
+    summary.write_text("".join(line for line in lines if "_error = " not in line))
+    # Without the checksums the file may differ from that of the run.
+    (tmp_path / "results/.thud").unlink()
+    with pytest.warns(thud.PlausibilityWarning, match="missing"):
+        impact = thud.read_results(tmp_path / "results")
+    error = impact.numerical_error
+    assert np.isnan([*error.level, error.contact_time, error.restitution, error.peak_force]).all()
+    assert np.isnan(impact.to_xarray()["octave_500_error"])
+    assert impact.restitution > 0
+
+
+def test_verdict_and_page_do_not_take_an_unknown_error_as_small(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    known = thud.solve()
+    unknown = replace(known, octave_500_error=np.nan)
+    methods = [
+        _Source(impact, (), lambda _: np.empty(0), "drops").method for impact in (known, unknown)
+    ]
+    assert methods[0] == "drops"
+    assert "numerical error of the drops is unknown" in methods[1]
+    monkeypatch.setattr("thud.explorer.answer.compute", lambda _: unknown)
+    titles = [title for title, *_ in answer_case(known.case)["numbers"]]
+    assert "contact time" in titles
+    assert not any("numerical error" in title for title in titles)
+
+
+def test_shortened_steps_are_stated() -> None:
+    assert "shortened_time_step" not in thud.solve().model_quantities
+    with pytest.warns(thud.PlausibilityWarning, match="youngs_modulus"):
+        impact = thud.solve(thud.Ball(youngs_modulus=2e10))
+    assert impact.model_quantities["shortened_time_step"] == pytest.approx(1 / (4 * 44100))
+
+
+@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
+def test_reduced_step_of_an_unstable_run_is_stated() -> None:
+    options = {"radial_elements": 3, "polar_elements": 12, "viscosity": "none"}
+    keys = {"model": "finite_element", "sample_rate": 16000.0, "step_safety": 0.98, **options}
+    quantities = thud.solve(**keys).model_quantities  # type: ignore[arg-type]
+    assert "reduced_step_safety" not in quantities
+    quantities = thud.solve(drop=thud.Drop(height=4.0), **keys).model_quantities  # type: ignore[arg-type]
+    assert quantities["reduced_step_safety"] == pytest.approx(0.75 * 0.98)
 
 
 VERIFIED = {

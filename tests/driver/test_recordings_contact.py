@@ -11,6 +11,7 @@ from scipy import stats
 from scipy.ndimage import uniform_filter1d
 from synthetic import half_sine, make_drop
 
+from thud.impact.contact_time import contact_span
 from thud.level.levels import low_pass
 from thud.recordings import contact, drops, flanks, measured_drop
 from thud.recordings.contact import Contact, cells_between, uniform_bounds
@@ -185,7 +186,7 @@ def test_content_that_folds_back_falls_with_the_square_of_the_frequency(
     for factor, expected in ((0.1, bool(told)), (0.34, False)):
         draws = np.array([[factor * white, 0, 0, 0, 0]])
         noisy = replace(one, background=replace(one.background, draws=draws))
-        assert bool(measured_drop._check_aliasing(noisy)) == expected  # noqa: SLF001
+        assert bool(measured_drop._check_aliasing(noisy, None)) == expected  # noqa: SLF001
 
 
 # Flanks: times of 30 cells, whose noise is known.
@@ -329,6 +330,29 @@ def test_only_rough_flanks_fall() -> None:
     found = flanks.Posterior(np.array([0.0, 1e-3]), kinds, 0.5 * np.eye(2), factors, release=False)
     (touch, _), _ = found.edge_times()
     assert touch == 1e-3
+
+
+@pytest.mark.parametrize("rate", [8000.0, 51200.0])
+@pytest.mark.parametrize(("power", "decay"), [(1.0, 1.4), (1.3, 1.4), (1.3, 0.6)])
+def test_slow_release_ends_where_its_force_passes_a_percent(
+    power: float, decay: float, rate: float
+) -> None:
+    """From a fifth of the peak to 1 % the force falls in 4.4 to 6.6 ms."""
+    fine = 32 * rate
+    x = np.arange(int(0.022 * fine)) / (0.022 * fine)
+    pulse = (1 - x) ** power * np.exp(-decay * x) * (1 - np.exp(-10 * x))
+    pulse *= 1500 / pulse.max()
+    begin, end = contact_span(pulse, fine)
+    fall = (fine * end - np.flatnonzero(pulse > 300)[-1]) / fine
+    assert 4.3e-3 < fall < 6.7e-3
+    record = np.zeros(int(0.25 * rate))
+    record[int(0.1 * rate) :][: len(pulse[::32])] += pulse[::32]
+    record += np.random.default_rng(3).normal(size=len(record))
+    (window,) = drops.search_drops(Signal.from_array(record, rate)).windows
+    found = contact.find_contact(window, record[window.start : window.stop])
+    for edge, expected in ((found.begin, begin), (found.end, end)):
+        late = edge.value - expected - int(0.1 * rate) / rate + window.start / rate
+        assert abs(late) < min(3 * edge.uncertainty, 1e-4)
 
 
 def test_scale_of_a_contact_is_its_peak_below_the_band_edge() -> None:

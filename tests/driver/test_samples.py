@@ -56,6 +56,7 @@ def test_rows_are_those_of_solve_many(run: Run, case: Path, tmp_path: Path) -> N
     result = run(case, "--samples", table)
     assert (result.returncode, result.stderr) == (0, "")
     assert "40 samples, 40 computed, 0 conform" in result.stdout
+    assert "The samples state no numerical errors" in result.stdout
     rows = rows_of(tmp_path / "outputs/ball_samples/samples.csv")
     parameters = {"mass": 2.45, "height": heights, "momentum_flux": flux}
     expected = thud.solve_many(parameters)

@@ -84,7 +84,9 @@ def answer_case(case: Case) -> Answer:
     answer["force"]["title"] = FORCE_NAMES[force]
     answer["warnings"] += impact.warnings
     error = float(impact.numerical_error.level.max())
-    answer["numbers"].append(["numerical error of an octave up to", error, "dB"])
+    # A warning states that the error is unknown.
+    if not math.isnan(error):
+        answer["numbers"].append(["numerical error of an octave up to", error, "dB"])
     verdict = assess_impact(impact)
     if verdict:
         answer["model_verdict"] = {"result": verdict.result, "reason": verdict.reason}

@@ -127,7 +127,10 @@ class Impact(ImpactQuantities, Displayed):
 
     @property
     def numerical_error(self) -> ImpactNumbers:
-        """Errors due to the resolution: modes, rings, elements, time steps and samples."""
+        """Errors due to the resolution: modes, rings, elements, time steps and samples.
+
+        They are NaN if no other resolution can be computed.
+        """
         return ImpactNumbers(
             level=np.array([getattr(self, f"{name}_error") for name in OCTAVE_NAMES]),
             contact_time=self.contact_time_error,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import math
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -150,7 +151,13 @@ def _read_history(
         "model_histories": {name: values for name, values in histories.items() if name != "time_s"},
         "model_quantities": dict(model_quantities),
         "motion": _read_motion(files, prefix) if f"{prefix}snapshots.xmf" in files else None,
-        **{name: scalars[name] for name in IMPACT_QUANTITIES},
+        **{name: scalars[name] for name in IMPACT_QUANTITIES if not name.endswith("_error")},
+        # The file has no unknown errors.
+        **{
+            name: scalars.get(name, math.nan)
+            for name in IMPACT_QUANTITIES
+            if name.endswith("_error")
+        },
     }
     return history, {name: force[name] for name in columns[last + 1 :]}
 

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.ndimage import convolve1d, uniform_filter1d
 
 from thud.base.immutable import Immutable
+from thud.impact.contact_time import THRESHOLD
 from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.flanks import SMOOTHING, Flank, Posterior, find_touch
@@ -36,6 +37,9 @@ FLANK = 3e-3
 MARGIN = 2e-3
 # Maximum time from the start of the pulse that the search for drops returns to the touch, s.
 MAX_DELAY = 1e-3
+# Time from a fifth of the peak to THRESHOLD over that from half of it to a fifth: of an exponential
+# decay. Flanks that end earlier, as powers of time, have less.
+REACH = math.log(0.2 / THRESHOLD) / math.log(0.5 / 0.2)
 # Width of the cells of a flank, s: from MIN_CELL to MAX_CELL in the interval of the touch; outside,
 # GROWTH times the distance from this interval, if this is more.
 MIN_CELL = 2e-5
@@ -279,12 +283,21 @@ def find_edges(
     # At most half of a short background is cut off.
     before_stop = int(max(first - MARGIN * rate, first / 2))
     after_start = int(min(stop + MARGIN * rate, (stop + len(force)) / 2))
-    touch = (before_stop / rate, first / rate + MARGIN)
-    release = (stop / rate - MARGIN, after_start / rate)
     offset = float(np.median(np.concatenate([force[:before_stop], force[after_start:]])))
     force = force - offset
     width = max(1, round(rate / RECORDED_BAND))
-    peak = float(uniform_filter1d(force[first:stop], width).max())
+    smooth = uniform_filter1d(force[first:stop], width)
+    peak = float(smooth.max())
+    low = float(smooth.min())
+    half, fifth = (
+        first + np.flatnonzero(smooth >= low + level * (peak - low))[[0, -1]]
+        for level in (0.5, 0.2)
+    )
+    reach = fifth + REACH * (fifth - half)
+    before_stop = int(np.clip(reach[0], first / 2, before_stop))
+    after_start = int(np.clip(reach[1], after_start, (stop + len(force)) / 2))
+    touch = (before_stop / rate, first / rate + MARGIN)
+    release = (stop / rate - MARGIN, after_start / rate)
     for pass_index in range(passes):
         # The first of two passes needs only the coarse grid.
         searches = 1 + 2 * pass_index if passes > 1 else 2

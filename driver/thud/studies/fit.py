@@ -9,11 +9,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Unpack
 
+from thud.base._schema import FiniteElement
 from thud.base.checks import MAX_SEED, refuse, refuse_value, require_kind, require_whole
-from thud.base.errors import FitWarning, InputError
+from thud.base.errors import FitWarning, InputError, ThudError
 from thud.base.files import read_input
 from thud.base.key import check_keywords
 from thud.case.case import Case, check_case
+from thud.case.keys import with_values
 from thud.studies.directory import FORMATS
 from thud.studies.fitting.fit_result import Fit, file_ends
 from thud.studies.fitting.force_target import ForceTarget
@@ -183,10 +185,32 @@ def _search(
     progress: bool,
 ) -> Fit:
     if surrogate is None:
+        pairs = [(_with_mesh(case, misfit, ranges), misfit) for case, misfit in pairs]
         return search(pairs, ranges, options, progress=progress)
     pairs = _with_surrogate(pairs, surrogate, ranges)
     inside = [within_region(entry, surrogate) for entry in ranges]
     return recompute(search(pairs, inside, options, progress=progress))
+
+
+def _with_mesh(case: Case, misfit: Misfit, ranges: list[Range]) -> Case:
+    """Return a case whose automatic finite elements are those of the start of a search.
+
+    The elements would change between points of the search, and with them a level by up to 0.2 dB.
+    """
+    model = case.model
+    if not isinstance(model, FiniteElement) or model.radial_elements or model.polar_elements:
+        return case
+    start = {entry.name: entry.start for entry in ranges}
+    try:
+        quantities = misfit.solve(with_values(case, start)).model_quantities
+    except ThudError:
+        return case  # The search reports it.
+    mesh = replace(
+        model,
+        radial_elements=round(quantities["radial_elements"]),
+        polar_elements=round(quantities["polar_elements"]),
+    )
+    return replace(case, model=mesh)
 
 
 def _with_surrogate(

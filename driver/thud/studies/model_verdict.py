@@ -233,6 +233,8 @@ class _Source:
         errors = impact.numerical_error
         numerical = np.zeros(count)
         numerical[:7] = [*errors.level, errors.contact_time, errors.restitution]
+        if np.isnan(numerical).any():
+            self.method += "; the numerical error of the drops is unknown and not included"
         self.numerical = np.nan_to_num(numerical)
         self.start = {u.key: _number(impact.case, u.key) for u in unknowns}
 

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+_NO_ERRORS = "The samples state no numerical errors; a run of a single case states its own."
+
 
 class StudyResult(Displayed):
     """Result of a study: `rows` and `table`, `plot`, `warnings` and `notes`.
@@ -77,6 +79,12 @@ class SampleResult(StudyResult):
         undecided = self.dataset["undecided"]
         share = f"{int(undecided.sum())} of {undecided.size} verdicts undecided"
         return (f"{self.dataset.attrs['surrogate']}; it leaves {share}",)
+
+    def table(self) -> str:
+        """Return the result as text; it says that the samples of a model state no errors."""
+        if "surrogate" in self.dataset.attrs:
+            return super().table()
+        return f"{super().table()}\n{_NO_ERRORS}"
 
     @property
     def succeeded(self) -> bool:

@@ -1,5 +1,6 @@
 !> Results as text: the files of a run.
 module thud_report
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
    use thud_band, only: octave_count
    use thud_case, only: case_type
    use thud_compute, only: assessment_type, get_assessed_force, is_conforming
@@ -138,7 +139,7 @@ contains
       end associate
    end function get_summary
 
-   !> The quantities of an impact as lines of a namelist.
+   !> The quantities of an impact as lines of a namelist, without unknown ones.
    function get_quantity_lines(history) result(text)
       type(force_history_type), intent(in) :: history
       character(len=:), allocatable :: text
@@ -148,6 +149,7 @@ contains
       values = get_quantities(history)
       text = ''
       do i = 1, history_quantity_count
+         if (ieee_is_nan(values(i))) cycle
          text = text//line(trim(quantities(i)%name), to_text(values(i)), trim(quantities(i)%unit))
       end do
    end function get_quantity_lines

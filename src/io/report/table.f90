@@ -66,6 +66,8 @@ contains
                   //get_band_name(assessment%bands(i))//' Hz', error, 2, 'dB')
             end associate
          end do
+         if (.not. history%numerical_error%known) text = text//'  '//padded('numerical error', 22) &
+            //flush_right('unknown', 10)//newline
          text = text//verification_rows(history, assessment)//newline
          text = text//'  The source '//trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
             //' to the limits of the '//replaced(trim(case%source), '_', ' ')//': it meets ' &

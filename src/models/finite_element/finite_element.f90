@@ -10,7 +10,7 @@ module thud_finite_element
    use thud_element_block, only: n_element
    use thud_error, only: error_type, input_error, numerical_error
    use thud_finite_element_options, only: finite_element_options_type, get_frame_count, get_stride
-   use thud_force_history, only: force_history_type
+   use thud_force_history, only: add_model_quantity, force_history_type
    use thud_impact_record, only: continue_flight, finish_record, max_energy_residual, new_impact_record, record_sample
    use thud_impact_run, only: choose_step, get_energy, get_mean_height, get_mean_velocity, impact_run_type, max_steps, &
       new_impact_run, update_position, update_velocity
@@ -73,12 +73,13 @@ module thud_finite_element
 
 contains
 
-   !> Approximate time of one drop on one core, s.
-   function get_cost(ball, options, sampling, receiver) result(cost)
+   !> Approximate time of a drop at one resolution on one core, s.
+   function get_cost(ball, options, sampling, receiver, contact_time) result(cost)
       type(ball_type), intent(in) :: ball
       class(finite_element_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(receiver_type), intent(in), optional :: receiver
+      real(wp), intent(in), optional :: contact_time
       real(wp) :: cost
       real(wp) :: speed, interval, time, n_step, element_cost, damping
 
@@ -106,11 +107,13 @@ contains
          end associate
          interval = interval*(hypot(1.0_wp, damping) - damping)
       end if
-      time = typical_contact + options%flight_before + options%flight_after
+      time = typical_contact
+      ! A contact is over when shear waves have crossed the ball.
+      if (present(contact_time)) time = contact_time + 2*ball%outer_radius/sqrt(ball%youngs_modulus/3/get_density(ball))
+      time = time + options%flight_before + options%flight_after
       if (options%bounces > 1) time = sampling%duration
       n_step = max(get_step_count(sampling, time), min(time, sampling%duration)/interval)
-      ! With the drop of elements of twice the size.
-      cost = 5.0e-3_wp + 1.125_wp*n_step*element_cost
+      cost = 2.5e-3_wp + n_step*element_cost
       if (present(receiver)) cost = cost + n_step*3.0e-9_wp*get_pole_count(receiver)
    end function get_cost
 
@@ -172,7 +175,8 @@ contains
       end do
    end subroutine compress
 
-   !> Force history of one drop. A run that turns out to be unstable is repeated with a smaller step.
+   !> Force history of one drop. A run that turns out to be unstable is repeated with a smaller step, and the history states
+   !> the reduced `step_safety`.
    subroutine solve(ball, drop, options, sampling, history, error, receiver)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
@@ -187,9 +191,11 @@ contains
       allocate (attempted, source=options)
       do attempt = 1, max_attempts
          call solve_once(ball, drop, attempted, sampling, history, error, receiver)
-         if (history%energy_residual <= max_energy_residual) return
+         if (history%energy_residual <= max_energy_residual) exit
          attempted%step_safety = next_safety*attempted%step_safety
       end do
+      if (attempt > 1 .and. .not. allocated(error)) call add_model_quantity(history, 'reduced_step_safety', '', &
+         attempted%step_safety)
    end subroutine solve
 
    !> Force history of one drop with the step as it is.

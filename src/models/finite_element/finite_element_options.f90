@@ -38,7 +38,7 @@ module thud_finite_element_options
 
    !> Highest level of resolution, and maximum time of its drop on one core, s.
    integer, parameter :: highest_level = 3
-   real(wp), parameter :: max_cost = 4.0_wp
+   real(wp), parameter :: max_cost = 3.54_wp
 
    !> Options of the model.
    type, abstract, extends(source_model_type) :: finite_element_options_type

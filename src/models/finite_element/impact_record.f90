@@ -3,7 +3,7 @@ module thud_impact_record
    use thud_ball, only: ball_type
    use thud_constants, only: recorded_band
    use thud_error, only: error_type, numerical_error
-   use thud_force_history, only: continue_to_zero, force_history_type, new_force_history
+   use thud_force_history, only: add_model_quantity, continue_to_zero, force_history_type, new_force_history
    use thud_impact_run, only: get_mean_height, get_mean_velocity, impact_run_type
    use thud_kinds, only: wp
    use thud_moving_floor, only: continue_freely
@@ -136,13 +136,13 @@ contains
       history%peak_elastic_force = history%peak_force
       call continue_to_zero(history)
       history%max_deflection = maxval(history%deflection)
-      associate (material => run%body%material)
-         history%model_quantity_name = [character(len=24) :: 'shear_modulus', 'bulk_modulus', 'simulated_time', &
-            'minimum_step', 'maximum_penetration']
-         history%model_quantity_unit = [character(len=8) :: 'Pa', 'Pa', 's', 's', 'm']
-         history%model_quantity = [material%shear_modulus, material%bulk_modulus, run%time, run%shortest_interval, &
-            run%penetration]
-      end associate
+      call add_model_quantity(history, 'shear_modulus', 'Pa', run%body%material%shear_modulus)
+      call add_model_quantity(history, 'bulk_modulus', 'Pa', run%body%material%bulk_modulus)
+      call add_model_quantity(history, 'simulated_time', 's', run%time)
+      call add_model_quantity(history, 'minimum_step', 's', run%shortest_interval)
+      call add_model_quantity(history, 'maximum_penetration', 'm', run%penetration)
+      call add_model_quantity(history, 'radial_elements', '', real(run%body%mesh%n_radial, wp))
+      call add_model_quantity(history, 'polar_elements', '', real(run%body%mesh%n_polar, wp))
       gain = ball%mass*(get_mean_velocity(run) + speed + run%gravity*run%time)
       history%impulse_residual = abs(sum(history%floor_force)/history%sample_rate - gain)/gain
       call check_contact_samples(sampling, history%contact_time, error)

@@ -11,7 +11,7 @@ module thud_modal_ball
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
-   use thud_force_history, only: continue_to_zero, force_history_type, max_residual, new_force_history
+   use thud_force_history, only: add_model_quantity, continue_to_zero, force_history_type, max_residual, new_force_history
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_lapack, only: dgemm
@@ -48,28 +48,29 @@ module thud_modal_ball
 
 contains
 
-   !> Approximate time of one drop on one core, s.
-   function get_cost(ball, options, sampling, receiver) result(cost)
+   !> Approximate time of a drop at one resolution on one core, s.
+   function get_cost(ball, options, sampling, receiver, contact_time) result(cost)
       type(ball_type), intent(in) :: ball
       class(modal_ball_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(receiver_type), intent(in), optional :: receiver
+      real(wp), intent(in), optional :: contact_time
       real(wp) :: cost
-      real(wp) :: n_mode, n_gap, step_cost
+      real(wp) :: n_mode, n_gap, step_cost, time
 
+      time = typical_contact
+      if (present(contact_time)) time = contact_time
       n_mode = 0.08_wp*options%get_highest_frequency()
       n_gap = options%get_ring_count()*merge(2.0_wp, 1.0_wp, options%floor_friction == 'stick')
-      cost = 2.5e-3_wp + 1.0e-9_wp*n_mode*n_gap**2
+      cost = 1.3e-3_wp + 5.0e-10_wp*n_mode*n_gap**2
       step_cost = 4.0e-7_wp + n_mode*(2.5e-9_wp + 6.0e-11_wp*n_gap)
       ! Maxwell branches.
       if (options%damping_law == 'fractional') step_cost = step_cost + 8.0e-9_wp*n_mode
       if (present(receiver)) step_cost = step_cost + 2.6e-9_wp*get_pole_count(receiver)
-      ! Both levels; sticking rings need twice the steps.
-      step_cost = merge(3, 2, options%floor_friction == 'stick')*step_cost
       if (present(receiver)) then
          cost = cost + get_step_count(sampling)*step_cost
       else
-         cost = cost + get_step_count(sampling, typical_contact)*step_cost
+         cost = cost + get_step_count(sampling, time)*step_cost
       end if
    end function get_cost
 
@@ -426,9 +427,7 @@ contains
       gain = ball%mass*(history%impact_velocity + state%velocity + state%gravity*time)
       history%impulse_residual = abs(history%impulse - gain)/gain
       history%floor_work = state%floor_work
-      history%model_quantity_name = [character(len=len(history%model_quantity_name)) :: 'contact_loss']
-      history%model_quantity_unit = [character(len=len(history%model_quantity_unit)) :: 'J']
-      history%model_quantity = [state%contact_loss]
+      call add_model_quantity(history, 'contact_loss', 'J', state%contact_loss)
       initial = ball%mass/2*history%impact_velocity**2
       energy = ball%mass*(state%velocity**2/2 + state%gravity*(state%height - ball%outer_radius)) &
          + state%loss + state%contact_loss + state%floor_work
