@@ -186,8 +186,8 @@ def calibrate_tap(
     Returns
     -------
     TappedPlate
-        Mean of the taps. The uncertainty is that of the noise or, if the taps differ by more, from
-        their scatter.
+        Weighted mean of the taps with the uncertainty due to noise or, if the taps differ by more,
+        mean with that from their scatter.
 
     Raises
     ------
@@ -304,15 +304,15 @@ def _depth(size: NDArray[np.float64], noise: NDArray[np.float64]) -> NDArray[np.
 
 def _mean(values: list[float], deviations: list[float]) -> tuple[float, float]:
     """Return the mean of values and its standard uncertainty."""
-    count = len(values)
-    mean, within = float(np.mean(values)), math.sqrt(sum(u**2 for u in deviations)) / count
+    count, value = len(values), np.array(values)
     if count == 1 or not min(deviations) > 0:
-        return mean, within
-    square = sum(((value - mean) / u) ** 2 for value, u in zip(values, deviations, strict=True))
-    if chdtrc(count - 1, square) >= SIGNIFICANT:
-        return mean, within
+        return float(value.mean()), max(deviations) / math.sqrt(count)
+    weight = 1 / np.square(deviations)
+    mean = float(weight @ value / weight.sum())
+    if chdtrc(count - 1, weight @ (value - mean) ** 2) >= SIGNIFICANT:
+        return mean, 1 / math.sqrt(weight.sum())
     factor = float(stdtrit(count - 1, 0.975)) / NORMAL
-    return mean, factor * float(np.std(values, ddof=1)) / math.sqrt(count)
+    return float(value.mean()), factor * float(value.std(ddof=1)) / math.sqrt(count)
 
 
 def _find_taps(level: NDArray[np.float64], rate: float, name: str) -> list[_Tap]:
