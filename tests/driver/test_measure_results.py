@@ -19,6 +19,7 @@ import thud
 from thud import cli
 from thud.base.errors import ReportWarning
 from thud.base.files import Results
+from thud.recordings.config import Instrument
 from thud.report import recording_files
 from thud.report.rows import HEAD
 from thud.report.write import PDF
@@ -172,7 +173,8 @@ def test_netcdf_holds_drops_levels_and_provenance(tmp_path: Path) -> None:
     files = [FOLDER / f"drop_{i}.csv" for i in (1, 2, 3)]
     recording = thud.read_recording(files, height=1.0, mass=2.5)
     drops = tuple(replace(drop, warnings=("long " * 20000,)) for drop in recording.drops)
-    config = replace(recording.config, laboratory="Ωmega\udcff\0")
+    instruments = ("plate", Instrument("amplifier", certificate="K-1"))
+    config = replace(recording.config, laboratory="Ωmega\udcff\0", instruments=instruments)
     recording = replace(recording, drops=drops, config=config)
     recording_files.save(recording, Results(tmp_path), figures=False)
     with xr.open_dataset(tmp_path / "recording.nc") as found:
@@ -193,7 +195,26 @@ def test_netcdf_holds_drops_levels_and_provenance(tmp_path: Path) -> None:
         assert found.attrs["verdict"] == recording.assess().result
         assert found.attrs["thud"] == thud.__version__
         assert found.attrs["laboratory"].startswith("Ωmega")
+        assert found.attrs["instruments"] == "plate\namplifier, K-1"
         assert len(found.attrs["warnings"]) > 300_000
+
+
+@pytest.mark.usefixtures("working_directory")
+def test_screen_lists_what_the_report_misses(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "lab.toml").write_text('[report]\nnumber = "1"\nclient = "Client"\n')
+    command = ["measure", str(FOLDER / "drop_1.csv"), "--config", "lab.toml"]
+    assert cli.main(command) == 0
+    (line,) = [
+        line for line in capsys.readouterr().out.splitlines() if "Missing in the report" in line
+    ]
+    assert "ISO/IEC 17025:2017" in line
+    assert "procedure" in line
+    assert "client" not in line
+    assert "number of the report" not in line
+    assert cli.main([*command, "--no-figures"]) == 0
+    assert "Missing in the report" not in capsys.readouterr().out
 
 
 def test_without_h5netcdf_a_warning_tells_what_is_left_out(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from scipy import stats
 from synthetic import half_sine, make_drop
 
 import thud
+from thud import cli
 from thud.base.errors import InputError
 from thud.level.estimate import Estimate
 from thud.recordings.budgets import average_estimates, level_estimates
@@ -121,6 +123,25 @@ def test_configuration_and_keywords_select_channels(tmp_path: Path) -> None:
     lab.write_text('channels = ["F1"]\n')
     with pytest.raises(InputError, match=naming("lab.toml", "channels", "is not allowed")):
         read_config(lab)
+
+
+def test_command_line_selects_and_calibrates_channels(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    forces = [record(i, count=1, share=share) for i, share in enumerate(SHARES)]
+    path = write_wav(tmp_path / "cells.wav", [force / 2500 for force in forces])
+    command = ["measure", str(path), "--output", str(tmp_path / "out"), "--no-figures"]
+    # A bare number is N per full scale, as in the configuration.
+    for options in (
+        ["--channels", "sum", "--calibration", "2500"],
+        ["--channels", "1+2+3+4", *4 * ["--calibration", "2500"]],
+    ):
+        assert cli.main([*command, *options]) == 0
+        out = capsys.readouterr().out
+        assert "forces of 4 load cells were added" in out
+        assert re.search(r" (1499|150\d) ", out)
+    assert cli.main([*command, "--channels", "sum", *3 * ["--calibration", "2500"]]) == 1
+    assert "3 calibrations for 4 channels" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("channels", ["", "F1", "F1+F1", [], ["F1"], 3, [1, True], ["F1", ""]])
@@ -236,7 +257,9 @@ def test_records_of_the_same_drops_are_refused(
     copy = write_part(tmp_path / name, force, kind, start)
     if not start and kind == "PCM_16":
         first = write_part(tmp_path / "first.wav", force, "PCM_24", 0.0)
-    with pytest.raises(InputError, match=r"is the same (record|drop) as first"):
+    with pytest.raises(
+        InputError, match=r"is given twice, also as first|is the same drop as first"
+    ):
         thud.read_recording([first, copy], **given)
     other = write_part(tmp_path / f"other{Path(name).suffix}", record(8, noise=noise), kind, start)
     assert len(thud.read_recording([first, other], **given).drops) >= 3

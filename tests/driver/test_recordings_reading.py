@@ -1264,7 +1264,7 @@ def test_damaged_date_times_are_named(tmp_path: Path) -> None:
         read_all(path)
 
 
-def testlab(force: NDArray[np.float64], rate: float) -> dict[str, Any]:
+def siemens_structure(force: NDArray[np.float64], rate: float) -> dict[str, Any]:
     return {
         "x_values": {"start_value": 0.0, "increment": 1 / rate, "quantity": {"label": "s"}},
         "y_values": {"values": 1e-3 * force, "quantity": {"label": "kN"}},
@@ -1279,7 +1279,7 @@ def testlab(force: NDArray[np.float64], rate: float) -> dict[str, Any]:
         lambda f, t: {"ball_1_time_F": f, "ball_1_time_t": t},
         lambda f, t: {"ball_1_time_F": {"time": t, "F": f}},
         lambda f, t: {"t": t, "ball_1_time_F": f},
-        lambda f, t: {"ball_1_time_F": testlab(f, 1 / t[1])},
+        lambda f, t: {"ball_1_time_F": siemens_structure(f, 1 / t[1])},
         lambda f, t: {"ball_1_time_F": f, "Fs": 1 / t[1]},
     ],
 )

@@ -20,9 +20,9 @@ from thud.base.checks import (
 from thud.base.errors import InputError
 from thud.level.assessment import get_criteria
 from thud.level.levels import SOURCES
+from thud.recordings import dates
 from thud.recordings.channel import MIB, shown_path, shown_text
 from thud.recordings.choice import parse_numbers
-from thud.recordings.dates import read_date
 from thud.recordings.force_units import (
     Calibration,
     plain_number,
@@ -80,7 +80,7 @@ def _date(value: object, key: str) -> str:
     """Return a date as text in ISO 8601; empty if not stated."""
     if isinstance(value, date):
         return value.isoformat()[:10]
-    read = read_date(_text(value, key)) if value else None
+    read = dates.read_date(_text(value, key)) if value else None
     if value and read is None:
         refuse(f"{key} = {shown(value)} is not allowed", 'a date, such as "2024-05-03"')
     return read.date().isoformat() if read else ""
@@ -378,10 +378,6 @@ class Config:
         Temperature of ball and air, degC.
     instruments : tuple of str or Instrument
         Instruments.
-    report : ReportConfig
-        What the report states besides the results.
-    properties : Properties
-        Properties of the ball that are stated, not assessed.
     channel, channels, unit, polarity, sample_rate, calibration
         As for `open_signals`.
     calibration_uncertainty : float or None
@@ -405,6 +401,10 @@ class Config:
         Whether levels are those of the force below 1.25 kHz.
     limits : mapping
         Minimum and maximum by criterion, which replace those of the standards.
+    report : ReportConfig
+        What the report states besides the results.
+    properties : Properties
+        Properties of the ball that are stated, not assessed.
     """
 
     laboratory: str = _key(_text, "")
@@ -414,8 +414,6 @@ class Config:
     source: LimitsSource = _key(partial(_choice, SOURCES), SOURCES[0])
     temperature: float | None = _key(partial(_number, -273.15, 200.0))
     instruments: tuple[str | Instrument, ...] = _key(_instruments, ())
-    report: ReportConfig = _key(partial(_table_of, ReportConfig), ReportConfig())
-    properties: Properties = _key(partial(_table_of, Properties), Properties())
     channel: int | str | None = _key(_channel)
     channels: str | tuple[int | str, ...] | None = _key(require_channels)
     unit: str | None = _key(require_unit)
@@ -439,6 +437,8 @@ class Config:
     limits: Mapping[str, tuple[float, float]] = field(
         default_factory=dict, metadata={"check": _limits}
     )
+    report: ReportConfig = _key(partial(_table_of, ReportConfig), ReportConfig())
+    properties: Properties = _key(partial(_table_of, Properties), Properties())
 
     @property
     def resonance(self) -> Plate | None:
@@ -474,12 +474,12 @@ class Config:
             self.height_uncertainty or 0.0,
         )
 
-    def check_due(self, dates: Iterable[str]) -> list[str]:
+    def check_due(self, file_dates: Iterable[str]) -> list[str]:
         """Return a warning for each instrument whose calibration was due before the measurement.
 
-        `dates` are those of the files, which count if no date is stated.
+        `file_dates` are those of the files, which count if no date is stated.
         """
-        days = [read_date(text) for text in ([self.date] if self.date else dates)]
+        days = [dates.read_date(text) for text in ([self.date] if self.date else file_dates)]
         last = max((day.date().isoformat() for day in days if day), default="")
         return [
             f"{item.name}: its calibration was due on {item.due}, before the measurement"

@@ -205,7 +205,10 @@ def estimate_limits(window: Window, noise: Background | None = None) -> tuple[Es
     """Return begin and end of a contact, s from the first sample, accurate to about 0.1 ms."""
     edges = find_edges(window, window.force, noise, passes=1)
     (t0, s0), (t1, s1) = edges.touch.edge_times()[1], edges.release.edge_times()[1]
-    return Estimate(t0, s0), Estimate(-t1, s1)
+    u0, u1 = _step_errors(
+        edges.background, window.force - edges.offset, window.sample_rate, t0, -t1
+    )
+    return Estimate(t0, math.hypot(s0, u0)), Estimate(-t1, math.hypot(s1, u1))
 
 
 def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
@@ -234,18 +237,13 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
     removed = np.interp(time, (cells[0] + cells[1]) / 2, background.predict_mean(cells))
     removed += edges.offset
     corrected = force[slice(*span)] - removed
-    errors = [
-        math.hypot(correction_error, _step_error(background, flank, rate))
-        for flank in (
-            corrected[max(int(begin[0] * rate), 0) - span[0] :],
-            corrected[: int(-end[0] * rate) + 1 - span[0]][::-1],
-        )
-    ]
+    start = span[0] / rate
+    u0, u1 = _step_errors(background, corrected, rate, begin[0] - start, -end[0] - start)
     return Contact(
         Estimate(t0, s0),
         Estimate(t1, s1),
-        Estimate(begin[0], math.hypot(begin[1], errors[0])),
-        Estimate(-end[0], math.hypot(end[1], errors[1])),
+        Estimate(begin[0], math.hypot(begin[1], correction_error, u0)),
+        Estimate(-end[0], math.hypot(end[1], correction_error, u1)),
         background.peak,
         span,
         corrected,
@@ -258,17 +256,23 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
     )
 
 
-def _step_error(background: Background, flank: NDArray[np.float64], rate: float) -> float:
-    """Return the standard deviation of an edge by quantization, s.
+def _step_errors(
+    background: Background, force: NDArray[np.float64], rate: float, begin: float, end: float
+) -> tuple[float, float]:
+    """Return the standard deviations of begin and end of a contact by quantization, s.
 
-    The flank, N, begins at the edge. Where the background lies within a step, offset and samples
-    are uncertain by half a step and a step: the edge by the time that the force needs for both.
+    Begin and end are in s from the first sample of the force, N. Where the background lies within a
+    step, offset and samples are uncertain by half a step and a step: the edges by the time that the
+    force needs for both.
     """
     step, offset = background.quantization.step, background.quantization.offset
     if not offset:
-        return 0.0
-    above = np.flatnonzero(flank > BEGIN * background.peak + 1.5 * step)
-    return offset / step * float(above[0] if above.size else flank.size) / rate
+        return 0.0, 0.0
+    level = BEGIN * background.peak + 1.5 * step
+    above = np.flatnonzero(force > level) / rate
+    inside = above[(above > begin) & (above < end)]
+    first, last = (inside[0], inside[-1]) if inside.size else (end, begin)
+    return offset / step * float(first - begin), offset / step * float(end - last)
 
 
 def find_edges(

@@ -62,10 +62,9 @@ def refuse_copy(signal: Signal, others: Sequence[Record]) -> None:
     for other in others:
         is_same_channel = signal.name == other.name or signal.path != other.path
         if signal.checksum == other.checksum and is_same_channel:
+            also = "" if signal.name == other.name else f", also as {other.name}"
             refuse(
-                f"{signal.name}: is the same record as {other.name}"
-                if signal.name != other.name
-                else f"{signal.name}: is given twice",
+                f"{signal.name}: is given twice{also}",
                 "each record once: repeatability is the scatter of different drops",
             )
 

@@ -313,7 +313,7 @@ def _budget(criterion: dict[str, Any]) -> str:
         cells = (
             part["name"], part["kind"], size, f"{part['divisor']:.4g}", sensitivity,
             with_unit(part["uncertainty"] / style.unit, unit), freedom_text(part["freedom"]),
-            share if part["counted"] else "in the repeatability",
+            share if part["counted"] else "included",
         )  # fmt: skip
         rows.append(f"<tr>{_labeled([_text(cell) for cell in cells], BUDGET_HEAD)}</tr>")
     return f"<tbody>{''.join(rows)}</tbody>"
@@ -329,7 +329,8 @@ def _budget_rule(data: dict[str, Any]) -> str:
     return (
         "Type: A by statistics of observations, B by other means. u = value / divisor · "
         "sensitivity, divisor √3 for a rectangular distribution, √n for the mean of n drops. "
-        "Share: of the combined variance; contributions are independent. Effective degrees of "
+        "Share: of the combined variance; contributions are independent; included: repeatability "
+        "contains noise, so that one of them counts. Effective degrees of "
         "freedom by Welch and Satterthwaite; U = k u with Student's t for 95 % (JCGM 100:2008, "
         "annex G)." + missing
     )
