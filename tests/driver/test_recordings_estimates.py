@@ -702,6 +702,22 @@ def test_noise_does_not_raise_the_peak() -> None:
     assert abs(stated) < 2 * doubt / np.sqrt(6) + doubt
 
 
+@pytest.mark.parametrize("rate", [4e3, 8e3, 51.2e3])
+def test_peak_may_lie_between_samples(rate: float) -> None:
+    """A ripple of 600 Hz at 4 kHz: the samples miss up to 1 % of the peak."""
+
+    def force(time: np.ndarray) -> np.ndarray:
+        late = time - 0.012
+        main = np.where(np.abs(late) < 0.012, 750 + 750 * np.cos(np.pi * late / 0.012), 0)
+        burst = np.where(np.abs(late) < 0.004, 1 + np.cos(np.pi * late / 0.004), 0)
+        return np.asarray(main + 75 * burst * np.cos(2 * np.pi * 600 * late))
+
+    for fraction in (0.0, 0.25, 0.5, 0.75):
+        time = np.arange(int(0.25 * rate)) / rate - 0.1 - fraction / rate
+        (drop,) = drops(force(time), rate)
+        assert drop.peak_force.value == pytest.approx(1650, rel=5e-4)
+
+
 def test_levels_know_hum() -> None:
     """Intervals hold with hum of 15 to 30 N in 25 to 35 ms of quiet."""
     pulls = []
