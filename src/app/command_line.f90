@@ -258,7 +258,8 @@ contains
          //'  --samples TABLE.csv  a header row of keys and one drop, a sample, in each'//newline &
          //'                       further row; all other keys are those of CASE.nml'//newline &
          //'  --threads N          threads for the samples (default: 1)'//newline &
-         //'  --check              exit with 3 where the source does not conform to the limits'//newline &
+         //'  --check              exit with 3 if the source, with the values of CASE.nml, does not'//newline &
+         //'                       conform to the limits'//newline &
          //'  -q, --quiet          show only errors and warnings'//newline &
          //'  --keys               show every key with default, range and meaning'//newline &
          //'  --schema             the same and more as JSON, for programs'//newline &

@@ -78,6 +78,10 @@ module thud_field
       character(len=72) :: range = ''
       !> The entries of the list must be whole numbers.
       logical :: whole_entries = .false.
+      !> The key belongs to the resolution or the output, and is no property of the source.
+      logical :: is_numerical = .false.
+      !> At the value 0 the key is derived from others.
+      logical :: derived_at_zero = .false.
       !> Number of allowed texts; 0 for free text.
       integer :: n_choice = 0
       !> Allowed texts; the first `n_choice` are used: [max_choices]. The size is fixed because some compilers lose

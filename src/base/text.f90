@@ -68,7 +68,7 @@ contains
    pure function fixed(value, decimals) result(text)
       real(wp), intent(in) :: value
       integer, intent(in) :: decimals
-      !> The rounded number, with a leading zero.
+      !> The rounded number, with a leading zero; without the sign of a negative one that is rounded to zero.
       character(len=len_trim(format_fixed(value, decimals))) :: text
 
       text = format_fixed(value, decimals)
@@ -93,6 +93,8 @@ contains
       write (buffer, form) value
       buffer = adjustl(buffer)
       if (decimals == 0) buffer(len_trim(buffer):) = ''
+      ! No negative zero.
+      if (verify(trim(buffer), '-0.') == 0) buffer = adjustl(merge(' ', buffer(:1), buffer(:1) == '-')//buffer(2:))
    end function format_fixed
 
    !> Shortest decimal text of a number, padded with blanks.

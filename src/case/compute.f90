@@ -1,6 +1,7 @@
 !> Computes all results that a case asks for: free modes, quasi-static compression, the drop on a rigid floor with its levels
 !> and criteria, the drop on the floor of the case, the level in the room below, and warnings. It reads and writes no files.
 module thud_compute
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    !$ use omp_lib, only: omp_get_max_threads
    use thud_band, only: band_type, get_level_bands, octave_count
    use thud_case, only: case_type, check_case, get_floor_number, get_model_number
@@ -19,7 +20,7 @@ module thud_compute
    use thud_room, only: check_below, get_room_bands, get_room_level, room_level_type
    use thud_sampling, only: get_sample_count
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
-      get_source_limits, source_limits_type
+      get_source_limits, is_inconclusive, source_limits_type
    use thud_system, only: is_forked
    use thud_warnings, only: get_warnings, warning_length
    implicit none (type, external)
@@ -270,6 +271,11 @@ contains
       if (allocated(error)) return
       criteria = get_criteria(limits, level(:octave_count), history%contact_time, history%restitution, &
          get_peak_count(force, history%sample_rate), case%ball%mass, case%drop%height)
+      associate (computed => criteria(:octave_count + 2))
+         computed%error = ieee_value(1.0_wp, ieee_quiet_nan)
+         if (history%numerical_error%known) computed%error = [history%numerical_error%octave, &
+            history%numerical_error%contact_time, history%numerical_error%restitution]
+      end associate
    end subroutine assess_force
 
    !> Level in the room below, from a force history.
@@ -323,14 +329,16 @@ contains
       index = findloc(force_names == case%level_force, .true., dim=1)
    end function get_assessed_force
 
-   !> Whether the source of a case conforms.
+   !> Whether the source of a case conforms, whatever the numerical errors of its values.
    pure function is_conforming(case, assessment) result(yes)
       type(case_type), intent(in) :: case
       type(assessment_type), intent(in) :: assessment
       !> The assessed force meets all criteria.
       logical :: yes
 
-      yes = all(conforms(assessment%criteria(:, get_assessed_force(case))))
+      associate (criteria => assessment%criteria(:, get_assessed_force(case)))
+         yes = all(conforms(criteria) .and. .not. is_inconclusive(criteria))
+      end associate
    end function is_conforming
 
 end module thud_compute

@@ -96,9 +96,12 @@ contains
          label = '&unknowns: '
          field = findloc(fields%key == key, .true., dim=1)
          if (field == 0) then
-            call get_suggestion(trim(key), fields%key, suggestion)
+            call get_suggestion(trim(key), pack(fields%key, .not. fields%is_numerical), suggestion)
             error = input_error(label//'key = '//quoted(key)//' is not allowed'//suggestion//'; allowed: ' &
-               //join_quoted(fields%key))
+               //join_quoted(pack(fields%key, .not. fields%is_numerical)))
+         else if (fields(field)%is_numerical) then
+            error = input_error(label//'key = '//quoted(key)//' belongs to the computation, not to the source: its effect ' &
+               //'is the numerical error; allowed: '//join_quoted(pack(fields%key, .not. fields%is_numerical)))
          else if (any(unknowns%key%values(:i - 1) == key)) then
             error = input_error(label//'key = '//quoted(key)//' is given twice; allowed: once')
          end if
@@ -112,6 +115,9 @@ contains
             error = input_error(label//'low = '//to_text(low)//' of '//trim(key)//' is not allowed; allowed: '//allowed)
          else if (.not. interval%contains(high)) then
             error = input_error(label//'high = '//to_text(high)//' of '//trim(key)//' is not allowed; allowed: '//allowed)
+         else if (fields(field)%derived_at_zero .and. .not. low > 0.0_wp) then
+            error = input_error(label//'low = '//to_text(low)//' of '//trim(key)//' is not allowed: at 0 it is derived ' &
+               //'from other keys; allowed: above 0')
          else if (.not. low < high) then
             error = input_error(label//'low = '//to_text(low)//' and high = '//to_text(high)//' of '//trim(key) &
                //' are not allowed; allowed: low < high')

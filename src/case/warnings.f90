@@ -9,6 +9,7 @@ module thud_warnings
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
+   use thud_numerical_error, only: finer_quantities, get_resolution_keys
    use thud_registry, only: floor_names, model_names
    use thud_sampling, only: get_rate_limit
    use thud_text, only: fixed, quoted, to_text
@@ -84,8 +85,10 @@ contains
       if (case%has_floor) call add_floor_warning(case, warnings)
       call add_limit_warnings(case, history, warnings)
       call add_level_warnings(history, warnings)
-      call add_error_warning(history, warnings)
-      if (present(on_floor)) call add_error_warning(on_floor, warnings)
+      call add_error_warning(history, '', warnings)
+      if (present(on_floor)) call add_error_warning(on_floor, '&floor: ', warnings)
+      if (case%sampling%verify .and. all(history%model_quantity_name /= finer_quantities(1))) call add(warnings, &
+         '&sampling: verify: the drop cannot be computed at a finer resolution, and is not verified')
       if (present(on_floor)) call add_limit_warnings(case, on_floor, warnings)
    end subroutine get_warnings
 
@@ -113,24 +116,32 @@ contains
       end do
    end subroutine add_limit_warnings
 
-   !> Adds a warning on a large numerical error, once for both floors.
-   subroutine add_error_warning(history, warnings)
+   !> Adds a warning on a large numerical error, with the keys that lower it.
+   subroutine add_error_warning(history, prefix, warnings)
       type(force_history_type), intent(in) :: history
+      !> Beginning of the message.
+      character(len=*), intent(in) :: prefix
       !> Messages: [n].
       character(len=warning_length), allocatable, intent(inout) :: warnings(:)
       type(band_type) :: bands(octave_count)
-      integer :: worst
+      character(len=:), allocatable :: octaves
+      integer :: lowest, highest
 
-      if (any(index(warnings, error_title) > 0)) return
       bands = get_octaves()
       associate (error => history%numerical_error)
-         worst = maxloc(error%octave, dim=1)
          if (.not. error%known) then
-            call add(warnings, error_title//' could not be estimated: no other resolution can be computed')
-         else if (error%octave(worst) > max_error) then
-            call add(warnings, error_title//' of the level at '//trim(get_band_name(bands(worst)))//' Hz is about ' &
-               //fixed(error%octave(worst), 1)//' dB; a finer resolution lowers it')
+            call add(warnings, prefix//error_title//' could not be estimated: no other resolution can be computed')
+            return
          end if
+         lowest = findloc(error%octave > max_error, .true., dim=1)
+         if (lowest == 0) return
+         highest = findloc(error%octave > max_error, .true., dim=1, back=.true.)
+         octaves = trim(get_band_name(bands(highest)))//' Hz'
+         if (lowest < highest) octaves = trim(get_band_name(bands(lowest)))//' to '//octaves
+         ! Rounded up, so that it exceeds the limit as printed.
+         call add(warnings, prefix//error_title//' of the octave levels is up to ' &
+            //fixed(ceiling(100*maxval(error%octave))/100.0_wp, 2)//' dB ('//octaves//'); raise ' &
+            //get_resolution_keys(history))
       end associate
    end subroutine add_error_warning
 

@@ -7,15 +7,24 @@ module thud_numerical_error
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: add_model_quantity, force_history_type, numerical_error_type
    use thud_kinds, only: wp
+   use thud_text, only: fixed
    implicit none (type, external)
    private
 
-   public :: add_verification, estimate_error, finer_quantities, get_largest_error
+   public :: add_verification, estimate_error, finer_prefix, finer_quantities, get_largest_error, get_resolution
+   public :: get_resolution_keys, resolution_quantities
 
    !> Names of the quantities of a drop at a finer resolution: levels of the octaves of the force on the floor, and others.
    character(len=24), parameter :: finer_quantities(*) = [character(len=24) :: 'finer_octave_31_5', 'finer_octave_63', &
       'finer_octave_125', 'finer_octave_250', 'finer_octave_500', 'finer_contact_time', 'finer_restitution', &
       'finer_peak_force']
+
+   !> Beginning of the names of the quantities of a drop at a finer resolution.
+   character(len=*), parameter :: finer_prefix = 'finer_'
+
+   !> Quantities of models that state the resolution, with the names of the keys that set it.
+   character(len=24), parameter :: resolution_quantities(*) = [character(len=24) :: 'radial_elements', 'polar_elements', &
+      'rings', 'highest_frequency', 'substeps']
 
    !> Part of the difference of two forces in an octave that is taken as in phase with the force, and so changes its level.
    real(wp), parameter :: in_phase = 0.15_wp
@@ -26,11 +35,12 @@ contains
    subroutine estimate_error(coarse, ratio, history)
       !> The same drop at a coarser resolution; its sampling rate may be lower.
       type(force_history_type), intent(in) :: coarse
-      !> Error of the history divided by the difference.
+      !> Error of a level of the history divided by the difference.
       real(wp), intent(in) :: ratio
       !> The history; its errors are set.
       type(force_history_type), intent(inout) :: history
       real(wp) :: level(octave_count, 3), change(octave_count)
+      real(wp) :: time_change, peak_change, first_order_ratio
       type(error_type), allocatable :: error
 
       call get_force_exposure_levels(coarse%floor_force, coarse%sample_rate, get_octaves(), 'exact', level(:, 1), error)
@@ -38,19 +48,28 @@ contains
       call get_force_exposure_levels(history%floor_force, history%sample_rate, get_octaves(), 'exact', level(:, 2), error)
       if (allocated(error)) return
       change = abs(level(:, 2) - level(:, 1))
+      peak_change = abs(history%peak_force - coarse%peak_force)
+      time_change = abs(get_contact_time(history) - get_contact_time(coarse))
       if (size(coarse%floor_force) == size(history%floor_force)) then
          ! Levels may agree by chance, the forces do not.
          call get_force_exposure_levels(history%floor_force - coarse%floor_force, history%sample_rate, get_octaves(), &
             'exact', level(:, 3), error)
          if (allocated(error)) return
          change = max(change, in_phase*20/log(10.0_wp)*10**((level(:, 3) - level(:, 2))/20))
+         ! The root of the mean square of the difference during the contact.
+         peak_change = max(peak_change, sqrt(sum(10**(level(:, 3)/10))/history%contact_time))
       end if
       change = ratio*change
       if (history%has_means) change = change + get_mean_loss(history%sample_rate)
-      history%numerical_error = numerical_error_type(known=.true., octave=change, &
-         contact_time=ratio*abs(get_contact_time(history) - get_contact_time(coarse)), &
-         restitution=ratio*abs(history%restitution - coarse%restitution), &
-         peak_force=ratio*abs(history%peak_force - coarse%peak_force))
+      ! Levels converge with the square of the step or element size: `ratio` = 1/(q**2 - 1) for sizes in the ratio q. Contact
+      ! time, restitution and peak converge in proportion to it: 1/(q - 1).
+      first_order_ratio = 1/(sqrt(1 + 1/ratio) - 1)
+      time_change = first_order_ratio*time_change
+      ! Means show the end of the contact to within an interval.
+      if (history%has_means) time_change = max(time_change, 1/history%sample_rate)
+      history%numerical_error = numerical_error_type(known=.true., octave=change, contact_time=time_change, &
+         restitution=first_order_ratio*abs(history%restitution - coarse%restitution), &
+         peak_force=first_order_ratio*peak_change)
    end subroutine estimate_error
 
    !> Maximum reduction of octave levels by means over a sampling interval, dB: that of the highest frequency of each octave.
@@ -83,7 +102,77 @@ contains
       call add_model_quantity(history, finer_quantities(octave_count + 1), 's', get_contact_time(finer))
       call add_model_quantity(history, finer_quantities(octave_count + 2), '', finer%restitution)
       call add_model_quantity(history, finer_quantities(octave_count + 3), 'N', finer%peak_force)
+      do i = 1, size(finer%model_quantity)
+         if (any(resolution_quantities == finer%model_quantity_name(i))) call add_model_quantity(history, &
+            finer_prefix//finer%model_quantity_name(i), finer%model_quantity_unit(i), finer%model_quantity(i))
+      end do
+      if (finer%sample_rate > history%sample_rate) call add_model_quantity(history, finer_prefix//'sample_rate', 'Hz', &
+         finer%sample_rate)
    end subroutine add_verification
+
+   !> The resolution of a result in words; empty if it is the sampling of the input.
+   pure function get_resolution(history, prefix) result(text)
+      type(force_history_type), intent(in) :: history
+      !> `finer_prefix` for the drop at a finer resolution, or empty.
+      character(len=*), intent(in) :: prefix
+      character(len=:), allocatable :: text
+
+      if (has_quantity(history, prefix//'radial_elements')) then
+         text = 'mesh '//whole(prefix//'radial_elements')//' x '//whole(prefix//'polar_elements')
+      else if (has_quantity(history, prefix//'rings')) then
+         text = whole(prefix//'rings')//' rings, modes up to '//whole(prefix//'highest_frequency')//' Hz, substeps ' &
+            //whole(prefix//'substeps')
+      else if (has_quantity(history, prefix//'sample_rate')) then
+         text = whole(prefix//'sample_rate')//' samples per second'
+      else
+         text = ''
+      end if
+
+   contains
+
+      !> A quantity without decimals.
+      pure function whole(name) result(number)
+         character(len=*), intent(in) :: name
+         character(len=:), allocatable :: number
+
+         number = fixed(get_model_quantity(history, name), 0)
+      end function whole
+
+   end function get_resolution
+
+   !> The keys that set the resolution of a result, with its values.
+   pure function get_resolution_keys(history) result(text)
+      type(force_history_type), intent(in) :: history
+      character(len=:), allocatable :: text
+
+      if (has_quantity(history, 'radial_elements')) then
+         text = '&mesh radial_elements, polar_elements (now '//fixed(get_model_quantity(history, 'radial_elements'), 0) &
+            //' x '//fixed(get_model_quantity(history, 'polar_elements'), 0)//')'
+      else if (has_quantity(history, 'rings')) then
+         text = '&modal_ball rings, highest_frequency (now '//fixed(get_model_quantity(history, 'rings'), 0)//', ' &
+            //fixed(get_model_quantity(history, 'highest_frequency'), 0)//' Hz)'
+      else
+         text = '&sampling sample_rate (now '//fixed(history%sample_rate, 0)//' Hz)'
+      end if
+   end function get_resolution_keys
+
+   !> Whether the model has stated a quantity.
+   pure function has_quantity(history, name) result(yes)
+      type(force_history_type), intent(in) :: history
+      character(len=*), intent(in) :: name
+      logical :: yes
+
+      yes = any(history%model_quantity_name == name)
+   end function has_quantity
+
+   !> A quantity that the model has stated.
+   pure function get_model_quantity(history, name) result(value)
+      type(force_history_type), intent(in) :: history
+      character(len=*), intent(in) :: name
+      real(wp) :: value
+
+      value = history%model_quantity(findloc(history%model_quantity_name == name, .true., dim=1))
+   end function get_model_quantity
 
    !> The contact time, resolved between steps if possible.
    pure function get_contact_time(history) result(time)

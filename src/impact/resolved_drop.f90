@@ -2,11 +2,13 @@
 !> levels of the octaves agree. The difference is the stated numerical error.
 module thud_resolved_drop
    use thud_ball, only: ball_type
+   use thud_band, only: octave_count
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, signal_base
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
+   use thud_motion, only: motion_type
    use thud_numerical_error, only: add_verification, estimate_error, get_largest_error
    use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
@@ -35,38 +37,60 @@ contains
       type(receiver_type), intent(in), optional :: receiver
       class(source_model_type), allocatable :: prepared
       type(force_history_type) :: coarse, finer
+      type(force_history_type), allocatable :: references(:)
+      real(wp), allocatable :: min_error(:, :)
       type(error_type), allocatable :: coarse_error
-      integer :: level, highest
+      integer :: level, highest, reference
+      logical :: is_finest
 
+      is_finest = .false.
       highest = model%get_highest_level(ball, sampling)
+      allocate (references(0:highest), min_error(octave_count, 0:highest + 1))
       allocate (prepared, source=model)
       call prepared%share_setup(ball, sampling)
       call solve_at(0, history, coarse_error)
-      if (is_interrupt(coarse_error)) call move_alloc(coarse_error, error)
-      if (allocated(error)) return
+      if (allocated(coarse_error)) then
+         if (is_interrupt(coarse_error) .or. coarse_error%has_short_record) then
+            call move_alloc(coarse_error, error)
+            return
+         end if
+      end if
       do level = 1, highest
-         if (.not. allocated(coarse_error)) coarse = history
+         if (.not. allocated(coarse_error)) then
+            coarse = history
+            references(level - 1) = history
+            references(level - 1)%motion = motion_type()
+         end if
          call solve_at(level, history, error)
          if (allocated(error)) then
             if (is_interrupt(error) .or. level == 1) return
-            ! The next coarser level has a result.
+            ! The next coarser level has a result, and no finer one can be computed.
             deallocate (error)
             history = coarse
+            is_finest = .true.
             exit
          end if
-         if (.not. allocated(coarse_error)) call estimate_error(coarse, model%get_error_ratio(level), history)
          if (allocated(coarse_error)) deallocate (coarse_error)
+         reference = model%get_reference_level(level)
+         if (allocated(references(reference)%floor_force)) then
+            call estimate_error(references(reference), model%get_error_ratio(ball, level, history), history)
+            history%numerical_error%octave = max(history%numerical_error%octave, min_error(:, level))
+         end if
          if (history%numerical_error%known .and. get_largest_error(history) <= max_error) exit
       end do
       level = min(level, highest)
-      if (history%numerical_error%known .and. .not. sampling%verify) return
+      if (is_finest .or. history%numerical_error%known .and. .not. sampling%verify) return
       ! The error is not known if the coarsest resolution fails and there is one level.
       call solve_at(level + 1, finer, error)
       if (allocated(error)) then
-         if (.not. (is_interrupt(error) .or. sampling%verify)) deallocate (error)
+         ! The result stands without the finer one; `get_warnings` reports that.
+         if (.not. is_interrupt(error)) deallocate (error)
          return
       end if
-      if (.not. history%numerical_error%known) call estimate_error(finer, 1 + model%get_error_ratio(level + 1), history)
+      if (.not. history%numerical_error%known) then
+         call estimate_error(finer, 1 + model%get_error_ratio(ball, level + 1, finer), history)
+         history%numerical_error%octave = max(history%numerical_error%octave, min_error(:, level))
+      end if
       if (sampling%verify) call add_verification(finer, history)
 
    contains
@@ -83,12 +107,13 @@ contains
          resolved_sampling = sampling
          call resolved%set_level(ball, level, resolved_sampling, coarse)
          call resolved%solve(ball, drop, resolved_sampling, history, error, receiver)
+         min_error(:, level) = resolved%get_min_error(ball)
       end subroutine solve_at
 
    end subroutine solve_drop
 
-   !> Approximate computing time of one drop with its numerical error on one core: levels 0 and 1, and the verification.
-   !> Whether higher levels are computed depends on the result; their time is not included.
+   !> Approximate computing time of one drop with its numerical error on one core: that of the levels which are probably
+   !> computed.
    function get_drop_cost(model, ball, drop, sampling, receiver) result(cost)
       !> The model with its options, checked.
       class(source_model_type), intent(in) :: model
@@ -102,12 +127,13 @@ contains
       class(source_model_type), allocatable :: resolved
       type(sampling_type) :: resolved_sampling
       type(force_history_type) :: contact, coarse
-      integer :: level
+      integer :: level, expected_level
 
       ! Only models that use the wall have such a modulus.
       if (model%get_paper_modulus() > 0.0_wp) contact = estimate_contact(ball, drop)
+      expected_level = min(model%get_highest_level(ball, sampling), model%get_expected_level(ball, contact))
       cost = 0.0_wp
-      do level = 0, merge(2, 1, sampling%verify)
+      do level = 0, merge(expected_level + 1, expected_level, sampling%verify)
          allocate (resolved, source=model)
          resolved_sampling = sampling
          call resolved%set_level(ball, level, resolved_sampling, coarse)
@@ -121,17 +147,23 @@ contains
       end do
    end function get_drop_cost
 
-   !> Contact time and contact radius of a linear shell under a point load (Reissner 1946), for estimates of cost.
+   !> Contact time, deflection and contact radius for estimates of cost, from a linear shell under a point load (Reissner
+   !> 1946) and Hertz's contact of a solid sphere (Johnson, Contact Mechanics, 1985, section 11.4) in series. The factors are
+   !> means over modal balls.
    function estimate_contact(ball, drop) result(history)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
       type(force_history_type) :: history
-      real(wp) :: stiffness, deflection
+      real(wp) :: stiffness, plane_modulus, velocity, time
 
+      velocity = get_impact_velocity(drop)
+      plane_modulus = ball%youngs_modulus/(1 - ball%poisson_ratio**2)
       stiffness = 4*ball%youngs_modulus*ball%wall_thickness**2/(ball%outer_radius*sqrt(3*(1 - ball%poisson_ratio**2)))
-      deflection = min(ball%outer_radius, get_impact_velocity(drop)*sqrt(ball%mass/stiffness))
-      history%contact_time = pi*sqrt(ball%mass/stiffness)
-      allocate (history%model_history(1, 1), source=sqrt(deflection*(2*ball%outer_radius - deflection)))
+      time = hypot(pi*sqrt(ball%mass/stiffness), &
+         2.87_wp*(ball%mass**2/(ball%outer_radius*plane_modulus**2*velocity))**0.2_wp)
+      history%contact_time = 0.85_wp*time
+      history%max_deflection = min(ball%outer_radius, 0.7_wp*velocity*time/pi)
+      allocate (history%model_history(1, 1), source=sqrt(ball%outer_radius*history%max_deflection))
    end function estimate_contact
 
    !> Whether an error is an interrupt.

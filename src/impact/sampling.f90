@@ -46,7 +46,8 @@ contains
       type(field_type) :: fields(4)
 
       fields = [ &
-         real_field('sample_rate', sampling%sample_rate, 'Hz', 'samples per second', '[2000, 1e7]'), &
+         real_field('sample_rate', sampling%sample_rate, 'Hz', 'samples per second; from 16000 with finite_element', &
+         '[2000, 1e7]'), &
          real_field('duration', sampling%duration, 's', 'duration of the record from first touch', &
          '[0.001, 10]'), &
          integer_field('substeps', sampling%substeps, 'integration steps per sampling interval', '[1, 10000]'), &
@@ -93,7 +94,7 @@ contains
       type(validity_limit_type) :: limit
 
       limit = validity_limit_type('sampling', 'sample_rate in Hz', sampling%sample_rate, lowest=8000.0_wp, &
-         reason='below, samples falsify the level at 500 Hz, by up to 2 dB at 2000 Hz')
+         reason='aliasing changes the level at 500 Hz by up to 2 dB', subject='levels hold')
    end function get_rate_limit
 
    !> Number of samples of the record.

@@ -5,6 +5,7 @@
 !> descriptions of arguments in this file hold for every model.
 module thud_source_model
    use thud_ball, only: ball_type
+   use thud_band, only: octave_count
    use thud_drop, only: drop_type
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type
@@ -37,7 +38,11 @@ module thud_source_model
       procedure, pass(options) :: share_setup
       procedure, pass(options) :: set_level
       procedure, pass(options) :: get_highest_level
+      procedure, pass(options) :: chooses_resolution
+      procedure, pass(options) :: get_reference_level
+      procedure, pass(options) :: get_expected_level
       procedure, pass(options) :: get_error_ratio
+      procedure, pass(options) :: get_min_error
    end type source_model_type
 
    abstract interface
@@ -198,16 +203,59 @@ contains
       level = 1
    end function get_highest_level
 
-   !> Estimated error of a result divided by its difference from the next coarser level. By default somewhat more than the
+   !> Whether the model chooses its resolution; by default it is that of the input.
+   function chooses_resolution(options) result(yes)
+      class(source_model_type), intent(in) :: options
+      logical :: yes
+
+      yes = .false.
+   end function chooses_resolution
+
+   !> Level whose difference from a level shows the error of the latter: by default the next coarser one.
+   function get_reference_level(options, level) result(reference)
+      class(source_model_type), intent(in) :: options
+      !> Level of the result, from 1 up.
+      integer, intent(in) :: level
+      integer :: reference
+
+      reference = level - 1
+   end function get_reference_level
+
+   !> Level at which the resolution is probably fine enough, for estimates of the computing time; by default 1.
+   function get_expected_level(ball, options, contact) result(level)
+      type(ball_type), intent(in) :: ball
+      class(source_model_type), intent(in) :: options
+      !> Expected contact time, deflection and contact radius, for models that use the wall.
+      type(force_history_type), intent(in) :: contact
+      integer :: level
+
+      level = 1
+   end function get_expected_level
+
+   !> Estimated error of a result divided by its difference from the reference level. By default somewhat more than the
    !> 1/3 of an error that is proportional to the square of the step, as that of a force that begins with a jump.
-   function get_error_ratio(options, level) result(ratio)
+   function get_error_ratio(ball, options, level, history) result(ratio)
+      type(ball_type), intent(in) :: ball
       class(source_model_type), intent(in) :: options
       !> Level of the result.
       integer, intent(in) :: level
+      !> The result.
+      type(force_history_type), intent(in) :: history
       real(wp) :: ratio
 
       ratio = 0.4_wp
    end function get_error_ratio
+
+   !> Minimum errors of the octave levels that differences between levels of resolution do not show; by default 0.
+   function get_min_error(ball, options) result(error)
+      type(ball_type), intent(in) :: ball
+      !> The options at the level of the result.
+      class(source_model_type), intent(in) :: options
+      !> Errors, dB: [octave_count].
+      real(wp) :: error(octave_count)
+
+      error = 0.0_wp
+   end function get_min_error
 
    !> Force on each of two plates in a quasi-static compression; models without one return an error.
    subroutine compress(ball, options, deflection, force, error)

@@ -19,6 +19,9 @@ module thud_progress_line
    !> Length of a line.
    integer, parameter :: line_length = 80
 
+   !> Amount of work done at the latest report.
+   real(wp) :: latest_done = 0.0_wp
+
    !> A line is on the screen.
    logical :: shown = .false.
 
@@ -29,6 +32,7 @@ contains
       if (.not. is_terminal(standard_error)) return
       call system_clock(latest, rate)
       first = latest
+      latest_done = 0.0_wp
       shown = .false.
       call set_progress_handler(print_line)
    end subroutine begin_progress
@@ -55,6 +59,9 @@ contains
       integer :: status
 
       call system_clock(now)
+      ! The next of several drops.
+      if (done < latest_done) first = now
+      latest_done = done
       if (real(now - latest, wp) < min_interval*real(rate, wp)) return
       latest = now
       if (whole > 0.0_wp .and. done > 0.0_wp) then

@@ -10,7 +10,7 @@ module thud_source_limits
    implicit none (type, external)
    private
 
-   public :: conforms, criterion_type, get_criteria, get_peak_count, get_source_limits
+   public :: conforms, criterion_type, get_criteria, get_peak_count, get_source_limits, is_inconclusive
    public :: criterion_count, source_limits_type, source_names
 
    !> Number of criteria of a verdict: octaves, contact time, restitution, peaks, mass, drop height.
@@ -62,6 +62,8 @@ module thud_source_limits
       real(wp) :: value = 0.0_wp
       !> Minimum and maximum conforming value.
       real(wp) :: lower = 0.0_wp, upper = 0.0_wp
+      !> Numerical error of the value; NaN if unknown.
+      real(wp) :: error = 0.0_wp
    end type criterion_type
 
 contains
@@ -140,6 +142,14 @@ contains
 
       met = criterion%value >= criterion%lower .and. criterion%value <= criterion%upper
    end function conforms
+
+   !> Whether the numerical error of a value could change whether it meets a criterion, or the error is unknown.
+   elemental function is_inconclusive(criterion) result(yes)
+      type(criterion_type), intent(in) :: criterion
+      logical :: yes
+
+      yes = .not. criterion%error <= min(abs(criterion%value - criterion%lower), abs(criterion%value - criterion%upper))
+   end function is_inconclusive
 
    !> Number of peaks of a force after low-pass filtering at `recorded_band`; see `peak_prominence`.
    function get_peak_count(whole_force, sample_rate) result(peak_count)

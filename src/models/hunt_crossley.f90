@@ -59,14 +59,14 @@ contains
 
       fields = [ &
          real_field('stiffness', options%stiffness, '', &
-         'contact stiffness, N/m^exponent; 0: derived from contact_time', '[0, 1e15]'), &
+         'contact stiffness, N/m^exponent; 0: derived from contact_time', '[0, 1e15]', derived_at_zero=.true.), &
          real_field('contact_time', options%contact_time, 's', &
-         'target contact time; 0: derived from stiffness', '[0, 10]'), &
+         'target contact time; 0: derived from stiffness', '[0, 10]', derived_at_zero=.true.), &
          real_field('exponent', options%exponent, '', 'exponent of the deflection in the contact force', '[1, 5]'), &
          real_field('damping', options%damping, 's/m', &
          'damping coefficient alpha; 0: derived from restitution', '[0, 100]'), &
          real_field('restitution', options%restitution, '', &
-         'target coefficient of restitution; 0: derived from damping', '[0, 1]')]
+         'target coefficient of restitution; 0: derived from damping', '[0, 1]', derived_at_zero=.true.)]
    end function get_fields
 
    !> Returns an error if values are missing or contradict each other.

@@ -19,7 +19,7 @@ from modal_rooms import DWELLINGS, HALLS, draw_differences, energy_mean
 def main() -> None:
     """Print the study."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 60
-    print(f"{'border, thirds, Hz':37}", *(f"{f:6}" for f in (50, 63, 80, 100, 125, 160)))
+    print(f"{'border; one-third octaves, Hz':37}", *(f"{f:6}" for f in (50, 63, 80, 100, 125, 160)))
     studies = {
         "dwellings, 0.5 m": (DWELLINGS, count, (3, 6), 0.5),
         "dwellings, 0 m": (DWELLINGS, count, (3, 6), 0.0),

@@ -4,7 +4,8 @@
 
 Each source is computed at the default resolution, at a fine one, and at one between, which shows
 how far the fine one is from convergence. Prints each source whose error is not covered, has no
-result, or exceeds 0.5 dB without a warning; then the coverage of the levels of all octaves.
+result, or exceeds 0.5 dB without a warning; then the coverage of the levels of all octaves, and of
+contact time, restitution and peak force.
 """
 
 from __future__ import annotations
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 
 # Errors below this are not distinguished from zero, dB.
 FLOOR = 0.02
+# The same of contact time and peak force, relative, and of the restitution.
+FLOORS = 0.001
 # Numerical error above which an impact carries a warning, and error that must not be without, dB.
 WARNED, MAXIMUM = 0.2, 0.5
 DENSITY = 900.0, 1300.0
@@ -166,8 +169,8 @@ STUDIES = {
 }
 
 
-def levels(case: dict[str, Any], keys: dict[str, Any]) -> tuple[Any, Array]:
-    """Return the impact of a case, and its levels, dB."""
+def levels(case: dict[str, Any], keys: dict[str, Any]) -> tuple[Any, Array, Array]:
+    """Return the impact of a case, its levels, dB, and contact time, restitution and peak force."""
     model = case["model"]
     options = {name: value for name, value in keys.items() if hasattr(model, name)}
     sampling = {name: value for name, value in keys.items() if name not in options}
@@ -175,7 +178,8 @@ def levels(case: dict[str, Any], keys: dict[str, Any]) -> tuple[Any, Array]:
         fields = {name: getattr(model, name) for name in vars(model)}
         model = type(model)(**{**fields, **options})
     impact = thud.solve(**{**case, "model": model, **sampling})
-    return impact, np.asarray(impact.levels(force="floor"))
+    scalars = np.array([impact.exact_contact_time, impact.restitution, impact.peak_force])
+    return impact, np.asarray(impact.levels(force="floor")), scalars
 
 
 def main() -> None:
@@ -185,18 +189,19 @@ def main() -> None:
     chance = random.Random(int(sys.argv[3]) if len(sys.argv) > 3 else 1)  # noqa: S311
     study = STUDIES[name]
     errors, stated, rests, seconds, refused = [], [], [], [], 0
+    scalars_covered = []
     for i in tqdm(range(count), disable=None):
         case = study.draw(chance)
         begin = time.perf_counter()
         try:
-            impact, here = levels(case, {})
+            impact, here, scalars = levels(case, {})
         except thud.ThudError as error:
             refused += 1
             print(i, error, case, flush=True)
             continue
         seconds.append(time.perf_counter() - begin)
         try:
-            fine = levels(case, study.fine)[1]
+            _, fine, fine_scalars = levels(case, study.fine)
             rest = np.abs(fine - levels(case, study.between)[1])
         except thud.ThudError as error:
             print(i, "no reference:", error, flush=True)
@@ -204,6 +209,15 @@ def main() -> None:
         errors.append(np.abs(here - fine))
         stated.append(impact.numerical_error.level)
         rests.append(rest)
+        own = impact.numerical_error
+        limit = np.array([own.contact_time, own.restitution, own.peak_force])
+        floors = FLOORS * np.array([scalars[0], 1.0, scalars[2]])
+        difference = np.abs(scalars - fine_scalars)
+        scalars_covered.append(difference <= np.maximum(limit, floors))
+        if not scalars_covered[-1].all():
+            print(
+                i, "contact time, restitution, peak: error", difference, "stated", limit, flush=True
+            )
         silent = (errors[-1] > MAXIMUM) & (stated[-1].max() < WARNED)
         if silent.any() or (errors[-1] > np.maximum(stated[-1], FLOOR) + rest).any():
             numbers = (values.round(2) for values in (errors[-1], stated[-1], rest))
@@ -222,6 +236,8 @@ def main() -> None:
         f"{rest.max():.2f} dB, median {np.median(rest):.4f} dB; median time "
         f"{1e3 * np.median(seconds):.1f} ms"
     )
+    shares = 100 * np.mean(scalars_covered, axis=0)
+    print("contact times {:.0f} %, restitutions {:.0f} %, peak forces {:.0f} %".format(*shares))
 
 
 if __name__ == "__main__":

@@ -38,14 +38,15 @@ def main() -> None:
         inside &= meets
         within = np.mean((value >= criterion.low) & (value <= criterion.high))
         print(
-            f"{criterion.name}: {meets.mean():.3f} meet it, stated {criterion.probability:.3f} "
-            f"± {criterion.error:.3f}; {within:.3f} within {criterion.low:.5g} to "
+            f"{criterion.name}: {meets.mean():.3f} meet it, stated "
+            f"{shown(criterion.probability_range)}; {within:.3f} within {criterion.low:.5g} to "
             f"{criterion.high:.5g}"
         )
-    print(
-        f"all: {inside.mean():.3f} of {count} conform, stated {verdict.probability:.3f} "
-        f"± {verdict.error:.3f}"
-    )
+    print(f"all: {inside.mean():.3f} of {count} conform, stated {shown(verdict.probability_range)}")
+
+
+def shown(ends: tuple[float, float]) -> str:
+    return " to ".join(f"{end:.3f}" for end in ends)
 
 
 if __name__ == "__main__":

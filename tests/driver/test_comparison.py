@@ -226,7 +226,8 @@ def test_case_that_fails_is_named() -> None:
 @pytest.mark.parametrize(
     ("value", "uncertainty", "scale", "decimals", "cell"),
     [
-        (38.1, 0, 10.0, 2, "381.00"), (37.9, 0, 1.0, 1, "37.9 low"), (40.1, 1, 1.0, 1, "40.1 high"),
+        (38.1, 0, 10.0, 2, "381.00"), (37.9, 0, 1.0, 1, "37.9 low"),
+        (40.1, 0, 1.0, 1, "40.1 high"), (40.1, 1, 1.0, 1, "40.1 undecided"),
         (38.0, 0.1, 1.0, 1, "38.0 undecided"), (40.0, 0.1, 1.0, 1, "40.0 undecided"),
         (np.nan, 0, 1.0, 1, "unknown"),
     ],

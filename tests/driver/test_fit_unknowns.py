@@ -14,8 +14,8 @@ from conftest import naming, quiet_fit
 import thud
 from thud.case.keys import with_values
 from thud.studies.fitting import misfit
+from thud.studies.fitting.alternatives import ORDERS, UNKNOWNS, alternatives
 from thud.studies.fitting.inference import misfit_ratio, posterior
-from thud.studies.fitting.unknowns import ORDERS, UNKNOWNS, alternatives
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "validation"))
 from fit_assumptions import ASSUMED, BACKGROUND, RATE, START, TRUTH, record

@@ -87,5 +87,11 @@ def test_fish_completes(line: str, directory: Path, share: Path) -> None:
 @pytest.mark.skipif(not shutil.which("zsh"), reason="zsh is not installed")
 @pytest.mark.parametrize("name", ["thud", "thud-driver"])
 def test_zsh_reads_the_completions(name: str, share: Path) -> None:
-    command = ["zsh", "-f", "-n", share / f"zsh/site-functions/_{name}"]
-    subprocess.run(command, check=True)
+    # zsh finds the completion of the command on its function path, and its code is valid.
+    script = (
+        'fpath=("$1" $fpath); autoload -Uz compinit; compinit -Du; print -r -- "$_comps[$2]"; '
+        'autoload +X -z "_$2"'
+    )
+    command = ["zsh", "-f", "-c", script, "zsh", share / "zsh/site-functions", name]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == (f"_{name}\n", "")

@@ -54,7 +54,7 @@ def test_each_floor_has_the_numbers_of_a_single_prediction(model: thud.ModelName
 
 
 def test_blocked_drop_is_kept_only_while_it_is_the_same(many: thud.Ensemble) -> None:
-    """It is kept from drop to drop and from call to call; no number hangs on what came before."""
+    """It is kept from drop to drop and from call to call; no number depends on what came before."""
     order = [3, 0, 2, 1]
     parameters = {name: values[order] for name, values in many.parameters.items()}
     again = thud.solve_many(parameters, CASE, threads=1)

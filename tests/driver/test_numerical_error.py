@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ import pytest
 
 import thud
 from thud.explorer.answer import answer_case
-from thud.studies.model_verdict import _Source
+from thud.studies.model_assessment import _Source
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -23,7 +24,7 @@ COARSE += " &modal_ball rings = 10, highest_frequency = 300 /"
 
 def test_results_keep_the_stated_error(case_file: CaseFile, run: Run, tmp_path: Path) -> None:
     path = case_file(COARSE)
-    with pytest.warns(thud.PlausibilityWarning, match=r"numerical error .* 500 Hz .* dB"):
+    with pytest.warns(thud.PlausibilityWarning, match=r"numerical error .* dB \(.* to 500 Hz\)"):
         impact = thud.solve(thud.read_case(path))
     error = impact.numerical_error
     assert error.level.shape == (5,)
@@ -70,8 +71,14 @@ def test_verdict_and_page_do_not_take_an_unknown_error_as_small(
 ) -> None:
     known = thud.solve()
     unknown = replace(known, octave_500_error=np.nan)
+    assert known.assess().criteria[4].estimate.expanded == pytest.approx(known.octave_500_error)
+    assert unknown.assess().criteria[4].result == "inconclusive"
+    assert unknown.assess().rows()[5][2] == "unknown"
     methods = [
-        _Source(impact, (), lambda _: np.empty(0), "drops").method for impact in (known, unknown)
+        _Source(
+            impact, (), lambda _: np.empty(0), "drops", impact.numerical_error.assessed[np.newaxis]
+        ).method
+        for impact in (known, unknown)
     ]
     assert methods[0] == "drops"
     assert "numerical error of the drops is unknown" in methods[1]
@@ -100,7 +107,7 @@ def test_reduced_step_of_an_unstable_run_is_stated() -> None:
 
 VERIFIED = {
     "shell": {"model": "hollow_sphere", "sample_rate": 8000.0},
-    "modes of the user": {"model": "modal_ball", "rings": 20, "highest_frequency": 600.0},
+    "modes of the user": {"model": "modal_ball", "rings": 20, "highest_frequency": 800.0},
     "elements of the user": {"model": "finite_element", "polar_elements": 24},
 }
 
@@ -135,6 +142,56 @@ def test_verification_is_printed_beside_the_stated_error(case_file: CaseFile, ru
     numbers = [f"{finer:.2f}", "dB", f"{change:.2f}", f"{error:.2f}"]
     assert lines[-1] == ["level,", "500", "Hz", "octave", *numbers]
     assert "finer octave" not in shown
+    assert "(16000 samples per second)" in shown
+    assert "exceeded" not in shown
+    assert "-0.00" not in shown
+
+
+FINE_MESH = {"radial_elements": 4, "polar_elements": 34}
+RESOLUTIONS = {
+    "&model name = 'finite_element' / &mesh radial_elements = 3, polar_elements = 24 /": (
+        "mesh 3 x 24\n", "&mesh radial_elements, polar_elements (now 3 x 24)", FINE_MESH,
+    ),
+    "&model name = 'modal_ball' / &modal_ball rings = 10, highest_frequency = 300 /": (
+        "10 rings, modes up to 300 Hz, substeps 1\n",
+        "&modal_ball rings, highest_frequency (now 10, 300 Hz)",
+        {"rings": 14, "highest_frequency": 420.0},
+    ),
+    "&model name = 'modal_ball' /": (
+        "40 rings, modes up to 1400 Hz, substeps 1, automatic\n", "", {"rings": 56},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", RESOLUTIONS)
+@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
+def test_resolution_is_stated(text: str, case_file: CaseFile, run: Run) -> None:
+    shown, keys, finer = RESOLUTIONS[text]
+    path = case_file(f"&ball / &drop / {text} &sampling verify = .true. /")
+    result = run(path, "--output", "results")
+    assert f"resolution: {shown}" in result.stdout
+    assert "penetration" not in result.stdout
+    assert keys in result.stderr
+    quantities = thud.solve(thud.read_case(path)).model_quantities
+    assert {name: quantities[f"finer_{name}"] for name in finer} == pytest.approx(finer)
+
+
+def test_errors_of_the_drop_on_a_floor_are_shown(case_file: CaseFile, run: Run) -> None:
+    text = "&ball / &drop / &model name = 'modal_ball' / &floor name = 'infinite_plate' /"
+    text += " &modal_ball rings = 10, highest_frequency = 300 / &sampling verify = .true. /"
+    path = case_file(text)
+    with pytest.warns(thud.PlausibilityWarning, match="numerical error"):
+        impact = thud.solve(thud.read_case(path))
+    assert impact.on_floor
+    result = run(path)
+    errors = impact.numerical_error.level[4], impact.on_floor.numerical_error.level[4]
+    lines = [line.split() for line in result.stdout.splitlines() if "  error at 500" in line]
+    assert lines == [
+        ["error", "at", "500", "Hz", f"{errors[0]:.2f}", "dB", f"{errors[1]:.2f}", "dB"]
+    ]
+    assert result.stdout.count("at a finer resolution") == 2
+    assert result.stderr.count("the numerical error") == 2
+    assert result.stderr.count("&floor: the numerical error") == 1
 
 
 AWKWARD = {
@@ -170,3 +227,48 @@ def test_elements_refine_themselves_or_state_the_error(name: str) -> None:
     stated = impact.numerical_error.level + finer.numerical_error.level
     assert (error < stated + 0.02).all()
     assert error.max() < 0.6 * np.abs(coarse.levels(force="floor") - levels).max()
+
+
+def slipping(friction: float, mesh: tuple[int, int] = (3, 24), **options: object) -> thud.Impact:
+    radial, polar = mesh
+    keys = {"model": "finite_element", "radial_elements": radial, "polar_elements": polar}
+    return thud.solve(thud.Ball.standard(), friction=friction, **keys, **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
+def test_stick_and_slip_raises_the_stated_error() -> None:
+    """Meshes that are too coarse for it agree with each other."""
+    least = np.array([0.03, 0.05, 0.25, 0.6, 1.3]) * 64 / 24
+    for friction in (0.4, 0.9):
+        assert (slipping(friction).numerical_error.level >= least).all()
+    for friction in (0.0, 0.3, 1.0):
+        assert (slipping(friction).numerical_error.level < least).any()
+    viscous = slipping(0.4, viscosity="kelvin_voigt").numerical_error.level
+    assert (viscous < least).any()
+    fine = slipping(0.4, (8, 96)).numerical_error.level
+    assert (fine >= least * 24 / 96).all()
+    assert (fine < least).all()
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
+def test_stated_error_covers_that_of_friction() -> None:
+    for friction in (0.2, 0.4):
+        coarse, fine = slipping(friction, (8, 64)), slipping(friction, (16, 128))
+        change = np.abs(coarse.levels(force="floor") - fine.levels(force="floor"))
+        assert (change <= coarse.numerical_error.level + 0.01).all()
+
+
+def test_short_record_is_found_at_the_coarsest_mesh() -> None:
+    soft = thud.Ball(youngs_modulus=3e5, poisson_ratio=0.49)
+    with pytest.raises(
+        thud.InputError, match=r"contact 1 is over; set .* at least 0\.\d{3} s"
+    ) as caught:
+        thud.solve(soft, model="finite_element")
+    needed = float(str(caught.value).split()[-2])
+    keys = {"radial_elements": 2, "polar_elements": 16}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert (
+            thud.solve(soft, duration=1.02 * needed, model="finite_element", **keys).restitution > 0
+        )

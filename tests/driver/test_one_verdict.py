@@ -11,7 +11,7 @@ from conftest import INPUTS
 
 import thud
 from thud import cli
-from thud.studies.model_verdict import assess_impact
+from thud.studies.model_assessment import assess_impact
 
 if TYPE_CHECKING:
     from pathlib import Path

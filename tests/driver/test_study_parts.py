@@ -493,7 +493,7 @@ def answering() -> Surrogate:
         thud.Case(model=thud.HollowSphere()), ("height", "mass"),
         np.array([[0.9, 1.1], [2.0, 3.0]]), names, 0.1, 1, {"thud": thud.__version__},
         np.random.default_rng(1).random((64, 2)), np.ones(2), np.zeros((64, 12)), mean, np.ones(12),
-        np.random.default_rng(2).normal(0, 0.02, (64, 12)),
+        np.random.default_rng(2).normal(0, 0.02, (64, 12)), np.zeros((32, 7)),
     )  # fmt: skip
 
 
@@ -546,6 +546,7 @@ def test_answers_are_the_verdict_of_what_is_predicted() -> None:
     "change",
     [
         {"bound": 0.0}, {"bound": -0.1}, {"peaks": 1.5}, {"identity": {}}, {"length": np.zeros(2)},
+        {"numerical_errors": np.zeros((0, 7))}, {"numerical_errors": np.zeros((32, 6))},
         {"region": np.array([[1.1, 0.9], [2.0, 3.0]])}, {"length": np.ones(3)},
         {"case": thud.Case(model=None)}, {"outputs": {"elastic_level": 5, "peak_force": 7}},
         *({name: np.full(shape, np.nan)} for name, shape in (

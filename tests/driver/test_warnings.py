@@ -76,7 +76,13 @@ OUTSIDE = {
     naming("&ball: wall_thickness", "outer_radius", 0.5, 0.4): "&ball wall_thickness = 0.0445 /",
     naming("&ball: poisson_ratio", 0.3, 0.45, "0.50"): "&ball poisson_ratio = 0.3 /",
     naming("&drop: deflection", "outer_radius", 0.5): "&drop height = 3 /",
-    naming("&drop: deflection", "wall_thickness", 2.0): "&ball wall_thickness = 0.01, mass = 1 /",
+    naming(
+        "&drop: deflection", "wall_thickness", 0.5, "thin wall", "9 dB off those of finite elements"
+    ): "&ball"
+    " wall_thickness = 0.016, mass = 1, youngs_modulus = 5e6, poisson_ratio = 0.49 /"
+    " &model name = 'modal_ball' /",
+    naming("&drop: deflection", "wall_thickness", 2.0, "buckles"): "&ball wall_thickness = 0.0272,"
+    " youngs_modulus = 4e5 / &drop height = 1.6 / &sampling duration = 0.1 /",
     naming("&drop: velocity", "youngs_modulus", "density", 0.25): "&drop height = 7 /",
     naming("&ball", "stress", "gauge_pressure", "youngs_modulus", 0.1): "&ball"
     " gauge_pressure = 3e5 /",
@@ -85,9 +91,9 @@ OUTSIDE = {
     naming("octaves", "63 Hz", "1e-12"): "&drop height = 10 / &sampling"
     " duration = 2 / &model name = 'hunt_crossley' /"
     " &hunt_crossley contact_time = 1, exponent = 3 /",
-    naming("numerical error", "dB", "resolution"): "&drop height = 0.01 /"
+    naming("numerical error", "dB", "&mesh", "x 32"): "&drop height = 0.01 /"
     " &ball youngs_modulus = 2.08e6 / &model name = 'finite_element' / &mesh polar_elements = 32 /",
-    naming("numerical error", "500 Hz", "dB"): "&model name = 'modal_ball' /"
+    naming("numerical error", "dB", "500 Hz", "&modal_ball"): "&model name = 'modal_ball' /"
     " &modal_ball rings = 10, highest_frequency = 300 /",
     naming("&floor: restitution", "-1.0e-6"): "&model name = 'hunt_crossley' /"
     " &hunt_crossley contact_time = 0.02 / &floor name = 'oscillator' /"
@@ -96,6 +102,17 @@ OUTSIDE = {
     " name = 'oscillator' / &oscillator mass = 30, stiffness = 1.70549e7,"
     " damping = 0 / &sampling duration = 0.2 /",
 }
+
+
+def test_drop_without_a_finer_one_is_not_verified(case_file: CaseFile) -> None:
+    # At 1.4 times the frequency there are too many modes.
+    text = "&ball wall_thickness = 0.01, mass = 0.8, youngs_modulus = 4e5 / &drop height = 0.003 /"
+    text += " &model name = 'modal_ball' / &modal_ball highest_frequency = 9500, rings = 20 /"
+    text += " &sampling duration = 0.3, verify = .true. /"
+    with pytest.warns(thud.PlausibilityWarning, match="is not verified"):
+        impact = thud.solve(thud.read_case(case_file(text)))
+    assert impact.finer is None
+    assert sum("verify: the drop cannot be computed" in text for text in impact.warnings) == 1
 
 
 def test_values_at_the_limits_of_rubbers_raise_no_warning(case_file: CaseFile) -> None:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from changes import Change
     from tree import Tree
 
-# Sources and test files: what the record of the lines hangs on.
+# Sources and test files: what the record of the lines depends on.
 STATE = (
     "src/**/*.f90",
     "src/**/*.c",

@@ -47,12 +47,12 @@ def test_default_mesh_is_converged_at_any_height(
     )
 
 
-def slow_impact(poisson_ratio: float, friction: float) -> thud.Impact:
-    """Return an elastic impact at 50 mm/s, 38 ms and six periods of the nearly solid ball long."""
+def slow_impact(speed: float, poisson_ratio: float, friction: float) -> thud.Impact:
+    """Return an elastic impact that lasts several periods of the nearly solid ball."""
     gravity = 1e-3
     ball = thud.Ball(poisson_ratio=poisson_ratio, ambient_pressure=0, wall_thickness=0.08)
     return thud.solve(
-        ball, thud.Drop(0.05**2 / (2 * gravity), gravity), "finite_element",
+        ball, thud.Drop(speed**2 / (2 * gravity), gravity), "finite_element",
         viscosity="none", duration=0.1, friction=friction, radial_elements=8, polar_elements=64,
     )  # fmt: skip
 
@@ -61,20 +61,25 @@ def slow_impact(poisson_ratio: float, friction: float) -> thud.Impact:
 @pytest.mark.parametrize("poisson_ratio", [0.0, 0.3])
 def test_sticking_contact_is_stiffer(poisson_ratio: float, oracle: Callable[..., None]) -> None:
     # Points stick where they touch; the contact time of a force k d**1.5 falls with the power 2/5
-    # of k. Elements approach the half space from above: by their peak forces, 1.100, 1.089, 1.085
-    # and 1.082 with 16 x 128, 64 x 128, 64 x 256 and 64 x 512 elements and a ratio of 0.
+    # of k. A ball is a half space for small contacts only, with an error of first order in the
+    # radius of the contact, which grows with the power 2/5 of the speed. Elements are too large for
+    # the limit itself: the ratio is extrapolated from two speeds, at which 12 x 96 elements change
+    # it by 0.1 %. Its error is below the correction, that of the first order.
     nu = poisson_ratio
     expected = sphere_ratio(new_half_space(nu, 80))
-    free, sticking = slow_impact(nu, 0), slow_impact(nu, 100)
+    speeds = (0.2, 0.5)
+    free, sticking = ([slow_impact(v, nu, mu).contact_time for v in speeds] for mu in (0, 100))
+    ratio = (np.array(free) / sticking) ** 2.5
+    slope, limit = np.polyfit(np.power(speeds, 0.4), ratio, 1)
     oracle(
         "finite elements: stiffness by sticking",
         "independent code",
-        (free.contact_time / sticking.contact_time) ** 2.5 / expected - 1,
-        0.04,
+        limit / expected - 1,
+        slope * speeds[0] ** 0.4 / expected,
     )
     # Hertz, 2.868 (m**2/(R E*'**2 v))**0.2, within the 6 % that 8 x 64 elements of 3 mm are off.
-    hertz = 2.868 * (2.5**2 * (1 - nu**2) ** 2 / (0.089 * 1.6e6**2 * 0.05)) ** 0.2
-    assert free.contact_time == pytest.approx(hertz, rel=0.06)
+    hertz = 2.868 * (2.5**2 * (1 - nu**2) ** 2 / (0.089 * 1.6e6**2 * speeds[0])) ** 0.2
+    assert free[0] == pytest.approx(hertz, rel=0.06)
 
 
 def test_friction_stays_in_its_cone_and_costs_energy() -> None:

@@ -149,7 +149,7 @@ class Sampling(Group):
     Attributes
     ----------
     sample_rate : float
-        Samples per second, Hz; 2000 <= sample_rate <= 1e+07.
+        Samples per second; from 16000 with finite_element, Hz; 2000 <= sample_rate <= 1e+07.
     duration : float
         Duration of the record from first touch, s; 0.001 <= duration <= 10.
     substeps : int
@@ -1079,7 +1079,7 @@ KEYS = (
     Key("two_mass", "two_mass", "contact_damping", "real", "s/m", "damping force of the contact divided by elastic force and velocity", (), 0.0, 100.0),
     Key("two_mass", "two_mass", "belt_frequency", "real", "Hz", "natural frequency of the belt on the sidewall with fixed rim", (), 0.0, 1000000.0),
     Key("two_mass", "two_mass", "belt_damping", "real", "", "damping ratio of the belt on the sidewall with fixed rim", (), 0.0, 10.0),
-    Key("", "sampling", "sample_rate", "real", "Hz", "samples per second", (), 2000.0, 10000000.0),
+    Key("", "sampling", "sample_rate", "real", "Hz", "samples per second; from 16000 with finite_element", (), 2000.0, 10000000.0),
     Key("", "sampling", "duration", "real", "s", "duration of the record from first touch", (), 0.001, 10.0),
     Key("", "sampling", "substeps", "whole", "", "integration steps per sampling interval", (), 1.0, 10000.0, True),
     Key("", "sampling", "verify", "flag", "", "compute again at a finer resolution, and state the changes"),

@@ -53,7 +53,12 @@ COMMANDS = {
             *output(
                 "the results; several cases have a subdirectory each (default: outputs/<case name>)"
             ),
-            argument("--check", action="store_true", help="exit with 3 unless all sources conform"),
+            argument(
+                "--check",
+                action="store_true",
+                help="exit with 3 unless all sources conform with the values of their cases "
+                "(assess --check: over what is not known)",
+            ),
             NO_FIGURES,
             FORMAT,
             argument(

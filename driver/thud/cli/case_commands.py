@@ -84,48 +84,53 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
     for warning in answer.get("messages", {}).values():
         tqdm.write(f"thud-driver: {text(warning)}", file=sys.stderr)
     folder = Path(output or os.fsdecode(answer["directory"]))
-    figures = _figures(answer, options)
-    if figures:
+    contents = _figures(answer, options)
+    sentence, files = _model_verdict(answer)
+    if contents | files:
         results = Results(folder, inputs=(path,), replace=options.replace)
-        results.write(figures, marker=answer["case"])
+        results.write(contents | files, marker=answer["case"])
     if not options.quiet:
-        tqdm.write(f"{text(answer['table'])}\n{_model_verdict(answer)}  Results: {folder}\n")
+        tqdm.write(f"{text(answer['table'])}\n{sentence}  Results: {folder}\n")
     return bool(answer["conforms"])
 
 
-def _model_verdict(answer: Bundle) -> str:
-    """Return the verdict over what is not known of a case in one line, or an empty text."""
+def _model_verdict(answer: Bundle) -> tuple[str, dict[str, bytes]]:
+    """Return the verdict over what is not known of a case in one line, and its file, if any."""
     if "samples" not in answer:
-        return ""
-    from thud.studies.model_verdict import assess_impact
+        return "", {}
+    from thud.studies.bundled_surrogate import find_unknowns
+    from thud.studies.model_assessment import assess_impact
+    from thud.studies.model_verdict import FILE
 
     case = Case.from_text(text(answer["case"]))
     verdict = assess_impact(new_impact(case, answer))
     if verdict:
-        return f"  {verdict.sentence}\n"
-    if case.unknowns:
-        return "  Verdict over what is not known: run thud-driver assess\n"
-    return ""
+        print_notes(verdict.warnings)
+        return f"  {verdict.message}\n", {FILE: verdict.to_csv().encode()}
+    if find_unknowns(case)[0]:
+        return "  Verdict over what is not known: run thud-driver assess\n", {}
+    return "", {}
 
 
 def assess_case(options: argparse.Namespace) -> int:
     """Assess a case over what is not known of its source; return the exit code."""
-    from thud.studies.model_verdict import OUTCOMES, assess
+    from thud.studies.model_assessment import assess
+    from thud.studies.model_verdict import FILE, OUTCOMES
 
     case = read_case(options.case)
-    folder = options.output or Path("outputs", f"{case.name}_unknowns")
+    results = results_of(options, f"{case.name}_unknowns", [options.case])
+    results.require([FILE])
     verdict = assess(
         case,
-        folder,
+        results.folder,
         progress=not options.quiet and sys.stderr.isatty(),
         replace_files=options.replace,
     )
+    results.write({FILE: verdict.to_csv().encode()})
+    print_notes(verdict.warnings)
+    print(verdict.message if options.quiet else verdict)
     if not options.quiet:
-        print(format_rows(verdict.unknown_rows()))
-        print()
-        print(format_rows(verdict.rows()))
-        print(f"by {verdict.method}")
-    print(verdict.sentence)
+        print(f"Results: {results.folder}")
     return NOT_CONFORMING if options.check and verdict.result != OUTCOMES[0] else 0
 
 
@@ -134,13 +139,19 @@ ASSESS = Command(
     (
         argument("case", metavar="CASE.nml", help="namelist file"),
         *output(
-            "the drops that train a surrogate, where an interrupted training resumes "
-            "(default: outputs/<case name>_unknowns)"
+            "the verdict and the drops that train a surrogate, where an interrupted training "
+            "resumes (default: outputs/<case name>_unknowns)"
         ),
-        argument("--check", action="store_true", help="exit with 3 unless the source conforms"),
+        argument(
+            "--check",
+            action="store_true",
+            help="exit with 3 unless the source conforms over what is not known of it "
+            "(run --check: with the values of the case)",
+        ),
         QUIET,
     ),
     assess_case,
+    "drops that train a surrogate are kept",
 )
 
 

@@ -23,12 +23,13 @@ from thud.base.files import Page
 from thud.case.case import Case, read_case
 from thud.impact.compute import compute
 from thud.impact.impact import Impact
+from thud.level.assessment import VERDICTS
 from thud.level.impact_result import ImpactResult
 from thud.level.levels import FORCES, SOURCES
 from thud.plot.impact_figures import common_source
 from thud.plot.pages import comparison_html, comparison_page
 from thud.plot.save_figures import page_files
-from thud.studies.model_verdict import assess_impact, same_source
+from thud.studies.model_assessment import assess_impacts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -57,8 +58,8 @@ class Comparison(Displayed, Page):
     source : str
         Impact source whose limits apply.
     model_verdicts : dict of str to ModelVerdict
-        Verdicts over what is not known, by the names of impacts that have one; impacts that differ
-        in nothing else share one.
+        Verdicts over what is not known, by the names of impacts that have one; impacts with equal
+        verdicts share one.
     """
 
     impacts: dict[str, ImpactResult]
@@ -70,8 +71,10 @@ class Comparison(Displayed, Page):
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings of all impacts, each after the name of its impact."""
-        return [f"{name}: {warning}" for name, i in self.impacts.items() for warning in i.warnings]
+        """Warnings of all impacts and their verdicts, each after the name of its impact."""
+        lists = [(name, impact.warnings) for name, impact in self.impacts.items()]
+        lists += [(name, verdict.warnings) for name, verdict in self.model_verdicts.items()]
+        return [f"{name}: {warning}" for name, warnings in lists for warning in warnings]
 
     def __repr__(self) -> str:
         """Return the names of the compared impacts."""
@@ -107,7 +110,14 @@ class Comparison(Displayed, Page):
         blank = [""] * (len(rows) - 4 - len(criteria))
         limits = (row[0].shown_limits for row in criteria)
         columns = [
-            ["range (95 %)", "", "", *(c.range for c in v.criteria), *blank, f"{v.share} conforms"]
+            [
+                "range (95 %)",
+                "",
+                "",
+                *(c.range for c in v.criteria),
+                *blank,
+                f"{v.shown_probability} conforms",
+            ]
             for v in self._shared_verdicts()
         ]
         columns.append([f"limits, {self.source.replace('_', ' ')}", "", "", *limits, *blank, ""])
@@ -148,12 +158,13 @@ def _cell(criterion: Criterion, quantity: Quantity) -> str:
     """Return the value of a criterion, and whether it is too low, too high or undecided."""
     if np.isnan(criterion.value):
         return "unknown"
-    if criterion.conforms:
+    conforms, fails, _ = VERDICTS
+    if criterion.result == conforms:
         state = ""
-    elif criterion.value < criterion.lower:
-        state = "low"
+    elif criterion.result == fails:
+        state = "low" if criterion.value < criterion.lower else "high"
     else:
-        state = "high" if criterion.value > criterion.upper else "undecided"
+        state = "undecided"
     return f"{criterion.value * quantity.display_scale:z.{quantity.decimals}f} {state}".rstrip()
 
 
@@ -243,28 +254,16 @@ def compare(
             solved[name] = item
     _require_same_drop(solved)
     limits = common_source(solved, source)
-    verdicts = _model_verdicts(solved, force, limits)
-    result = Comparison(solved, run_times, force, limits, verdicts)
+    assessed = {
+        name: impact
+        for name, impact in solved.items()
+        if isinstance(impact, Impact)
+        and impact.case.limits.source == limits
+        and force in {None, impact.case.levels.force}
+    }
+    result = Comparison(solved, run_times, force, limits, assess_impacts(assessed))
     for warning in result.warnings:
         warnings.warn(warning, PlausibilityWarning, stacklevel=2)
-    return result
-
-
-def _model_verdicts(
-    impacts: Mapping[str, ImpactResult], force: LevelsForce | None, source: LimitsSource
-) -> dict[str, ModelVerdict]:
-    """Return the verdicts over what is not known, by name; the same for the same source."""
-    result: dict[str, ModelVerdict] = {}
-    for name, impact in impacts.items():
-        if not isinstance(impact, Impact):
-            continue
-        case = impact.case
-        if case.limits.source != source or force not in {None, case.levels.force}:
-            continue
-        others = (verdict for n, verdict in result.items() if same_source(impacts[n].case, case))
-        verdict = next(others, None) or assess_impact(impact)
-        if verdict:
-            result[name] = verdict
     return result
 
 

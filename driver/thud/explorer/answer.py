@@ -19,12 +19,13 @@ from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
 from thud.impact.ensemble import get_cost
 from thud.impact.floor_impact import FloorImpact
+from thud.level.estimate import NUMERICAL_ERROR
 from thud.level.levels import get_bands
 from thud.plot.impact_figures import contact_force
 from thud.plot.style import FORCE_NAMES
 from thud.recordings.config import config_from
 from thud.recordings.read_recording import read_recording
-from thud.studies.model_verdict import assess_impact
+from thud.studies.model_assessment import assess_impact
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -90,6 +91,7 @@ def answer_case(case: Case) -> Answer:
     verdict = assess_impact(impact)
     if verdict:
         answer["model_verdict"] = {"result": verdict.result, "reason": verdict.reason}
+        answer["warnings"] += verdict.warnings
         for entry, criterion in zip(answer["criteria"], verdict.criteria, strict=True):
             entry["range"] = criterion.range
     on_floor = impact.on_floor
@@ -164,12 +166,16 @@ def _criterion(criterion: Criterion) -> Answer:
     scale, unit = (1e3, "ms") if criterion.unit == "s" else (1.0, criterion.unit)
     name, band = criterion.name.rpartition("octave_")[1:]
     expanded = scale * criterion.estimate.expanded
+    # Numerical errors are often too small to be shown.
+    is_computed = criterion.uncertainty_name == NUMERICAL_ERROR
+    smallest = 0.5 * 10.0**-criterion.quantity.decimals if is_computed else 0.0
     return {
         "name": f"{band.replace('_', '.')} Hz" if name else humanize(band),
         "band": bool(name),
         "unit": unit,
         "value": None if np.isnan(criterion.value) else round(scale * criterion.value, 6),
-        "uncertainty": expanded if 0 < expanded < np.inf else None,
+        "uncertainty": expanded if expanded > smallest and expanded < np.inf else None,
+        "uncertainty_name": criterion.uncertainty_name,
         "lower": round(scale * criterion.lower, 6),
         "upper": round(scale * criterion.upper, 6),
         "verdict": criterion.result,

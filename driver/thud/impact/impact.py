@@ -17,6 +17,7 @@ from thud.case.case import case_text
 from thud.impact.contact_time import contact_span
 from thud.impact.motion import Motion, new_motion
 from thud.level.assessment import assess_levels
+from thud.level.estimate import Estimate
 from thud.level.impact_result import DropForce
 from thud.level.levels import FORCES, force_exposure_levels, peak_count
 
@@ -53,6 +54,11 @@ class ImpactNumbers:
     contact_time: float
     restitution: float
     peak_force: float
+
+    @property
+    def assessed(self) -> NDArray[np.float64]:
+        """Levels, contact time and restitution, shape (7,)."""
+        return np.array([*self.level, self.contact_time, self.restitution])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -241,7 +247,10 @@ class Impact(ImpactQuantities, Displayed):
     def assess(
         self, source: LimitsSource | None = None, force: LevelsForce | None = None
     ) -> Verdict:
-        """Assess the source by the criteria of the standards.
+        """Assess the source by the criteria of the standards, with `numerical_error`.
+
+        A criterion is inconclusive if the numerical error, which is that of the force on the floor,
+        is unknown or could change the result.
 
         Parameters
         ----------
@@ -250,10 +259,12 @@ class Impact(ImpactQuantities, Displayed):
         force
             ``"floor"`` or ``"elastic"``; by default the assessed force.
         """
+        errors = self.numerical_error
+        levels = zip(self.levels(force=force), errors.level, strict=True)
         return assess_levels(
-            self.levels(force=force),
-            self.contact_time,
-            self.restitution,
+            [Estimate.computed(float(level), float(error)) for level, error in levels],
+            Estimate.computed(self.contact_time, errors.contact_time),
+            Estimate.computed(self.restitution, errors.restitution),
             peak_count(self.force(force), self.sample_rate),
             self.case.ball.mass,
             self.case.drop.height,

@@ -14,7 +14,7 @@ from thud.base._schema import LIMITS, QUANTITIES
 from thud.base.checks import refuse, refuse_value, require_choice
 from thud.base.display import Displayed
 from thud.base.quantity import Quantity
-from thud.level.estimate import Estimate
+from thud.level.estimate import NUMERICAL_ERROR, Estimate
 from thud.level.levels import BANDWIDTHS, SOURCES, get_bands, to_float
 
 if TYPE_CHECKING:
@@ -56,6 +56,12 @@ class Criterion(Displayed):
     def unit(self) -> str:
         """Unit of value and limits."""
         return self.estimate.unit
+
+    @property
+    def uncertainty_name(self) -> str:
+        """``"numerical error"`` for a computed value, else ``"uncertainty (95 %)"``."""
+        names = {contribution.name for contribution in self.estimate.contributions}
+        return NUMERICAL_ERROR if names == {NUMERICAL_ERROR} else "uncertainty (95 %)"
 
     @property
     def quantity(self) -> Quantity:
@@ -120,7 +126,7 @@ class Criterion(Displayed):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
-        return [("criterion", "value", "uncertainty (95 %)", "limits", "result"), self._row()]
+        return [("criterion", "value", self.uncertainty_name, "limits", "result"), self._row()]
 
     def _row(self) -> tuple[str, ...]:
         name = re.sub(r"(\d)_(\d)", r"\1.\2", self.name).replace("_", " ")
@@ -129,6 +135,7 @@ class Criterion(Displayed):
             return name, "", "", limits, "not known"
         value = f"{self.value:.4g} {self.unit}".strip()
         expanded = f"{self.estimate.expanded:.2g}" if self.estimate.uncertainty else ""
+        expanded = expanded.replace("nan", "unknown")
         result = self.result
         if result == VERDICTS[1]:
             result = "too low" if self.value < self.lower else "too high"

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import Self
 
 from thud.base.immutable import Immutable
 
 CONFIDENCE = 0.95
+# Name of the contribution of a computed value; see `Estimate.computed`.
+NUMERICAL_ERROR = "numerical error"
+_NORMAL_FACTOR = NormalDist().inv_cdf((1 + CONFIDENCE) / 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +62,7 @@ class Contribution(Immutable):
 
 @dataclass(frozen=True, eq=False)
 class Estimate(Immutable):
-    """Value and its uncertainty, which is 0 for computed values.
+    """Value and its uncertainty; that of a computed value is its numerical error.
 
     Attributes
     ----------
@@ -96,6 +100,15 @@ class Estimate(Immutable):
         return cls(value, combined, "", freedom, contributions, upper_bound)
 
     @classmethod
+    def computed(cls, value: float, error: float) -> Self:
+        """Return a computed value with its numerical error, which is its expanded uncertainty.
+
+        The errors that models state hold for 95 % of the levels or more (docs/levels.md). NaN: an
+        unknown error.
+        """
+        return cls.from_budget(value, Contribution(NUMERICAL_ERROR, error / _NORMAL_FACTOR))
+
+    @classmethod
     def unknown(cls) -> Self:
         """Return an unknown value."""
         return cls(math.nan, math.nan)
@@ -103,6 +116,9 @@ class Estimate(Immutable):
     @property
     def coverage_factor(self) -> float:
         """Quantile of Student's t distribution for a two-sided coverage of 95 %."""
+        if math.isinf(self.freedom):
+            return _NORMAL_FACTOR
+        # SciPy is slow to import.
         from scipy.special import stdtrit
 
         return float(stdtrit(self.freedom, (1 + CONFIDENCE) / 2)) if self.freedom > 0 else math.nan

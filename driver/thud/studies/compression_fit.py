@@ -16,6 +16,7 @@ from thud.base.errors import FitWarning, NumericalError
 from thud.base.extras import require_extra
 from thud.base.key import check_keywords
 from thud.impact.compression import CompressionCurve, compress
+from thud.studies.fitting.alternatives import PRESS_UNKNOWNS, require_unknowns
 from thud.studies.fitting.estimates import Estimates
 from thud.studies.fitting.inference import (
     MIN_TESTED,
@@ -25,7 +26,6 @@ from thud.studies.fitting.inference import (
     runs_warning,
 )
 from thud.studies.fitting.marginal import Marginal, estimate_marginal
-from thud.studies.fitting.unknowns import PRESS_UNKNOWNS, require_unknowns
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -17,13 +17,13 @@ from thud.base.key import check_keywords
 from thud.case.case import Case, check_case
 from thud.case.keys import with_values
 from thud.studies.directory import FORMATS
+from thud.studies.fitting.alternatives import UNKNOWNS, require_unknowns
 from thud.studies.fitting.fit_result import Fit, file_ends
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.inference import require_confidence
 from thud.studies.fitting.ranges import bound_parameters, fitted_parameter, get_ranges
 from thud.studies.fitting.read_target import Target, read_target
 from thud.studies.fitting.search import search
-from thud.studies.fitting.unknowns import UNKNOWNS, require_unknowns
 from thud.studies.kind import Kind
 from thud.studies.study import Study, fix_keys, table_of, with_density
 from thud.studies.surrogate_levels import recompute, surrogate_misfit, within_region

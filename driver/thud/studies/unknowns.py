@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 # Minimum and maximum order of the damping laws of rubber; 1: Kelvin–Voigt.
 ORDER_RANGE = (0.2, 1.0)
+# Standard deviation over the range from which a normal distribution is uniform within 1e-6.
+_MAX_RATIO = 1e3
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class Unknown:
 
     def quantiles(self, fraction: NDArray[np.float64], value: float) -> NDArray[np.float64]:
         """Return the values below which fractions of all values lie; `value` is of the case."""
-        if not self.standard_deviation:
+        if not 0 < self.standard_deviation < _MAX_RATIO * (self.high - self.low):
             return self.low + fraction * (self.high - self.low)
         # SciPy is slow to import.
         from scipy.special import ndtr, ndtri

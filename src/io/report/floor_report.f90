@@ -1,6 +1,6 @@
 !> The drop on a mobile floor as text: files and the table on the screen.
 module thud_floor_report
-   use thud_band, only: get_band_name
+   use thud_band, only: band_type, get_band_name, get_octaves, octave_count
    use thud_case, only: case_type
    use thud_compute, only: impact_type
    use thud_csv, only: get_table_csv
@@ -10,7 +10,7 @@ module thud_floor_report
    use thud_quantities, only: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
       sample_quantity_count
    use thud_report, only: get_model_quantities, get_force_csv, get_quantity_lines, line
-   use thud_table, only: is_peak_of_other
+   use thud_table, only: get_verification_rows, is_peak_of_other, shown_error
    use thud_text, only: fixed, flush_right, newline, padded, to_text
    implicit none (type, external)
    private
@@ -97,8 +97,10 @@ contains
       character(len=:), allocatable :: cells
       real(wp), allocatable :: blocked_level(:)
       real(wp) :: values(history_quantity_count, 2)
+      type(band_type) :: octaves(octave_count)
       integer :: i
 
+      octaves = get_octaves()
       blocked_level = get_blocked_levels(impact)
       name = 'on '//trim(case%floor)
       text = '  '//name//'   blocked       contact    difference       energy'//newline
@@ -120,6 +122,13 @@ contains
       call add_row('velocity of the floor', 0.0_wp, 1.0e3_wp*maxval(abs(contact%floor_velocity)), 3, 'mm/s')
       call add_row('its displacement', 0.0_wp, 1.0e3_wp*maxval(abs(contact%floor_displacement)), 4, 'mm')
       call add_quantity(get_quantity('floor_work'), 0.0_wp, contact%floor_work)
+      do i = 1, octave_count
+         associate (errors => [impact%history%numerical_error%octave(i), contact%numerical_error%octave(i)])
+            if (errors(2) > shown_error) call add_row('error at '//get_band_name(octaves(i))//' Hz', errors(1), errors(2), &
+               2, 'dB')
+         end associate
+      end do
+      text = text//get_verification_rows(contact)
       text = text//newline//'  The energy to the floor by its mobility, in all frequencies, differs by ' &
          //fixed(1.0e2_wp*(floor_result%total_energy/max(contact%floor_work, tiny(1.0_wp)) - 1), 3)//' %.'//newline
 

@@ -9,13 +9,13 @@ module thud_report
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_kinds, only: wp
    use thud_quantities, only: get_quantities, history_quantity_count, quantities
-   use thud_source_limits, only: conforms, criterion_type
+   use thud_source_limits, only: conforms, criterion_type, is_inconclusive
    use thud_text, only: join, join_quoted, newline, quoted, to_text
    implicit none (type, external)
    private
 
    public :: get_model_histories_csv, get_model_quantities, get_force_csv, get_levels_csv, get_quantity_lines
-   public :: get_summary, get_verdict_word, line
+   public :: get_summary, get_verdict, get_verdict_word, line
 
 contains
 
@@ -130,12 +130,15 @@ contains
          //line('level_force', quoted(case%level_force), '') &
          //line('conforms', to_text(is_conforming(case, assessment)), '')
       associate (criteria => assessment%criteria(:, get_assessed_force(case)))
-         text = text//line('criterion', join_quoted(criteria%name), '') &
+         text = text//line('result', quoted(get_verdict(criteria)), '') &
+            //line('criterion', join_quoted(criteria%name), '') &
             //line('unit', join_quoted(criteria%unit), '') &
             //line('value', join(criteria%value), '') &
             //line('lower', join(criteria%lower), '') &
             //line('upper', join(criteria%upper), '') &
-            //line('met', join(merge('.true. ', '.false.', conforms(criteria))), '')//'/'//newline
+            //line('met', join(merge('.true. ', '.false.', conforms(criteria) .and. .not. is_inconclusive(criteria))), '')
+         if (history%numerical_error%known) text = text//line('numerical_error', join(criteria%error), '')
+         text = text//'/'//newline
       end associate
    end function get_summary
 
@@ -185,12 +188,27 @@ contains
          //'/'//newline//newline
    end function warning_group
 
-   !> Verdict on one value: `conforms`, `too low` or `too high`.
+   !> Verdict on all values: `conforms`, `does not conform`, or `inconclusive` by their numerical errors.
+   pure function get_verdict(criteria) result(word)
+      !> The criteria: [criterion_count].
+      type(criterion_type), intent(in) :: criteria(:)
+      character(len=:), allocatable :: word
+
+      if (any(.not. conforms(criteria) .and. .not. is_inconclusive(criteria))) then
+         word = 'does not conform'
+      else
+         word = trim(merge('inconclusive', 'conforms    ', any(is_inconclusive(criteria))))
+      end if
+   end function get_verdict
+
+   !> Verdict on one value: `conforms`, `too low` or `too high`, or `inconclusive` by its numerical error.
    function get_verdict_word(criterion) result(word)
       type(criterion_type), intent(in) :: criterion
       character(len=:), allocatable :: word
 
-      if (conforms(criterion)) then
+      if (is_inconclusive(criterion)) then
+         word = 'inconclusive'
+      else if (conforms(criterion)) then
          word = 'conforms'
       else
          word = trim(merge('too low ', 'too high', criterion%value < criterion%lower))

@@ -1,26 +1,28 @@
 !> Results as tables on the screen.
 module thud_table
-   use thud_band, only: get_band_name, octave_count
-   use thud_case, only: case_type
+   use thud_band, only: band_type, get_band_name, get_octaves, octave_count
+   use thud_case, only: case_type, get_model_number
    use thud_compression, only: compression_type
    use thud_compute, only: assessment_type, get_assessed_force
+   use thud_error, only: error_type
+   use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
-   use thud_numerical_error, only: finer_quantities
+   use thud_numerical_error, only: finer_prefix, finer_quantities, get_resolution, resolution_quantities
    use thud_quantities, only: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
       sample_quantity_count
-   use thud_report, only: get_verdict_word
-   use thud_source_limits, only: conforms, criterion_type
+   use thud_report, only: get_verdict, get_verdict_word
+   use thud_source_limits, only: conforms, criterion_type, is_inconclusive
    use thud_text, only: fixed, flush_right, newline, padded, replaced, to_text
    implicit none (type, external)
    private
 
    public :: get_compression_table, get_defaults_line, get_force_title, get_modes_table, get_span_row, get_table
-   public :: is_peak_of_other
+   public :: get_verification_rows, is_peak_of_other
 
    !> Numerical error of a level above which it is shown, dB.
-   real(wp), parameter :: shown_error = 0.1_wp
+   real(wp), parameter, public :: shown_error = 0.1_wp
 
 contains
 
@@ -30,7 +32,9 @@ contains
       type(force_history_type), intent(in) :: history
       type(assessment_type), intent(in) :: assessment
       character(len=:), allocatable :: text
+      character(len=:), allocatable :: resolution
       real(wp) :: values(history_quantity_count)
+      character(len=:), allocatable :: verdict, undecided
       integer :: i, assessed, other
 
       assessed = get_assessed_force(case)
@@ -60,18 +64,29 @@ contains
             text = text//quantity_row(quantities(i), values(i))
          end do
          text = text//model_quantity_rows(history)
+         resolution = get_resolution(history, '')
+         if (case%models(get_model_number(case))%model%chooses_resolution()) resolution = resolution//', automatic'
+         if (resolution /= '') text = text//'  resolution: '//resolution//newline
          do i = 1, octave_count
             associate (error => history%numerical_error%octave(i))
-               if (error > shown_error) text = text//row('numerical error at ' &
+               if (.not. history%numerical_error%known) exit
+               if (error > shown_error .or. is_inconclusive(criteria(i))) text = text//row('numerical error at ' &
                   //get_band_name(assessment%bands(i))//' Hz', error, 2, 'dB')
             end associate
          end do
          if (.not. history%numerical_error%known) text = text//'  '//padded('numerical error', 22) &
             //flush_right('unknown', 10)//newline
-         text = text//verification_rows(history, assessment)//newline
-         text = text//'  The source '//trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
-            //' to the limits of the '//replaced(trim(case%source), '_', ' ')//': it meets ' &
-            //to_text(count(conforms(criteria)))//' of '//to_text(size(criteria))//' criteria.'//newline &
+         text = text//get_verification_rows(history)//newline
+         verdict = 'the source '//get_verdict(criteria)
+         undecided = ''
+         if (any(is_inconclusive(criteria))) then
+            undecided = '; '//to_text(count(is_inconclusive(criteria)))//' inconclusive by the numerical error'
+            if (get_verdict(criteria) == 'inconclusive') verdict = 'it is inconclusive whether the source conforms'
+         end if
+         text = text//'  With these values '//verdict//' to the limits of the ' &
+            //replaced(trim(case%source), '_', ' ')//': it meets ' &
+            //to_text(count(conforms(criteria) .and. .not. is_inconclusive(criteria)))//' of '//to_text(size(criteria)) &
+            //' criteria'//undecided//'.'//newline &
             //'  Levels in dB re 1 N, method '//trim(case%level_method)//'.'//newline
       end associate
 
@@ -220,7 +235,10 @@ contains
 
       rows = ''
       do i = 1, size(history%model_quantity_name)
-         if (any(finer_quantities == history%model_quantity_name(i))) cycle
+         if (index(history%model_quantity_name(i), finer_prefix) == 1) cycle
+         if (any(resolution_quantities == history%model_quantity_name(i))) cycle
+         ! On a hard floor there is none.
+         if (history%model_quantity_name(i) == 'maximum_penetration' .and. .not. history%model_quantity(i) > 0.0_wp) cycle
          power = 0
          if (history%model_quantity_unit(i) /= '') power = floor(log10(max(abs(history%model_quantity(i)), tiny(1.0_wp)))/3)
          if (abs(power) > 3) power = 0
@@ -231,28 +249,33 @@ contains
    end function model_quantity_rows
 
    !> Rows that compare a result with that at a finer resolution and with the stated error; none if it is not verified.
-   function verification_rows(history, assessment) result(rows)
+   function get_verification_rows(history) result(rows)
       type(force_history_type), intent(in) :: history
-      !> Levels of the history.
-      type(assessment_type), intent(in) :: assessment
       character(len=:), allocatable :: rows
-      real(wp) :: values(history_quantity_count)
+      character(len=:), allocatable :: resolution
+      type(band_type) :: octaves(octave_count)
+      type(error_type), allocatable :: error
+      real(wp) :: values(history_quantity_count), level(octave_count)
       real(wp) :: finer
       integer :: i, first
 
       rows = ''
       first = findloc(history%model_quantity_name, finer_quantities(1), dim=1)
       if (first == 0) return
+      octaves = get_octaves()
+      call get_force_exposure_levels(history%floor_force, history%sample_rate, octaves, 'exact', level, error)
+      if (allocated(error)) return
       rows = newline//'  at a finer resolution      value          change    stated error'//newline
+      resolution = get_resolution(history, finer_prefix)
+      if (resolution /= '') rows = rows//'  ('//resolution//')'//newline
       values = get_quantities(history)
       do i = 1, size(finer_quantities)
          finer = history%model_quantity(first - 1 + i)
          if (i <= octave_count) then
-            rows = rows//compared('level, '//get_band_name(assessment%bands(i))//' Hz octave', finer, &
-               assessment%level(i, force_count), history%numerical_error%octave(i), get_quantity('octave_500_error'))
+            rows = rows//compared('level, '//get_band_name(octaves(i))//' Hz octave', finer, level(i), &
+               history%numerical_error%octave(i), get_quantity('octave_500_error'))
          else
-            ! The name without `finer_`.
-            associate (name => finer_quantities(i) (7:))
+            associate (name => finer_quantities(i) (len(finer_prefix) + 1:))
                rows = rows//compared(name, finer, values(findloc(quantities%name, name, dim=1)), &
                   values(findloc(quantities%name, trim(name)//'_error', dim=1)), get_quantity(name))
             end associate
@@ -261,7 +284,7 @@ contains
 
    contains
 
-      !> Row with a number at the finer resolution, its change, and the stated error.
+      !> Row with a number at the finer resolution, its change, and the stated error; marked if the change exceeds the error.
       function compared(name, finer, value, error, quantity) result(text)
          character(len=*), intent(in) :: name
          !> SI units.
@@ -273,11 +296,14 @@ contains
          associate (scale => quantity%display_scale, decimals => quantity%decimals)
             text = row(replaced(trim(name), '_', ' '), finer*scale, decimals, quantity%display_unit)
             text = padded(text(:len(text) - 1), 40)//flush_right(fixed((finer - value)*scale, decimals), 8) &
-               //flush_right(fixed(error*scale, decimals), 16)//newline
+               //flush_right(fixed(error*scale, decimals), 16)
+            ! As far as the decimals show it.
+            if (abs(finer - value)*scale > error*scale + 0.5_wp*10.0_wp**(-decimals)) text = text//'  exceeded'
+            text = text//newline
          end associate
       end function compared
 
-   end function verification_rows
+   end function get_verification_rows
 
    !> A limit with up to three decimals, without trailing zeros.
    pure function short(value) result(text)

@@ -25,7 +25,7 @@ module thud_finite_element
    use thud_receiver, only: get_pole_count, receiver_type
    use thud_sampling, only: get_step_count, sampling_type
    use thud_source_model, only: typical_contact
-   use thud_text, only: to_text
+   use thud_text, only: fixed, to_text
    use thud_validity_limit, only: get_wave_limit, validity_limit_type
    implicit none (type, external)
    private
@@ -44,6 +44,9 @@ module thud_finite_element
 
    !> Maximum number of steps times nodes in a run, which takes about twenty minutes.
    real(wp), parameter :: max_work = 2.0e10_wp
+
+   !> Ratio of the required to the given length of a record from which on it is too short at any resolution.
+   real(wp), parameter :: short_record = 1.05_wp
 
    !> Time between two checks of the step, s: the ball deforms little meanwhile.
    real(wp), parameter :: check_interval = 0.5e-3_wp
@@ -295,11 +298,31 @@ contains
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends while the ball is on the' &
             //' mobile floor; allowed: longer than the contact, which never ends on a floor too light for the ball')
       else if (contacts%n_over < options%bounces) then
-         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
-            //to_text(contacts%settling_time)//' s after contact '//to_text(options%bounces)//'; allowed: longer than that')
+         error = get_duration_error(contacts, options%bounces, sampling%duration)
       end if
       if (.not. allocated(error)) call continue_flight(run, latest, touch_height, history)
    end subroutine march
+
+   !> The error of a record that ends before the last wanted contact is over.
+   function get_duration_error(contacts, bounces, duration) result(error)
+      type(contacts_type), intent(in) :: contacts
+      !> Number of wanted contacts.
+      integer, intent(in) :: bounces
+      !> Length of the record, s.
+      real(wp), intent(in) :: duration
+      type(error_type) :: error
+      real(wp) :: required
+
+      error = input_error('&sampling: duration = '//to_text(duration)//' s ends before contact '//to_text(bounces) &
+         //' is over')
+      if (contacts%active .and. contacts%n_over + 1 == bounces) then
+         required = ceiling(1.0e3_wp*(contacts%latest + contacts%settling_time))/1.0e3_wp
+         error%message = error%message//'; set duration to at least '//fixed(required, 3)//' s'
+         error%has_short_record = required > short_record*duration
+      else
+         error%message = error%message//'; allowed: a longer one'
+      end if
+   end function get_duration_error
 
    !> Chooses the steps of the next sampling intervals; returns an error if the run would take too long.
    subroutine check_step(run, time, options, sampling, n_sample, n_step, error)

@@ -1,6 +1,7 @@
 !> Options of the finite-element model, group by group; `thud_finite_element` adds the solution.
 module thud_finite_element_options
    use thud_ball, only: ball_type
+   use thud_band, only: octave_count
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type
@@ -40,6 +41,18 @@ module thud_finite_element_options
    integer, parameter :: highest_level = 3
    real(wp), parameter :: max_cost = 3.54_wp
 
+   !> Coefficients of friction between which a mesh may be too coarse for the stick and slip of the surface, which then
+   !> changes the levels of a finer one only (docs/finite_elements.md): smaller friction is too weak, larger friction sticks.
+   !> The viscosity of Kelvin and Voigt prevents it.
+   real(wp), parameter :: slip_friction(2) = [0.33_wp, 0.95_wp]
+
+   !> Changes of the octave levels of the standard ball by it, from the default elements to the converged level, dB;
+   !> the change is taken as proportional to the element size.
+   real(wp), parameter :: slip_error(octave_count) = [0.03_wp, 0.05_wp, 0.25_wp, 0.6_wp, 1.3_wp]
+
+   !> Wall thickness relative to the radius below which, and coefficient of friction above which higher levels are expected.
+   real(wp), parameter :: thin_wall = 0.25_wp, high_friction = 0.3_wp
+
    !> Options of the model.
    type, abstract, extends(source_model_type) :: finite_element_options_type
       !> Number of contacts to follow.
@@ -61,7 +74,11 @@ module thud_finite_element_options
       procedure, pass(options) :: get_snapshot_shape
       procedure, pass(options) :: set_level
       procedure, pass(options) :: get_highest_level
+      procedure, pass(options) :: chooses_resolution
+      procedure, pass(options) :: get_reference_level
+      procedure, pass(options) :: get_expected_level
       procedure, pass(options) :: get_error_ratio
+      procedure, pass(options) :: get_min_error
    end type finite_element_options_type
 
 contains
@@ -73,16 +90,17 @@ contains
 
       fields = [ &
          integer_field('bounces', options%bounces, 'number of contacts to compute', '[1, 100]'), &
-         real_field('flight_before', options%flight_before, 's', 'duration of free flight before first touch', '[0, 1]'), &
+         real_field('flight_before', options%flight_before, 's', 'duration of free flight before first touch', '[0, 1]', &
+         is_numerical=.true.), &
          real_field('flight_after', options%flight_after, 's', 'duration of free flight after the last contact', &
-         '[0, 10]'), &
+         '[0, 10]', is_numerical=.true.), &
          real_field('step_safety', options%step_safety, '', 'time step divided by the stability limit', &
-         '[0.01, 0.98]'), &
+         '[0.01, 0.98]', is_numerical=.true.), &
          in_group('mesh', get_mesh_fields(options%mesh)), &
          in_group('material', get_material_fields(options%material)), &
          in_group('contact', get_contact_fields(options%contact)), &
          in_group('output', [real_field('snapshot_interval', options%snapshot_interval, 's', &
-         'time between snapshots of the deformed ball; 0: none', '[0, 10]')])]
+         'time between snapshots of the deformed ball; 0: none', '[0, 10]', is_numerical=.true.)])]
    end function get_fields
 
    !> Returns an error if options do not fit each other, the ball or the memory.
@@ -126,7 +144,7 @@ contains
       logical :: resolves_contact
 
       refinement = merge(0.5_wp, refinement_ratio**(level - 1), level == 0)
-      resolves_contact = is_automatic(options) .and. allocated(coarse%model_history)
+      resolves_contact = options%chooses_resolution() .and. allocated(coarse%model_history)
       associate (mesh => options%mesh)
          mesh = get_element_counts(ball, mesh)
          if (resolves_contact) mesh%polar_elements = nint(mesh%polar_elements*max(1.0_wp, min(max_contact_ratio, &
@@ -145,31 +163,79 @@ contains
       integer :: level
 
       level = 1
-      if (.not. is_automatic(options)) return
+      if (.not. options%chooses_resolution()) return
       do while (level < highest_level .and. options%get_cost(ball, sampling)*refinement_ratio**(3*level) < max_cost)
          level = level + 1
       end do
    end function get_highest_level
 
+   !> Nodes that stick and slip, and thin walls need higher levels.
+   function get_expected_level(ball, options, contact) result(level)
+      type(ball_type), intent(in) :: ball
+      class(finite_element_options_type), intent(in) :: options
+      type(force_history_type), intent(in) :: contact
+      integer :: level
+
+      level = 1
+      if (options%contact%friction > 0.0_wp .or. ball%wall_thickness < thin_wall*ball%outer_radius) level = 2
+      if (options%contact%friction > high_friction) level = highest_level
+   end function get_expected_level
+
    !> Whether the resolution may be chosen: the user's keys do not grow.
-   pure function is_automatic(options) result(yes)
+   function chooses_resolution(options) result(yes)
       class(finite_element_options_type), intent(in) :: options
       logical :: yes
 
       yes = options%mesh%radial_elements == 0 .and. options%mesh%polar_elements == 0
-   end function is_automatic
+   end function chooses_resolution
 
-   !> Estimated error of a result divided by its difference from the next coarser level, for errors proportional to the
-   !> square of the element size; at level 1 more, since the elements of level 0 are often outside of that order.
-   function get_error_ratio(options, level) result(ratio)
+   !> The level with elements of twice the size, if there is one.
+   function get_reference_level(options, level) result(reference)
       class(finite_element_options_type), intent(in) :: options
       integer, intent(in) :: level
+      integer :: reference
+
+      reference = merge(level - 2, level - 1, level > 2)
+   end function get_reference_level
+
+   !> Estimated error of a level divided by its difference from the reference level, for errors proportional to the square of
+   !> the element size; with elements of twice the size more, since these are often outside of that order.
+   function get_error_ratio(ball, options, level, history) result(ratio)
+      type(ball_type), intent(in) :: ball
+      class(finite_element_options_type), intent(in) :: options
+      integer, intent(in) :: level
+      type(force_history_type), intent(in) :: history
       real(wp) :: ratio
 
-      ratio = merge(0.5_wp, 1/(refinement_ratio**2 - 1), level == 1)
+      ratio = merge(1/(refinement_ratio**2 - 1), 0.5_wp, level == 2)
       ! Nodes that stick and slip converge more slowly.
       if (options%contact%friction > 0.0_wp) ratio = 2*ratio
    end function get_error_ratio
+
+   !> Minimum error with friction at which a sliding surface may begin to stick and slip on its own (`slip_friction`).
+   function get_min_error(ball, options) result(error)
+      type(ball_type), intent(in) :: ball
+      class(finite_element_options_type), intent(in) :: options
+      real(wp) :: error(octave_count)
+      type(mesh_options_type) :: automatic, mesh
+      logical :: slips
+
+      error = 0.0_wp
+      slips = options%contact%friction > slip_friction(1) .and. options%contact%friction < slip_friction(2)
+      if (.not. slips .or. is_viscous(options%material)) return
+      automatic = get_element_counts(ball, mesh_options_type())
+      mesh = get_element_counts(ball, options%mesh)
+      error = slip_error*automatic%polar_elements/mesh%polar_elements
+   end function get_min_error
+
+   !> Whether the viscosity of the material is that of Kelvin and Voigt.
+   pure function is_viscous(material) result(yes)
+      type(material_options_type), intent(in) :: material
+      logical :: yes
+
+      yes = material%viscosity == 'kelvin_voigt' .or. &
+         (material%viscosity == 'fractional' .and. .not. material%fractional_order < 1.0_wp)
+   end function is_viscous
 
    !> Size of the snapshots; of automatic elements the largest that the levels of resolution can have.
    function get_snapshot_shape(ball, options, sampling) result(extents)
@@ -180,7 +246,7 @@ contains
       integer :: factor(2)
 
       factor = 1
-      if (is_automatic(options)) factor = nint(refinement_ratio**(highest_level - 1)*[max_contact_ratio, 1.0_wp])
+      if (options%chooses_resolution()) factor = nint(refinement_ratio**(highest_level - 1)*[max_contact_ratio, 1.0_wp])
       associate (counts => get_element_counts(ball, options%mesh))
          extents = [factor*[counts%polar_elements, counts%radial_elements] + 1, get_frame_count(options, sampling)]
       end associate

@@ -277,9 +277,11 @@ contains
 
    !> Estimated error of a result divided by its difference from the next coarser level. Only with the balance of momentum
    !> does the force end without a jump: another force has an error that is proportional to the sampling interval.
-   function get_error_ratio(options, level) result(ratio)
+   function get_error_ratio(ball, options, level, history) result(ratio)
+      type(ball_type), intent(in) :: ball
       class(hollow_sphere_type), intent(in) :: options
       integer, intent(in) :: level
+      type(force_history_type), intent(in) :: history
       real(wp) :: ratio
 
       ratio = merge(0.4_wp, 1.0_wp, options%momentum_flux == 'momentum_balance')

@@ -15,7 +15,7 @@ module thud_modal_ball
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_lapack, only: dgemm
-   use thud_modal_ball_options, only: max_phase, modal_ball_options_type
+   use thud_modal_ball_options, only: estimate_mode_count, get_shear_velocity, max_phase, modal_ball_options_type
    use thud_modal_compression, only: compress_modal_ball
    use thud_modal_damping, only: set_damping
    use thud_mode_step, only: get_energies, mode_step_type, index_amplitude, set_factors
@@ -56,16 +56,26 @@ contains
       type(receiver_type), intent(in), optional :: receiver
       real(wp), intent(in), optional :: contact_time
       real(wp) :: cost
-      real(wp) :: n_mode, n_gap, step_cost, time
+      real(wp) :: n_mode, n_family, n_gap, n_ring_harmonic, n_polynomial, step_cost, time, omega
 
       time = typical_contact
-      if (present(contact_time)) time = contact_time
-      n_mode = 0.08_wp*options%get_highest_frequency()
+      ! The ball rises a little before the end is certain.
+      if (present(contact_time)) time = 1.15_wp*contact_time
       n_gap = options%get_ring_count()*merge(2.0_wp, 1.0_wp, options%floor_friction == 'stick')
-      cost = 1.3e-3_wp + 5.0e-10_wp*n_mode*n_gap**2
-      step_cost = 4.0e-7_wp + n_mode*(2.5e-9_wp + 6.0e-11_wp*n_gap)
-      ! Maxwell branches.
-      if (options%damping_law == 'fractional') step_cost = step_cost + 8.0e-9_wp*n_mode
+      n_ring_harmonic = 2*pi*options%get_ring_count()/options%outermost_angle
+      omega = min(2*pi*options%get_highest_frequency(), max_phase*sampling%sample_rate*sampling%substeps)
+      n_mode = estimate_mode_count(ball, omega)
+      n_family = 3 + omega/get_shear_velocity(ball)*ball%outer_radius
+      cost = 7.3e-5_wp + n_gap*n_ring_harmonic*(3.5e-8_wp + 3.2e-11_wp*n_gap)
+      if (options%level > 0) then
+         ! An eigenproblem for each harmonic; level 0 shares those of level 1. See `get_degree` of `thud_sphere_modes`.
+         n_polynomial = 5 + max(6.0_wp, omega/get_shear_velocity(ball)*ball%wall_thickness/2) &
+            + 2.4_wp*sqrt(n_family/2*abs(log(1 - ball%wall_thickness/ball%outer_radius)))
+         cost = cost + n_family*(1.4e-5_wp + 5.5e-8_wp*n_polynomial**2 + 2.1e-11_wp*n_polynomial**3)
+      end if
+      ! The amplitudes and rates of the modes, and Maxwell branches.
+      step_cost = 5.6e-7_wp + 2.1e-9_wp*n_mode*merge(7, 2, options%damping_law == 'fractional') &
+         + 1.0e-10_wp*n_gap*(2*n_family + n_gap)
       if (present(receiver)) step_cost = step_cost + 2.6e-9_wp*get_pole_count(receiver)
       if (present(receiver)) then
          cost = cost + get_step_count(sampling)*step_cost
@@ -148,6 +158,10 @@ contains
             allocate (history%floor_displacement(n_sample), history%floor_velocity(n_sample), source=0.0_wp)
          end if
          call march(ball, sampling, interval, rings, modes, static, contact, state, history, error)
+         call add_model_quantity(history, 'rings', '', real(size(rings%radius), wp))
+         call add_model_quantity(history, 'highest_frequency', 'Hz', &
+            min(options%get_highest_frequency(), max_phase/(2*pi*interval)))
+         call add_model_quantity(history, 'substeps', '', real(sampling%substeps, wp))
       end if
       call restore_blas_threads()
    end subroutine solve

@@ -17,7 +17,7 @@ module thud_modal_ball_options
    implicit none (type, external)
    private
 
-   public :: modal_ball_options_type
+   public :: estimate_mode_count, get_shear_velocity, modal_ball_options_type
 
    !> Rings of levels 0 and 1.
    real(wp), parameter :: coarse_rings = 36.0_wp, default_rings = 40.0_wp
@@ -25,6 +25,9 @@ module thud_modal_ball_options
    !> Minimum of the highest frequency of the modes of level 0, Hz, and the same for stiff balls, divided by the velocity of
    !> shear waves per outer radius.
    real(wp), parameter :: min_frequency = 1000.0_wp, min_relative_frequency = 2.1_wp
+
+   !> Minimum of the highest frequency that the user may state, Hz.
+   real(wp), parameter :: lowest_frequency = 10.0_wp
 
    !> Ratio of frequencies from one level to the next, and of rings from level 1 on.
    real(wp), parameter :: ratio = 1.4_wp
@@ -35,6 +38,18 @@ module thud_modal_ball_options
    !> Angle of the outermost ring divided by that of the contact of a coarser drop; rings of level 0 are added.
    real(wp), parameter :: margin = 1.1_wp
    integer, parameter :: added_rings = 2
+
+   !> Deflection relative to the radius above which, and Poisson's ratio below which errors are larger than the difference
+   !> of two levels.
+   real(wp), parameter :: wide_contact = 0.36_wp, compressible = 0.4_wp
+
+   !> Numbers of modes of level 1 above which level 2 or 3 is expected, and contact radius relative to the radius of the ball
+   !> below which level 2 is.
+   real(wp), parameter :: many_modes(2) = [180.0_wp, 240.0_wp]
+   real(wp), parameter :: small_contact = 0.2_wp
+
+   !> Wall thickness relative to the radius below which sticking needs level 3.
+   real(wp), parameter :: thin_wall = 0.2_wp
 
    !> Number of steps in a contact from level 1 on, as far as at most twice the steps of a level reach it.
    real(wp), parameter :: min_steps = 500.0_wp
@@ -84,6 +99,8 @@ module thud_modal_ball_options
       procedure, pass(options) :: share_setup
       procedure, pass(options) :: set_level
       procedure, pass(options) :: get_highest_level
+      procedure, pass(options) :: chooses_resolution
+      procedure, pass(options) :: get_expected_level
       procedure, pass(options) :: get_error_ratio
    end type modal_ball_options_type
 
@@ -96,7 +113,8 @@ contains
 
       fields = [ &
          real_field('highest_frequency', options%highest_frequency, 'Hz', &
-         'highest frequency of oscillating modes; faster ones follow without inertia; 0: automatic', '[0, 20000]'), &
+         'highest frequency of oscillating modes; faster ones follow without inertia; 0: automatic', '[0, 20000]', &
+         is_numerical=.true.), &
          integer_field('rings', options%rings, &
          'number of rings on the surface, from the lowest point to 60 degrees; 0: automatic', '[0, 400]'), &
          choice_field('damping_law', options%damping_law, 'damping law: loss factor as a function of frequency', &
@@ -115,7 +133,8 @@ contains
          '[0, 400]', whole=.true.)]
    end function get_fields
 
-   !> Returns an error if no fractional law has this loss factor, or if there is a single ring.
+   !> Returns an error if no fractional law has this loss factor, if there is a single ring, or if the modes without inertia
+   !> would creep more slowly than the contact.
    subroutine check(ball, options, sampling, error)
       type(ball_type), intent(in) :: ball
       class(modal_ball_options_type), intent(in) :: options
@@ -124,13 +143,16 @@ contains
 
       if (options%rings == 1) then
          error = input_error('&modal_ball: rings = 1 cannot carry a pressure; allowed: from 2, or 0 for automatic')
+      else if (options%highest_frequency > 0.0_wp .and. options%highest_frequency < lowest_frequency) then
+         error = input_error('&modal_ball: highest_frequency = '//to_text(options%highest_frequency) &
+            //' Hz is not allowed; allowed: from '//to_text(lowest_frequency)//' to 20000 Hz, or 0 for automatic')
       else if (options%damping_law == 'fractional') then
          call check_fractional_loss('modal_ball', options%fractional_order, options%loss_factor, options%loss_frequency, &
             error)
       end if
    end subroutine check
 
-   !> Computes the modes of level 1, which include those of level 0.
+   !> Computes the modes of levels 0 and 1.
    subroutine share_setup(ball, options, sampling)
       type(ball_type), intent(in) :: ball
       class(modal_ball_options_type), intent(inout) :: options
@@ -139,11 +161,8 @@ contains
       real(wp) :: highest_omega
 
       options%level = 1
-      associate (shear_modulus => ball%youngs_modulus/(2*(1 + ball%poisson_ratio)))
-         options%coarse_frequency = max(min_frequency, &
-            min_relative_frequency*sqrt(shear_modulus/get_density(ball))/ball%outer_radius)
-      end associate
-      highest_omega = min(2*pi*options%get_highest_frequency(), &
+      options%coarse_frequency = get_coarse_frequency(ball)
+      highest_omega = min(2*pi*max(get_level_frequency(options, 0), get_level_frequency(options, 1)), &
          max_phase*sampling%sample_rate*sampling%substeps*max_refinement)
       call use_one_blas_thread()
       ! After an error there are no families; the drop repeats it, and returns the error.
@@ -164,6 +183,7 @@ contains
 
       if (level > 1 .and. allocated(options%families)) deallocate (options%families)
       options%level = level
+      options%coarse_frequency = get_coarse_frequency(ball)
       refinement = 2**level
       contact_steps = coarse%contact_time*sampling%sample_rate*sampling%substeps
       ! Sticking rings converge slowly; without them few steps suffice.
@@ -172,28 +192,92 @@ contains
       end if
       sampling%substeps = sampling%substeps*refinement
       if (options%rings > 0 .or. .not. allocated(coarse%model_history)) return
+      ! A ball with few modes may have a larger contact than one with more.
+      if (has_few_modes(options, options%coarse_frequency)) return
       options%outermost_angle = min(greatest_angle, margin*asin(maxval(coarse%model_history(:, 1))/ball%outer_radius) &
          + added_rings*greatest_angle/(coarse_rings - 1))
    end subroutine set_level
 
-   !> Highest level of resolution: the user's keys do not grow.
+   !> Highest level of resolution: if the user sets the resolution, it does not grow.
    function get_highest_level(ball, options, sampling) result(level)
       type(ball_type), intent(in) :: ball
       class(modal_ball_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       integer :: level
 
-      level = merge(1, highest_level, options%rings > 0 .and. options%highest_frequency > 0.0_wp)
+      level = merge(highest_level, 1, options%chooses_resolution() &
+         .and. .not. has_few_modes(options, get_coarse_frequency(ball)))
    end function get_highest_level
+
+   !> Whether the input leaves rings or modes open.
+   function chooses_resolution(options) result(yes)
+      class(modal_ball_options_type), intent(in) :: options
+      logical :: yes
+
+      yes = options%rings == 0 .or. .not. options%highest_frequency > 0.0_wp
+   end function chooses_resolution
+
+   !> Level that most of 80 random balls reach with such contacts and numbers of modes.
+   function get_expected_level(ball, options, contact) result(level)
+      type(ball_type), intent(in) :: ball
+      class(modal_ball_options_type), intent(in) :: options
+      type(force_history_type), intent(in) :: contact
+      integer :: level
+      real(wp) :: n_mode
+
+      n_mode = estimate_mode_count(ball, 2*pi*ratio*get_coarse_frequency(ball))
+      level = 1
+      if (n_mode > many_modes(1) .or. maxval(contact%model_history) < small_contact*ball%outer_radius) level = 2
+      if (n_mode > many_modes(2)) level = 3
+      ! Rings of thin walls that stick do not converge.
+      if (options%floor_friction == 'stick' .and. ball%wall_thickness < thin_wall*ball%outer_radius) level = 3
+      if (options%get_error_ratio(ball, level, contact) > 1.0_wp) level = level + 1
+   end function get_expected_level
+
+   !> Approximate number of modes up to a frequency, within about a third: waves in the cross section of the wall, and
+   !> along the surface.
+   pure function estimate_mode_count(ball, omega) result(n_mode)
+      type(ball_type), intent(in) :: ball
+      !> Angular frequency, rad/s.
+      real(wp), intent(in) :: omega
+      real(wp) :: n_mode
+      real(wp) :: wavenumber, area
+
+      wavenumber = omega/get_shear_velocity(ball)
+      area = pi/2*(ball%outer_radius**2 - (ball%outer_radius - ball%wall_thickness)**2)
+      ! Shear and pressure waves.
+      n_mode = area/(4*pi)*wavenumber**2*(1 + (1 - 2*ball%poisson_ratio)/(2*(1 - ball%poisson_ratio))) &
+         + wavenumber*ball%outer_radius
+   end function estimate_mode_count
+
+   !> Highest frequency of the modes of level 0, Hz.
+   pure function get_coarse_frequency(ball) result(frequency)
+      type(ball_type), intent(in) :: ball
+      real(wp) :: frequency
+
+      frequency = max(min_frequency, min_relative_frequency*get_shear_velocity(ball)/ball%outer_radius)
+   end function get_coarse_frequency
+
+   !> Velocity of shear waves, m/s.
+   pure function get_shear_velocity(ball) result(velocity)
+      type(ball_type), intent(in) :: ball
+      real(wp) :: velocity
+
+      velocity = sqrt(ball%youngs_modulus/(2*(1 + ball%poisson_ratio)*get_density(ball)))
+   end function get_shear_velocity
 
    !> Estimated error of a result divided by its difference from the next coarser level: it is found from random balls
    !> (docs/modal_ball.md).
-   function get_error_ratio(options, level) result(ratio)
+   function get_error_ratio(ball, options, level, history) result(ratio)
+      type(ball_type), intent(in) :: ball
       class(modal_ball_options_type), intent(in) :: options
       integer, intent(in) :: level
+      type(force_history_type), intent(in) :: history
       real(wp) :: ratio
 
-      ratio = 1.0_wp
+      ! Wide contacts and compressible walls converge more slowly.
+      ratio = 1 + 25*max(0.0_wp, history%max_deflection/ball%outer_radius - wide_contact)
+      if (ball%poisson_ratio < compressible) ratio = max(ratio, 2.5_wp)
    end function get_error_ratio
 
    !> Number of rings: that of the user, fewer at level 0, or that of the level of resolution.
@@ -205,16 +289,51 @@ contains
       if (options%rings > 0) n_ring = max(2, nint(options%rings*ratio**(options%level - 1)))
    end function get_ring_count
 
-   !> Highest frequency of oscillating modes, Hz: that of the user, lower at level 0, or that of the level of resolution.
+   !> Highest frequency of oscillating modes at the level of resolution, Hz.
    pure function get_highest_frequency(options) result(frequency)
       class(modal_ball_options_type), intent(in) :: options
       real(wp) :: frequency
 
-      frequency = options%highest_frequency*ratio**(options%level - 1)
-      if (frequency > 0.0_wp) return
-      frequency = options%coarse_frequency*ratio**options%level
+      frequency = get_level_frequency(options, options%level)
+   end function get_highest_frequency
+
+   !> Highest frequency of oscillating modes at a level of resolution, Hz: automatic, or that of the user at level 1, lower
+   !> at level 0. If the user leaves out modes that matter, the other levels have them, so that the error is known.
+   pure function get_level_frequency(options, level) result(frequency)
+      class(modal_ball_options_type), intent(in) :: options
+      integer, intent(in) :: level
+      real(wp) :: frequency
+
+      if (options%highest_frequency > 0.0_wp .and. (level == 1 &
+         .or. .not. has_few_modes(options, options%coarse_frequency))) then
+         frequency = options%highest_frequency*ratio**(level - 1)
+      else
+         frequency = get_automatic_frequency(options, options%coarse_frequency, level)
+      end if
+   end function get_level_frequency
+
+   !> Highest frequency of oscillating modes at a level of resolution where the user leaves it open, Hz.
+   pure function get_automatic_frequency(options, coarse_frequency, level) result(frequency)
+      class(modal_ball_options_type), intent(in) :: options
+      !> That of level 0 without sticking, Hz.
+      real(wp), intent(in) :: coarse_frequency
+      integer, intent(in) :: level
+      real(wp) :: frequency
+
+      frequency = coarse_frequency*ratio**level
       ! Rings that are released lose the energy of modes without inertia.
       if (options%floor_friction == 'stick') frequency = 2*frequency
-   end function get_highest_frequency
+   end function get_automatic_frequency
+
+   !> Whether the user's highest frequency is so low that even level 0 has more modes where it is automatic.
+   pure function has_few_modes(options, coarse_frequency) result(yes)
+      class(modal_ball_options_type), intent(in) :: options
+      !> Automatic frequency of level 0 without sticking, Hz.
+      real(wp), intent(in) :: coarse_frequency
+      logical :: yes
+
+      yes = options%highest_frequency > 0.0_wp .and. options%highest_frequency*ratio &
+         < get_automatic_frequency(options, coarse_frequency, 0)
+   end function has_few_modes
 
 end module thud_modal_ball_options

@@ -13,7 +13,7 @@ module thud_sphere_modes
    use thud_kinds, only: wp
    use thud_lapack, only: dgemm, dgetf2, dgetrs, dposv, dsygvx
    use thud_legendre, only: get_gauss_legendre, get_legendre
-   use thud_text, only: to_text
+   use thud_text, only: fixed, to_text
    implicit none (type, external)
    private
 
@@ -234,7 +234,7 @@ contains
 
       wavenumber = highest_omega*sqrt(get_density(ball)*2*(1 + ball%poisson_ratio)/ball%youngs_modulus)
       if (.not. wavenumber*ball%outer_radius <= max_waves) then
-         error = numerical_error('&modal_ball: the ball has too many modes up to '//to_text(highest_omega/(2*pi)) &
+         error = numerical_error('&modal_ball: the ball has too many modes up to '//fixed(highest_omega/(2*pi), 0) &
             //' Hz; allowed: a stiffer or smaller ball, or a lower highest_frequency')
          return
       end if

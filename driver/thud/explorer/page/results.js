@@ -57,7 +57,8 @@ function margin(criterion) {
 
 function missedSide(criterion) {
   if (criterion.value === null) return "not known";
-  if (margin(criterion) >= 0) return criterion.verdict === "conforms" ? "" : "undecided";
+  if (criterion.verdict === "inconclusive") return "undecided";
+  if (margin(criterion) >= 0) return "";
   return criterion.value < criterion.lower ? "low" : "high";
 }
 
@@ -78,7 +79,7 @@ function summarize({ name, answer }) {
 function showCriteria(variants) {
   const cell = (criterion) => {
     const value = element("td", { class: criterion.verdict === "conforms" ? "conforms" : "fails" }, rounded(criterion.value, criterion.unit).replace(criterion.unit && ` ${criterion.unit}`, ""));
-    if (criterion.uncertainty) value.append(` ± ${Number(criterion.uncertainty.toPrecision(2))}`);
+    if (criterion.uncertainty) value.append(element("span", { title: criterion.uncertainty_name }, ` ± ${Number(criterion.uncertainty.toPrecision(2))}`));
     if (criterion.range) value.append(element("small", {}, ` (${criterion.range})`));
     const exact = criterion.lower === criterion.upper || criterion.value === null;
     return [value, element("td", { class: "margin" }, exact ? "" : signed(margin(criterion), criterion.unit), " ", missedSide(criterion))];

@@ -9,7 +9,7 @@ import numpy as np
 
 from thud.base.errors import NumericalError, ThudError
 from thud.case.keys import with_values
-from thud.studies.fitting.unknowns import alternatives
+from thud.studies.fitting.alternatives import alternatives
 
 if TYPE_CHECKING:
     from collections.abc import Collection

@@ -1,6 +1,6 @@
-"""Unknowns of a source: assumptions of a case that its force history cannot confirm.
+"""Alternatives to a case: assumptions about its source that a force history cannot confirm.
 
-Each unknown is a list of alternatives to the case. The differences of force that they make are
+Each unknown is a list of alternatives. The differences of force that they make are
 directions in which the model may be wrong, by about as much as the alternatives are.
 """
 

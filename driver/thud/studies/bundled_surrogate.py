@@ -1,0 +1,88 @@
+"""The surrogate of the standard ball in the package, and the cases that it covers."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from functools import cache
+from importlib import resources
+from typing import TYPE_CHECKING
+
+from thud.base.bridge import version
+from thud.base.checks import refuse
+from thud.base.errors import InputError
+from thud.case.keys import value_in
+from thud.studies.trained_surrogate import Surrogate, read_surrogate
+from thud.studies.unknowns import STANDARD_BALL, Unknown, blocked_case, stated_unknowns
+
+if TYPE_CHECKING:
+    from thud.case.case import Case
+
+# File of the package, made by `./bootstrap surrogate` from inputs/studies/standard_ball.toml.
+FILE = "standard_ball.npz"
+
+
+@cache
+def bundled_surrogate() -> Surrogate:
+    """Return the surrogate of the standard ball by finite elements.
+
+    The version of thud that trained it does not matter: tests compare it with drops of this
+    version, and each verdict with the drop of its case.
+    """
+    with resources.as_file(resources.files("thud.studies") / FILE) as path:
+        surrogate = read_surrogate(path)
+    return replace(surrogate, identity={**surrogate.identity, "thud": version()})
+
+
+def find_unknowns(case: Case) -> tuple[tuple[Unknown, ...], Case | None]:
+    """Return the unknowns of a case, and its drop as the bundled surrogate predicts it.
+
+    The unknowns are those that the case states; if none, those of the standard ball if it is one.
+    The drop is None if the surrogate does not cover the case with all values of its unknowns.
+    """
+    unknowns = stated_unknowns(case) if case.unknowns else STANDARD_BALL
+    try:
+        return unknowns, _covered_case(case, unknowns)
+    except InputError:
+        return (unknowns if case.unknowns else ()), None
+
+
+def reason_without_defaults(case: Case) -> str:
+    """Return why the default unknowns do not hold for a case; empty if they do."""
+    try:
+        _covered_case(case, STANDARD_BALL)
+    except InputError as error:
+        return str(error).replace("; allowed: ", ", allowed: ")
+    return ""
+
+
+def _covered_case(case: Case, unknowns: tuple[Unknown, ...]) -> Case:
+    """Return the drop of a case on a rigid floor as the bundled surrogate predicts it.
+
+    Mesh, sampling and bands of the surrogate replace those of the case: they affect the numerical
+    error only. Raises InputError with the key that the surrogate does not cover.
+    """
+    surrogate = bundled_surrogate()
+    result = blocked_case(case, unknowns)
+    model, trained = result.model, surrogate.case.model
+    assert trained is not None  # noqa: S101 - see `Surrogate.is_complete`
+    if model is None or model.name != trained.name:
+        refuse(f"model = {model.name if model else ''!r}", repr(trained.name))
+    mesh = {
+        option.name: getattr(trained, option.name)
+        for option in fields(trained)
+        if option.metadata.get("group") == "mesh"
+    }
+    result = replace(
+        result,
+        model=replace(model, **mesh),
+        levels=replace(result.levels, bands=surrogate.case.levels.bands),
+        sampling=surrogate.case.sampling,
+    )
+    surrogate.require(result, [entry.key for entry in unknowns])
+    ranges = {u.key: (u.low, u.high) for u in unknowns}
+    for name, region in zip(surrogate.keys, surrogate.region.tolist(), strict=True):
+        value = value_in(result, name)
+        low, high = ranges.get(name, region)
+        if not (isinstance(value, float | int) and region[0] <= low <= value <= high <= region[1]):
+            refuse(f"{name} = {value:g}", f"{region[0]:g} <= {name} <= {region[1]:g}")
+    return result
