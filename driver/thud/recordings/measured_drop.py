@@ -181,7 +181,7 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
     # The first flight gives the restitution; without the height two flights are compared.
     landings = _landings(window, contact, 1 if conditions.height else 2)
     if conditions.height and landings:
-        flight = _between(contact.end, landings[0][0]).value
+        flight = _between(contact.release, landings[0][0]).value
         peak = _peak_above_background(window.bounces[0]) / contact.peak
         expected = GRAVITY * flight / (2 * conditions.speed)
         if not peak / MAX_BOUNCE_RATIO < expected < peak * MAX_BOUNCE_RATIO:
@@ -191,9 +191,10 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
                 f"it is no bounce after a drop from {conditions.height:g} m"
             )
             warnings += (no_bounce,)
-    ends = [contact.end, *(end for _, end in landings)]
+    ends = [contact.release, *(end for _, end in landings)]
     flights = [_between(end, begin) for end, (begin, _) in zip(ends, landings, strict=False)]
-    methods, unknown = conditions.restitutions(impulse, contact_time, flights)
+    duration = _between(contact.touch, contact.release)
+    methods, unknown = conditions.restitutions(impulse, duration, flights)
     restitution, shared = conditions.mean(methods, impulse, contact.quantization_impulse)
     rate, first = window.sample_rate, contact.span[0]
     return Drop(
@@ -211,7 +212,7 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
         peak_force=_with_step(_peak(contact), _largest, offset_step, contact),
         offset_step=offset_step,
         impulse=impulse,
-        effective_mass=conditions.effective_mass(impulse, contact_time, methods.get(BOUNCES)),
+        effective_mass=conditions.effective_mass(impulse, duration, methods.get(BOUNCES)),
         noise=_noise(contact),
         bounces=tuple(begin.value - contact.touch.value for begin, _ in landings),
         steps=(*steps, *_removed(contact)),
@@ -231,7 +232,7 @@ def _between(start: Estimate, end: Estimate) -> Estimate:
 
 
 def _landings(window: Window, drop: Contact, count: int) -> list[tuple[Estimate, Estimate]]:
-    """Return begin and end of each of the first bounces, s from the start of the window."""
+    """Return first touch and release of each of the first bounces, s from the start."""
     landings = []
     for bounce in window.bounces[:count]:
         first, stop = bounce.contact
