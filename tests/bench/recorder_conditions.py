@@ -349,6 +349,10 @@ def _doubts() -> Iterator[Condition]:
         ("all", {"calibration": 0.007, "mass": 0.005, "height": 0.003}),
     ):
         yield Condition("stated errors", name, doubts=doubts)
+    for key, doubt in (("calibration", 0.02), ("mass", 0.03), ("height", 0.02)):
+        config, doubts = {f"{key}_uncertainty": None}, {key: doubt}
+        name = f"{key}, not stated"
+        yield Condition("stated errors untold", name, UNTOLD, config=config, doubts=doubts)
 
 
 def _mixed() -> Iterator[Condition]:

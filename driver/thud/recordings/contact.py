@@ -206,9 +206,9 @@ class Edges:
 
 
 def estimate_limits(window: Window, noise: Background | None = None) -> tuple[Estimate, Estimate]:
-    """Return begin and end of a contact, s from the first sample, accurate to about 0.1 ms."""
+    """Return first touch and release, s from the first sample, accurate to about 0.1 ms."""
     edges = find_edges(window, window.force, noise, passes=1)
-    (t0, s0), (t1, s1) = edges.touch.edge_times()[1], edges.release.edge_times()[1]
+    (t0, s0), (t1, s1) = edges.touch.edge_times()[0], edges.release.edge_times()[0]
     u0, u1 = _step_errors(
         edges.background, window.force - edges.offset, window.sample_rate, t0, -t1
     )

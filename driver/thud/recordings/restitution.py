@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 # Gravity, m/s2, the default of the models.
 GRAVITY = Drop.gravity
 IMPULSE, BOUNCES = "impulse", "bounces"
-# Maximum time between the end of the measured contact and the release, s, and maximum height by
+# Maximum error of the measured release, s, and maximum height by
 # which the center of a ball is lower or higher at the release than at first touch, m: finite
 # elements, modal ball and shell have up to 0.5 ms, and -2 to 4 mm.
 SLOW_RELEASE = 5e-4
@@ -55,17 +55,20 @@ class DropConditions:
         }
 
     def restitutions(
-        self, impulse: Estimate, contact_time: Estimate, flights: Sequence[Estimate]
+        self, impulse: Estimate, duration: Estimate, flights: Sequence[Estimate]
     ) -> tuple[dict[str, Estimate], tuple[str, ...]]:
-        """Return the restitution by each method that can be applied, and warnings."""
+        """Return the restitution by each method that can be applied, and warnings.
+
+        The duration of the contact, and the flights, are those between first touch and release.
+        """
         methods: dict[str, Estimate] = {}
         speed = self.speed
         if self.height and self.mass:
             momentum = self.mass * speed
-            value = impulse.value / momentum - 1 - GRAVITY * contact_time.value / speed
+            value = impulse.value / momentum - 1 - GRAVITY * duration.value / speed
             uncertainties = (
                 impulse.uncertainty / momentum,
-                GRAVITY * contact_time.uncertainty / speed,
+                GRAVITY * duration.uncertainty / speed,
             )
             methods[IMPULSE] = Estimate(value, math.hypot(*uncertainties))
         if self.height and flights:
@@ -137,17 +140,17 @@ class DropConditions:
         return Estimate(value, uncertainty), {k: effect for k, effect in combined.items() if effect}
 
     def effective_mass(
-        self, impulse: Estimate, contact_time: Estimate, restitution: Estimate | None
+        self, impulse: Estimate, duration: Estimate, restitution: Estimate | None
     ) -> Estimate:
         """Return J / (v0 (1 + e) + g t_c), kg, from impulse J and restitution e by bounces."""
         if restitution is None or not self.height:
             return Estimate.unknown()
         speed = self.speed
-        velocity_change = speed * (1 + restitution.value) + GRAVITY * contact_time.value
+        velocity_change = speed * (1 + restitution.value) + GRAVITY * duration.value
         value = impulse.value / velocity_change
         uncertainties = (
             impulse.uncertainty / velocity_change,
             value * speed * restitution.uncertainty / velocity_change,
-            value * GRAVITY * contact_time.uncertainty / velocity_change,
+            value * GRAVITY * duration.uncertainty / velocity_change,
         )
         return Estimate(value, math.hypot(*uncertainties))
