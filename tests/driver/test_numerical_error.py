@@ -155,7 +155,7 @@ RESOLUTIONS = {
     "&model name = 'modal_ball' / &modal_ball rings = 10, highest_frequency = 300 /": (
         "10 rings, modes up to 300 Hz, substeps 1\n",
         "&modal_ball rings, highest_frequency (now 10, 300 Hz)",
-        {"rings": 14, "highest_frequency": 420.0},
+        {"rings": 14, "highest_frequency": 1960.0},
     ),
     "&model name = 'modal_ball' /": (
         "40 rings, modes up to 1400 Hz, substeps 1, automatic\n", "", {"rings": 56},

@@ -649,7 +649,7 @@ def test_level_budget_has_calibration_and_plate() -> None:
     levels = level_estimates(average, calibration=0.01, systematic={"plate": plate})
     names = [c.name for c in levels[0].contributions]
     assert names == [
-        "repeatability", "noise", "method", "filter", "calibration", "plate",
+        "repeatability", "noise", "method", "filter", "offset step", "calibration", "plate",
     ]  # fmt: skip
     calibration = next(c for c in levels[0].contributions if c.name == "calibration")
     assert calibration.uncertainty == pytest.approx(20 * math.log10(1.01), rel=0.01)

@@ -504,7 +504,7 @@ def test_levels_and_criteria_agree_on_uncertainty(one: Recording) -> None:
     octaves, thirds = (recording.level_estimates(bands) for bands in ("octave", "third"))
     for budgets in (octaves, thirds):
         names = [part.name for part in budgets[-1].contributions]
-        assert names[-2:] == ["calibration", "plate"]
+        assert names[-3:] == ["calibration", "plate", "recorder filter, assumed"]
     # Of the 500 Hz octave and the 630 Hz third, which have one upper edge.
     assert thirds[-1].contributions[-1] == octaves[-1].contributions[-1]
 

@@ -539,11 +539,12 @@ def picture(path: Path) -> tuple[str, bytes]:
     """Return media type and content of a picture; raise InputError if it cannot be used."""
     kind = PICTURES.get(path.suffix.lower().replace(".jpeg", ".jpg"))
     allowed = f"{', '.join(PICTURES)} up to {MAX_PICTURE // 1000} kB"
-    problem = f"report: accreditation_mark = {shown(str(path))} cannot be used"
+    problem = f"report: accreditation_mark = {shown_path(path)} cannot be used"
     try:
         content = path.read_bytes() if kind and path.stat().st_size <= MAX_PICTURE else b""
     except (OSError, ValueError) as error:
-        refuse(f"{problem} ({shown_text(error)})", allowed, error)
+        reason = getattr(error, "strerror", None) or shown_text(error)
+        refuse(f"{problem} ({reason})", allowed, error)
     if not kind or not content:
         refuse(f"{problem} ({'too large or empty' if kind else 'no picture'})", allowed)
     return kind, content

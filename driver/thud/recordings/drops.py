@@ -47,11 +47,12 @@ MIN_HEIGHT = 0.03
 # Duration of a pulse above half its peak, s: contacts of balls and tyres last 12 to 40 ms.
 DURATIONS = (0.003, 0.06)
 # A pulse is neither a drop nor its bounce, but a tap, a knock or a step, if its peak is below this
-# fraction of that of the highest drop, or of the previous contact; or if the forces before and
-# after it differ by this fraction of its peak, and it is not one of two that overlap.
+# fraction of that of the highest drop, or of the previous contact; or if the medians of the forces
+# before and after it, over STEP cells each, differ by this fraction of its peak.
 MIN_DROP = 0.25
 MIN_BOUNCE = 0.15
 MAX_CHANGE = 0.3
+STEP = 100
 # Two peaks are two impacts if the force between them falls below this fraction of the lower peak.
 VALLEY = 0.3
 # A pulse whose peak reaches this fraction of the previous peak is a new drop. The limits of the
@@ -246,7 +247,13 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]
         stop = _find_edge(corrected, high, 1, FOOT * peak) + 1 + MARGIN
         warning = _double_peak_warning(corrected[max(group[0], earliest) : group[-1] + 1])
         span = first + start * width, first + stop * width
-        is_step = not warning and abs(backgrounds[1] - backgrounds[0]) > MAX_CHANGE * peak
+        # A second impact next to this one is shorter than half of STEP.
+        sides = (
+            level[max(low - DISTANCE - STEP, 0) : low - DISTANCE],
+            level[high + DISTANCE :][:STEP],
+        )
+        change = [float(np.median(side)) if side.size else 0.0 for side in sides]
+        is_step = abs(change[1] - change[0]) > MAX_CHANGE * peak
         pulses.append(_Pulse(*span, peak, is_step, warnings=[warning] if warning else []))
     return pulses
 
