@@ -15,7 +15,7 @@ from thud.level.levels import force_exposure_levels
 from thud.recordings.band_noise import band_noise
 from thud.recordings.budgets import average_mass
 from thud.recordings.config import Config
-from thud.recordings.drops import find_windows
+from thud.recordings.drops import search_drops
 from thud.recordings.measure_drops import measure_window
 from thud.recordings.quantization import (
     find_quantization,
@@ -61,7 +61,7 @@ def measured(force: NDArray[np.float64], rate: float = RATE) -> Recording:
 
 
 def one_drop(force: NDArray[np.float64]) -> Drop:
-    (window,) = find_windows(Signal.from_array(force, RATE, "scope"))
+    (window,) = search_drops(Signal.from_array(force, RATE, "scope")).windows
     return measure_window(window, Config(height=1.0, mass=MASS))
 
 
@@ -125,7 +125,7 @@ def test_offset_lies_within_its_deviation() -> None:
 def test_noise_that_covers_the_step_needs_no_budget() -> None:
     drop = one_drop(record(15.625, 12.0, 3))
     assert find_quantization(
-        find_windows(Signal.from_array(record(15.625, 12.0, 3), RATE))[0]
+        search_drops(Signal.from_array(record(15.625, 12.0, 3), RATE)).windows[0]
     ).offset == 0.0  # fmt: skip
     assert not len(drop.contact.quantization_errors)
     assert drop.contact.quantization_impulse == 0.0
@@ -166,7 +166,7 @@ def test_constant_background_next_to_a_steep_flank_is_no_dropout() -> None:
     time = np.arange(2400) / 8000 - 0.1
     x = np.clip(time / DURATION, 0, 1)
     force = np.rint(PEAK * np.sin(np.pi * x**0.8) / 15.625) * 15.625
-    (window,) = find_windows(Signal.from_array(force, 8000.0))
+    (window,) = search_drops(Signal.from_array(force, 8000.0)).windows
     drop = measure_window(window, Config())
     assert not any("dropout" in text for text in (*drop.steps, *drop.warnings))
 
@@ -174,14 +174,14 @@ def test_constant_background_next_to_a_steep_flank_is_no_dropout() -> None:
 def test_few_digits_are_coarser_at_the_peak() -> None:
     force = half_sine(RATE, 0.1, 10_000)
     digits = np.array([float(f"{value:.2g}") for value in force])
-    (window,) = find_windows(Signal.from_array(digits, RATE))
+    (window,) = search_drops(Signal.from_array(digits, RATE)).windows
     assert find_quantization(window).step == pytest.approx(100.0)
     assert find_quantization(replace(window, signal=Signal.from_array(force, RATE))).step == 0.0
 
 
 def test_load_cells_add_their_steps() -> None:
     cells = [Signal.from_array(record(step, 0.01, 1), RATE, "F") for step in (5.0, 12.0)]
-    (window,) = find_windows(replace(cells[0], cells=tuple(cells)))
+    (window,) = search_drops(replace(cells[0], cells=tuple(cells))).windows
     alone = [find_quantization(replace(window, signal=cell)) for cell in cells]
     both = find_quantization(window)
     assert both.step == pytest.approx(12.0)
