@@ -125,7 +125,7 @@ def test_offset_lies_within_its_deviation() -> None:
 def test_noise_that_covers_the_step_needs_no_budget() -> None:
     drop = one_drop(record(15.625, 12.0, 3))
     assert find_quantization(
-        find_windows(Signal.from_array(record(15.625, 12.0, 3), RATE))[0]
+        search_drops(Signal.from_array(record(15.625, 12.0, 3), RATE)).windows[0]
     ).offset == 0.0  # fmt: skip
     assert not len(drop.contact.quantization_errors)
     assert drop.contact.quantization_impulse == 0.0
