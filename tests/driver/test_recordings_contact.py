@@ -119,7 +119,8 @@ def test_peak_has_the_uncertainty_of_its_place() -> None:
     # That of the background grows from cell to cell; the peak lies in the middle one.
     slope = replace(quiet, covariance=np.diag(np.arange(1.0, n_cell + 1)))
     found = measured_drop._peak(slope)  # noqa: SLF001
-    low = low_pass(np.pad(quiet.gated, 2), RATE)
+    margin = int(np.ceil(measured_drop.PEAK_MARGIN * RATE))
+    low = measured_drop._interpolated(np.pad(quiet.gated, margin), RATE)  # noqa: SLF001
     assert found.value == pytest.approx(low.max())
     cell = np.argmax(low) / len(low) * n_cell
     assert found.uncertainty**2 == pytest.approx(cell + 0.5, abs=1.0)
