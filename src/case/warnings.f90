@@ -124,7 +124,7 @@ contains
       !> Messages: [n].
       character(len=warning_length), allocatable, intent(inout) :: warnings(:)
       type(band_type) :: bands(octave_count)
-      character(len=:), allocatable :: octaves
+      character(len=:), allocatable :: octaves, keys
       integer :: lowest, highest
 
       bands = get_octaves()
@@ -138,10 +138,11 @@ contains
          highest = findloc(error%octave > max_error, .true., dim=1, back=.true.)
          octaves = trim(get_band_name(bands(highest)))//' Hz'
          if (lowest < highest) octaves = trim(get_band_name(bands(lowest)))//' to '//octaves
+         call get_resolution_keys(history, keys)
          ! Rounded up, so that it exceeds the limit as printed.
          call add(warnings, prefix//error_title//' of the octave levels is up to ' &
             //fixed(ceiling(100*maxval(error%octave))/100.0_wp, 2)//' dB ('//octaves//'); raise ' &
-            //get_resolution_keys(history))
+            //keys)
       end associate
    end subroutine add_error_warning
 

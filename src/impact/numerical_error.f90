@@ -11,8 +11,8 @@ module thud_numerical_error
    implicit none (type, external)
    private
 
-   public :: add_verification, estimate_error, finer_prefix, finer_quantities, get_largest_error, get_resolution
-   public :: get_resolution_keys, resolution_quantities
+   public :: add_verification, estimate_error, finer_prefix, finer_quantities, get_largest_error, get_model_quantity
+   public :: get_resolution_keys, has_quantity, resolution_quantities
 
    !> Names of the quantities of a drop at a finer resolution: levels of the octaves of the force on the floor, and others.
    character(len=24), parameter :: finer_quantities(*) = [character(len=24) :: 'finer_octave_31_5', 'finer_octave_63', &
@@ -110,40 +110,10 @@ contains
          finer%sample_rate)
    end subroutine add_verification
 
-   !> The resolution of a result in words; empty if it is the sampling of the input.
-   pure function get_resolution(history, prefix) result(text)
-      type(force_history_type), intent(in) :: history
-      !> `finer_prefix` for the drop at a finer resolution, or empty.
-      character(len=*), intent(in) :: prefix
-      character(len=:), allocatable :: text
-
-      if (has_quantity(history, prefix//'radial_elements')) then
-         text = 'mesh '//whole(prefix//'radial_elements')//' x '//whole(prefix//'polar_elements')
-      else if (has_quantity(history, prefix//'rings')) then
-         text = whole(prefix//'rings')//' rings, modes up to '//whole(prefix//'highest_frequency')//' Hz, substeps ' &
-            //whole(prefix//'substeps')
-      else if (has_quantity(history, prefix//'sample_rate')) then
-         text = whole(prefix//'sample_rate')//' samples per second'
-      else
-         text = ''
-      end if
-
-   contains
-
-      !> A quantity without decimals.
-      pure function whole(name) result(number)
-         character(len=*), intent(in) :: name
-         character(len=:), allocatable :: number
-
-         number = fixed(get_model_quantity(history, name), 0)
-      end function whole
-
-   end function get_resolution
-
    !> The keys that set the resolution of a result, with its values.
-   pure function get_resolution_keys(history) result(text)
+   pure subroutine get_resolution_keys(history, text)
       type(force_history_type), intent(in) :: history
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
 
       if (has_quantity(history, 'radial_elements')) then
          text = '&mesh radial_elements, polar_elements (now '//fixed(get_model_quantity(history, 'radial_elements'), 0) &
@@ -154,7 +124,7 @@ contains
       else
          text = '&sampling sample_rate (now '//fixed(history%sample_rate, 0)//' Hz)'
       end if
-   end function get_resolution_keys
+   end subroutine get_resolution_keys
 
    !> Whether the model has stated a quantity.
    pure function has_quantity(history, name) result(yes)

@@ -155,9 +155,7 @@ def realise(seed: int) -> tuple[Draw, Result | str]:
     pull = np.where(upper, np.maximum(-pull, 0), pull)
     begin, end = contact_span(force, FINE)
     late = drop.contact_time.value - (end - begin)
-    # The velocities are those at begin and end of the contact.
-    fall = GRAVITY * (contact_time - (end - begin)) / np.sqrt(2 * GRAVITY * HEIGHT)
-    bounce = drop.restitution.value - (restitution.value + fall)
+    bounce = drop.restitution.value - restitution.value
     flanks = flank_bounds(draw, oracle, record)
     gravity = GRAVITY * flanks[0] / np.sqrt(2 * GRAVITY * HEIGHT)
     doubt = drop.contact_time.uncertainty

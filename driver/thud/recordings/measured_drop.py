@@ -16,7 +16,7 @@ from thud.base.checks import refuse
 from thud.base.immutable import Immutable
 from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
-from thud.recordings.contact import Contact, estimate_limits, find_contact
+from thud.recordings.contact import SAMPLE_ERROR, Contact, estimate_limits, find_contact
 from thud.recordings.faults import min_background, repair
 from thud.recordings.noise import Noise
 from thud.recordings.offset_step import find_offset_step, step_errors
@@ -299,6 +299,7 @@ def _peak(contact: Contact) -> Estimate:
     maxima = [_interpolated(force + noise, contact.sample_rate).max() for noise in draws]
     bias = max(float(np.mean(maxima) - low.max()), 0.0)
     variance = density * min(RECORDED_BAND, contact.sample_rate / 2) + bias**2
+    variance += (SAMPLE_ERROR * contact.peak) ** 2
     # The top stays within a step for some time: its error is that of the offset again.
     variance += contact.covariance[cell, cell] + 2 * contact.background.quantization.offset**2
     return Estimate(float(low.max()) - bias, math.sqrt(variance))

@@ -9,7 +9,8 @@ module thud_table
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
-   use thud_numerical_error, only: finer_prefix, finer_quantities, get_resolution, resolution_quantities
+   use thud_numerical_error, only: finer_prefix, finer_quantities, get_model_quantity, has_quantity, &
+      resolution_quantities
    use thud_quantities, only: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
       sample_quantity_count
    use thud_report, only: get_verdict, get_verdict_word
@@ -247,6 +248,36 @@ contains
             trim(adjustl(prefixes(power)//history%model_quantity_unit(i))))
       end do
    end function model_quantity_rows
+
+   !> The resolution of a result in words; empty if it is the sampling of the input.
+   pure function get_resolution(history, prefix) result(text)
+      type(force_history_type), intent(in) :: history
+      !> `finer_prefix` for the drop at a finer resolution, or empty.
+      character(len=*), intent(in) :: prefix
+      character(len=:), allocatable :: text
+
+      if (has_quantity(history, prefix//'radial_elements')) then
+         text = 'mesh '//whole(prefix//'radial_elements')//' x '//whole(prefix//'polar_elements')
+      else if (has_quantity(history, prefix//'rings')) then
+         text = whole(prefix//'rings')//' rings, modes up to '//whole(prefix//'highest_frequency')//' Hz, substeps ' &
+            //whole(prefix//'substeps')
+      else if (has_quantity(history, prefix//'sample_rate')) then
+         text = whole(prefix//'sample_rate')//' samples per second'
+      else
+         text = ''
+      end if
+
+   contains
+
+      !> A quantity without decimals.
+      pure function whole(name) result(number)
+         character(len=*), intent(in) :: name
+         character(len=:), allocatable :: number
+
+         number = fixed(get_model_quantity(history, name), 0)
+      end function whole
+
+   end function get_resolution
 
    !> Rows that compare a result with that at a finer resolution and with the stated error; none if it is not verified.
    function get_verification_rows(history) result(rows)
