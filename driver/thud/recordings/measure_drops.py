@@ -153,6 +153,11 @@ def _measure(
     return [measured[window.start] for window in windows]
 
 
+def _limit_threads() -> None:
+    """Limit the BLAS libraries that this module loads to one thread."""
+    threadpool_limits(1, "blas")
+
+
 class _Processes(ExitStack):
     """Pool of processes that measure drops; a context manager."""
 
@@ -165,9 +170,7 @@ class _Processes(ExitStack):
         """Start the processes, without waiting for them."""
         if self.workers < 2 or self._pool:  # noqa: PLR2004 - 1 is this process
             return
-        self._pool = self.enter_context(
-            process_pool(self.workers, partial(threadpool_limits, 1, "blas"))
-        )
+        self._pool = self.enter_context(process_pool(self.workers, _limit_threads))
         with no_interrupt_in_processes():
             for _ in range(self.workers):
                 self._pool.submit(int)
