@@ -255,7 +255,8 @@ def test_step_is_that_of_least_squares_with_its_uncertainty() -> None:
     # What still decays takes one more degree of freedom.
     variance = np.linalg.inv(columns.T @ columns)[0, 0] * square / 75
     assert found.sizes == pytest.approx([factors[0]])
-    assert found.uncertainty == pytest.approx(np.sqrt(variance) * stats.t(75).ppf(0.975) / 1.96)
+    factor = stats.t(75).ppf(0.975) / stats.norm.ppf(0.975)
+    assert found.uncertainty == pytest.approx(np.sqrt(variance) * factor)
     assert (misfit, found.rate) == (0, (0, 0))
 
 

@@ -13,7 +13,7 @@ from conftest import naming
 from scipy import stats
 from scipy.optimize import brentq
 from scipy.signal import lsim, lti
-from scipy.stats import binom, t as student
+from scipy.stats import binom, norm, t as student
 from synthetic import make_drop
 
 import thud
@@ -359,10 +359,10 @@ def test_outliers_begin_at_the_critical_value_and_beyond_their_own_uncertainty()
 
     edge = brentq(lambda last: score(last) - grubbs(9, 0.05), 1, 10)
     assert (marked(edge - 1e-6), marked(edge + 1e-6)) == (False, True)
-    # 1.96 standard uncertainties of the value itself explain as much.
+    # The expanded uncertainty of the value itself explains as much.
     distance = 10 - np.append(others, 10.0).mean()
     for factor, expected in ((1 - 1e-6, True), (1 + 1e-6, False)):
-        own = [0.0] * 8 + [factor * distance / 1.96]
+        own = [0.0] * 8 + [factor * distance / norm.ppf(0.975)]
         assert marked(10.0, uncertainty=own) == expected
     # Of ten values two are looked for, of nine one.
     two = [*np.linspace(-1, 1, 8), 30.0, 30.0]

@@ -12,7 +12,8 @@ from thud.base.immutable import Immutable
 CONFIDENCE = 0.95
 # Name of the contribution of a computed value; see `Estimate.computed`.
 NUMERICAL_ERROR = "numerical error"
-_NORMAL_FACTOR = NormalDist().inv_cdf((1 + CONFIDENCE) / 2)
+# Standard deviations of the normal distribution within which 95 % lie.
+NORMAL_FACTOR = NormalDist().inv_cdf((1 + CONFIDENCE) / 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +107,7 @@ class Estimate(Immutable):
         The errors that models state hold for 95 % of the levels or more (docs/levels.md). NaN: an
         unknown error.
         """
-        return cls.from_budget(value, Contribution(NUMERICAL_ERROR, error / _NORMAL_FACTOR))
+        return cls.from_budget(value, Contribution(NUMERICAL_ERROR, error / NORMAL_FACTOR))
 
     @classmethod
     def unknown(cls) -> Self:
@@ -117,7 +118,7 @@ class Estimate(Immutable):
     def coverage_factor(self) -> float:
         """Quantile of Student's t distribution for a two-sided coverage of 95 %."""
         if math.isinf(self.freedom):
-            return _NORMAL_FACTOR
+            return NORMAL_FACTOR
         # SciPy is slow to import.
         from scipy.special import stdtrit
 

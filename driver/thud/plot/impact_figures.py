@@ -14,6 +14,7 @@ from thud.base._schema import (
     LimitsSource,
 )
 from thud.base.checks import refuse
+from thud.impact.contact_time import THRESHOLD
 from thud.level.assessment import octave_limits
 from thud.level.levels import low_pass
 from thud.plot.style import (
@@ -41,8 +42,6 @@ if TYPE_CHECKING:
     from thud.impact.impact import Impact
     from thud.plot.style import Curve
 
-# A contact ends below this fraction of the maximum force.
-CONTACT_THRESHOLD = 0.01
 # Drawn time before and after the contact, as a fraction of the contact time.
 MARGIN = 0.04
 TIME_LABEL = "Time since first touch, ms"
@@ -90,7 +89,7 @@ def contact_force(
     """
     time = impact.time - impact.touch_time
     recorded = low_pass(impact.force(kind), impact.sample_rate)
-    end = time[recorded > CONTACT_THRESHOLD * recorded.max()][-1]
+    end = time[recorded > THRESHOLD * recorded.max()][-1]
     shown = (time >= -MARGIN * end) & (time <= (1 + MARGIN) * end)
     return 1e3 * time[shown], 1e-3 * recorded[shown]
 

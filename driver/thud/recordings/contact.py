@@ -11,6 +11,7 @@ import numpy as np
 from scipy.ndimage import convolve1d, uniform_filter1d
 
 from thud.base.immutable import Immutable
+from thud.impact.contact_time import THRESHOLD
 from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.flanks import SMOOTHING, Flank, Posterior, find_touch
@@ -59,8 +60,6 @@ CORRECTION_ERROR = 0.06
 N_PHASE = 16
 # Weights of neighboring samples that give values between the steps.
 NO_GRID = np.array([0.21, 0.58, 0.21])
-# Fraction of the peak at which a contact begins and ends (`thud.impact.contact_time`).
-BEGIN = 0.01
 # Errors of samples due to quantization and the filter of the recorder, as a fraction of the peak.
 SAMPLE_ERROR = 2e-4
 
@@ -272,7 +271,7 @@ def _step_errors(
     step, offset = background.quantization.step, background.quantization.offset
     if not offset:
         return 0.0, 0.0
-    level = BEGIN * background.peak + 1.5 * step
+    level = THRESHOLD * background.peak + 1.5 * step
     above = np.flatnonzero(force > level) / rate
     inside = above[(above > begin) & (above < end)]
     first, last = (inside[0], inside[-1]) if inside.size else (end, begin)

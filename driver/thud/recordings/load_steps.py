@@ -11,6 +11,7 @@ from scipy.optimize import minimize_scalar
 from scipy.special import fdtrc, stdtrit
 
 from thud.base.checks import refuse
+from thud.level.estimate import NORMAL_FACTOR
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -51,8 +52,6 @@ SIGNIFICANT_DRIFT = 2.5
 SIGNIFICANT_SECOND = 3.0
 # Relative singular values below this are zero.
 NEGLIGIBLE = 1e-6
-# Standard deviations of the normal distribution within which 95 % lie.
-NORMAL = 1.96
 
 
 class Plateau(NamedTuple):
@@ -268,7 +267,7 @@ def _fit_steps(
     width = max(time.shape[1] for time in droop.times)
     variance = gradient @ covariance @ gradient
     variance += (rate * noise / len(sizes)) ** 2 * between * width
-    deviation = math.sqrt(variance) * float(stdtrit(freedom, 0.975)) / NORMAL
+    deviation = math.sqrt(variance) * float(stdtrit(freedom, 0.975)) / NORMAL_FACTOR
     last = droop.excess.shape[1] - 1
     if abs(parameters[last]) > SIGNIFICANT_DRIFT * math.sqrt(covariance[last, last]):
         effect = parameters[last] * (gradient @ covariance)[last] / covariance[last, last]

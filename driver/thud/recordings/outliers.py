@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import stdtrit
 
+from thud.level.estimate import NORMAL_FACTOR
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -16,8 +18,6 @@ if TYPE_CHECKING:
 
 # Probability that any drop is marked if all differ by chance only.
 SIGNIFICANCE = 0.05
-# Ratio of expanded (95 %) and standard uncertainty.
-EXPANDED = 1.96
 # Maximum deviation due to rounding, in the unit of the values.
 ROUNDING = 1e-9
 
@@ -79,6 +79,6 @@ def find_outliers(
         removed.append(Outlier(names[worst], quantity, float(data[worst]), score, critical))
         remaining = remaining[remaining != worst]
         # Rosner: outliers are all values up to the last one that exceeds its critical value.
-        if score > critical and distance > EXPANDED * uncertainties[worst]:
+        if score > critical and distance > NORMAL_FACTOR * uncertainties[worst]:
             last = step + 1
     return tuple(removed[:last])

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.checks import refuse, refuse_value, require_number
+from thud.level.estimate import NORMAL_FACTOR
 from thud.level.levels import get_bands
 
 if TYPE_CHECKING:
@@ -165,7 +166,7 @@ def _check_high(plate: Plate | None) -> PlateCheck:
     frequency = np.linspace(0.0, high, 1001, dtype=np.float64)
     response = np.abs(plate.response(frequency))
     # Expanded uncertainty of the resonance, in both directions.
-    shift = 1.96 * plate.frequency_uncertainty
+    shift = NORMAL_FACTOR * plate.frequency_uncertainty
     ratios = [np.abs(plate.response(frequency / (1 + sign * shift))) / response for sign in (-1, 1)]
     deviation = max(float(np.abs(ratio - 1).max()) for ratio in ratios)
     return PlateCheck(

@@ -11,11 +11,12 @@ from scipy.special import stdtrit
 
 from thud.base.checks import refuse, require_choice
 from thud.base.immutable import Immutable
+from thud.level.estimate import NORMAL_FACTOR
 from thud.level.levels import force_exposure_levels, get_bands
 from thud.recordings.band_noise import band_noise
 from thud.recordings.filters import filter_levels, low_pass_attenuation, low_pass_force
 from thud.recordings.offset_step import step_errors
-from thud.recordings.outliers import EXPANDED, SIGNIFICANCE, Outlier, find_outliers
+from thud.recordings.outliers import SIGNIFICANCE, Outlier, find_outliers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -238,7 +239,7 @@ def noise_exceeds(scatter: ArrayLike, noise: ArrayLike, count: int) -> NDArray[n
     degree of freedom less. The scatter includes the noise, but may be small by chance.
     """
     return np.asarray(
-        EXPANDED * np.asarray(noise) > stdtrit(count - 1, 0.975) * np.asarray(scatter)
+        NORMAL_FACTOR * np.asarray(noise) > stdtrit(count - 1, 0.975) * np.asarray(scatter)
     )
 
 

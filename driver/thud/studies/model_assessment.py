@@ -20,6 +20,7 @@ from thud.case.keys import value_in, with_values
 from thud.impact.compute import compute
 from thud.impact.ensemble import get_cost, solve_many
 from thud.impact.impact import Impact
+from thud.level.estimate import NORMAL_FACTOR
 from thud.level.levels import peak_count
 from thud.studies.bundled_surrogate import (
     bundled_surrogate,
@@ -53,8 +54,6 @@ _MAX_DEVIATION = 3.0
 _NEGLIGIBLE = 0.01
 # Training of other surrogates: maximum error, dB, which widens the ranges, and number of drops.
 _TRAINING = {"error": 1.0, "size": 1024}
-# Quantile of the normal distribution for a two-sided interval of 95 %.
-_FACTOR = 1.96
 # Number of criteria that are computed: octave levels, contact time and restitution; the last two
 # have relative residuals.
 _COMPUTED = 7
@@ -113,7 +112,7 @@ class _Source:
         residual = self.residuals[rows] * scale
         rows = random.integers(len(self.numerical_errors), size=SAMPLES)
         # The numerical errors hold for 95 % of the drops.
-        noise = self.numerical_errors[rows] / _FACTOR * random.standard_normal(values.shape)
+        noise = self.numerical_errors[rows] / NORMAL_FACTOR * random.standard_normal(values.shape)
         actual = values + residual + noise
         # The errors may also be common to all samples; few numerical errors are far above others.
         parts = {
@@ -129,7 +128,7 @@ class _Source:
         adverse, favorable = margins >= spread, margins >= -spread
         indices = self._indices(fractions, values)
         # The range holds at least the stated fraction in spite of the finite number of samples.
-        coverage = COVERAGE + _FACTOR * math.sqrt(COVERAGE * (1 - COVERAGE) / SAMPLES)
+        coverage = COVERAGE + NORMAL_FACTOR * math.sqrt(COVERAGE * (1 - COVERAGE) / SAMPLES)
         ends = (1 - coverage) / 2, (1 + coverage) / 2
         low, high = np.quantile(actual, ends, axis=0)
         low, high = low - spread.mean(axis=0), high + spread.mean(axis=0)
@@ -194,7 +193,7 @@ def _probability(
 ) -> tuple[float, float]:
     """Return the fraction of samples that conform, and its error (95 %)."""
     probability = float(inside.mean())
-    sampling = _FACTOR * math.sqrt(probability * (1 - probability) / len(inside))
+    sampling = NORMAL_FACTOR * math.sqrt(probability * (1 - probability) / len(inside))
     systematic = float(favorable.mean() - adverse.mean()) / 2
     return probability, math.hypot(sampling, systematic)
 
