@@ -12,8 +12,9 @@ from scipy.optimize import least_squares
 from scipy.special import chdtrc, stdtrit
 
 from thud.base.checks import refuse
+from thud.level.estimate import NORMAL_FACTOR
 from thud.recordings.calibration import open_source
-from thud.recordings.load_steps import NORMAL
+from thud.recordings.free_oscillation import matched_energy, resonance
 from thud.recordings.plate import Plate
 
 if TYPE_CHECKING:
@@ -311,7 +312,7 @@ def _mean(values: list[float], deviations: list[float]) -> tuple[float, float]:
     mean = float(weight @ value / weight.sum())
     if chdtrc(count - 1, weight @ (value - mean) ** 2) >= SIGNIFICANT:
         return mean, 1 / math.sqrt(weight.sum())
-    factor = float(stdtrit(count - 1, 0.975)) / NORMAL
+    factor = float(stdtrit(count - 1, 0.975)) / NORMAL_FACTOR
     return float(value.mean()), factor * float(value.std(ddof=1)) / math.sqrt(count)
 
 
@@ -409,12 +410,9 @@ def _columns(rates: NDArray[np.float64], time: NDArray[np.float64]) -> NDArray[n
 def _strongest(level: NDArray[np.float64], rate: float) -> tuple[float, float] | None:
     """Return frequency, Hz, and logarithm of the decay rate of the strongest oscillation.
 
-    A matched filter searches A exp(-t/d) cos(2 pi f t + p); the usual energy is that of the noise.
+    Its energy is compared with the usual one, that of the noise.
     """
-    windows = np.exp(-np.arange(len(level)) / rate / DECAYS[:, None])
-    length = next_fast_len(2 * len(level), real=True)
-    frequency = np.fft.rfftfreq(length, 1 / rate)
-    energy = np.abs(np.fft.rfft(windows * level, length)) ** 2 / (windows**2).sum(axis=1)[:, None]
+    frequency, energy = matched_energy(level, rate, DECAYS)
     energy = energy[:, (frequency >= MIN_FREQUENCY) & (frequency <= MAX_FREQUENCY * rate)]
     k, index = np.unravel_index(np.argmax(energy), energy.shape)
     if not energy[k, index] > MIN_ENERGY * np.median(energy[k]):
@@ -446,8 +444,7 @@ def _describe(
     modes = []
     for k, (frequency, log_decay) in enumerate(rates):
         decay = math.exp(min(log_decay, 50.0))
-        natural = math.hypot(frequency, decay / (2 * math.pi))
-        quality = math.pi * natural / decay
+        natural, quality = resonance(frequency, 1 / decay)
         if not (MIN_FREQUENCY <= natural <= MAX_FREQUENCY * rate and quality > MIN_QUALITY):
             return None
         # Of colored noise that around the resonance counts.

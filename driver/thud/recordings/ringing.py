@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.fft import next_fast_len
 from scipy.optimize import least_squares
+
+from thud.recordings.free_oscillation import matched_energy, resonance
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -87,25 +88,25 @@ def find_ringing(contact: Contact, chain: Chain | None = None) -> Ringing | None
         return None
     frequency, energy = _matched(after, contact, chain)
     k, index = np.unravel_index(np.argmax(energy), energy.shape)
-    resonance, decay = float(frequency[index]), float(DECAYS[k])
-    if not (MIN_FREQUENCY <= resonance <= MAX_FREQUENCY * rate and energy[k, index] > MIN_ENERGY):
+    strongest, decay = float(frequency[index]), float(DECAYS[k])
+    if not (MIN_FREQUENCY <= strongest <= MAX_FREQUENCY * rate and energy[k, index] > MIN_ENERGY):
         return None
-    if np.pi * resonance * decay < MIN_QUALITY:
+    if np.pi * strongest * decay < MIN_QUALITY:
         return None
     if len(before) >= MIN_LENGTH * rate:
         frequency_before, energy_before = _matched(before, contact, chain)
-        nearest = int(np.argmin(np.abs(frequency_before - resonance)))
+        nearest = int(np.argmin(np.abs(frequency_before - strongest)))
         tone = energy_before[k, max(nearest - 1, 0) : nearest + 2].max()
         if energy[k, index] < MIN_INCREASE * tone:
             return None
-    density, _ = contact.background.density(resonance)
-    density *= float(chain.noise_gain(np.array([resonance]))[0]) if chain else 1.0
+    density, _ = contact.background.density(strongest)
+    density *= float(chain.noise_gain(np.array([strongest]))[0]) if chain else 1.0
     window = np.exp(-2 * np.arange(len(after)) / rate / decay).sum()
     amplitude = 2 * np.sqrt(energy[k, index] * density * rate / 2 / window)
     if amplitude < MIN_AMPLITUDE[chain is not None] * contact.peak:
         return None
-    resonance, quality = _fitted(after[: int(LENGTH * decay * rate)], rate, resonance, decay)
-    return Ringing(resonance, quality, float(amplitude), chain is not None)
+    natural, quality = _fitted(after[: int(LENGTH * decay * rate)], rate, strongest, decay)
+    return Ringing(natural, quality, float(amplitude), chain is not None)
 
 
 def _fitted(
@@ -123,9 +124,7 @@ def _fitted(
     start = np.array([frequency, decay])
     bounds = (0.8 * start[0], 0.25 * start[1]), (1.25 * start[0], 4 * start[1])
     frequency, decay = least_squares(residual, start, bounds=bounds, x_scale=start).x
-    # The free oscillation of a damped mode is slower than its resonance.
-    resonance = float(np.hypot(frequency, 1 / (2 * np.pi * decay)))
-    return resonance, float(np.pi * resonance * decay)
+    return resonance(frequency, decay)
 
 
 def is_in_record(recorded: Window, contact: Contact, plate: Plate) -> bool | None:
@@ -173,13 +172,10 @@ def _matched(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return frequencies, Hz, and the ratio of energy and noise by decay time and frequency."""
     rate = contact.sample_rate
-    windows = np.exp(-np.arange(len(force)) / rate / DECAYS[:, None])
-    length = next_fast_len(2 * len(force), real=True)
-    frequency = np.asarray(np.fft.rfftfreq(length, 1 / rate), dtype=np.float64)[1:]
-    power = np.abs(np.fft.rfft(windows * force, length)[:, 1:]) ** 2
+    frequency, energy = matched_energy(force, rate, DECAYS)
+    frequency, energy = frequency[1:], energy[:, 1:]
     white, pink, brown = contact.background.variances[:3]
     density = white + pink / frequency + brown / frequency**2
     if chain is not None:
         density *= chain.noise_gain(frequency)
-    noise = density * rate / 2 * (windows**2).sum(axis=1)[:, None]
-    return frequency, np.asarray(power / noise)
+    return frequency, energy / (density * rate / 2)
