@@ -26,8 +26,9 @@ from thud.base.files import Results
 from thud.level.estimate import Estimate
 from thud.level.levels import low_pass
 from thud.plot.recording_figures import recording_forces, recording_levels
-from thud.recordings.config import Config, PlateConfig, picture, read_config
+from thud.recordings.config import Config, PlateConfig, read_config
 from thud.recordings.dates import read_date
+from thud.recordings.picture import read_picture
 from thud.recordings.read_recording import read_recording
 from thud.recordings.recording import Recording
 from thud.report.contents import FIELDS, missing_fields, report_data
@@ -569,7 +570,7 @@ def words_of(page: str) -> str:
 def test_page_states_what_the_laboratory_states(one: Recording, tmp_path: Path) -> None:
     recording = stated(one, tmp_path)
     data = report_data(recording)
-    page = report_page(data, [], "abc", picture(tmp_path / "mark.svg"))
+    page = report_page(data, [], "abc", read_picture(tmp_path / "mark.svg"))
     words = words_of(page)
     for text in (
         "Calibration report 2024-17", "Address Street 1 Town", "Client Client & Co. Their town",

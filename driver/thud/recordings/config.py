@@ -4,32 +4,42 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
-from datetime import date
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from thud.base.checks import (
     refuse,
-    refuse_unknown,
-    require_choice,
-    require_number,
-    require_whole,
-    shown,
 )
-from thud.base.errors import InputError
-from thud.level.assessment import get_criteria
 from thud.level.levels import SOURCES
 from thud.recordings import dates
 from thud.recordings.channel import MIB, shown_path, shown_text
-from thud.recordings.choice import parse_numbers
+from thud.recordings.config_values import (
+    checked_values,
+    require_keys,
+    to_calibrations,
+    to_channel,
+    to_choice,
+    to_date,
+    to_day,
+    to_flag,
+    to_instance,
+    to_limits,
+    to_line,
+    to_linearity,
+    to_lines,
+    to_number,
+    to_numbers,
+    to_reasons,
+    to_table,
+    to_whole,
+)
 from thud.recordings.force_units import (
     Calibration,
-    plain_number,
-    read_chain,
     require_unit,
 )
 from thud.recordings.load_cells import require_channels
+from thud.recordings.picture import read_picture
 from thud.recordings.plate import Plate, check_plate
 from thud.recordings.polarity import POLARITIES
 from thud.recordings.recorder_filter import KINDS, MAX_ORDER, RecorderFilter
@@ -40,139 +50,9 @@ from thud.recordings.signal_files import regular_file
 if TYPE_CHECKING:
     import os
     from collections.abc import Callable, Iterable
-    from pathlib import Path
 
     from thud.base._schema import LimitsSource
     from thud.recordings.plate import PlateCheck
-
-MAX_TEXT = 500
-# Formats and maximum size of a picture in the report, bytes.
-PICTURES = {".svg": "image/svg+xml", ".png": "image/png", ".jpg": "image/jpeg"}
-MAX_PICTURE = 300_000
-
-
-def _number(low: float, high: float, value: object, key: str) -> float:
-    require_number(key, value)
-    number = float(value)  # type: ignore[arg-type]
-    if not low <= number <= high:
-        refuse(f"{key} = {shown(value)} is not allowed", f"{low:g} to {high:g}")
-    return number
-
-
-def _text(value: object, key: str) -> str:
-    if not isinstance(value, str) or len(value) > MAX_TEXT or not value.isprintable():
-        refuse(f"{key} = {shown(value)} is not allowed", f"a line of up to {MAX_TEXT} characters")
-    return value
-
-
-def _whole(low: int, high: int, value: object, key: str) -> int:
-    require_whole(key, value, low, high)
-    return int(value)  # type: ignore[call-overload, no-any-return]
-
-
-def _texts(value: object, key: str) -> tuple[str, ...]:
-    return tuple(
-        _text(text, key) for text in (value if isinstance(value, list | tuple) else [value])
-    )
-
-
-def _date(value: object, key: str) -> str:
-    """Return a date as text in ISO 8601; empty if not stated."""
-    if isinstance(value, date):
-        return value.isoformat()[:10]
-    read = dates.read_date(_text(value, key)) if value else None
-    if value and read is None:
-        refuse(f"{key} = {shown(value)} is not allowed", 'a date, such as "2024-05-03"')
-    return read.date().isoformat() if read else ""
-
-
-def _day(value: object, key: str) -> str:
-    """Return the date of the measurement as text, in any form."""
-    return value.isoformat() if isinstance(value, date) else _text(value, key)
-
-
-def _choice(choices: Mapping[str, object] | tuple[str, ...], value: object, key: str) -> str:
-    require_choice(key, value, choices)
-    return str(value)
-
-
-def _flag(value: object, key: str) -> bool:
-    if not isinstance(value, bool):
-        refuse(f"{key} = {shown(value)} is not allowed", "true or false")
-    return value
-
-
-def _channel(value: object, key: str) -> int | str:
-    is_number = isinstance(value, int) and not isinstance(value, bool)
-    return int(_number(1, 1e6, value, key)) if is_number else _text(value, key)
-
-
-def _calibration(value: object, key: str) -> Calibration | str | float:
-    if isinstance(value, Calibration):
-        return value
-    value = plain_number(value)
-    if not isinstance(value, str):
-        return _number(-1e30, 1e30, value, key)
-    try:
-        read_chain(_text(value, key))
-    except InputError as error:
-        message = f"{key}: {error}"
-        raise InputError(message) from error
-    return value
-
-
-def _calibrations(
-    value: object, key: str
-) -> Calibration | str | float | tuple[Calibration | str | float, ...]:
-    if not isinstance(value, list | tuple):
-        return _calibration(value, key)
-    return tuple(_calibration(entry, f"{key}, entry {i}") for i, entry in enumerate(value, 1))
-
-
-def _table(value: object, key: str) -> Mapping[str, object]:
-    if not isinstance(value, Mapping):
-        refuse(f"{key} = {shown(value)} is not allowed", "a table")
-    return value
-
-
-def _pair(value: object, key: str, ends: str, low: float, high: float) -> tuple[float, float]:
-    if not isinstance(value, list | tuple) or len(value) != 2:  # noqa: PLR2004
-        refuse(f"{key} = {shown(value)} is not allowed", f"[{ends}]")
-    return _number(low, high, value[0], key), _number(low, high, value[1], key)
-
-
-def _linearity(value: object, key: str) -> tuple[tuple[float, float], ...]:
-    pairs = value if isinstance(value, list | tuple) else []
-    if len(pairs) < 2:  # noqa: PLR2004
-        refuse(f"{key} = {shown(value)} is not allowed", "[[applied, indicated], ...], N")
-    return tuple(_pair(pair, key, "applied, indicated", 1e-3, 1e9) for pair in pairs)
-
-
-def _numbers(value: object, key: str) -> str:
-    text = _text(value, key)
-    parse_numbers(text, key)
-    return text
-
-
-def _reasons(value: object, key: str) -> dict[str, str]:
-    table = _table(value, key)
-    reasons = {_numbers(str(number), key): _text(reason, key) for number, reason in table.items()}
-    for number, reason in reasons.items():
-        if not reason.strip():
-            refuse(f"{key}: {number} has no reason", 'a reason, such as "touched"')
-    return reasons
-
-
-def _limits(value: object, key: str) -> dict[str, tuple[float, float]]:
-    table = _table(value, key)
-    refuse_unknown(key, table, [criterion.name for criterion in get_criteria(SOURCES[0])])
-    limits = {}
-    for name, span in table.items():
-        low, high = _pair(span, f"{key}: {name}", "minimum, maximum", -1e6, 1e6)
-        if not low < high:
-            refuse(f"{key}: {name} = {shown(span)} is not allowed", "minimum < maximum")
-        limits[name] = (low, high)
-    return limits
 
 
 def _key(check: Callable[[object, str], object], default: object = None) -> Any:  # noqa: ANN401
@@ -202,31 +82,25 @@ class PlateConfig:
         Pairs of a force applied and the force indicated, N.
     """
 
-    f0: float | None = _key(partial(_number, 1.0, 1e6))
-    Q: float | None = _key(partial(_number, 0.5, 1e6))
-    f0_uncertainty: float | None = _key(partial(_number, 0.0, 0.5))
-    share: float = _key(partial(_number, 0.001, 1.0), 1.0)
-    flat_limit: float | None = _key(partial(_number, 100.0, 1e6))
-    time_constant: float | None = _key(partial(_number, 1e-3, 1e9))
-    full_scale: float | None = _key(partial(_number, 1.0, 1e9))
-    linearity: tuple[tuple[float, float], ...] = _key(_linearity, ())
+    f0: float | None = _key(partial(to_number, 1.0, 1e6))
+    Q: float | None = _key(partial(to_number, 0.5, 1e6))
+    f0_uncertainty: float | None = _key(partial(to_number, 0.0, 0.5))
+    share: float = _key(partial(to_number, 0.001, 1.0), 1.0)
+    flat_limit: float | None = _key(partial(to_number, 100.0, 1e6))
+    time_constant: float | None = _key(partial(to_number, 1e-3, 1e9))
+    full_scale: float | None = _key(partial(to_number, 1.0, 1e9))
+    linearity: tuple[tuple[float, float], ...] = _key(to_linearity, ())
 
 
 def _plate(value: object, key: str) -> PlateConfig:
     if isinstance(value, PlateConfig):
         return value
-    table = _checked(_table(value, key), PlateConfig, f"{key}: ")
+    table = checked_values(to_table(value, key), PlateConfig, f"{key}: ")
     if {"f0", "Q", "f0_uncertainty", "share"} & set(table):
-        _require_keys(table, key, "f0", "Q")
+        require_keys(table, key, "f0", "Q")
         if "flat_limit" in table:
             refuse(f"{key}: f0 and flat_limit are both stated", "one of them")
     return PlateConfig(**table)
-
-
-def _require_keys(table: Mapping[str, object], key: str, *names: str) -> None:
-    for name in names:
-        if name not in table:
-            refuse(f"{key}: {name} is missing", " and ".join(names))
 
 
 @dataclass(frozen=True)
@@ -246,19 +120,19 @@ class FilterConfig:
         Relative standard uncertainty of the cutoff.
     """
 
-    kind: str = _key(partial(_choice, (*KINDS, "none")), "none")
-    order: int | None = _key(partial(_whole, 1, MAX_ORDER))
-    cutoff: float | None = _key(partial(_number, 1.0, 1e9))
-    cutoff_uncertainty: float | None = _key(partial(_number, 0.0, 0.5))
+    kind: str = _key(partial(to_choice, (*KINDS, "none")), "none")
+    order: int | None = _key(partial(to_whole, 1, MAX_ORDER))
+    cutoff: float | None = _key(partial(to_number, 1.0, 1e9))
+    cutoff_uncertainty: float | None = _key(partial(to_number, 0.0, 0.5))
 
 
 def _filter(value: object, key: str) -> FilterConfig:
     if isinstance(value, FilterConfig):
         return value
-    table = _checked(_table(value, key), FilterConfig, f"{key}: ")
-    _require_keys(table, key, "kind")
+    table = checked_values(to_table(value, key), FilterConfig, f"{key}: ")
+    require_keys(table, key, "kind")
     if table["kind"] != "none":
-        _require_keys(table, key, "order", "cutoff")
+        require_keys(table, key, "order", "cutoff")
     return FilterConfig(**table)
 
 
@@ -274,20 +148,20 @@ class Instrument:
         Dates of the certificate and of the next calibration.
     """
 
-    name: str = _key(_text, "")
-    serial: str = _key(_text, "")
-    certificate: str = _key(_text, "")
-    calibrated: str = _key(_date, "")
-    due: str = _key(_date, "")
+    name: str = _key(to_line, "")
+    serial: str = _key(to_line, "")
+    certificate: str = _key(to_line, "")
+    calibrated: str = _key(to_date, "")
+    due: str = _key(to_date, "")
 
 
 def _instruments(value: object, key: str) -> tuple[str | Instrument, ...]:
     return tuple(
-        Instrument(**_checked(entry, Instrument, f"{key}: "))
+        Instrument(**checked_values(entry, Instrument, f"{key}: "))
         if isinstance(entry, Mapping)
         else entry
         if isinstance(entry, Instrument)
-        else _text(entry, key)
+        else to_line(entry, key)
         for entry in (value if isinstance(value, list | tuple) else [value])
     )
 
@@ -318,21 +192,21 @@ class ReportConfig:
         Person who authorizes the report.
     """
 
-    number: str = _key(_text, "")
-    address: tuple[str, ...] = _key(_texts, ())
-    client: tuple[str, ...] = _key(_texts, ())
-    item: str = _key(_text, "")
-    state: str = _key(_text, "")
-    received: str = _key(_date, "")
-    issued: str = _key(_date, "")
-    place: str = _key(_text, "")
-    procedure: str = _key(_text, "")
-    deviations: str = _key(_text, "")
-    humidity: float | None = _key(partial(_number, 0.0, 100.0))
-    pressure: float | None = _key(partial(_number, 5e4, 1.2e5))
-    accreditation: str = _key(_text, "")
-    accreditation_mark: str = _key(_text, "")
-    authorized_by: str = _key(_text, "")
+    number: str = _key(to_line, "")
+    address: tuple[str, ...] = _key(to_lines, ())
+    client: tuple[str, ...] = _key(to_lines, ())
+    item: str = _key(to_line, "")
+    state: str = _key(to_line, "")
+    received: str = _key(to_date, "")
+    issued: str = _key(to_date, "")
+    place: str = _key(to_line, "")
+    procedure: str = _key(to_line, "")
+    deviations: str = _key(to_line, "")
+    humidity: float | None = _key(partial(to_number, 0.0, 100.0))
+    pressure: float | None = _key(partial(to_number, 5e4, 1.2e5))
+    accreditation: str = _key(to_line, "")
+    accreditation_mark: str = _key(to_line, "")
+    authorized_by: str = _key(to_line, "")
 
 
 @dataclass(frozen=True)
@@ -349,17 +223,11 @@ class Properties:
         Temperature of the ball, degC, if not that of the air.
     """
 
-    diameter: float | None = _key(partial(_number, 0.01, 10.0))
-    wall_thickness: float | None = _key(partial(_number, 1e-4, 1.0))
-    hardness: str = _key(_text, "")
-    surface: str = _key(_text, "")
-    temperature: float | None = _key(partial(_number, -273.15, 200.0))
-
-
-def _table_of(kind: type[Any], value: object, key: str) -> Any:  # noqa: ANN401 - of `kind`
-    if isinstance(value, kind):
-        return value
-    return kind(**_checked(_table(value, key), kind, f"{key}: "))
+    diameter: float | None = _key(partial(to_number, 0.01, 10.0))
+    wall_thickness: float | None = _key(partial(to_number, 1e-4, 1.0))
+    hardness: str = _key(to_line, "")
+    surface: str = _key(to_line, "")
+    temperature: float | None = _key(partial(to_number, -273.15, 200.0))
 
 
 @dataclass(frozen=True)
@@ -407,38 +275,38 @@ class Config:
         Properties of the ball that are stated, not assessed.
     """
 
-    laboratory: str = _key(_text, "")
-    ball: str = _key(_text, "")
-    serial: str = _key(_text, "")
-    date: str = _key(_day, "")
-    source: LimitsSource = _key(partial(_choice, SOURCES), SOURCES[0])
-    temperature: float | None = _key(partial(_number, -273.15, 200.0))
+    laboratory: str = _key(to_line, "")
+    ball: str = _key(to_line, "")
+    serial: str = _key(to_line, "")
+    date: str = _key(to_day, "")
+    source: LimitsSource = _key(partial(to_choice, SOURCES), SOURCES[0])
+    temperature: float | None = _key(partial(to_number, -273.15, 200.0))
     instruments: tuple[str | Instrument, ...] = _key(_instruments, ())
-    channel: int | str | None = _key(_channel)
+    channel: int | str | None = _key(to_channel)
     channels: str | tuple[int | str, ...] | None = _key(require_channels)
     unit: str | None = _key(require_unit)
     calibration: Calibration | str | float | tuple[Calibration | str | float, ...] | None = _key(
-        _calibrations
+        to_calibrations
     )
-    calibration_uncertainty: float | None = _key(partial(_number, 0.0, 0.5))
-    polarity: str | None = _key(partial(_choice, POLARITIES))
-    sample_rate: float | None = _key(partial(_number, 1.0, 1e9))
-    mass: float | None = _key(partial(_number, 0.01, 1000.0))
-    height: float | None = _key(partial(_number, 0.001, 100.0))
-    mass_uncertainty: float | None = _key(partial(_number, 0.0, 100.0))
-    height_uncertainty: float | None = _key(partial(_number, 0.0, 10.0))
+    calibration_uncertainty: float | None = _key(partial(to_number, 0.0, 0.5))
+    polarity: str | None = _key(partial(to_choice, POLARITIES))
+    sample_rate: float | None = _key(partial(to_number, 1.0, 1e9))
+    mass: float | None = _key(partial(to_number, 0.01, 1000.0))
+    height: float | None = _key(partial(to_number, 0.001, 100.0))
+    mass_uncertainty: float | None = _key(partial(to_number, 0.0, 100.0))
+    height_uncertainty: float | None = _key(partial(to_number, 0.0, 10.0))
     plate: PlateConfig | None = _key(_plate)
     filter: FilterConfig | None = _key(_filter)
-    drops: str | None = _key(_numbers)
-    leave_out: Mapping[str, str] = field(default_factory=dict, metadata={"check": _reasons})
-    begin: float | None = _key(partial(_number, 0.0, 1e9))
-    end: float | None = _key(partial(_number, 0.0, 1e9))
-    low_pass: bool = _key(_flag, default=False)
+    drops: str | None = _key(to_numbers)
+    leave_out: Mapping[str, str] = field(default_factory=dict, metadata={"check": to_reasons})
+    begin: float | None = _key(partial(to_number, 0.0, 1e9))
+    end: float | None = _key(partial(to_number, 0.0, 1e9))
+    low_pass: bool = _key(to_flag, default=False)
     limits: Mapping[str, tuple[float, float]] = field(
-        default_factory=dict, metadata={"check": _limits}
+        default_factory=dict, metadata={"check": to_limits}
     )
-    report: ReportConfig = _key(partial(_table_of, ReportConfig), ReportConfig())
-    properties: Properties = _key(partial(_table_of, Properties), Properties())
+    report: ReportConfig = _key(partial(to_instance, ReportConfig), ReportConfig())
+    properties: Properties = _key(partial(to_instance, Properties), Properties())
 
     @property
     def resonance(self) -> Plate | None:
@@ -506,7 +374,7 @@ def config_from(table: Mapping[str, object], prefix: str = "") -> Config:
 
     Raise InputError if a key is unknown, or its value of the wrong type or out of range.
     """
-    return Config(**_checked(table, Config, prefix))
+    return Config(**checked_values(table, Config, prefix))
 
 
 def read_config(path: str | os.PathLike[str]) -> Config:
@@ -531,33 +399,13 @@ def read_config(path: str | os.PathLike[str]) -> Config:
     if not mark:
         return config
     path = file.parent / mark
-    picture(path)
+    read_picture(path)
     return replace(config, report=replace(config.report, accreditation_mark=str(path)))
-
-
-def picture(path: Path) -> tuple[str, bytes]:
-    """Return media type and content of a picture; raise InputError if it cannot be used."""
-    kind = PICTURES.get(path.suffix.lower().replace(".jpeg", ".jpg"))
-    allowed = f"{', '.join(PICTURES)} up to {MAX_PICTURE // 1000} kB"
-    problem = f"report: accreditation_mark = {shown_path(path)} cannot be used"
-    try:
-        content = path.read_bytes() if kind and path.stat().st_size <= MAX_PICTURE else b""
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or shown_text(error)
-        refuse(f"{problem} ({reason})", allowed, error)
-    if not kind or not content:
-        refuse(f"{problem} ({'too large or empty' if kind else 'no picture'})", allowed)
-    return kind, content
 
 
 def checked_config(config: Config) -> Config:
     """Return a configuration; raise InputError if a value is not allowed."""
-    _checked({key: value for key, value in vars(config).items() if value is not None}, Config, "")
+    checked_values(
+        {key: value for key, value in vars(config).items() if value is not None}, Config, ""
+    )
     return config
-
-
-def _checked(table: Mapping[str, object], kind: type[Any], prefix: str) -> dict[str, Any]:
-    """Return the values of a table; raise InputError for an unknown key or a wrong value."""
-    checks = {key.name: key.metadata["check"] for key in fields(kind)}
-    refuse_unknown(prefix.removesuffix(": "), table, checks)
-    return {key: checks[key](value, f"{prefix}{key}") for key, value in table.items()}

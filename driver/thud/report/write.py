@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from thud.base.display import draw_all
 from thud.base.errors import ReportWarning
 from thud.base.files import Results, content_of
-from thud.recordings.config import picture
+from thud.recordings.picture import read_picture
 
 if TYPE_CHECKING:
     import os
@@ -94,7 +94,7 @@ def page_contents(
         data,
         [content.decode() for content in drawings.values()],
         hashlib.sha256(json_bytes(data)).hexdigest(),
-        picture(Path(mark)) if mark else None,
+        read_picture(Path(mark)) if mark else None,
     )
     contents = {HTML: page.encode()}
     try:
