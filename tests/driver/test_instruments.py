@@ -12,7 +12,7 @@ from conftest import naming
 from synthetic import make_drop
 
 import thud
-from thud.recordings.assumptions import assumed_contributions, level_change
+from thud.recordings.assumptions import PulseSpectra, assumed_contributions
 from thud.recordings.config import Config, FilterConfig, PlateConfig, checked_config
 from thud.recordings.plate import Plate
 from thud.recordings.recorder_filter import RecorderFilter, assumed_filter
@@ -140,8 +140,8 @@ def test_unstated_filter_is_assumed_by_the_rate() -> None:
     config = Config(**STATED, plate=PlateConfig(flat_limit=1e5))
     recording = thud.Recording.from_signals([slow], config)
     assert any("[filter]" in warning for warning in recording.warnings)
-    effect = level_change(
-        recording.drops, lambda f: np.abs(assumed_filter(RATE / 19).response(f)), "octave"
+    effect = PulseSpectra(recording.drops).level_change(
+        lambda f: np.abs(assumed_filter(RATE / 19).response(f))
     )
     found = assumed_contributions(recording.drops, config)["recorder filter, assumed"]
     np.testing.assert_allclose(found, -effect / math.sqrt(3))
@@ -194,7 +194,7 @@ def test_other_backgrounds_are_no_step(kind: str) -> None:
 
 
 def test_gain_of_two_is_six_decibels_in_every_band() -> None:
-    change = level_change([make_drop(1.0)], lambda f: np.full(len(f), 2.0), "third")
+    change = PulseSpectra([make_drop(1.0)]).level_change(lambda f: np.full(len(f), 2.0), "third")
     np.testing.assert_allclose(change, 20 * math.log10(2))
 
 

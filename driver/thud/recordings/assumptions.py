@@ -45,13 +45,14 @@ def assumed_contributions(
     size: a rectangular distribution with this half-width.
     """
     contributions = {}
+    pulses = PulseSpectra(drops)
     plate, stated = config.resonance, config.recorder_filter
     if plate is not None:
         contributions["plate"] = plate.level_uncertainty(bands)
     if stated is not None:
         shifted = stated.shifted()
         contributions["recorder filter"] = np.abs(
-            level_change(drops, lambda f: np.abs(shifted.response(f) / stated.response(f)), bands)
+            pulses.level_change(lambda f: np.abs(shifted.response(f) / stated.response(f)), bands)
         )
     assumed = {
         ASSUMED_PLATE: _plate_gain(drops, config),
@@ -59,7 +60,7 @@ def assumed_contributions(
     }
     for name, gain in assumed.items():
         if gain is not None:
-            contributions[name] = np.abs(level_change(drops, gain, bands)) / math.sqrt(3)
+            contributions[name] = np.abs(pulses.level_change(gain, bands)) / math.sqrt(3)
     return {name: values for name, values in contributions.items() if values.any()}
 
 
@@ -95,7 +96,7 @@ def assumption_warnings(drops: Sequence[Drop], config: Config) -> tuple[str, ...
         )
     seen = [drop.plate_recorded for drop in drops]
     if plate is not None and True not in seen:
-        change = level_change(drops, lambda f: np.abs(plate.response(f)), "octave")
+        change = PulseSpectra(drops).level_change(lambda f: np.abs(plate.response(f)))
         if False in seen:
             result.append(
                 f"the record does not show the stated resonance of {plate.frequency:.4g} Hz: its "
@@ -126,23 +127,29 @@ def with_assumptions(drop: Drop, config: Config) -> Drop:
     return replace(drop, peak_force=replace(drop.peak_force, uncertainty=math.sqrt(variance)))
 
 
-def level_change(
-    drops: Sequence[Drop], gain: Gain, bands: BandSet = "octave"
-) -> NDArray[np.float64]:
-    """Return the change of the mean level of drops by a gain of the force, dB, shape (n_band,)."""
-    edges = get_bands(bands)
-    before, after = np.zeros((2, len(edges.nominal)))
-    for rate in {drop.sample_rate for drop in drops}:
-        forces = [drop.contact.gated for drop in drops if drop.sample_rate == rate]
-        length = next_fast_len(PADDING * max(map(len, forces)), real=True)
-        energy = np.sum([np.abs(np.fft.rfft(force, length)) ** 2 for force in forces], axis=0)
-        frequency = np.asarray(np.fft.rfftfreq(length, 1 / rate), dtype=np.float64)
-        first, stop = np.searchsorted(frequency, [edges.lower, edges.upper])
-        for sums, energies in ((before, energy), (after, energy * gain(frequency) ** 2)):
-            below = np.concatenate([[0.0], np.cumsum(energies)]) / (rate * length)
-            sums += below[stop] - below[first]  # noqa: PLW2901 - in place
-    with np.errstate(invalid="ignore"):  # a band above half the rate
-        return np.asarray(10 * np.log10(after / before))
+class PulseSpectra:
+    """Energy spectra of drops, summed for each sample rate."""
+
+    def __init__(self, drops: Sequence[Drop]) -> None:
+        self._spectra = []
+        for rate in {drop.sample_rate for drop in drops}:
+            forces = [drop.contact.gated for drop in drops if drop.sample_rate == rate]
+            length = next_fast_len(PADDING * max(map(len, forces)), real=True)
+            energy = np.sum([np.abs(np.fft.rfft(force, length)) ** 2 for force in forces], axis=0)
+            frequency = np.asarray(np.fft.rfftfreq(length, 1 / rate), dtype=np.float64)
+            self._spectra.append((frequency, energy / (rate * length)))
+
+    def level_change(self, gain: Gain, bands: BandSet = "octave") -> NDArray[np.float64]:
+        """Return the change of the mean level by a gain of the force, dB, shape (n_band,)."""
+        edges = get_bands(bands)
+        before, after = np.zeros((2, len(edges.nominal)))
+        for frequency, energy in self._spectra:
+            first, stop = np.searchsorted(frequency, [edges.lower, edges.upper])
+            for sums, energies in ((before, energy), (after, energy * gain(frequency) ** 2)):
+                below = np.concatenate([[0.0], np.cumsum(energies)])
+                sums += below[stop] - below[first]  # noqa: PLW2901 - in place
+        with np.errstate(invalid="ignore"):  # a band above half the rate
+            return np.asarray(10 * np.log10(after / before))
 
 
 def _flat_limit(config: Config) -> float | None:

@@ -337,11 +337,17 @@ class Recording(Displayed):
 
     def level_estimates(self, bands: BandSet = "octave") -> tuple[Estimate, ...]:
         """Return the average levels with their uncertainty budgets, dB, shape (n_band,)."""
-        return level_estimates(
-            self.average(bands),
-            self.calibration_uncertainty,
-            assumed_contributions(self.drops, self.config, bands),
-        )
+        if bands not in self._level_estimates:
+            self._level_estimates[bands] = level_estimates(
+                self.average(bands),
+                self.calibration_uncertainty,
+                assumed_contributions(self.drops, self.config, bands),
+            )
+        return self._level_estimates[bands]
+
+    @cached_property
+    def _level_estimates(self) -> dict[str, tuple[Estimate, ...]]:
+        return {}
 
     def assess(
         self,
