@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.signal import resample
@@ -24,8 +24,6 @@ from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.restitution import BOUNCES, GRAVITY, DropConditions
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
@@ -177,7 +175,12 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
             "uncertainty"
         )
         warnings += (changed,)
-    impulse = _with_step(_impulse(contact), np.sum, offset_step, contact, 1 / contact.sample_rate)
+    impulse, peak_force = _impulse(contact), _peak(contact)
+    if offset_step:
+        errors = step_errors(offset_step, len(contact.gated))
+        error_impulses = errors.sum(axis=1) / contact.sample_rate
+        impulse = _with_half_width(impulse, float(np.abs(error_impulses).max()))
+        peak_force = _with_half_width(peak_force, float(np.abs(errors).max()))
     # The first flight gives the restitution; without the height two flights are compared.
     landings = _landings(window, contact, 1 if conditions.height else 2)
     if conditions.height and landings:
@@ -209,7 +212,7 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
         shared_effects=shared,
         restitution_method=" and ".join(methods),
         restitutions=methods,
-        peak_force=_with_step(_peak(contact), _largest, offset_step, contact),
+        peak_force=peak_force,
         offset_step=offset_step,
         impulse=impulse,
         effective_mass=conditions.effective_mass(impulse, duration, methods.get(BOUNCES)),
@@ -262,23 +265,10 @@ def _impulse(contact: Contact) -> Estimate:
     return Estimate(float((ones @ contact.gated)[0]), math.sqrt(variance))
 
 
-def _with_step(
-    estimate: Estimate,
-    quantity: Callable[..., Any],
-    step: float,
-    contact: Contact,
-    factor: float = 1.0,
-) -> Estimate:
-    """Return an estimate whose uncertainty includes that of the instant of an offset step."""
-    if not step:
-        return estimate
-    errors = quantity(step_errors(step, len(contact.gated)), axis=1)
-    half_width = factor * float(np.abs(errors).max())
-    return replace(estimate, uncertainty=math.hypot(estimate.uncertainty, half_width / 3**0.5))
-
-
-def _largest(errors: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
-    return np.asarray(np.abs(errors).max(axis=axis))
+def _with_half_width(estimate: Estimate, half_width: float) -> Estimate:
+    """Return an estimate whose uncertainty includes a rectangular distribution."""
+    uncertainty = math.hypot(estimate.uncertainty, half_width / math.sqrt(3))
+    return replace(estimate, uncertainty=uncertainty)
 
 
 def _peak(contact: Contact) -> Estimate:
