@@ -37,16 +37,11 @@ def choose(
     """
     chosen: list[Window] = []
     notes: list[str] = []
-    reasons = {
-        number: reason
-        for text, reason in leave_out.items()
-        for numbers in parse_numbers(text, "leave_out")
-        for number in numbers
-    }
+    excluded = [(parse_numbers(text, "leave_out"), why) for text, why in leave_out.items()]
     included = None if drops is None else parse_numbers(drops, "drops")
     for number, window in enumerate(windows, start=first):
-        reason = reasons.get(number, "")
-        if not reason and included and not any(number in numbers for numbers in included):
+        reason = next((why for ranges, why in excluded if _holds(ranges, number)), "")
+        if not reason and included and not _holds(included, number):
             reason = f"only {drops} were chosen"
         if not reason:
             chosen.append(window)
@@ -54,6 +49,10 @@ def choose(
         time = (window.start + window.contact[0]) / window.sample_rate
         notes.append(f"drop {number} at {time:.2f} s was left out: {reason}")
     return chosen, tuple(notes)
+
+
+def _holds(ranges: Sequence[range], number: int) -> bool:
+    return any(number in numbers for numbers in ranges)
 
 
 def require_chosen(
