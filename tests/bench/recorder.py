@@ -190,16 +190,16 @@ def record(condition: Condition, seed: int, folder: Path) -> tuple[list[Path], P
     }  # fmt: skip
     ball = Ball(**{**drawn, **condition.ball})
     pulse, truth = drop_pulse(kind_of(condition, seed), ball, rng)
-    doubts = condition.doubts
-    error = {key: size * rng.normal() for key, size in doubts.items()}
+    uncertainties = condition.uncertainties
+    error = {key: size * rng.normal() for key, size in uncertainties.items()}
     chain = replace(condition.chain, gain=1 + error.get("calibration", 0.0))
     config: dict[str, Any] = {
         "polarity": "positive", "mass": ball.mass + error.get("mass", 0.0),
         "height": ball.height + error.get("height", 0.0),
-        "mass_uncertainty": doubts.get("mass", 0.0),
-        "height_uncertainty": doubts.get("height", 0.0),
+        "mass_uncertainty": uncertainties.get("mass", 0.0),
+        "height_uncertainty": uncertainties.get("height", 0.0),
         "calibration": f"{chain.full_scale!r} N/FS" if condition.files != "newtons" else None,
-        "calibration_uncertainty": doubts.get("calibration", 0.0),
+        "calibration_uncertainty": uncertainties.get("calibration", 0.0),
     }  # fmt: skip
     config |= condition.config
     if condition.plate_told:
@@ -211,9 +211,9 @@ def record(condition: Condition, seed: int, folder: Path) -> tuple[list[Path], P
     if condition.filter_told and "filter" in KNOWN:
         config["filter"] = condition.config.get("filter", {"kind": "none"})
     for table, key in (("plate", "f0"), ("filter", "cutoff")):
-        if key in doubts:
+        if key in uncertainties:
             value = config[table][key] * (1 + error[key])
-            config[table] = {**config[table], key: value, f"{key}_uncertainty": doubts[key]}
+            config[table] = {**config[table], key: value, f"{key}_uncertainty": uncertainties[key]}
 
     def take(one: Pulse, name: str) -> Path:
         force = plate_force(one, ball, chain, condition.scene, rng)

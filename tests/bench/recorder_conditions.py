@@ -48,7 +48,7 @@ class Condition:
         Attributes of the ball that are not random.
     config : mapping
         Keys of the configuration, besides those of any recording.
-    doubts : mapping
+    uncertainties : mapping
         Standard uncertainties that are stated, and from which errors are drawn: calibration
         (relative), mass, kg, height, m, f0 and cutoff of the filter (relative).
     cells : Cells or None
@@ -73,7 +73,7 @@ class Condition:
     kind: str = ""
     ball: Mapping[str, float] = field(default_factory=dict)
     config: Mapping[str, Any] = field(default_factory=dict)
-    doubts: Mapping[str, float] = field(default_factory=dict)
+    uncertainties: Mapping[str, float] = field(default_factory=dict)
     cells: Cells | None = None
     plate_told: bool = True
     filter_told: bool = True
@@ -145,12 +145,12 @@ def _plate() -> Iterator[Condition]:
             config = {"plate": {"f0": f0, "Q": quality}}
             yield Condition(
                 "plate", f"{f0:g} Hz, Q {quality:g}", chain=chain, config=config,
-                doubts={"f0": 0.003},
+                uncertainties={"f0": 0.003},
             )  # fmt: skip
     chain = Chain(10e3, modes=(Mode(1600.0, 25.0),))
     config = {"plate": {"f0": 1600.0, "Q": 25.0}}
     yield Condition(
-        "plate", "1600 Hz, Q 25, 10 kHz", chain=chain, config=config, doubts={"f0": 0.003}
+        "plate", "1600 Hz, Q 25, 10 kHz", chain=chain, config=config, uncertainties={"f0": 0.003}
     )
     chain = Chain(modes=(Mode(900.0, 25.0),))
     config = {"plate": {"f0": 900.0, "Q": 25.0}}
@@ -197,7 +197,7 @@ def _filter() -> Iterator[Condition]:
         chain = Chain(rate, filter=Filter(kind, order, cutoff))
         name = f"{kind} {order}, {cutoff:g} Hz, {rate / 1e3:g} kHz"
         config = {"filter": {"kind": kind, "order": order, "cutoff": cutoff}}
-        yield Condition("filter", name, TOLD, chain, config=config, doubts={"cutoff": 0.005})
+        yield Condition("filter", name, TOLD, chain, config=config, uncertainties={"cutoff": 0.005})
         yield Condition("filter untold", name, UNTOLD, chain, filter_told=False)
     for rate in (2.5e3, 5e3, 25e3):
         chain = Chain(rate, filter=Filter("elliptic", 6, 0.4 * rate))
@@ -340,19 +340,21 @@ def _bounces() -> Iterator[Condition]:
         )
 
 
-def _doubts() -> Iterator[Condition]:
-    for name, doubts in (
+def _stated_errors() -> Iterator[Condition]:
+    for name, uncertainties in (
         ("calibration 0.5 %", {"calibration": 0.005}),
         ("calibration 2 %", {"calibration": 0.02}),
         ("mass 10 g", {"mass": 0.01}),
         ("height 5 mm", {"height": 0.005}),
         ("all", {"calibration": 0.007, "mass": 0.005, "height": 0.003}),
     ):
-        yield Condition("stated errors", name, doubts=doubts)
-    for key, doubt in (("calibration", 0.02), ("mass", 0.03), ("height", 0.02)):
-        config, doubts = {f"{key}_uncertainty": None}, {key: doubt}
+        yield Condition("stated errors", name, uncertainties=uncertainties)
+    for key, uncertainty in (("calibration", 0.02), ("mass", 0.03), ("height", 0.02)):
+        config, uncertainties = {f"{key}_uncertainty": None}, {key: uncertainty}
         name = f"{key}, not stated"
-        yield Condition("stated errors untold", name, UNTOLD, config=config, doubts=doubts)
+        yield Condition(
+            "stated errors untold", name, UNTOLD, config=config, uncertainties=uncertainties
+        )
 
 
 def _mixed() -> Iterator[Condition]:
@@ -384,13 +386,19 @@ def _mixed() -> Iterator[Condition]:
             float(np.exp(rng.uniform(-4, -1))),
             int(rng.integers(3)),
         )
-        doubts = (
+        uncertainties = (
             {"calibration": 0.005, "mass": 0.002, "height": 0.003} if rng.random() < 0.5 else {}
         )
-        doubts |= {"f0": 0.003} if modes else {}
+        uncertainties |= {"f0": 0.003} if modes else {}
         yield Condition(
-            "mixed", f"mixed {index + 1}", TOLD, chain, scene, config=config, doubts=doubts
-        )
+            "mixed",
+            f"mixed {index + 1}",
+            TOLD,
+            chain,
+            scene,
+            config=config,
+            uncertainties=uncertainties,
+        )  # fmt: skip
 
 
 def _clipping() -> Iterator[Condition]:
@@ -453,8 +461,8 @@ def conditions() -> tuple[Condition, ...]:
     """Return all conditions."""
     groups = (
         _clean, _noise, _surroundings, _droop, _plate, _plate_untold, _filter, _quantization,
-        _offset_step, _duplicates, _footsteps, _channels, _pretrigger, _bounces, _doubts, _mixed,
-        _clipping, _calibrate, _tap,
+        _offset_step, _duplicates, _footsteps, _channels, _pretrigger, _bounces, _stated_errors,
+        _mixed, _clipping, _calibrate, _tap,
     )  # fmt: skip
     return tuple(condition for group in groups for condition in group())
 

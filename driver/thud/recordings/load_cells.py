@@ -131,10 +131,10 @@ def repair_cells(window: Window) -> tuple[Window, tuple[str, ...], tuple[str, ..
     for cell, force in zip(cells, forces, strict=True):
         section = replace(window, name=cell.name, signal=cell)
         refuse_clipped(section, force)
-        values, notes, remarks = fill_dropouts(section, force, peak)
+        values, notes, cell_warnings = fill_dropouts(section, force, peak)
         filled.append(values)
         steps += tuple(f"{cell.name}: {note}" for note in notes)
-        warnings += tuple(f"{cell.name}: {remark}" for remark in remarks)
+        warnings += tuple(f"{cell.name}: {warning}" for warning in cell_warnings)
     _refuse_total(window, [force[first:stop] for force in filled])
     repaired = partial(read_repaired, window.signal, window.start, np.sum(filled, axis=0))
     signal = replace(window.signal, samples=repaired, cells=())

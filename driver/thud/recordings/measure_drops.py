@@ -204,8 +204,8 @@ def measure_window(window: Window, config: Config) -> Drop:
         window, steps, warnings = repair_cells(window)
     chain, plate, recorded = config.chain, config.resonance, window
     if chain is not None:
-        window, notes, remarks = correct_window(window, chain)
-        steps, warnings = (*steps, *notes), (*warnings, *remarks)
+        window, notes, further = correct_window(window, chain)
+        steps, warnings = (*steps, *notes), (*warnings, *further)
     drop = measure_drop(window, config.conditions(window.signal.calibration_uncertainty))
     # A copy without the cached factors of the background, which are no longer needed.
     contact = replace(drop.contact, background=replace(drop.contact.background))
