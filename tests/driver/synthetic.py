@@ -163,8 +163,8 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
         steps=(),
         warnings=(),
         contact=Contact(
-            touch, release, touch, release, 1500.0, (0, len(time)), force, np.zeros(len(time)),
-            gate, offset, (before, after),
+            touch, release, touch, release, 1500.0, (0, len(time)), force,
+            (np.zeros(1), np.zeros(1)), gate, offset, (before, after),
             Background((np.zeros(1), np.ones(1)), np.zeros(1), draws, 1500.0), rate,
         ),
     )  # fmt: skip

@@ -151,10 +151,10 @@ def test_noise_of_the_quiet_is_that_outside_the_gate() -> None:
 @pytest.mark.parametrize(("drift", "hum"), [(2.9, 3.1), (3.1, 2.9), (-3.1, 0.0)])
 def test_drift_and_hum_are_told_from_three_deviations_on(drift: float, hum: float) -> None:
     one = make_drop(1.0, RATE).contact
-    under = np.zeros(len(one.removed))
-    under[slice(*one.gate)] = np.linspace(-2, 12, len(one.gated))
+    gate = np.array(one.gate) / RATE
+    under = (np.array([gate[0], gate[1] - 1 / RATE]), np.array([-2.0, 12.0]))
     known = SimpleNamespace(drift=(drift * 4, 4.0), hum=(60.0, hum * 0.5, 0.5))
-    steps = measured_drop._removed(replace(one, removed=under, background=known))  # type: ignore[arg-type] # noqa: SLF001
+    steps = measured_drop._removed(replace(one, removed_means=under, background=known))  # type: ignore[arg-type] # noqa: SLF001
     told = " ".join(steps)
     # The mean of what lies under the contact.
     assert "offset of 5 N" in told

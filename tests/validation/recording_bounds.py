@@ -212,7 +212,7 @@ def oracle_drop(  # noqa: PLR0913, PLR0917 - what is known of a recording
         peak,
         (first, last),
         clean[first:last],
-        np.zeros(last - first),
+        (np.zeros(1), np.zeros(1)),
         (first, last),
         covariance,
         (1.0, 1.0),

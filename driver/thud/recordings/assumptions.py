@@ -28,8 +28,10 @@ if TYPE_CHECKING:
 ASSUMED_FLAT = 1000.0
 # Effect on an octave above which an assumption is a warning, dB.
 MIN_WARNED = 0.1
-# Length of the spectrum of a pulse, in lengths of the pulse: the lowest band holds three lines.
+# Length of the spectrum of a pulse, in lengths of the pulse: the lowest band holds three lines; for
+# the peak, longer responses do not return to the beginning.
 PADDING = 16
+PEAK_PADDING = 2
 
 
 # Contributions of instruments that are not stated: rectangular distributions.
@@ -117,7 +119,7 @@ def with_assumptions(drop: Drop, config: Config) -> Drop:
     force, rate = drop.contact.gated, drop.sample_rate
     for gain in (_plate_gain([drop], config), _filter_gain([drop], config)):
         if gain is not None:
-            length = next_fast_len(PADDING * len(force), real=True)
+            length = next_fast_len(PEAK_PADDING * len(force), real=True)
             factor = gain(np.asarray(np.fft.rfftfreq(length, 1 / rate), dtype=np.float64))
             changed = np.fft.irfft(np.fft.rfft(force, length) * factor, length)[: len(force)]
             change = (

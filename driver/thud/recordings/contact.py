@@ -80,8 +80,10 @@ class Contact(Immutable):
     span : tuple of int
         First and stop index of `force` in the window: the gate and up to MAX_BACKGROUND on either
         side.
-    force, removed : ndarray, shape (span[1] - span[0],)
-        Force without background, N, and the removed background, N.
+    force : ndarray, shape (span[1] - span[0],)
+        Force without background, N.
+    removed_means : tuple of ndarray, shape (n_cell,)
+        Times of cells, and the removed background in them, N.
     gate : tuple of int
         First and stop index of the contact with its margins in the window.
     covariance : ndarray, shape (n_cell, n_cell)
@@ -101,7 +103,7 @@ class Contact(Immutable):
     peak: float
     span: tuple[int, int]
     force: NDArray[np.float64]
-    removed: NDArray[np.float64]
+    removed_means: tuple[NDArray[np.float64], NDArray[np.float64]]
     gate: tuple[int, int]
     covariance: NDArray[np.float64]
     background_lengths: tuple[float, float]
@@ -113,6 +115,11 @@ class Contact(Immutable):
         """Force within the gate, N."""
         first = self.span[0]
         return self.force[self.gate[0] - first : self.gate[1] - first]
+
+    @property
+    def removed(self) -> NDArray[np.float64]:
+        """Removed background, N, shape (span[1] - span[0],): linear between the cells."""
+        return np.interp(np.arange(*self.span) / self.sample_rate, *self.removed_means)
 
     @property
     def quantization_errors(self) -> NDArray[np.float64]:
@@ -236,10 +243,11 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
     # Cells outside the gate are five times as wide; the width in samples is proportional to `rate`.
     sides = [uniform_bounds(*side, 5 * rate) for side in ((span[0], gate[0]), (gate[1], span[1]))]
     cells = cells_between(np.unique(np.concatenate([*sides, inner])), rate, middle)
-    time = np.arange(*span) / rate - middle
-    removed = np.interp(time, (cells[0] + cells[1]) / 2, background.predict_mean(cells))
-    removed += edges.offset
-    corrected = force[slice(*span)] - removed
+    removed_means = (
+        (cells[0] + cells[1]) / 2 + middle,
+        background.predict_mean(cells) + edges.offset,
+    )
+    corrected = force[slice(*span)] - np.interp(np.arange(*span) / rate, *removed_means)
     start = span[0] / rate
     u0, u1 = _step_errors(background, corrected, rate, begin[0] - start, -end[0] - start)
     return Contact(
@@ -250,7 +258,7 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
         background.peak,
         span,
         corrected,
-        removed,
+        removed_means,
         gate,
         covariance,
         (before_stop / rate, (len(force) - after_start) / rate),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 
 # Number of draws of noise for its effect on the maximum.
 PEAK_DRAWS = 32
+# The length of this noise in samples is a multiple of this one.
+NOISE_LENGTH = 1024
 # Minimum rate of the force in which the peak is searched, Hz, and length of zeros on either side of
 # the contact for the interpolation to it, s. At this rate a peak of a 500 Hz ripple is 0.05 % of
 # the ripple too low at most.
@@ -285,14 +288,22 @@ def _peak(contact: Contact) -> Estimate:
     cell //= len(contact.gated)
     density, _ = contact.background.density(RECORDED_BAND)
     deviation = math.sqrt(density * contact.sample_rate / 2)
-    draws = np.random.default_rng(0).normal(scale=deviation, size=(PEAK_DRAWS, len(force)))
-    maxima = [_interpolated(force + noise, contact.sample_rate).max() for noise in draws]
-    bias = max(float(np.mean(maxima) - low.max()), 0.0)
+    # The low-pass is linear: that of noise is added to that of the force.
+    size = NOISE_LENGTH * math.ceil(len(force) / NOISE_LENGTH)
+    noise = deviation * _unit_noise(size, contact.sample_rate)[:, : len(low)]
+    bias = max(float((low + noise).max(axis=1).mean() - low.max()), 0.0)
     variance = density * min(RECORDED_BAND, contact.sample_rate / 2) + bias**2
     variance += (SAMPLE_ERROR * contact.peak) ** 2
     # The top stays within a step for some time: its error is that of the offset again.
     variance += contact.covariance[cell, cell] + 2 * contact.background.quantization.offset**2
     return Estimate(float(low.max()) - bias, math.sqrt(variance))
+
+
+@lru_cache(maxsize=4)
+def _unit_noise(count: int, rate: float) -> NDArray[np.float64]:
+    """Return draws of white noise of unit deviation, interpolated like a force of a length."""
+    draws = np.random.default_rng(0).normal(size=(PEAK_DRAWS, count))
+    return np.array([_interpolated(noise, rate) for noise in draws])
 
 
 def _interpolated(force: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
