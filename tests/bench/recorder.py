@@ -206,6 +206,7 @@ def record(condition: Condition, seed: int, folder: Path) -> tuple[list[Path], P
         tau, plate = chain.time_constant, condition.config.get("plate", {})
         config["plate"] = {
             "time_constant": STATIC if math.isinf(tau) else tau, "full_scale": chain.full_scale,
+            **({"share": chain.modes[0].share} if "f0" in plate and condition.told else {}),
             **({} if "f0" in plate or "flat_limit" not in KNOWN else {"flat_limit": FLAT}), **plate,
         }  # fmt: skip
     if condition.filter_told and "filter" in KNOWN:

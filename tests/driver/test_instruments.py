@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -203,6 +204,8 @@ def test_gain_of_two_is_six_decibels_in_every_band() -> None:
     [
         ({"filter": {"kind": "bessel", "order": 4}}, ("filter: cutoff", "missing")),
         ({"filter": {"order": 4}}, ("filter: kind", "missing")),
+        ({"filter": {"kind": "none", "order": 4}}, ("filter", "none", "order")),
+        ({"plate": {"linearity": [[500, 500]]}}, ("linearity", "two or more pairs")),
         ({"filter": {"kind": "elliptic"}}, ("filter: kind", "bessel")),
         ({"filter": {"kind": "bessel", "order": 40, "cutoff": 1e3}}, ("order", "1 to 12")),
         ({"plate": {"share": 0.4}}, ("plate: f0", "missing")),
@@ -220,3 +223,22 @@ def test_filter_below_the_bands_is_refused() -> None:
         measured(PULSE, filter=FilterConfig("butterworth", 6, 300.0))
     chain = Chain((Plate(1100.0, 8.0), RecorderFilter("bessel", 4, 900.0)))
     assert chain.highest == min(part.highest for part in chain.instruments)
+
+
+def test_share_that_is_not_stated_is_assumed_and_named() -> None:
+    half = Plate(1100.0, 8.0, share=0.5)
+    stated: dict[str, Any] = {"f0": 1100.0, "Q": 8.0, "f0_uncertainty": 0.001}
+    assumed = measured(felt(half), plate=PlateConfig(**stated))
+    known = measured(felt(half), plate=PlateConfig(**stated, share=0.5))
+    error = abs(float((assumed.levels() - known.levels())[-1]))
+    (text,) = [warning for warning in assumed.warnings if "share" in warning]
+    named = re.search(r"half of it ([\d.]+) dB", text)
+    assert named
+    assert float(named[1]) == pytest.approx(error, rel=0.1)
+    assert not any("share" in warning for warning in known.warnings)
+
+
+def test_limit_of_a_flat_plate_below_that_of_the_standard_is_a_warning() -> None:
+    for limit, warned in ((999.0, True), (1000.0, False)):
+        recording = measured(PULSE, plate=PlateConfig(flat_limit=limit))
+        assert any("asks for 1000 Hz" in text for text in recording.warnings) == warned

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -10,8 +10,12 @@ from conftest import naming
 
 import thud
 from thud.recordings.choice import parse_numbers
+from thud.recordings.config import Config
 from thud.recordings.drops import Search, search_drops
 from thud.recordings.signal import Signal
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 RATE = 8_000.0
 
@@ -77,8 +81,6 @@ def test_only_drops_are_drops(kind: str) -> None:
 
 def measured(**choice: Any) -> thud.Recording:  # noqa: ANN401
     """Return the recording of the three drops with a choice."""
-    from thud.recordings.config import Config
-
     _, force = three_drops()
     return thud.Recording.from_signals([Signal.from_array(force, RATE, "r")], Config(**choice))
 
@@ -101,9 +103,46 @@ def test_drops_are_chosen_by_number_and_time() -> None:
     assert any("drop 2 at 8.50 s was left out: touched" in step for step in left.steps)
 
 
+def test_bounce_is_no_drop_of_a_section_that_begins_before_it() -> None:
+    # The first bounce of the drop at 5 s lands at 5.72 s.
+    recording = measured(begin=5.4)
+    assert [round(drop.onset, 1) for drop in recording.drops] == [8.5, 12.0]
+    steps = " ".join(recording.steps)
+    assert "searched for drops from 5.4 s to the end only" in steps
+    assert "a bounce at 5.7" in steps
+
+
+@pytest.mark.parametrize("instant", [2.0, 8.507])
+def test_spike_of_one_sample_hides_no_drop(instant: float) -> None:
+    _, force = three_drops()
+    force[int(instant * RATE)] += 1e6
+    windows = search_drops(Signal.from_array(force, RATE, "record")).windows
+    assert [len(window.bounces) for window in windows] == [2, 2, 2]
+
+
+def test_drops_left_out_by_an_argument_join_those_of_the_configuration(tmp_path: Path) -> None:
+    _, force = three_drops()
+    np.savetxt(tmp_path / "drops.csv", force, header="Force (N)", comments="")
+    config = Config(sample_rate=RATE, leave_out={"3": "touched"})
+    recording = thud.read_recording(tmp_path / "drops.csv", config=config, leave_out={"1": "noise"})
+    assert [round(drop.onset, 1) for drop in recording.drops] == [8.5]
+
+
+def test_impossible_restitution_is_a_warning() -> None:
+    for scale, is_impossible in ((0.5, True), (1.0, False), (2.0, True)):
+        _, force = three_drops(bounces=0)
+        signal = Signal.from_array(scale * force, RATE, "r")
+        # The impulse is 19.1 N s: with 2.5 kg and 1 m the restitution is 0.68.
+        recording = thud.Recording.from_signals([signal], Config(mass=2.5, height=1.0))
+        found = any("impossible" in warning for warning in recording.warnings)
+        assert found == is_impossible
+
+
 @pytest.mark.parametrize(
     ("choice", "words"),
     [
+        ({"begin": 5.0, "end": 3.0}, ("from 5 to 3 s", "0 to 16 s")),
+        ({"begin": 500.0}, ("from 500", "16 s")),
         ({"drops": "1-"}, ("drops", "1-5, 8")),
         ({"drops": "0"}, ("drops", "from 1")),
         ({"drops": "5"}, ("drops", "no drop 5", "1 to 3")),

@@ -103,6 +103,8 @@ def _left_out(options: argparse.Namespace) -> dict[str, str]:
     numbers, reasons = options.leave_out or [], options.because or []
     if len(reasons) == 1:
         reasons *= len(numbers)
+    if reasons and not numbers:
+        refuse("--because is stated without --leave-out", "--leave-out 3")
     if len(reasons) != len(numbers):
         refuse("--leave-out: a drop is left out without a reason", '--because "touched"')
     return dict(zip(numbers, reasons, strict=True))

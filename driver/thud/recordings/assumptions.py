@@ -84,6 +84,12 @@ def assumption_warnings(drops: Sequence[Drop], config: Config) -> tuple[str, ...
             f"the force plate is flat within {100 * TOLERANCE:g} % up to {ASSUMED_FLAT:g} Hz "
             f"([plate]; {size(ASSUMED_PLATE)})"
         )
+    change = _share_effect(drops, config)
+    if change > MIN_WARNED:
+        assumed.append(
+            "the resonance has the whole static response of the plate ([plate] share; with half "
+            f"of it {change:.2f} dB at 500 Hz)"
+        )
     if config.filter is None:
         assumed.append(
             "the filter of the recorder is at a quarter of the sample rate or above "
@@ -91,26 +97,55 @@ def assumption_warnings(drops: Sequence[Drop], config: Config) -> tuple[str, ...
         )
     if assumed:
         result.append(f"not stated, and assumed for levels and peak: {'; '.join(assumed)}")
+    limit = _flat_limit(config)
+    if limit is not None and limit < ASSUMED_FLAT:
+        result.append(
+            f"force plate: it is flat up to {limit:g} Hz; the standard asks for {ASSUMED_FLAT:g} Hz"
+        )
     if plate is None and rings:
         result.append(
             "the resonance of the force plate is not stated: its estimated effect, "
             f"{size(ASSUMED_PLATE)}, is in the uncertainty"
         )
-    seen = [drop.plate_recorded for drop in drops]
-    if plate is not None and True not in seen:
-        change = PulseSpectra(drops).level_change(lambda f: np.abs(plate.response(f)))
-        if False in seen:
-            result.append(
-                f"the record does not show the stated resonance of {plate.frequency:.4g} Hz: its "
-                f"correction, {size(ASSUMED_PLATE)}, is in the uncertainty; check [plate]"
-            )
-        elif np.nanmax(np.abs(change)) > MIN_WARNED:
-            result.append(
-                f"the record neither shows nor excludes the stated resonance of "
-                f"{plate.frequency:.4g} Hz: its correction, {np.nanmax(np.abs(change)):.2f} dB at "
-                "500 Hz, depends on [plate] alone"
-            )
+    if plate is not None:
+        result += _plate_warnings(drops, plate, size(ASSUMED_PLATE))
     return tuple(result)
+
+
+def _plate_warnings(drops: Sequence[Drop], plate: Plate, effect: str) -> list[str]:
+    """Return a warning if a stated resonance is not, or not clearly, in the record."""
+    seen = [drop.plate_recorded for drop in drops]
+    if True in seen:
+        return []
+    if False in seen:
+        absent = (
+            f"the record does not show the stated resonance of {plate.frequency:.4g} Hz: its "
+            f"correction, {effect}, is in the uncertainty; check [plate]"
+        )
+        return [absent]
+    change = np.nanmax(
+        np.abs(PulseSpectra(drops).level_change(lambda f: np.abs(plate.response(f))))
+    )
+    unclear = (
+        f"the record neither shows nor excludes the stated resonance of {plate.frequency:.4g} Hz: "
+        f"its correction, {change:.2f} dB at 500 Hz, depends on [plate] alone"
+    )
+    return [unclear] if change > MIN_WARNED else []
+
+
+def _share_effect(drops: Sequence[Drop], config: Config) -> float:
+    """Return the change at 500 Hz, dB, if the mode had half of the static response, not all.
+
+    It is zero if the share is stated, or no resonance.
+    """
+    plate = config.resonance
+    if plate is None or config.plate is None or config.plate.share is not None:
+        return 0.0
+    half = replace(plate, share=0.5)
+    change = PulseSpectra(drops).level_change(
+        lambda f: np.abs(half.response(f) / plate.response(f))
+    )
+    return abs(float(change[-1]))
 
 
 def with_assumptions(drop: Drop, config: Config) -> Drop:

@@ -131,8 +131,18 @@ def drop_estimates(
 
 
 def check_restitution(drops: Sequence[Drop], conditions: DropConditions) -> tuple[str, ...]:
-    """Return a warning if impulse and bounces differ by more than their uncertainties."""
-    _, difference = average_restitution(drops, conditions)
+    """Return a warning if the restitution is impossible, or impulse and bounces differ by more.
+
+    They may differ by the expanded uncertainty of their difference.
+    """
+    mean, difference = average_restitution(drops, conditions)
+    outside = max(-mean.value, mean.value - 1)
+    if outside > 0 and outside > mean.expanded:
+        impossible = (
+            f"the restitution is {mean.value:.2f}, which is impossible: check mass, height, "
+            "calibration and sample rate"
+        )
+        return (impossible,)
     if not abs(difference.value) > difference.expanded:
         return ()
     mass = average_mass(drops, conditions)

@@ -70,8 +70,9 @@ class PlateConfig:
         Frequency, Hz, and quality factor of the first resonance, which will be corrected.
     f0_uncertainty : float or None
         Relative standard uncertainty of the frequency.
-    share : float
-        Share of this mode in the static response; 1 for a mass on a spring.
+    share : float or None
+        Share of this mode in the static response, 1 for a mass on a spring; assumed to be 1 if it
+        is not stated.
     flat_limit : float or None
         Frequency, Hz, up to which the response is flat within 2 %, if no resonance is stated.
     time_constant : float or None
@@ -85,7 +86,7 @@ class PlateConfig:
     f0: float | None = _key(partial(to_number, 1.0, 1e6))
     Q: float | None = _key(partial(to_number, 0.5, 1e6))
     f0_uncertainty: float | None = _key(partial(to_number, 0.0, 0.5))
-    share: float = _key(partial(to_number, 0.001, 1.0), 1.0)
+    share: float | None = _key(partial(to_number, 0.001, 1.0))
     flat_limit: float | None = _key(partial(to_number, 100.0, 1e6))
     time_constant: float | None = _key(partial(to_number, 1e-3, 1e9))
     full_scale: float | None = _key(partial(to_number, 1.0, 1e9))
@@ -133,6 +134,8 @@ def _filter(value: object, key: str) -> FilterConfig:
     require_keys(table, key, "kind")
     if table["kind"] != "none":
         require_keys(table, key, "order", "cutoff")
+    elif len(table) > 1:
+        refuse(f"{key}: kind = 'none' has an order or a cutoff", "kind alone, or another kind")
     return FilterConfig(**table)
 
 
@@ -314,7 +317,8 @@ class Config:
         plate = self.plate
         if plate is None or plate.f0 is None or plate.Q is None:
             return None
-        return Plate(plate.f0, plate.Q, plate.f0_uncertainty or 0.0, plate.share)
+        share = 1.0 if plate.share is None else plate.share
+        return Plate(plate.f0, plate.Q, plate.f0_uncertainty or 0.0, share)
 
     @property
     def recorder_filter(self) -> RecorderFilter | None:
@@ -349,11 +353,17 @@ class Config:
         """
         days = [dates.read_date(text) for text in ([self.date] if self.date else file_dates)]
         last = max((day.date().isoformat() for day in days if day), default="")
-        return [
+        result = [
             f"{item.name}: its calibration was due on {item.due}, before the measurement"
             for item in self.instruments
             if isinstance(item, Instrument) and item.due and item.due < last
         ]
+        if not last and any(isinstance(item, Instrument) and item.due for item in self.instruments):
+            result.append(
+                "the date of the measurement cannot be read: whether a calibration was due before "
+                "is not known"
+            )
+        return result
 
     @property
     def plate_checks(self) -> tuple[PlateCheck, ...]:

@@ -129,7 +129,9 @@ def to_linearity(value: object, key: str) -> tuple[tuple[float, float], ...]:
     """Return pairs of an applied and an indicated force, N."""
     pairs = value if isinstance(value, list | tuple) else []
     if len(pairs) < 2:  # noqa: PLR2004
-        refuse(f"{key} = {shown(value)} is not allowed", "[[applied, indicated], ...], N")
+        refuse(
+            f"{key} = {shown(value)} is not allowed", "two or more pairs [applied, indicated], N"
+        )
     return tuple(_pair(pair, key, "applied, indicated", 1e-3, 1e9) for pair in pairs)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import median_filter, uniform_filter1d
 from tqdm import tqdm
 
 from thud.base.checks import refuse
@@ -40,12 +40,16 @@ MARGIN = 2
 # distance. LENGTH: the farthest distance on the left, the length on the right.
 DISTANCE = 6
 LENGTH = 20
+# A cell is a spike if it is higher than its neighbors by this factor: contacts are longer.
+SPIKE = 3.0
 # Maximum gap within one pulse, in cells.
 MAX_GAP = 4
 # Minimum height of a pulse as a fraction of the highest one of a signal.
 MIN_HEIGHT = 0.03
 # Duration of a pulse above half its peak, s: contacts of balls and tyres last 12 to 40 ms.
 DURATIONS = (0.003, 0.06)
+# The search begins this long before a section, s, so that a bounce in it is not taken for a drop.
+LOOK_BACK = 1.5
 # A pulse is neither a drop nor its bounce, but a tap, a knock or a step, if its peak is below this
 # fraction of that of the highest drop, or of the previous contact; or if the medians of the forces
 # before and after it, over STEP cells each, differ by this fraction of its peak.
@@ -136,14 +140,20 @@ class Search:
 def search_drops(
     signal: Signal, begin: float = 0.0, end: float = math.inf, *, progress: bool = False
 ) -> Search:
-    """Return the drops in a signal between two times, s.
+    """Return the drops in a signal that begin between two times, s.
 
     The signal is read twice: in blocks for the search, then around each drop. Raise InputError if
-    there is no impact, or the rate is too low.
+    there is no impact, the section is empty, or the rate is too low.
     """
     rate, name = signal.sample_rate, signal.name
-    first_sample = min(int(begin * rate), signal.n_sample)
+    section = min(int(begin * rate), signal.n_sample)
+    first_sample = max(0, section - round(LOOK_BACK * rate))
     stop_sample = int(min(end * rate, signal.n_sample))
+    if not section < stop_sample:
+        refuse(
+            f"{name}: there are no samples from {begin:g} to {end:g} s",
+            f"times from 0 to {signal.n_sample / rate:.4g} s, the first one below the second",
+        )
     if not rate >= MIN_RATE:
         refuse(f"{name}: sample_rate = {rate:g} Hz is too low", f"at least {MIN_RATE:g} Hz")
     pulses: list[_Pulse] = []
@@ -160,9 +170,16 @@ def search_drops(
     highest = max((p.peak for p in pulses), default=0.0)
     pulses = [pulse for pulse in pulses if pulse.peak > MIN_HEIGHT * highest]
     drops, ignored = _assign_bounces(pulses, rate)
+    before = [pulse for drop in drops if drop.start < section for pulse in (drop, *drop.bounces)]
+    ignored += [
+        f"a bounce at {pulse.start / rate:.2f} s of an earlier drop"
+        for pulse in before
+        if section <= pulse.start
+    ]
+    drops = [drop for drop in drops if section <= drop.start]
     if not drops:
         refuse(f"{name}: no impact", "a pulse of 12 to 40 ms that rises above the noise")
-    windows = list(_windows(signal, drops, pulses, first_sample, stop_sample))
+    windows = list(_windows(signal, drops, pulses, section, stop_sample))
     return Search(windows, tuple(f"{text} is no drop" for text in ignored))
 
 
@@ -210,10 +227,19 @@ def _baseline(cells: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.interp(np.arange(n), middle, np.median(segments, axis=1))
 
 
+def _without_spikes(cells: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return cells of which single ones that are far above their neighbors have the median."""
+    middle = np.median(cells)
+    neighbors = median_filter(cells, 3, mode="nearest")
+    height = cells - middle
+    is_spike = (height > SPIKE * (neighbors - middle)) & (height > height.max() / 2)
+    return np.where(is_spike, neighbors, cells)
+
+
 def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]:
     """Return the pulses in cells; `first` is the first sample of the cells."""
     width = max(1, round(rate * CELL))
-    level = uniform_filter1d(cells, 3, mode="nearest") - _baseline(cells)
+    level = uniform_filter1d(_without_spikes(cells), 3, mode="nearest") - _baseline(cells)
     below = -level[level < 0]
     deviation = 1.4826 * float(np.median(below)) if below.size else 0.0
     highest = float(level.max(initial=0.0))

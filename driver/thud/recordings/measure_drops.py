@@ -69,6 +69,14 @@ class Origin:
         return replace(origin, steps=(*origin.steps, *notes))
 
 
+def _section(config: Config) -> tuple[str, ...]:
+    """Return a sentence on the section that was searched for drops, if it is not the whole file."""
+    if config.begin is None and config.end is None:
+        return ()
+    end = "the end" if config.end is None else f"{config.end:g} s"
+    return (f"searched for drops from {config.begin or 0:g} s to {end} only",)
+
+
 def measure_signals(
     signals: Iterable[Signal],
     config: Config,
@@ -109,7 +117,7 @@ def measure_signals(
             refuse_simultaneous_channels(search.windows, searched)
             searched.append((signal.path, search.windows))
             measured = _measure(windows, config, stored, processes, progress=progress)
-            notes = (*search.ignored, *left_out)
+            notes = (*_section(config), *search.ignored, *left_out)
             records.append(Record(signal.name, signal.path, signal.checksum, tuple(measured)))
             uncertainties.append(signal.calibration_uncertainty)
             origins.append(Origin.of(signal, len(windows), notes))

@@ -99,6 +99,12 @@ def check_peak(extremes: Extremes, scale: float, name: str, *, assumed: bool) ->
     allowed = f"{low:g} to {high:g} N for heavy/soft sources"
     if assumed and not low <= peak <= high:
         refuse(f"{name}: the values are without a unit and reach {peak:.4g}", f"{allowed}, or unit")
+    if not low <= peak <= high and low <= opposite_peak <= high:
+        refuse(
+            f"{name}: the peaks are {-opposite_peak:.4g} N and {peak:.4g} N; the polarity is "
+            "probably wrong",
+            allowed,
+        )
     for ratio, cause in ((THOUSAND, "kN instead of N"), (1 / THOUSAND, "mN instead of N")):
         if low <= peak * ratio <= high:
             refuse(

@@ -105,6 +105,8 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     # Either choice of channels overrides both of the configuration.
     if stated.keys() & {"channel", "channels"}:
         settings = replace(settings, channel=None, channels=None)
+    if leave_out:
+        stated["leave_out"] = {**settings.leave_out, **leave_out}
     settings = replace(settings, **stated)
     files = [paths] if isinstance(paths, str | os.PathLike) else paths
     signals = (
