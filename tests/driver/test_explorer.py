@@ -22,6 +22,7 @@ import scipy.io
 import uvicorn
 from conftest import REPOSITORY, naming
 from starlette.testclient import TestClient
+from synthetic import half_sine
 
 import thud
 from thud import cli
@@ -220,6 +221,54 @@ def test_recording_of_a_ball_that_is_not_known_is_shown(client: TestClient) -> N
     warnings = report["answer"]["warnings"]
     # The page puts the name before them.
     assert any("ring" in warning for warning in warnings)
+
+
+def table_of(force: np.ndarray, rate: float) -> bytes:
+    """Return a recording as a table of text."""
+    text = io.StringIO()
+    time = np.arange(len(force)) / rate
+    np.savetxt(
+        text, np.column_stack([time, force]), "%.9g", ",", header="time_s,force_N", comments=""
+    )
+    return text.getvalue().encode()
+
+
+def test_drawn_force_of_a_recording_is_low_passed(client: TestClient) -> None:
+    rate, start = 48000.0, 0.3
+    pulse = half_sine(rate, start, round(0.6 * rate))
+    # A ripple of 10 % above the cutoff.
+    ripple = 0.1 * pulse * np.sin(2 * np.pi * 4000.0 * np.arange(len(pulse)) / rate)
+    noise = np.random.default_rng(1).normal(scale=0.5, size=len(pulse))
+    content = table_of(pulse + ripple + noise, rate)
+    answer = last_report(client, "/measure", params={"name": "a.csv"}, content=content)["answer"]
+    time, value = (np.array(answer["force"][key]) for key in ("time", "value"))
+    expected = np.interp(1e-3 * time + start, np.arange(len(pulse)) / rate, pulse)
+    inside = (time > 2) & (time < 18)
+    # The ripple has an amplitude of 150 N.
+    assert abs(value - expected)[inside].max() < 10
+
+
+def test_values_of_a_recording_have_the_digits_of_their_uncertainty(client: TestClient) -> None:
+    query = {"name": "a.wav", "height": 1, "mass": 2.5, "calibration": CALIBRATION}
+    answer = last_report(client, "/measure", params=query, content=WAV)["answer"]
+    recording = thud.read_recording(
+        REPOSITORY / "inputs/recordings/drop_1.wav", height=1, mass=2.5, calibration=CALIBRATION
+    )
+    stated = 0
+    for entry, criterion in zip(answer["criteria"], recording.assess().criteria, strict=True):
+        if entry["uncertainty"] is None:
+            continue
+        stated += 1
+        value = entry["value_text"].replace("−", "-")
+        expanded = entry["uncertainty_text"]
+        assert len(expanded.replace(".", "").lstrip("0")) == 2
+        decimals = len(expanded.partition(".")[2])
+        assert decimals == len(value.partition(".")[2])
+        scale = 1e3 if criterion.unit == "s" else 1.0
+        assert float(value) == pytest.approx(scale * criterion.value, abs=0.51 * 10.0**-decimals)
+        expected = scale * criterion.estimate.expanded
+        assert float(expanded) == pytest.approx(expected, abs=0.51 * 10.0**-decimals)
+    assert stated >= 6
 
 
 @pytest.mark.parametrize("name", ["../../etc/passwd.wav", "x.exe", "a\0b.wav", "", "x" * 5000])

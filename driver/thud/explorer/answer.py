@@ -25,6 +25,8 @@ from thud.plot.impact_figures import contact_force
 from thud.plot.style import FORCE_NAMES
 from thud.recordings.config import config_from
 from thud.recordings.read_recording import read_recording
+from thud.report.contents import criteria_data
+from thud.report.rows import expanded_text, value_text
 from thud.studies.model_assessment import assess_impact
 
 if TYPE_CHECKING:
@@ -115,14 +117,13 @@ def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answe
     try:
         config = config_from(settings.get("config", {}))
         recording = read_recording(path, **{**settings, "config": config})
-        drop = recording.drop_force()
-        times, force = drop.time, drop.force
-        contact = (times >= 0) & (times <= TIME_RANGE * recording.contact_time)
-        curve = 1e3 * times[contact], 1e-3 * force[contact]
-        answer = _answer(recording, *curve)
+        answer = _answer(recording, *contact_force(recording, "floor"))
     except ThudError as error:
         # The message names the original file instead of the copy.
         raise type(error)(str(error).replace(path, shown(name))) from error
+    for entry, row in zip(answer["criteria"], criteria_data(recording), strict=True):
+        entry["value_text"] = value_text(row)
+        entry["uncertainty_text"] = expanded_text(row)
     answer["seconds"] = time.perf_counter() - start
     answer["drops"] = len(recording.drops)
     copy = Path(path).name
