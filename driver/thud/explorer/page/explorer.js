@@ -1,5 +1,5 @@
 // Main module of the page: sends the values of the form to the server and shows the latest answer.
-import { build, caseValues, describeChanges, isCase, markField, startWith, state, titleOf } from "./form.js";
+import { build, buildRecording, caseValues, describeChanges, isCase, markField, startWith, state, titleOf } from "./form.js";
 import { byId, element } from "./page.js";
 import { listenToBall } from "./ball.js";
 import { ConnectionError, ServerError, ask, follow, linkedCase, storeToken } from "./request.js";
@@ -188,6 +188,7 @@ async function begin() {
     about = await (await ask("about")).json();
   } catch (error) { return showMessage(error.message); }
   state.form = about.form;
+  buildRecording(about.recording);
   let start = about.start;
   try { start = JSON.parse(linkedCase()) ?? start; } catch { start = null; }
   const isValid = isCase(start);
