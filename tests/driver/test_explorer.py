@@ -22,6 +22,7 @@ import scipy.io
 import uvicorn
 from conftest import REPOSITORY, naming
 from starlette.testclient import TestClient
+from synthetic import half_sine
 
 import thud
 from thud import cli
@@ -220,6 +221,131 @@ def test_recording_of_a_ball_that_is_not_known_is_shown(client: TestClient) -> N
     warnings = report["answer"]["warnings"]
     # The page puts the name before them.
     assert any("ring" in warning for warning in warnings)
+
+
+def table_of(force: np.ndarray, rate: float) -> bytes:
+    """Return a recording as a table of text."""
+    text = io.StringIO()
+    time = np.arange(len(force)) / rate
+    np.savetxt(
+        text, np.column_stack([time, force]), "%.9g", ",", header="time_s,force_N", comments=""
+    )
+    return text.getvalue().encode()
+
+
+def test_drawn_force_of_a_recording_is_low_passed(client: TestClient) -> None:
+    rate, start = 48000.0, 0.3
+    pulse = half_sine(rate, start, round(0.6 * rate))
+    # A ripple of 10 % above the cutoff.
+    ripple = 0.1 * pulse * np.sin(2 * np.pi * 4000.0 * np.arange(len(pulse)) / rate)
+    noise = np.random.default_rng(1).normal(scale=0.5, size=len(pulse))
+    content = table_of(pulse + ripple + noise, rate)
+    answer = last_report(client, "/measure", params={"name": "a.csv"}, content=content)["answer"]
+    time, value = (np.array(answer["force"][key]) for key in ("time", "value"))
+    expected = np.interp(1e-3 * time + start, np.arange(len(pulse)) / rate, pulse)
+    inside = (time > 2) & (time < 18)
+    # The ripple has an amplitude of 150 N.
+    assert abs(value - expected)[inside].max() < 10
+
+
+def test_values_of_a_recording_have_the_digits_of_their_uncertainty(client: TestClient) -> None:
+    query = {"name": "a.wav", "height": 1, "mass": 2.5, "calibration": CALIBRATION}
+    answer = last_report(client, "/measure", params=query, content=WAV)["answer"]
+    recording = thud.read_recording(
+        REPOSITORY / "inputs/recordings/drop_1.wav", height=1, mass=2.5, calibration=CALIBRATION
+    )
+    stated = 0
+    for entry, criterion in zip(answer["criteria"], recording.assess().criteria, strict=True):
+        if entry["uncertainty"] is None:
+            continue
+        stated += 1
+        value = entry["value_text"].replace("−", "-")
+        expanded = entry["uncertainty_text"]
+        assert len(expanded.replace(".", "").lstrip("0")) == 2
+        decimals = len(expanded.partition(".")[2])
+        assert decimals == len(value.partition(".")[2])
+        scale = 1e3 if criterion.unit == "s" else 1.0
+        assert float(value) == pytest.approx(scale * criterion.value, abs=0.51 * 10.0**-decimals)
+        expected = scale * criterion.estimate.expanded
+        assert float(expanded) == pytest.approx(expected, abs=0.51 * 10.0**-decimals)
+    assert stated >= 6
+
+
+def test_uncertainties_of_the_fields_are_counted(client: TestClient) -> None:
+    query = {"name": "a.wav", "height": 1, "mass": 2.5, "calibration": CALIBRATION}
+    bare = last_report(client, "/measure", params=query, content=WAV)["answer"]
+    query |= {
+        "calibration_uncertainty": 5, "mass_uncertainty": 0.002, "height_uncertainty": 0.003,
+    }  # fmt: skip
+    answer = last_report(client, "/measure", params=query, content=WAV)["answer"]
+    before, after = (
+        {entry["name"]: entry["uncertainty"] for entry in found["criteria"]}
+        for found in (bare, answer)
+    )
+    # 95 % of a normal distribution; 5 % of a force are 0.43 dB of its level.
+    assert after["mass"] == pytest.approx(1.96 * 0.002, rel=1e-3)
+    assert after["drop height"] == pytest.approx(1.96 * 0.003, rel=1e-3)
+    level = 1.96 * 20 * np.log10(np.e) * 0.05
+    assert after["31.5 Hz"] == pytest.approx(np.hypot(before["31.5 Hz"], level), rel=0.02)
+    not_stated = [[w for w in found["warnings"] if "not included" in w] for found in (bare, answer)]
+    assert [len(found) for found in not_stated] == [1, 0]
+
+
+@pytest.mark.parametrize(
+    ("query", "words"),
+    [
+        ({}, "'ball 1.wav': enter a calibration"),
+        ({"filter_order": "4"}, "“Filter of the recorder” is not chosen; allowed: flat, Bessel"),
+        (
+            {"filter_kind": "bessel", "filter_order": "4"},
+            "“Cutoff of the filter (−3 dB), Hz” is mis",
+        ),
+        ({"filter_kind": "bessel", "filter_order": "4.5"}, "“Order of the filter” = 4.5 is not"),
+        ({"plate_f0": "1500"}, "“Quality factor of the force plate” is missing"),
+        ({"height": "-1"}, "“Drop height, m” = -1 is not allowed; allowed: 0.001 to 100"),
+        ({"height": "high"}, "“Drop height, m” = 'high' is not a number"),
+        ({"calibration": "much"}, "“Calibration”: 'much' is not a number with units"),
+        ({"unit": "stone"}, "“Unit of the values” = 'stone' is not known"),
+        (
+            {"calibration_uncertainty": "60"},
+            "“Uncertainty of the calibration, %” = 60 is not allowed; allowed: 0 to 50",
+        ),
+        (
+            {"channel": "1", "channels": "sum"},
+            "both “Channel” and “Load cells to be added” are stated",
+        ),
+        (
+            {"channel": "9", "calibration": "1 N/FS"},
+            "'ball 1.wav': “Channel” = 9 matches 0 channels",
+        ),
+        ({"drops": "7", "calibration": CALIBRATION}, "“Drops”: there is no drop 7"),
+    ],
+)
+def test_messages_on_a_recording_name_its_fields_and_its_file(
+    client: TestClient, query: dict[str, str], words: str
+) -> None:
+    response = client.post("/measure", params={"name": "ball 1.wav"} | query, content=WAV)
+    is_begun = response.status_code == 200
+    message = json.loads(response.text.splitlines()[-1])["error"] if is_begun else response.text
+    assert words in message
+    assert "recording.wav" not in message
+
+
+def test_load_cells_are_named_like_the_fields(client: TestClient) -> None:
+    pulse = half_sine(48000.0, 0.3, round(0.6 * 48000))
+    noise = np.random.default_rng(1).normal(scale=0.5, size=(2, len(pulse)))
+    time = np.arange(len(pulse)) / 48000
+    text = io.StringIO()
+    cells = np.column_stack([time, *(pulse / 2 + noise)])
+    np.savetxt(text, cells, "%.9g", ",", header="time_s,F1_N,F2_N", comments="")
+    content = text.getvalue().encode()
+    report = last_report(client, "/measure", params={"name": "cells.csv"}, content=content)
+    assert "“Load cells to be added” =" in report["error"]
+    assert "or “Channel” = the force" in report["error"]
+    query = {"name": "cells.csv", "channels": "sum"}
+    warnings = last_report(client, "/measure", params=query, content=content)["answer"]["warnings"]
+    assert warnings
+    assert not any("[" in warning or "recording.csv" in warning for warning in warnings)
 
 
 @pytest.mark.parametrize("name", ["../../etc/passwd.wav", "x.exe", "a\0b.wav", "", "x" * 5000])

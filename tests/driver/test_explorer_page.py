@@ -131,12 +131,13 @@ def test_recording_on_the_page_is_assessed(browser: Browser, server: Served) -> 
     found.locator("button").click()
     sync_api.expect(page.locator("#variants")).to_be_hidden()
     # What the file does not say of plate and filter.
+    page.locator("summary", has_text="Standard uncertainties").click()
     for key, value in (("plate_f0", "1100"), ("plate_Q", "25"), ("filter_cutoff", "5e3")):
         page.locator(f"#recording_{key}").fill(value)
     page.locator("#recording_filter_kind").select_option("bessel")
     page.locator("#file").set_input_files(RECORDING)
     message = page.locator("#message")
-    sync_api.expect(message).to_contain_text("filter: order is missing", timeout=60_000)
+    sync_api.expect(message).to_contain_text("“Order of the filter” is missing", timeout=60_000)
     page.locator("#recording_filter_order").fill("4")
     page.locator("#file").set_input_files(RECORDING)
     sync_api.expect(found).to_be_visible(timeout=60_000)
@@ -152,6 +153,46 @@ def test_recording_on_the_page_is_assessed(browser: Browser, server: Served) -> 
     sync_api.expect(found).to_be_visible(timeout=60_000)
     page.evaluate(drop, [b64encode(b"no record").decode(), "<b>note</b>.wav"])
     sync_api.expect(page.locator("#message")).to_contain_text("<b>note</b>.wav", timeout=60_000)
+
+
+def test_recording_measured_again_is_numbered_and_the_table_fits(
+    browser: Browser, server: Served
+) -> None:
+    page = new_page(browser, server[0], 1300)
+    # By keyboard and label only.
+    page.locator("summary", has_text="Recording").press("Enter")
+    page.get_by_label("Calibration, such as").fill("2000 N/FS")
+    page.get_by_label("Drop height, m", exact=True).fill("1")
+    page.locator("summary", has_text="Standard uncertainties").press("Enter")
+    for label, value in (("calibration, %", "0.5"), ("drop height, m", "0.002")):
+        page.get_by_label(f"Uncertainty of the {label}").fill(value)
+    variants = page.locator("#variants li")
+    for count in (2, 3, 4):
+        page.locator("#file").set_input_files(RECORDING)
+        sync_api.expect(variants).to_have_count(count, timeout=60_000)
+    names = variants.locator("b")
+    first = " drop_1.wav, 1 drop"
+    sync_api.expect(names).to_have_text(["Hollow sphere", first, f"{first} (2)", f"{first} (3)"])
+    # A number that is free again is used again.
+    page.get_by_label("Remove drop_1.wav, 1 drop (2)").press("Enter")
+    page.get_by_label("Remove drop_1.wav, 1 drop (3)").press("Enter")
+    sync_api.expect(names).to_have_text(["Hollow sphere", first])
+    page.locator("#file").set_input_files(RECORDING)
+    sync_api.expect(names).to_have_text(["Hollow sphere", first, f"{first} (2)"], timeout=60_000)
+    height = page.locator("#criteria tbody tr", has_text="Drop height")
+    sync_api.expect(height).to_contain_text("1.0000 ± 0.0039")
+    table = page.get_by_label("Table of criteria")
+    assert table.evaluate("box => box.scrollWidth <= box.clientWidth")
+    # On a phone the table scrolls, by keyboard too, and a shadow shows it.
+    page.set_viewport_size({"width": 390, "height": 900})
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    assert table.evaluate("box => box.scrollWidth > box.clientWidth")
+    assert "gradient" in table.evaluate("box => getComputedStyle(box).backgroundImage")
+    table.press("ArrowRight")
+    page.wait_for_timeout(500)
+    assert table.evaluate("box => box.scrollLeft") > 0
+    whole = "spans => spans.every((span) => span.getClientRects().length === 1)"
+    assert page.locator("#criteria .value span").evaluate_all(whole)
 
 
 def test_recording_is_seen_and_cancelled_before_the_server_answers(
@@ -290,6 +331,8 @@ def test_page_is_accessible(
     page.locator("#pin").click()
     page.locator("#has_room").check()
     sync_api.expect(page.locator("#room_text")).to_contain_text("standardized")
+    page.locator("summary", has_text="Recording").click()
+    page.locator("summary", has_text="Standard uncertainties").click()
     page.screenshot(path=tmp_path / "page.png", full_page=True)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     found = axe.Axe().run(page).response["violations"]

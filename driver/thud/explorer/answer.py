@@ -15,6 +15,7 @@ from thud.base.checks import refuse, shown
 from thud.base.errors import ThudError
 from thud.case.case import tables_case
 from thud.case.keys import humanize
+from thud.explorer.recording_fields import name_fields
 from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
 from thud.impact.ensemble import get_cost
@@ -25,6 +26,8 @@ from thud.plot.impact_figures import contact_force
 from thud.plot.style import FORCE_NAMES
 from thud.recordings.config import config_from
 from thud.recordings.read_recording import read_recording
+from thud.report.contents import criteria_data
+from thud.report.rows import expanded_text, value_text
 from thud.studies.model_assessment import assess_impact
 
 if TYPE_CHECKING:
@@ -105,30 +108,30 @@ def answer_case(case: Case) -> Answer:
     return answer
 
 
-def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answer:
+def answer_recording(path: str, name: str, config: Mapping[str, object]) -> Answer:
     """Return the answer of a recording.
 
-    `path` is a copy of the file, `name` the name of the original file, and `settings` are keyword
-    arguments of `read_recording`, with a table for `config`.
+    `path` is a copy of the file, `name` the name of the original file, and `config` a table of the
+    configuration.
     """
     start = time.perf_counter()
+    copy = Path(path).name
     try:
-        config = config_from(settings.get("config", {}))
-        recording = read_recording(path, **{**settings, "config": config})
-        drop = recording.drop_force()
-        times, force = drop.time, drop.force
-        contact = (times >= 0) & (times <= TIME_RANGE * recording.contact_time)
-        curve = 1e3 * times[contact], 1e-3 * force[contact]
-        answer = _answer(recording, *curve)
+        recording = read_recording(path, config=config_from(config))
+        answer = _answer(recording, *contact_force(recording, "floor"))
     except ThudError as error:
         # The message names the original file instead of the copy.
-        raise type(error)(str(error).replace(path, shown(name))) from error
+        message = name_fields(str(error)).replace(path, copy).replace(copy, shown(name))
+        raise type(error)(message) from error
+    for entry, row in zip(answer["criteria"], criteria_data(recording), strict=True):
+        entry["value_text"] = value_text(row)
+        entry["uncertainty_text"] = expanded_text(row)
     answer["seconds"] = time.perf_counter() - start
     answer["drops"] = len(recording.drops)
-    copy = Path(path).name
     # The page shows the name of the recording next to its warnings.
     answer["warnings"] += [
-        warning.removeprefix(f"{copy}: ").replace(copy, name) for warning in recording.warnings
+        name_fields(warning.removeprefix(f"{copy}: ")).replace(copy, name)
+        for warning in recording.warnings
     ]
     return answer
 

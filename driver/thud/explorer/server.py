@@ -20,12 +20,12 @@ from starlette.responses import JSONResponse, PlainTextResponse, Response, Strea
 from starlette.routing import Route
 
 from thud.base.bridge import version
-from thud.base.checks import refuse, shown
+from thud.base.checks import refuse
 from thud.case.case import read_case
 from thud.explorer.downloads import DOWNLOADS
 from thud.explorer.form import form
 from thud.explorer.jobs import INPUT_ERRORS, Jobs
-from thud.recordings.channel import channel_of
+from thud.explorer.recording_fields import recording_form, recording_table
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Mapping
@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 
     Endpoint = Callable[[Request], Awaitable[Response]]
 
-# Keys of tables of the configuration of a recording that the page has.
-TABLES = {"plate": ("f0", "Q", "flat_limit"), "filter": ("kind", "order", "cutoff")}
 # Maximum size of a case and of a recording, bytes.
 MAX_CASE = 100_000
 MAX_RECORDING = 200_000_000
@@ -112,6 +110,7 @@ def new_application(
     )
     application.state.about = {
         "form": form(),
+        "recording": recording_form(),
         "version": version(),
         "start": start,
         "max_recording": MAX_RECORDING,
@@ -146,16 +145,7 @@ async def _solve(request: Request) -> Response:
 
 async def _measure(request: Request) -> Response:
     query = dict(request.query_params)
-    settings: dict[str, Any] = {
-        key: _number(key, query[key]) for key in ("height", "mass") if key in query
-    }
-    texts = ("calibration", "unit", "channels", "drops")
-    settings |= {key: query[key] for key in texts if key in query}
-    settings["config"] = {
-        table: values for table, keys in TABLES.items() if (values := _table(query, table, keys))
-    }
-    if "channel" in query:
-        settings["channel"] = channel_of(query["channel"])
+    config = recording_table(query)
     name = query.get("name", "recording.wav")
     ending = "".join(c for c in Path(name).suffix if c.isascii() and c.isalnum())[:8]
     state = request.app.state
@@ -165,16 +155,8 @@ async def _measure(request: Request) -> Response:
         async with await anyio.open_file(path, "wb") as copy:
             async for chunk in _body(request, MAX_RECORDING):
                 await copy.write(chunk)
-        reports = state.slow.run("recording", str(path), name, settings)
+        reports = state.slow.run("recording", str(path), name, config)
         return _Reports(reports, stack.pop_all())
-
-
-def _table(query: Mapping[str, str], table: str, keys: tuple[str, ...]) -> dict[str, Any]:
-    """Return the stated keys of a table of the configuration of a recording."""
-    stated = {key: query[f"{table}_{key}"] for key in keys if f"{table}_{key}" in query}
-    numbers = {key: _number(f"{table}: {key}", stated[key]) for key in stated if key != "kind"}
-    whole = {key: int(value) for key, value in numbers.items() if key == "order" and value % 1 == 0}
-    return stated | numbers | whole
 
 
 async def _download(request: Request) -> Response:
@@ -245,13 +227,6 @@ class _Reports(StreamingResponse):
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         async with self._stack:
             await super().__call__(scope, receive, send)
-
-
-def _number(key: str, text: str) -> float:
-    try:
-        return float(text)
-    except ValueError as error:
-        refuse(f"{key} = {shown(text)} is not a number", "a number", error)
 
 
 async def _body(request: Request, max_length: int) -> AsyncIterator[bytes]:

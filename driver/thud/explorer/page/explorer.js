@@ -1,5 +1,5 @@
 // Main module of the page: sends the values of the form to the server and shows the latest answer.
-import { build, caseValues, describeChanges, isCase, markField, startWith, state, titleOf } from "./form.js";
+import { build, buildRecording, caseValues, describeChanges, isCase, markField, startWith, state, titleOf } from "./form.js";
 import { byId, element } from "./page.js";
 import { listenToBall } from "./ball.js";
 import { ConnectionError, ServerError, ask, follow, linkedCase, storeToken } from "./request.js";
@@ -95,6 +95,14 @@ function onChange() {
   timer = setTimeout(solve, PAUSE);
 }
 
+/** Return a name that no variant has, with a number if needed. */
+function newName(name) {
+  const isUsed = (text) => pinned.some((variant) => variant.name === text);
+  let [text, number] = [name, 1];
+  while (isUsed(text)) text = `${name} (${number += 1})`;
+  return text;
+}
+
 async function measure(file) {
   if (file.size > about.max_recording) return showMessage(`${file.name} is larger than ${about.max_recording / 1e6} MB; allowed: less`);
   const query = new URLSearchParams({ name: file.name });
@@ -104,7 +112,7 @@ async function measure(file) {
   try {
     const answer = await runTask(`Measuring ${file.name}`, `measure?${query}`, file, new AbortController(), { showNow: true });
     hideMessage();
-    const name = `${file.name}, ${answer.drops} drop${answer.drops === 1 ? "" : "s"}`;
+    const name = newName(`${file.name}, ${answer.drops} drop${answer.drops === 1 ? "" : "s"}`);
     pinned.push({ name, short: name, description: answer.verdict, answer, pinned: true });
     refresh();
   } catch (error) { showError(error); }
@@ -188,6 +196,7 @@ async function begin() {
     about = await (await ask("about")).json();
   } catch (error) { return showMessage(error.message); }
   state.form = about.form;
+  buildRecording(about.recording);
   let start = about.start;
   try { start = JSON.parse(linkedCase()) ?? start; } catch { start = null; }
   const isValid = isCase(start);

@@ -185,6 +185,21 @@ function sliderInput(field, value, onMove) {
   return slider;
 }
 
+/** Build the fields of what the file of a recording does not state. */
+export function buildRecording(fields) {
+  const elements = (folded) => fields.filter((field) => field.folded === folded).map(recordingField);
+  byId("fields_of_recording").replaceChildren(...elements(false),
+    element("details", {}, element("summary", {}, "Standard uncertainties, force plate and filter"), ...elements(true)));
+}
+
+function recordingField({ name, label, kind, hint, choices }) {
+  const id = `recording_${name}`;
+  const options = Object.entries({ "": "not known", ...choices }).map(([value, text]) => element("option", { value }, text));
+  const isNumber = kind === "number";
+  const input = kind === "choice" ? element("select", { id }, ...options) : element("input", { id, type: kind, step: isNumber && "any", min: isNumber && "0" });
+  return element("div", { class: "field" }, element("label", { for: id }, label + hint), input);
+}
+
 /** Mark only the field that is named in a message of the server as invalid. */
 export function markField(message) {
   for (const input of document.querySelectorAll("#form [aria-invalid=true]")) input.setAttribute("aria-invalid", "false");

@@ -78,8 +78,12 @@ function summarize({ name, answer }) {
 
 function showCriteria(variants) {
   const cell = (criterion) => {
-    const value = element("td", { class: criterion.verdict === "conforms" ? "conforms" : "fails" }, rounded(criterion.value, criterion.unit).replace(criterion.unit && ` ${criterion.unit}`, ""));
-    if (criterion.uncertainty) value.append(element("span", { title: criterion.uncertainty_name }, ` ± ${Number(criterion.uncertainty.toPrecision(2))}`));
+    const text = criterion.value_text ?? rounded(criterion.value, criterion.unit).replace(criterion.unit && ` ${criterion.unit}`, "");
+    const value = element("td", { class: `value ${criterion.verdict === "conforms" ? "conforms" : "fails"}` }, text);
+    if (criterion.uncertainty) {
+      const uncertainty = criterion.uncertainty_text ?? Number(criterion.uncertainty.toPrecision(2));
+      value.append(" ", element("span", { title: criterion.uncertainty_name }, `± ${uncertainty}`));
+    }
     if (criterion.range) value.append(element("small", {}, ` (${criterion.range})`));
     const exact = criterion.lower === criterion.upper || criterion.value === null;
     return [value, element("td", { class: "margin" }, exact ? "" : signed(margin(criterion), criterion.unit), " ", missedSide(criterion))];

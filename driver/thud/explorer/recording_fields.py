@@ -1,0 +1,151 @@
+"""Form fields of a recording: what its file does not state."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from thud.base.checks import refuse, shown
+from thud.recordings.channel import channel_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    Table = dict[str, Any]
+
+# Tables of a configuration; the names of their fields begin with that of the table.
+TABLES = ("plate", "filter")
+PERCENT = "%"
+
+
+@dataclass(frozen=True)
+class Field:
+    """Form field of a key of the configuration of a recording.
+
+    Attributes
+    ----------
+    name : str
+        Name of the key, after that of its table and an underscore if it has one.
+    label : str
+        Name of the field on the page and in messages, with its unit.
+    kind : str
+        ``"text"``, ``"number"`` or ``"choice"``.
+    unit : str
+        Unit of a number: that of the key, or ``"%"`` for a fraction.
+    hint : str
+        Rest of the label, such as an example.
+    choices : mapping
+        Texts of the allowed values, if they are a choice.
+    folded : bool
+        Whether the field is among those that are folded away.
+    """
+
+    name: str
+    label: str
+    kind: str = "number"
+    unit: str = ""
+    hint: str = ""
+    choices: Mapping[str, str] = field(default_factory=dict)
+    folded: bool = False
+
+    @property
+    def quoted(self) -> str:
+        """Name of the field in a message."""
+        return f"“{self.label}”"
+
+    @property
+    def path(self) -> tuple[str, str]:
+        """Name of the table, empty if the key is in none, and name of the key."""
+        table, _, key = self.name.partition("_")
+        return (table, key) if table in TABLES else ("", self.name)
+
+    def value(self, text: str) -> object:
+        """Return the value of the key; raise InputError for a text that is not a number."""
+        if self.name == "channel":
+            return channel_of(text)
+        if self.kind != "number":
+            return text
+        try:
+            number = float(text)
+        except ValueError as error:
+            refuse(f"{self.quoted} = {shown(text)} is not a number", "a number", error)
+        if self.unit == PERCENT:
+            return number / 100
+        return int(number) if number.is_integer() else number
+
+
+FILTERS = {"none": "flat", "bessel": "Bessel", "butterworth": "Butterworth"}
+FIELDS = (
+    Field("height", "Drop height, m"),
+    Field("mass", "Mass, kg"),
+    Field("calibration", "Calibration", "text", hint=", such as 250 N/V"),
+    Field("unit", "Unit of the values", "text", hint=", such as kN"),
+    Field("channel", "Channel", "text", hint=", by number or name"),
+    Field("channels", "Load cells to be added", "text", hint=", such as F1+F2+F3+F4, or sum"),
+    Field("drops", "Drops", "text", hint=", such as 1-5 (all)"),
+    Field("height_uncertainty", "Uncertainty of the drop height, m", folded=True),
+    Field("mass_uncertainty", "Uncertainty of the mass, kg", folded=True),
+    Field(
+        "calibration_uncertainty", "Uncertainty of the calibration, %",
+        unit=PERCENT, folded=True,
+    ),
+    Field("plate_f0", "First resonance of the force plate, Hz", folded=True),
+    Field("plate_Q", "Quality factor of the force plate", folded=True),
+    Field("plate_flat_limit", "Force plate flat within 2 % up to, Hz", folded=True),
+    Field("filter_kind", "Filter of the recorder", "choice", choices=FILTERS, folded=True),
+    Field("filter_order", "Order of the filter", folded=True),
+    Field("filter_cutoff", "Cutoff of the filter (−3 dB), Hz", folded=True),
+)  # fmt: skip
+
+
+def recording_form() -> list[dict[str, Any]]:
+    """Return the fields for the page."""
+    return [asdict(item) for item in FIELDS]
+
+
+def recording_table(stated: Mapping[str, str]) -> Table:
+    """Return the table of a configuration from the texts of fields, by name.
+
+    Raise InputError for a text that is not a number, or if a table lacks a choice.
+    """
+    result: Table = {}
+    for item in FIELDS:
+        if item.name in stated:
+            table, key = item.path
+            (result.setdefault(table, {}) if table else result)[key] = item.value(stated[item.name])
+    for item in FIELDS:
+        table, key = item.path
+        if item.choices and table in result and key not in result[table]:
+            refuse(f"{item.quoted} is not chosen", ", ".join(item.choices.values()))
+    return result
+
+
+def name_fields(message: str) -> str:
+    """Return a message with the names of fields instead of those of keys.
+
+    >>> name_fields("filter: order is missing; allowed: order and cutoff")
+    '“Order of the filter” is missing; allowed: “Order of the filter” and “Cutoff of the filter \
+(−3 dB), Hz”'
+    """
+    own = message.partition(": ")[0]
+    for item in FIELDS:
+        table, key = item.path
+        if table and own == table:
+            message = re.sub(rf"(^{table}: )?\b{key}\b", item.quoted, message)
+            continue
+        if item.unit == PERCENT and message.startswith(key):
+            message = re.sub(r"\d[\d.e+-]*", _in_percent, message)
+        # Messages name a key before its value, at their beginning or both, or as stated.
+        message = re.sub(rf"^({key}: )+(?={key}\b)", "", message)
+        message = re.sub(rf"^({key}: )+", f"{item.quoted}: ", message)
+        message = re.sub(
+            rf"(?<![\w“]){key}(?= = | and channels are| are stated)", item.quoted, message
+        )
+    for table in TABLES:
+        message = message.replace(f"[{table}]", f"the fields of the {table}")
+    return message
+
+
+def _in_percent(number: re.Match[str]) -> str:
+    return f"{100 * float(number[0]):g}"
