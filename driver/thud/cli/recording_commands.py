@@ -277,6 +277,9 @@ def run_history(options: argparse.Namespace) -> int:
     if not options.quiet:
         print(history.title)
         print(format_rows(history.table()))
+        marks = history.marks()
+        if marks:
+            print(marks)
         for warning in history.warnings():
             print(warning)
         if paths:
