@@ -218,6 +218,34 @@ def test_temperatures_and_calibrations_are_shown() -> None:
     np.testing.assert_allclose(sorted(drawn), expected)
 
 
+def test_marks_of_the_table_are_explained(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = read_history([folder])
+    line = "?: inconclusive; *: the drift is significant, at 5 % for all criteria together"
+    assert found.marks() == line
+    options = argparse.Namespace(
+        name="history", reports=[str(folder)], different_balls=False, output=str(folder / "out"),
+        quiet=False, replace=False,
+    )  # fmt: skip
+    run_history(options)
+    assert line in capsys.readouterr().out.splitlines()
+    # Drop height is unknown in all of them, so that one verdict is always inconclusive.
+    assert "*" not in history(count=2).marks()
+
+
+def test_different_balls_are_named_in_table_and_chart() -> None:
+    plain = history(count=4)
+    assert plain.balls == ()
+    assert "Ball" not in [row[0] for row in plain.table()]
+    for report_, serial in zip(plain.reports, ("7", "8", "8", "7"), strict=True):
+        report_["serial"] = serial
+    mixed = History("2 balls", plain.dates, plain.reports)
+    assert mixed.table()[1] == ("Ball", "ball 7", "ball 8", "ball 8", "ball 7", "", "")
+    figure = draw_history(mixed)
+    assert figure.legends[0].get_title().get_text() == "1: ball 7; 2: ball 8"
+    panel = next(axes for axes in figure.axes if axes.get_ylabel().startswith("63 Hz"))
+    assert [text.get_text() for text in panel.texts] == ["1", "2", "2", "1"]
+
+
 def test_ball_that_does_not_change_has_no_trend() -> None:
     told = sum(
         any(trend is not None and trend.significant for trend in history(seed=k).trends())

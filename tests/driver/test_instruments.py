@@ -80,6 +80,13 @@ def test_stated_instrument_is_undone(instrument: Response, stated: dict[str, Any
     assert any("corrected up to" in step for step in corrected.steps)
 
 
+def test_high_frequencies_are_in_kilohertz() -> None:
+    text = RecorderFilter("butterworth", 4, 12_000.0).describe(48_000.0)
+    assert re.search(r"-3 dB at 12 kHz, corrected up to 15\.\d+ kHz$", text)
+    assert "-3 dB at 8000 Hz" in RecorderFilter("bessel", 4, 8000.0).describe(96_000.0)
+    assert "up to 12.8 kHz;" in Plate(6400.0, 20.0).describe(48_000.0)
+
+
 def test_filters_are_those_of_scipy() -> None:
     frequency = np.array([10.0, 500.0, 1000.0, 2400.0])
     for kind, design in (

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import naming
+from conftest import REPOSITORY, naming
 from matplotlib import font_manager
+from scipy.special import stdtrit
 from synthetic import make_recording
 from test_figure_look import assert_clean
 
@@ -26,8 +27,9 @@ from thud.base.files import Results
 from thud.level.estimate import Estimate
 from thud.level.levels import low_pass
 from thud.plot.recording_figures import recording_forces, recording_levels
-from thud.recordings.config import Config, PlateConfig, read_config
+from thud.recordings.config import Config, PlateConfig, ReportConfig, read_config
 from thud.recordings.dates import read_date
+from thud.recordings.outliers import Outlier
 from thud.recordings.picture import read_picture
 from thud.recordings.read_recording import read_recording
 from thud.recordings.recording import Recording
@@ -35,7 +37,9 @@ from thud.report.contents import FIELDS, missing_fields, report_data
 from thud.report.fonts import missing_characters
 from thud.report.notes import group_messages, shorten
 from thud.report.page import _range_picture, report_page
-from thud.report.rows import criterion_row
+from thud.report.pdf import html_to_pdf
+from thud.report.recording_files import table, uncertainty_text
+from thud.report.rows import criterion_row, freedom_text, risk_text
 from thud.report.write import write_report
 
 if TYPE_CHECKING:
@@ -211,19 +215,25 @@ def numbers(recording: Recording) -> list[list[str]]:
         value, expanded = decision.value / unit, decision.estimate.expanded / unit
         is_bound, is_count = decision.estimate.upper_bound, decision.name == "peak_count"
         has_budget = bool(decision.estimate.contributions) and not np.isnan(value)
+        # LAB states no uncertainties: U lacks those of calibration, mass and height, at least
+        # one of which matters to all but the contact time, and the scatter of a single drop.
+        is_known = recording.calibration_uncertainty is not None and len(recording.drops) > 1
+        is_complete = decision.name == "contact_time" or decision.name.startswith("octave")
+        mark = "" if is_known and is_complete else " †"
         # Two significant digits of U decide.
         is_rounded = has_budget and expanded > 1e-6
         places = 1 - int(f"{expanded:.1e}".partition("e")[2]) if is_rounded else default
         limits = [f"{end / unit:g}" for end in (decision.lower, decision.upper)]
         cells = ["not known" if np.isnan(value) else f"{value:.{places}f}"]
         if has_budget:
-            cells.append(f"{expanded:.{places}f}" if is_rounded else "0")
+            cells.append((f"{expanded:.{places}f}" if is_rounded else "0") + mark)
         cells.append(" to ".join(dict.fromkeys(limits)))
         if not (is_bound or is_count or np.isnan(value)):
             cells.append(f"{decision.margin / unit:.{places}f}")
         if has_budget and not is_bound:
             risk = 100 * (1 - decision.probability)
-            cells.append(f"{risk:.{1 if risk >= 1 else 2}f} %" if risk >= 0.01 else "< 0.01 %")
+            text = f"{risk:.{1 if risk >= 1 else 2}f} %" if risk >= 0.01 else "< 0.01 %"
+            cells.append("> 99.9 %" if text == "100.0 %" else text)
         rows.append([*cells, decision.result])
     return rows
 
@@ -264,6 +274,24 @@ def test_each_page_has_its_number_and_that_of_the_report(
     assert "Signature" in pages[-1]
     # Five drops fill two sheets; only crowded recordings need many.
     assert len(pages) <= (2 if len(recording.drops) < 10 else 15)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("weasyprint")
+def test_signature_is_on_a_page_with_the_last_notes(one: Recording, tmp_path: Path) -> None:
+    data = report_data(many(one, 5))
+    figures = ['<svg viewBox="0 0 9 9"></svg>'] * 2
+    counts = set()
+    # The end of the notes moves over the end of a page.
+    for count in range(14, 24):
+        warnings = [f"last note {i} " + "of some length " * 4 for i in range(count)]
+        path = tmp_path / f"{count}.pdf"
+        path.write_bytes(html_to_pdf(report_page({**data, "warnings": warnings}, figures, "")))
+        pages = [page.get_textpage().get_text_bounded() for page in open_pdf(path)]
+        assert "last note" in pages[-1]
+        assert "Signature" in pages[-1]
+        counts.add(len(pages))
+    assert counts == {2, 3}
 
 
 @pytest.mark.slow
@@ -599,7 +627,15 @@ def test_what_iso_17025_asks_for_and_is_not_stated_is_listed(
 ) -> None:
     recording = stated(one, tmp_path)
     missing = missing_fields(recording.config, recording.origins)
-    assert missing == ["ball", "serial number", "temperature", "certificates of instruments"]
+    assert missing == [
+        "ball", "serial number", "metrological traceability", "temperature",
+        "certificates of instruments",
+    ]  # fmt: skip
+    text = STATED.replace("procedure =", 'traceability = "to the SI by K-1"\nprocedure =')
+    traceable = stated(one, tmp_path, text)
+    missing.remove("metrological traceability")
+    assert missing_fields(traceable.config, traceable.origins) == missing
+    assert "Traceability to the SI by K-1" in words_of(report_page(report_data(traceable), [], ""))
     nothing = missing_fields(Config(), one.origins)
     assert nothing == [*FIELDS.values(), "instruments"]
     # The files have dates.
@@ -611,6 +647,7 @@ def test_what_iso_17025_asks_for_and_is_not_stated_is_listed(
     [
         ("2024-04-30", '"soon"', naming("report: received", "'soon'", "2024-05-03")),
         ("humidity = 45.4", "humidity = 145", naming("report: humidity", "145", "100")),
+        ("humidity = 45.4", "humidity = 0.454", naming("report: humidity", "0.454", "1 to 100")),
         ("pressure = 101325.0", "pressure = 1013", naming("report: pressure", "1013", "50000")),
         ("number =", "nummer =", naming("report", "'nummer'", "number")),
         ("mark.svg", "none.svg", naming("accreditation_mark", "none.svg", ".png")),
@@ -653,10 +690,122 @@ def test_budgets_combine_to_the_uncertainty(one: Recording, tmp_path: Path) -> N
     share = 100 * (parts["calibration"]["uncertainty"] / level["uncertainty"]) ** 2
     assert f"calibration B 0.010 1 8.7 dB 0.087 dB ∞ {share:.1f} %" in words
     k = level["coverage_factor"]
-    assert f"degrees of freedom {int(level['freedom'])}; k = {k:.2f}" in words
+    assert f"degrees of freedom {level['freedom']:.4g}; k = {k:.2f}" in words
     (mass,) = [entry for entry in data["criteria"] if entry["name"] == "mass"]
     assert mass["contributions"][0]["uncertainty"] == 0.002
     assert "Mass: 2.5000 ± 0.0039 kg; u = 0.0020 kg; degrees of freedom ∞; k = 1.96" in words
+
+
+def test_degrees_of_freedom_give_the_coverage_factor_again() -> None:
+    for freedom in (1.0, 1.2345, 1.9876, 2.71828, 4.0, 8.4999, 17.777, 234.56):
+        k = stdtrit(freedom, 0.975)
+        assert stdtrit(float(freedom_text(freedom)), 0.975) == pytest.approx(k, abs=0.01)
+    assert freedom_text(4.0) == "4"
+    assert freedom_text(4.567) == "4.567"
+    assert (freedom_text(2000.0), freedom_text(None)) == ("> 1000", "∞")
+
+
+def excluded(recording: Recording) -> dict[str, list[str]]:
+    """Return what the uncertainties exclude, by criterion."""
+    return {entry["name"]: entry["excluded"] for entry in report_data(recording)["criteria"]}
+
+
+SCATTER = "scatter between drops"
+
+
+def test_uncertainties_that_lack_contributions_are_marked(one: Recording) -> None:
+    # Of one drop nothing is stated, and the scatter is unknown.
+    lacking = excluded(one)
+    assert lacking["octave_63"] == ["calibration", SCATTER]
+    assert lacking["contact_time"] == [SCATTER]
+    assert lacking["restitution"] == ["calibration", "mass", "drop height", SCATTER]
+    assert lacking["mass"] == ["mass"]
+    assert lacking["drop_height"] == ["drop height"]
+    assert lacking["peak_count"] == []
+    note = (
+        "† U excludes, and the verdict treats as zero: calibration, mass, drop height (uncertainty "
+        "not stated); scatter between drops (unknown from one drop)."
+    )
+    assert uncertainty_text(one) == note
+    page = report_page(report_data(one), [], "")
+    assert note in words_of(page)
+    assert "U is incomplete where it is marked †" in words_of(page)
+    assert len(re.findall(r'data-label="U \(95 %\)">[^<]* †<', page)) == 9
+    # The table on the screen has the same marks.
+    marked = [row[0] for row in table(one)[1:] if row[2].endswith(" †")]
+    assert len(marked) == 9
+    assert "Peaks of the force" not in marked
+
+
+def test_complete_uncertainties_are_not_marked(one: Recording, tmp_path: Path) -> None:
+    recording = stated(one, tmp_path)
+    assert not any(excluded(recording).values())
+    assert uncertainty_text(recording) == ""
+    assert "†" not in report_page(report_data(recording), [], "")
+    # An effective mass has the uncertainties of its origins.
+    effective = replace(many(one, 1), config=replace(LAB, mass=None), calibration_uncertainty=None)
+    assert set(excluded(effective)["mass"]) <= {"calibration", "drop height", SCATTER}
+    plate = PlateConfig(f0=1600.0, Q=20.0)
+    assert excluded(many(one, 5, plate=plate))["octave_500"] == ["resonance of the plate"]
+
+
+def test_table_names_the_measurand_and_its_reference(one: Recording) -> None:
+    words = words_of(report_page(report_data(one), [], ""))
+    assert "Verdict Force exposure level L_FE, dB re 1 N 31.5 Hz, dB" in words
+    assert "the repeatability in the budgets is that of the mean energy" in words
+
+
+def test_rectangular_distributions_have_their_half_width_and_divisor() -> None:
+    folder = REPOSITORY / "inputs/recordings"
+    drops = read_recording(folder / "three_drops.flac", config=read_config(folder / "lab.toml"))
+    (entry,) = [e for e in report_data(drops)["criteria"] if e["name"] == "restitution"]
+    parts = {part["name"]: part for part in entry["contributions"]}
+    for name, size, unit in (("slow release", 5e-4, "s"), ("deformed ball", 4e-3, "m")):
+        part = parts[name]
+        assert (part["size"], part["unit"]) == (size, unit)
+        assert part["divisor"] == pytest.approx(np.sqrt(3))
+        product = part["size"] / part["divisor"] * part["sensitivity"]
+        assert product == pytest.approx(part["uncertainty"])
+
+
+@pytest.mark.parametrize(
+    ("changes", "warning"),
+    [
+        ({}, ""),
+        (
+            {"received": "2024-05-04", "issued": "2024-05-04"},
+            "the item was received on 2024-05-04, after the measurement on 2024-05-03",
+        ),
+        (
+            {"received": "2024-05-02", "issued": "2024-05-02"},
+            "the measurement was made on 2024-05-03, after the issue of the report on 2024-05-02",
+        ),
+    ],
+)
+def test_dates_in_the_wrong_order_raise_a_warning(
+    one: Recording, changes: dict[str, str], warning: str
+) -> None:
+    dates = {"received": "2024-05-03", "issued": "2024-05-03", **changes}
+    recording = many(one, 3, date="2024-05-03", report=ReportConfig(**dates))
+    found = [text for text in recording.own_warnings if "received" in text or "issue" in text]
+    assert found == ([warning] if warning else [])
+    # Without a date of the measurement, those of receipt and issue are compared.
+    undated = Config(report=ReportConfig(received="2024-05-04", issued="2024-05-02"))
+    assert undated.check_dates([]) == [
+        "the item was received on 2024-05-04, after the issue of the report on 2024-05-02"
+    ]
+
+
+def test_risk_that_rounds_to_certainty_is_a_bound() -> None:
+    assert [risk_text(p) for p in (0.0, 4e-4, 6e-4)] == ["> 99.9 %", "> 99.9 %", "99.9 %"]
+
+
+def test_score_of_an_outlier_differs_from_its_critical_value() -> None:
+    text = str(Outlier("drop", "contact time, ms,", 19.0, 1.49934, 1.49902))
+    assert (
+        "lies 1.4993 standard deviations from the mean of the drops (Grubbs, 5 %: 1.4990)" in text
+    )
+    assert "lies 2.31 standard" in str(Outlier("drop", "level, dB,", 19.0, 2.314, 1.715))
 
 
 def test_rules_and_standards_are_named(one: Recording) -> None:
@@ -710,6 +859,7 @@ def test_values_have_the_digits_of_their_uncertainty(
         "name": "octave_63", "unit": "dB", "band": 63.0, "value": value, "upper_bound": False,
         "expanded_uncertainty": expanded, "contributions": [{}], "lower": 0.0, "upper": 90.0,
         "limits_of_standard": True, "margin": None, "probability": 1.0, "spread": None,
+        "excluded": [],
         "background": None, "verdict": "conforms",
     })  # fmt: skip
     assert row[1:3] == texts
@@ -751,6 +901,14 @@ def test_sentences_that_differ_in_numbers_are_one() -> None:
         "-3.5 to 12 N at 50 Hz (IEC 61260-1) (2 of 9 drops)",
         "x (b)",
     ]
+
+
+def test_drops_that_were_left_out_are_listed() -> None:
+    said = [("a", f"drop {i} at {i / 2} s was left out: touched") for i in (2, 5, 6, 7)]
+    assert group_messages(said, 1, "files") == [
+        "drops 2, 5 to 7 at 1.0 to 3.5 s were left out: touched"
+    ]
+    assert group_messages(said[:1], 1, "files") == [said[0][1]]
 
 
 def test_long_lists_are_shortened_with_their_count() -> None:

@@ -84,6 +84,9 @@ def measure(options: argparse.Namespace) -> int:
         for step in (*recording_files.messages(recording, "steps"), *recording.level_steps):
             print(f"  {step}")
         print(f"  {recording_files.verdict_text(recording)}")
+        excluded = recording_files.uncertainty_text(recording)
+        if excluded:
+            print(f"  {excluded}")
         if figures:
             print(recording_files.missing_text(recording))
     messages = recording_files.messages(recording, "warnings")
@@ -279,6 +282,9 @@ def run_history(options: argparse.Namespace) -> int:
     if not options.quiet:
         print(history.title)
         print(format_rows(history.table()))
+        marks = history.marks()
+        if marks:
+            print(marks)
         for warning in history.warnings():
             print(warning)
         if paths:

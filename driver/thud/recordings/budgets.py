@@ -197,8 +197,7 @@ def _difference(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
 
 
 def _mean_effect(cause: str, effects: Sequence[float], conditions: DropConditions) -> Contribution:
-    size, unit = conditions.uncertainties.get(cause, (math.nan, ""))
-    return Contribution(cause, abs(float(np.mean(effects))), size=size, unit=unit)
+    return Contribution(cause, abs(float(np.mean(effects))), **conditions.sizes.get(cause, {}))
 
 
 def average_mass(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:

@@ -185,6 +185,8 @@ class ReportConfig:
         Dates of receipt of the item and of issue of the report.
     place, procedure, deviations : str
         Place and procedure of the measurement, and deviations from the procedure.
+    traceability : str
+        Statement on the metrological traceability of the results.
     humidity, pressure : float or None
         Relative humidity, %, and static pressure of the air, Pa.
     accreditation : str
@@ -205,7 +207,9 @@ class ReportConfig:
     place: str = _key(to_line, "")
     procedure: str = _key(to_line, "")
     deviations: str = _key(to_line, "")
-    humidity: float | None = _key(partial(to_number, 0.0, 100.0))
+    traceability: str = _key(to_line, "")
+    # Below 1 % it is likely to be a fraction.
+    humidity: float | None = _key(partial(to_number, 1.0, 100.0))
     pressure: float | None = _key(partial(to_number, 5e4, 1.2e5))
     accreditation: str = _key(to_line, "")
     accreditation_mark: str = _key(to_line, "")
@@ -346,17 +350,33 @@ class Config:
             self.height_uncertainty or 0.0,
         )
 
-    def check_due(self, file_dates: Iterable[str]) -> list[str]:
-        """Return a warning for each instrument whose calibration was due before the measurement.
+    def check_dates(self, file_dates: Iterable[str]) -> list[str]:
+        """Return a warning for each date that contradicts another one.
 
-        `file_dates` are those of the files, which count if no date is stated.
+        These are calibrations that were due before the measurement, and dates of receipt and issue
+        in the wrong order. `file_dates` are those of the files, which count if no date is stated.
         """
-        days = [dates.read_date(text) for text in ([self.date] if self.date else file_dates)]
-        last = max((day.date().isoformat() for day in days if day), default="")
+        read = [dates.read_date(text) for text in ([self.date] if self.date else file_dates)]
+        days = sorted(day.date().isoformat() for day in read if day)
+        first, last = (days[0], days[-1]) if days else ("", "")
+        received, issued = self.report.received, self.report.issued
+        # Each pair should be in this order; dates that are not stated are empty.
+        pairs = (
+            ("the item was received", received, "the measurement", first),
+            ("the measurement was made", last, "the issue of the report", issued),
+            ("the item was received", received, "the issue of the report", issued),
+        )
         result = [
-            f"{item.name}: its calibration was due on {item.due}, before the measurement"
-            for item in self.instruments
-            if isinstance(item, Instrument) and item.due and item.due < last
+            *(
+                f"{item.name}: its calibration was due on {item.due}, before the measurement"
+                for item in self.instruments
+                if isinstance(item, Instrument) and item.due and item.due < last
+            ),
+            *(
+                f"{event} on {day}, after {other} on {limit}"
+                for event, day, other, limit in pairs
+                if day and limit and day > limit
+            ),
         ]
         if not last and any(isinstance(item, Instrument) and item.due for item in self.instruments):
             result.append(

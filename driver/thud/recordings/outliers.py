@@ -37,10 +37,14 @@ class Outlier:
     critical: float
 
     def __str__(self) -> str:
-        """Return a sentence."""
+        """Return a sentence, with the decimals that tell the score from its critical value."""
+        for decimals in range(2, 16):
+            score, critical = f"{self.score:.{decimals}f}", f"{self.critical:.{decimals}f}"
+            if score != critical:
+                break
         return (
-            f"{self.name}: {self.quantity} {self.value:.6g} lies {self.score:.2f} standard "
-            f"deviations from the mean of the drops (Grubbs, 5 %: {self.critical:.2f})"
+            f"{self.name}: {self.quantity} {self.value:.6g} lies {score} standard "
+            f"deviations from the mean of the drops (Grubbs, 5 %: {critical})"
         )
 
 

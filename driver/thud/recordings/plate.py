@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.checks import refuse, refuse_value, require_number
+from thud.base.units import frequency_text
 from thud.level.estimate import NORMAL_FACTOR
 from thud.level.levels import get_bands
 
@@ -78,17 +79,18 @@ class Plate:
         highest = min(self.highest, sample_rate / 2)
         gain = 1 / abs(self.response(np.array([highest]))[0])
         return (
-            f"force plate: resonance of {self.frequency:.4g} Hz, quality {self.quality:g}, "
-            f"corrected up to {highest:.4g} Hz; noise there times {gain:.2g}"
+            f"force plate: resonance of {frequency_text(self.frequency)}, "
+            f"quality {self.quality:g}, corrected up to {frequency_text(highest)}; "
+            f"noise there times {gain:.2g}"
         )
 
     def require_above(self, edge: float) -> None:
         """Raise InputError if the resonance is below 1.41 times the highest edge of bands, Hz."""
         if self.frequency < MIN_RATIO * edge:
             refuse(
-                f"plate: the resonance, {self.frequency:.4g} Hz, is too close to the bands, which "
-                f"reach up to {edge:.4g} Hz, for a correction",
-                f"{MIN_RATIO * edge:.4g} Hz or more",
+                f"plate: the resonance, {frequency_text(self.frequency)}, is too close "
+                f"to the bands, which reach up to {frequency_text(edge)}, for a correction",
+                f"{frequency_text(MIN_RATIO * edge)} or more",
             )
 
     def level_uncertainty(self, bands: BandSet = "octave") -> NDArray[np.float64]:
@@ -172,8 +174,9 @@ def _check_high(plate: Plate | None) -> PlateCheck:
     return PlateCheck(
         requirement,
         deviation <= TOLERANCE,
-        f"up to {high:g} Hz the plate with its resonance of {plate.frequency:.4g} Hz is up to "
-        f"{100 * deviation:.2g} % off (after the correction, whose resonance is known to "
+        f"up to {high:g} Hz the plate with its resonance of "
+        f"{frequency_text(plate.frequency)} is up to {100 * deviation:.2g} % off "
+        "(after the correction, whose resonance is known to "
         f"{100 * shift:.2g} %)",
     )
 

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.signal import bessel, butter, freqs_zpk
 
 from thud.base.checks import refuse, refuse_value, require_choice, require_number, require_whole
+from thud.base.units import frequency_text
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -70,17 +71,18 @@ class RecorderFilter:
         """Describe the correction at a sample rate, Hz."""
         highest = min(self.highest, sample_rate / 2)
         return (
-            f"{self.kind.capitalize()} filter of order {self.order}, -3 dB at {self.cutoff:.4g} Hz,"
-            f" corrected up to {highest:.4g} Hz"
+            f"{self.kind.capitalize()} filter of order {self.order}, "
+            f"-3 dB at {frequency_text(self.cutoff)}, corrected up to {frequency_text(highest)}"
         )
 
     def require_above(self, edge: float) -> None:
         """Raise InputError if the response is below 1/3 at the highest edge of bands, Hz."""
         if self.highest < edge:
             refuse(
-                f"filter: the cutoff, {self.cutoff:.4g} Hz, is too low for the bands, which reach "
-                f"up to {edge:.4g} Hz: the response falls to 1/3 at {self.highest:.4g} Hz",
-                f"{self.cutoff * edge / self.highest:.4g} Hz or more",
+                f"filter: the cutoff, {frequency_text(self.cutoff)}, is too low for the bands, "
+                f"which reach up to {frequency_text(edge)}: the response falls to 1/3 at "
+                f"{frequency_text(self.highest)}",
+                f"{frequency_text(self.cutoff * edge / self.highest)} or more",
             )
 
     def shifted(self) -> RecorderFilter:

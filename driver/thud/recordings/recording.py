@@ -248,8 +248,17 @@ class Recording(Displayed):
         warnings += [
             f"force plate: {check.reason}" for check in config.plate_checks if check.met is False
         ]
-        warnings += config.check_due(origin.date for origin in self.origins)
+        warnings += config.check_dates(origin.date for origin in self.origins)
         warnings += assumption_warnings(self.drops, config)
+        if self.not_stated:
+            names = ", ".join(self.not_stated)
+            warnings.append(f"uncertainty not stated, and not included: {names}")
+        return tuple(warnings)
+
+    @property
+    def not_stated(self) -> tuple[str, ...]:
+        """What has an uncertainty that is not stated, so that no budget includes it."""
+        config = self.config
         plate, stated = config.resonance, config.recorder_filter
         missing = {
             "calibration": self.calibration_uncertainty is None,
@@ -258,10 +267,7 @@ class Recording(Displayed):
             "mass": config.mass is not None and config.mass_uncertainty is None,
             "drop height": config.height is not None and config.height_uncertainty is None,
         }
-        if any(missing.values()):
-            names = ", ".join(name for name in missing if missing[name])
-            warnings.append(f"uncertainty not stated, and not included: {names}")
-        return tuple(warnings)
+        return tuple(name for name in missing if missing[name])
 
     @property
     def steps(self) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import Drop
 from thud.level.estimate import Estimate
@@ -46,12 +46,17 @@ class DropConditions:
         return math.sqrt(2 * GRAVITY * self.height) if self.height else math.nan
 
     @property
-    def uncertainties(self) -> dict[str, tuple[float, str]]:
-        """Standard uncertainty and its unit by the cause of a shared effect."""
+    def sizes(self) -> dict[str, dict[str, Any]]:
+        """Size, unit and divisor of a `Contribution` by the cause of a shared effect.
+
+        They are standard uncertainties, or half widths of rectangular distributions.
+        """
         return {
-            "calibration": (self.calibration_uncertainty, ""),
-            "mass": (self.mass_uncertainty, "kg"),
-            "drop height": (self.height_uncertainty, "m"),
+            "calibration": {"size": self.calibration_uncertainty},
+            "mass": {"size": self.mass_uncertainty, "unit": "kg"},
+            "drop height": {"size": self.height_uncertainty, "unit": "m"},
+            "slow release": {"size": SLOW_RELEASE, "unit": "s", "divisor": math.sqrt(3)},
+            "deformed ball": {"size": DEFORMATION, "unit": "m", "divisor": math.sqrt(3)},
         }
 
     def restitutions(

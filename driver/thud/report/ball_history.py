@@ -18,7 +18,7 @@ from thud.base.immutable import Immutable
 from thud.level.assessment import VERDICTS
 from thud.recordings.dates import read_date
 from thud.report.contents import FORMAT
-from thud.report.rows import Style, criterion_style, limits_of, number, value_text
+from thud.report.rows import NOT_KNOWN, Style, criterion_style, limits_of, number, value_text
 
 if TYPE_CHECKING:
     import os
@@ -38,8 +38,9 @@ MIN_VALUES, MOVING_RANGE = 5, 2 / math.sqrt(math.pi)
 WARNING, ACTION = 2.0, 3.0
 # Maximum number of reports in the table: the first and the most recent ones.
 MAX_COLUMNS = 8
-# Marks of values in the table by verdict.
+# Marks in the table: of values by verdict, and of significant drifts.
 MARKS = {VERDICTS[0]: "", VERDICTS[1]: " no", VERDICTS[2]: " ?"}
+SIGNIFICANT = " *"
 # Maximum size of a report, bytes.
 MAX_SIZE = 2**28
 # Entries of a report, and of each of its criteria, that a history needs.
@@ -107,6 +108,12 @@ class History:
     title: str
     dates: tuple[datetime, ...]
     reports: tuple[dict[str, Any], ...]
+
+    @property
+    def balls(self) -> tuple[str, ...]:
+        """Name and serial number of the ball of each report, shape (n_report,); empty if one."""
+        names = [_ball(report) or NOT_KNOWN for report in self.reports]
+        return tuple(names) if len(set(names)) > 1 else ()
 
     @property
     def years(self) -> NDArray[np.float64]:
@@ -177,19 +184,34 @@ class History:
         criteria, last = self.criteria(), len(self.dates) - 1
         styles = [criterion_style(entries[0]) for entries in criteria]
         temperatures = [_degrees(value) for value in self.temperatures()]
-        columns = [("", *(style.title for style in styles), "Temperature, °C", "verdict")]
+        balls = self.balls
+        head = ("Ball",) if balls else ()
+        columns = [("", *head, *(style.title for style in styles), "Temperature, °C", "verdict")]
         for i in range(last + 1):
             if 0 < i <= last + 1 - MAX_COLUMNS:
                 continue
             column = [entries[i] for entries in criteria]
             cells = (value_text(entry) + MARKS[entry["verdict"]] for entry in column)
             day = self.dates[i].date().isoformat()
-            columns.append((day, *cells, temperatures[i], self.reports[i]["verdict"]))
+            ball = balls[i : i + 1]
+            columns.append((day, *ball, *cells, temperatures[i], self.reports[i]["verdict"]))
         trends = self.trends()
         slopes = (_slope(style, trend) for style, trend in zip(styles, trends, strict=True))
-        columns.append(("per year", *slopes, "", ""))
-        columns.append(("limit on", *(self._limit(trend) for trend in trends), "", ""))
+        none = ("",) * len(head)
+        columns.append(("per year", *none, *slopes, "", ""))
+        columns.append(("limit on", *none, *(self._limit(trend) for trend in trends), "", ""))
         return list(zip(*columns, strict=True))
+
+    def marks(self) -> str:
+        """Return the meaning of the marks that the table has, as a line; empty if it has none."""
+        verdicts = {entry["verdict"] for entries in self.criteria() for entry in entries}
+        parts = [f"{mark.strip()}: {v}" for v, mark in MARKS.items() if mark and v in verdicts]
+        if any(trend is not None and trend.significant for trend in self.trends()):
+            parts.append(
+                f"{SIGNIFICANT.strip()}: the drift is significant, at {100 * SIGNIFICANCE:g} % "
+                "for all criteria together"
+            )
+        return "; ".join(parts)
 
     def warnings(self) -> list[str]:
         """Return a warning for each significant trend, and for values beyond control limits."""
@@ -202,7 +224,7 @@ class History:
         ):
             style = criterion_style(entries[0])
             if trend is not None and trend.significant:
-                slope = _slope(style, trend).rstrip(" *")
+                slope = _slope(style, trend).removesuffix(SIGNIFICANT)
                 text = f"{style.title}: changes by {slope} per year{temperature}"
                 date = self._date_text(trend.reached)
                 if date:
@@ -241,6 +263,11 @@ class History:
         return self.date(years).date().isoformat() if known else ""
 
 
+def _ball(report: dict[str, Any]) -> str:
+    """Return name and serial number of the ball of a report."""
+    return " ".join(filter(None, (report["ball"], report["serial"])))
+
+
 def _degrees(value: float | None) -> str:
     return "–" if value is None else number(value, 1)
 
@@ -275,9 +302,7 @@ def read_history(
     dated = sorted(((*_read(file), file) for file in files), key=lambda entry: entry[0])
     for _, report, file in dated[1:]:
         _require_same(report, file, dated[0][1], dated[0][2], different_balls=different_balls)
-    names = dict.fromkeys(
-        " ".join(filter(None, (report["ball"], report["serial"]))) for _, report, _ in dated
-    )
+    names = dict.fromkeys(_ball(report) for _, report, _ in dated)
     title = next(iter(names)) if len(names) == 1 else f"{len(names)} balls"
     reports = tuple(report for _, report, _ in dated)
     return History(title or "ball", tuple(date for date, _, _ in dated), reports)
@@ -427,5 +452,5 @@ def _slope(style: Style, trend: Trend | None) -> str:
     slope, expanded = trend.slope / style.unit, trend.expanded / style.unit
     decimals = style.decimals + 1
     sign = "+" if round(slope, decimals) > 0 else ""
-    mark = " *" if trend.significant else ""
+    mark = SIGNIFICANT if trend.significant else ""
     return f"{sign}{number(slope, decimals)} ± {number(expanded, decimals)}{mark}"

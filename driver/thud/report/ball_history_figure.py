@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import timedelta
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,6 +42,8 @@ CONTROL: dict[float, dict[str, Any]] = {
 CALIBRATION: dict[str, Any] = {"color": COLORS[2], "linewidth": 0.8, "linestyle": (0, (6, 2))}
 # Margin before the first and after the last report: fraction of the time between them, and minimum.
 MARGIN, MIN_MARGIN = 0.06, timedelta(days=15)
+# Maximum number of characters in a line of the title.
+MAX_TITLE = 90
 
 
 @own_style()
@@ -49,7 +52,7 @@ def draw_history(history: History) -> Figure:
 
     The allowed range is grey, bars are expanded uncertainties (95 %), markers show the verdict, and
     lines the significant trends, control limits and calibrations. The last panel has the recorded
-    temperatures.
+    temperatures. If the reports are of different balls, each point has the number of its ball.
     """
     criteria, trends = history.criteria(), history.trends()
     control, temperatures = history.control_limits(), history.temperatures()
@@ -98,7 +101,8 @@ def _draw_criterion(
     edges = np.array([history.dates[0] - span, *history.dates, history.dates[-1] + span])
     lower, upper = np.pad(bounds, ((1, 1), (0, 0)), "edge").T
     axes.fill_between(edges, lower, upper, step="mid", color=GRAY, linewidth=0)
-    for date, entry in zip(history.dates, entries, strict=True):
+    numbers = _ball_numbers(history)
+    for i, (date, entry) in enumerate(zip(history.dates, entries, strict=True)):
         if entry["value"] is None:
             continue
         marker, color = MARKS.get(entry["verdict"], ("D", "white"))
@@ -108,6 +112,11 @@ def _draw_criterion(
             marker=marker, markersize=4.5, markerfacecolor=color, color="black", capsize=2,
             elinewidth=0.8, markeredgewidth=0.7,
         )  # fmt: skip
+        if numbers:
+            axes.annotate(
+                str(numbers[history.balls[i]]), (date, entry["value"] / style.unit),
+                (3, 4), textcoords="offset points", fontsize="x-small",
+            )  # fmt: skip
     if all(entry["value"] is None for entry in entries):
         axes.text(0.5, 0.5, NOT_KNOWN, transform=axes.transAxes, ha="center")
     if trend is not None and trend.significant:
@@ -142,4 +151,11 @@ def _add_legend(axes: Axes, trends: list[Trend | None], history: History) -> Non
             axes.plot([], [], label=f"{name} limits ({factor:g} σ)", **line)
     if history.calibrations():
         axes.plot([], [], label="calibration", **CALIBRATION)
-    legend_above(axes, title=escape_label(history.title)).get_title().set_fontweight("bold")
+    balls = [f"{number}: {name}" for name, number in _ball_numbers(history).items()]
+    title = fill("; ".join(balls), MAX_TITLE) or history.title
+    legend_above(axes, title=escape_label(title)).get_title().set_fontweight("bold")
+
+
+def _ball_numbers(history: History) -> dict[str, int]:
+    """Return the numbers of different balls by their names; empty for one ball."""
+    return {name: number for number, name in enumerate(dict.fromkeys(history.balls), 1)}

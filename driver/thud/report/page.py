@@ -18,9 +18,11 @@ from thud.report.notes import group_by_kind, shorten
 from thud.report.rows import (
     COUNT,
     HEAD,
+    INCOMPLETE,
     NOT_KNOWN,
     criterion_row,
     criterion_style,
+    excluded_text,
     expanded_text,
     freedom_text,
     limits_of,
@@ -37,6 +39,8 @@ if TYPE_CHECKING:
 MAX_FILES, MAX_NOTES = 60, 40
 # Maximum number of characters of the name at the foot of each page.
 MAX_IDENTITY = 70
+# Title of the levels, which are the first criteria.
+LEVEL = "Force exposure level L_FE, dB re 1 N"
 # Minimum number of drops for the test for outliers.
 MIN_DROPS = 3
 STANDARDS = {
@@ -85,6 +89,7 @@ def report_page(
         about=_pairs(_about(data)),
         measured=_pairs(_measured(data)),
         head="".join(f"<th>{_text(name)}</th>" for name in _with_picture(HEAD, "")),
+        level=_text(LEVEL),
         rows="\n".join(map(_row, data["criteria"])),
         rule="<br>".join(map(_text, _rules(data))),
         figures="\n".join(f"<td>{_on_page(svg, f'f{i}')}</td>" for i, svg in enumerate(figures)),
@@ -153,14 +158,17 @@ def _mark(mark: tuple[str, bytes] | None) -> str:
 
 
 def _reason(criteria: Sequence[dict[str, Any]]) -> str:
-    """Return the criteria that are inconclusive or not met, as text."""
+    """Return the criteria that are inconclusive or not met, and whether U is incomplete."""
     parts = []
     for verdict in VERDICTS[1:]:
         matching = [criterion for criterion in criteria if criterion["verdict"] == verdict]
         names = [criterion_style(criterion).title.split(",")[0] for criterion in matching]
         if names:
             parts.append(f"{verdict}: {', '.join(names).lower().replace(' hz', ' Hz')}")
-    return "; ".join(parts) or "all criteria are met"
+    parts = parts or ["all criteria are met"]
+    if any(criterion["excluded"] for criterion in criteria):
+        parts.append(f"U is incomplete where it is marked {INCOMPLETE}")
+    return "; ".join(parts)
 
 
 def _about(data: dict[str, Any]) -> list[tuple[str, str]]:
@@ -207,6 +215,7 @@ def _measured(data: dict[str, Any]) -> list[tuple[str, str]]:
         "Procedure": report["procedure"],
         "Deviations": report["deviations"],
     }
+    traceability = report["traceability"]
     return [
         *((name, text) for name, text in texts.items() if text),
         ("Temperature", _number_text(data["temperature"], 1, "°C")),
@@ -215,6 +224,7 @@ def _measured(data: dict[str, Any]) -> list[tuple[str, str]]:
         ("Recordings", amount),
         ("Calibration", f"{calibration}; {uncertainty}"),
         ("Instruments", "\n".join(map(_instrument, data["instruments"]))),
+        *([("Traceability", traceability)] if traceability else []),
     ]
 
 
@@ -369,13 +379,16 @@ def _rules(data: dict[str, Any]) -> list[str]:
         "transcription, not taken from the standards themselves"
     )
     limits += "; those marked * are the laboratory's own." if has_own_limits else "."
+    excluded = excluded_text(data["criteria"])
+    excluded += " " * bool(excluded)
     decision = (
         "Decision rule: non-binary statement with guard bands w = U (ILAC-G8:09/2019, 4.2; "
         "JCGM 106:2012). A criterion conforms if value ± U lies within its limits, does not "
-        "conform if it lies outside, and is inconclusive otherwise. P (outside): probability "
-        "that the true value lies outside the limits, which for a criterion that conforms is the "
-        "probability of a false acceptance. U: expanded uncertainty for 95 %. Spread: standard "
-        "deviation of single drops."
+        f"conform if it lies outside, and is inconclusive otherwise. {excluded}"
+        "P (outside): probability that the true value lies outside the limits, which for a "
+        "criterion that conforms is the probability of a false acceptance. U: expanded "
+        "uncertainty for 95 %. Spread: standard deviation of single drops, for levels in dB; the "
+        "repeatability in the budgets is that of the mean energy, which differs slightly."
     )
     peaks = (
         "Peaks: a maximum of the force, low-passed at 1.25 kHz, counts if the force falls on "

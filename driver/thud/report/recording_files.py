@@ -18,7 +18,7 @@ from thud.level.levels import get_bands
 from thud.report import write
 from thud.report.contents import criteria_data, missing_fields, report_data
 from thud.report.notes import group_by_kind
-from thud.report.rows import HEAD, NOT_KNOWN, criterion_rows
+from thud.report.rows import HEAD, NOT_KNOWN, criterion_rows, excluded_text
 from thud.report.write import HTML, JSON, PDF, json_bytes, page_contents, write_files
 
 if TYPE_CHECKING:
@@ -99,6 +99,11 @@ def verdict_text(recording: Recording) -> str:
     )
     note = " Limits marked * are those of the laboratory." if has_own_limits else ""
     return f"{sentence} at 95 %: {count_verdicts(d.result for d in assessment.criteria)}.{note}"
+
+
+def uncertainty_text(recording: Recording) -> str:
+    """Return what the marked uncertainties exclude, as a sentence; empty if none is marked."""
+    return excluded_text(criteria_data(recording))
 
 
 def missing_text(recording: Recording) -> str:

@@ -26,6 +26,10 @@ HEAD = (
 DIGITS, MIN_WIDTH = 2, 1e-6
 # Maximum of the degrees of freedom that are shown: above, Student's t differs by less than 0.1 %.
 MAX_FREEDOM = 1000.0
+# Contribution that is unknown if only one drop has a value, and mark of an uncertainty without it
+# or without contributions that are not stated.
+SCATTER = "scatter between drops"
+INCOMPLETE = "†"
 
 
 class Style(NamedTuple):
@@ -52,7 +56,8 @@ def criterion_style(criterion: dict[str, Any]) -> Style:
 def criterion_row(criterion: dict[str, Any]) -> tuple[str, ...]:
     """Return a criterion of a report as texts, in the columns of `HEAD`.
 
-    Value and margin have the decimals of U with two significant digits (JCGM 100, 7.2.6).
+    Value and margin have the decimals of U with two significant digits (JCGM 100, 7.2.6). A U that
+    lacks contributions is marked; `excluded_text` names them.
     """
     style, expanded = rounded_style(criterion), expanded_text(criterion)
     ends = [f"{end / style.unit:g}".replace("-", "−") for end in limits_of(criterion)]
@@ -62,7 +67,7 @@ def criterion_row(criterion: dict[str, Any]) -> tuple[str, ...]:
     return (
         style.title,
         value_text(criterion),
-        expanded,
+        f"{expanded} {INCOMPLETE}" if criterion["excluded"] else expanded,
         " to ".join(dict.fromkeys(ends)) + mark,
         style.text(criterion["margin"], "–"),
         risk_text(criterion["probability"]) if has_budget else "–",
@@ -81,18 +86,31 @@ def value_text(criterion: dict[str, Any]) -> str:
 def risk_text(probability: float | None) -> str:
     """Return the probability that the true value lies outside the limits, as text.
 
-    >>> risk_text(0.9871), risk_text(1.0)
-    ('1.3 %', '< 0.01 %')
+    >>> risk_text(0.9871), risk_text(1.0), risk_text(1e-5)
+    ('1.3 %', '< 0.01 %', '> 99.9 %')
     """
     if probability is None:
         return "–"
     percent = 100 * (1 - probability)
+    if percent >= 99.95:  # noqa: PLR2004
+        return "> 99.9 %"
     return "< 0.01 %" if percent < 0.01 else f"{percent:.{2 if percent < 1 else 1}f} %"  # noqa: PLR2004
 
 
 def criterion_rows(criteria: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
     """Return the criteria of a report as rows of text below `HEAD`."""
     return [HEAD, *map(criterion_row, criteria)]
+
+
+def excluded_text(criteria: Sequence[dict[str, Any]]) -> str:
+    """Return what the marked uncertainties lack, as a sentence; empty if none is marked."""
+    names = list(dict.fromkeys(name for criterion in criteria for name in criterion["excluded"]))
+    stated = [name for name in names if name != SCATTER]
+    parts = [f"{', '.join(stated)} (uncertainty not stated)"] if stated else []
+    parts += [f"{SCATTER} (unknown from one drop)"] if SCATTER in names else []
+    if not parts:
+        return ""
+    return f"{INCOMPLETE} U excludes, and the verdict treats as zero: {'; '.join(parts)}."
 
 
 def limits_of(criterion: dict[str, Any]) -> tuple[float, float]:
@@ -133,10 +151,14 @@ def _decimals(width: float) -> int:
 
 
 def freedom_text(freedom: float | None) -> str:
-    """Return degrees of freedom as text, truncated (JCGM 100, G.4.1); None: infinite."""
+    """Return degrees of freedom as text, with the digits that give k again; None: infinite.
+
+    >>> freedom_text(4.0), freedom_text(4.5678)
+    ('4', '4.568')
+    """
     if freedom is None:
         return "∞"
-    return f"> {MAX_FREEDOM:g}" if freedom > MAX_FREEDOM else str(math.floor(freedom))
+    return f"> {MAX_FREEDOM:g}" if freedom > MAX_FREEDOM else f"{freedom:.4g}"
 
 
 def number(value: float, decimals: int) -> str:

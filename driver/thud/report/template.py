@@ -17,6 +17,7 @@ $mark<div class="verdict"><b>$verdict</b><br>$reason</div>
 <table class="cards criteria">
 <thead><tr>$head</tr></thead>
 <tbody>
+<tr><th colspan="10">$level</th></tr>
 $rows
 </tbody>
 </table>
@@ -34,7 +35,7 @@ $budgets
 <td>$drops$properties</td>
 <td>$processing$warnings</td>
 </tr></table>
-<h2>Files and their SHA-256</h2>
+<h2 class="keep">Files and their SHA-256</h2>
 <table class="files">$files</table>
 <div class="end">
 <p class="statement">$statement</p>
@@ -77,6 +78,7 @@ td, th { padding: 0; vertical-align: top; text-align: left; }
 .cards { margin-top: 0.8em; border-bottom: 1px solid #000; }
 .cards th, .cards td { text-align: right; padding: 0.2em 0 0.2em 0.6em; white-space: nowrap; }
 .cards thead th { border-top: 1px solid #000; border-bottom: 1px solid #000; }
+.criteria tbody th { font-weight: normal; }
 .criteria tbody tr + tr td { border-top: 1px solid #bbb; }
 .cards th:first-child, .cards td:first-child { text-align: left; padding-left: 0; }
 .criteria th:last-child, .criteria td:last-child { text-align: left; }
@@ -93,6 +95,8 @@ li, tr { break-inside: avoid; }
 .columns > tbody > tr { break-inside: auto; }
 ul { margin: 0; padding: 0 0 0 1em; list-style: '–  '; }
 .files td:last-child { text-align: right; }
+/* The signature is on a page with the last files, and with the last notes if they are few. */
+.keep, .end, .files tr:nth-last-child(-n+6) { break-before: avoid; }
 .end { break-inside: avoid; }
 .statement { margin: 0.8em 0 0; }
 .signature { margin-top: 2em; table-layout: fixed; }
@@ -102,16 +106,16 @@ footer { margin-top: 0.8em; color: #444; font-size: 0.85em; }
 @media print {
   html { font: 7.3pt/3.4mm '$family', Verdana, sans-serif; }
   body { width: 186mm; }
-  .range { width: 22mm; height: 3.4mm; }
+  .range { width: 20mm; height: 3.4mm; }
   .cards, .files { table-layout: fixed; }
   .cards th, .cards td { padding-left: 1.1mm; }
   .criteria th { width: 16mm; }
   .criteria th:first-child { width: 24mm; }
-  .criteria th:nth-child(2) { width: 18mm; }
-  .criteria th:nth-child(3) { width: 13mm; }
+  .criteria th:nth-child(2) { width: 17mm; }
+  .criteria th:nth-child(3) { width: 16mm; }
   .criteria th:nth-child(4) { width: 19mm; }
   .criteria th:nth-child(5), .criteria th:nth-child(7) { width: 10.5mm; }
-  .criteria th:nth-last-child(2) { width: 22mm; }
+  .criteria th:nth-last-child(2) { width: 20mm; }
   .criteria th:last-child { width: 26.5mm; }
   .budget th { width: 20mm; }
   .budget th:first-child { width: 38mm; }
