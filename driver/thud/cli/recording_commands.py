@@ -184,7 +184,15 @@ MEASURE = Command(
 
 
 # Options of `calibrate` for a known force.
-OF_A_FORCE = ("mass", "force", "uncertainty", "unit", "time_constant", "time_constant_uncertainty")
+OF_A_FORCE = (
+    "mass",
+    "force",
+    "gravity",
+    "uncertainty",
+    "unit",
+    "time_constant",
+    "time_constant_uncertainty",
+)
 
 
 def run_calibrate(options: argparse.Namespace) -> int:
@@ -205,6 +213,7 @@ def run_calibrate(options: argparse.Namespace) -> int:
         options.record,
         force=options.force,
         mass=options.mass,
+        gravity=options.gravity,
         channel=channel_of(options.channel),
         unit=options.unit,
         uncertainty=options.uncertainty or 0.0,
@@ -217,6 +226,7 @@ def run_calibrate(options: argparse.Namespace) -> int:
         print(f"# {result.origin}")
         if result.time_constant:
             print(f"# {result.time_constant}")
+    print_notes(result.warnings)
     unknown = "uncertainty of the {} not stated: not included ({})"
     if options.time_constant not in {None, math.inf} and not options.time_constant_uncertainty:
         print_notes([unknown.format("time constant", "--time-constant-uncertainty")])
@@ -236,6 +246,12 @@ CALIBRATE = Command(
         ),
         argument("--mass", type=float, metavar="KG", help="mass that exerts the known force"),
         argument("--force", type=float, metavar="N", help="known force, if no mass is given"),
+        argument(
+            "--gravity",
+            type=float,
+            metavar="M/S2",
+            help="local gravity for --mass, such as 9.798 (default: 9.80665, with an uncertainty)",
+        ),
         argument(
             "--uncertainty",
             type=float,

@@ -88,12 +88,15 @@ class Calibration:
         Where the calibration comes from, for reports.
     time_constant : TimeConstant or None
         Time constant of the amplifier, if the calibration comes from a record of a known force.
+    warnings : tuple of str
+        What was assumed, and possible faults of the record, a sentence each.
     """
 
     chain: str
     uncertainty: float | None = None
     origin: str = ""
     time_constant: TimeConstant | None = None
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Raise InputError if the chain or the uncertainty are not allowed."""

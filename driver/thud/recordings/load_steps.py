@@ -69,7 +69,10 @@ class Rate(NamedTuple):
 
 
 class Steps(NamedTuple):
-    """Magnitude of each step, standard uncertainty of their mean, and the rate of the droop."""
+    """Magnitude of each step, standard uncertainty of their mean, and the rate of the droop.
+
+    Then the signs of the steps, and if a rate was stated, the one that the record alone shows.
+    """
 
     sizes: NDArray[np.float64]
     uncertainty: float
@@ -79,7 +82,7 @@ class Steps(NamedTuple):
 def measure_steps(
     level: NDArray[np.float64], interval: float | None, name: str, stated: Rate | None = None
 ) -> Steps:
-    """Return the steps of a level, whose interval is in s if it is known.
+    """Return the steps of a record, the interval of whose sections is in s if it is known.
 
     The rate of the droop is fitted unless it is stated as exact. Raise InputError if there is no
     clear step, or if the level between the steps fits no exponential decay.
@@ -88,6 +91,8 @@ def measure_steps(
         refuse(f"{name}: a value is not finite", "real numbers")
     longest = max(1, int(MAX_LAG * len(level)))
     lag = longest if interval is None else min(longest, max(1, round(LAG / interval)))
+    signs: NDArray[np.float64]
+    shown: Rate | None = None
     edges = [(0, 0), *_edges(level, lag), (len(level), len(level))]
     middles = [(first + last) // 2 for first, last in edges]
     plateaus = []
@@ -133,6 +138,8 @@ def _edges(level: NDArray[np.float64], lag: int) -> list[tuple[int, int]]:
         edges.append((int(top[0] + offset), math.ceil(top[-1] + offset)))
     return edges
 
+    if stated:
+        steps = steps._replace(shown=_fit_steps(level, plateaus, lag, None)[0].rate)
 
 class _Droop:
     """Model of the plateaus behind a first-order high-pass; times are in means.
@@ -272,7 +279,7 @@ def _fit_steps(
     if abs(parameters[last]) > SIGNIFICANT_DRIFT * math.sqrt(covariance[last, last]):
         effect = parameters[last] * (gradient @ covariance)[last] / covariance[last, last]
         deviation = math.hypot(deviation, effect)
-    sizes = np.abs(sizes)
+    signs, sizes = np.sign(sizes), np.abs(sizes)
     if len(sizes) > 1:
         deviation = max(deviation, float(sizes.std(ddof=1)) / math.sqrt(len(sizes)))
     # A rate at its bound fits nothing.
@@ -287,8 +294,8 @@ def _fit_steps(
             first = other.best_rate(noise, 1 / lag)
             changed = np.abs(other.steps(first, other.solve(first, noise)[0])[0])
             deviation = math.hypot(deviation, float(changed.mean() - sizes.mean()))
-    steps = Steps(sizes, deviation, Rate(rate, 0.0 if fixed else math.sqrt(covariance[-1, -1])))
-    return steps, misfit / float(sizes.mean())
+    fitted = Rate(rate, 0.0 if fixed else math.sqrt(covariance[-1, -1]))
+    return Steps(sizes, deviation, fitted, signs), misfit / float(sizes.mean())
 
 
 def _lost_level(
