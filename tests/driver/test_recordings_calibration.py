@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+import soundfile
 from conftest import naming
 from scipy import stats
 from scipy.signal import cont2discrete, lfilter
@@ -231,6 +232,85 @@ def test_command_states_the_time_constant(
     assert "time constant of 5 s, taken off" in shown.out
     assert "--time-constant-uncertainty" in shown.err
     assert "(--uncertainty)" in shown.err
+
+
+def test_gravity_of_a_mass_is_stated_or_counts_as_uncertainty(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    level = recorded(math.inf, 1, noise=1e-4)
+    signal = Signal.from_array(level, RATE)
+    stated = calibrate(signal, mass=10.0, gravity=9.798, unit="V")
+    assert float(stated.chain.split()[0]) == pytest.approx(97.98, rel=1e-4)
+    assert stated.origin.startswith("2 steps of 10 kg (g = 9.798 m/s2)")
+    assert not stated.warnings
+    silent = calibrate(signal, mass=10.0, unit="V")
+    assert float(silent.chain.split()[0]) == pytest.approx(98.0665, rel=1e-4)
+    # From 9.780 m/s2 at the equator to 9.833 m/s2 at the poles: a rectangular distribution.
+    spread = (9.833 - 9.780) / 2 / math.sqrt(3) / 9.80665
+    assert stated.uncertainty is not None
+    assert silent.uncertainty == pytest.approx(math.hypot(stated.uncertainty, spread))
+    assert re.search(naming("gravity not stated", "0.16 %"), *silent.warnings)
+    for given, words in (
+        ({"mass": 10.0, "gravity": 98.0}, naming("gravity", "9.76 to 9.84")),
+        ({"mass": 10.0, "gravity": math.nan}, naming("gravity", "nan")),
+        ({"force": 98.0, "gravity": 9.81}, naming("gravity", "mass")),
+    ):
+        with pytest.raises(InputError, match=words):
+            calibrate(signal, unit="V", **given)
+    np.savetxt(tmp_path / "weight.csv", level, header="Force [V]", comments="")
+    arguments = ["calibrate", str(tmp_path / "weight.csv"), "--mass", "10", "--uncertainty", "1e-3"]
+    assert cli.main(arguments) == 0
+    assert "--gravity" in capsys.readouterr().err
+    assert cli.main([*arguments, "--gravity", "9.798"]) == 0
+    shown = capsys.readouterr()
+    assert "(g = 9.798 m/s2)" in shown.out
+    assert not shown.err
+
+
+def test_stated_time_constant_that_the_record_contradicts_raises_a_warning() -> None:
+    level = recorded(12.0, 2, noise=0.001)
+    wrong, _ = calibrated(level, time_constant=11.0, time_constant_uncertainty=0.01)
+    assert re.search(naming("time constant", "11 s", "11.98 s"), *wrong.warnings)
+    for right in (
+        {"time_constant": 11.5, "time_constant_uncertainty": 0.03},
+        {"time_constant": 12.0},
+        {},
+    ):
+        assert not calibrated(level, **right)[0].warnings
+
+
+@pytest.mark.parametrize("limits", [(-1.0, 1.2), (-1.0, 1.3), (0.31, 2.0)])
+def test_clipped_plateaus_are_refused(limits: tuple[float, float]) -> None:
+    """The load, the noise above the load, and the rest; they are 0.3 and 1.3 V."""
+    with pytest.raises(InputError, match=naming("plateau", "clipped")):
+        calibrated(np.clip(recorded(math.inf, 1), *limits))
+
+
+def test_plateau_at_full_scale_is_refused(tmp_path: Path) -> None:
+    level = 1.12 * load([5.0, 13.0], 0.3, 20.0)
+    path = tmp_path / "weight.wav"
+    soundfile.write(path, np.minimum(level, 0.9999), int(RATE), "PCM_16")
+    with pytest.raises(InputError, match=naming("weight.wav", "clipped", "full scale")):
+        calibrate(path, force=FORCE)
+    soundfile.write(path, 0.9 / 1.12 * level, int(RATE), "PCM_16")
+    assert float(calibrate(path, force=FORCE).chain.split()[0]) == pytest.approx(FORCE / 0.9, 1e-4)
+
+
+def test_coarse_record_that_rests_at_one_value_is_not_clipped() -> None:
+    """The rest is the minimum of the record, exactly constant; the loaded level droops."""
+    level = np.rint(1000 * high_pass(load([5.0], 0.3, 20.0), 30.0)) / 1000
+    _, error = calibrated(level)
+    assert abs(error) < 0.005
+
+
+def test_steps_in_one_direction_are_each_the_whole_force() -> None:
+    time = np.arange(0, 15, 1 / RATE)
+    level = sum(np.clip((time - begin) / 0.3, 0, 1) for begin in (4.0, 9.0))
+    level += np.random.default_rng(1).normal(0, 0.01, time.size)
+    found, error = calibrated(level)
+    assert abs(error) < 0.01
+    assert re.search(naming("same direction", "whole", "250 N"), *found.warnings)
+    assert not calibrated(recorded(math.inf, 1))[0].warnings
 
 
 def test_time_constant_needs_a_time_scale(tmp_path: Path) -> None:

@@ -1025,7 +1025,9 @@ def test_means_of_a_calibration_are_those_of_its_parts_however_it_is_read(
     found = calibration._means(read, count)  # noqa: SLF001
     width = max(1, count // calibration.MEANS)
     parts = values[: count - count % width].reshape(-1, width)
-    np.testing.assert_array_equal(found, [part.mean() for part in parts])
+    np.testing.assert_array_equal(found.mean, [part.mean() for part in parts])
+    np.testing.assert_array_equal(found.low, [part.min() for part in parts])
+    np.testing.assert_array_equal(found.high, [part.max() for part in parts])
     assert len(opened) <= math.ceil(count / max(width, block - width + 1))
 
 

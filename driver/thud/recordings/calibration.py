@@ -17,8 +17,7 @@ from thud.recordings.force_units import (
     require_unit,
 )
 from thud.recordings.formats import read_channels
-from thud.recordings.load_steps import Rate, measure_steps
-from thud.recordings.restitution import GRAVITY
+from thud.recordings.load_steps import Level, Rate, Steps, measure_steps
 from thud.recordings.signal import Signal
 from thud.recordings.signal_files import choose_channels, regular_file
 
@@ -31,12 +30,12 @@ if TYPE_CHECKING:
 # A record is reduced to about this many means.
 MEANS = 4096
 # Number of samples per read.
+BLOCK = 2**20
 # Standard gravity, m/s2, with which a mass is weighed if the local gravity is not stated; its range
 # at sea level, from the equator to the poles; and that of stated values, also on high mountains.
 GRAVITY = 9.80665
 SEA_LEVEL = (9.780, 9.833)
 ALLOWED_GRAVITY = (9.76, 9.84)
-BLOCK = 2**20
 # Maximum relative uncertainty of the step, and of a stated time constant.
 MAX_UNCERTAINTY = 0.1
 MAX_STATED = 0.5
@@ -92,8 +91,8 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
     Raises
     ------
     InputError
-        If force and mass are both stated or both missing, or the record has no clear step, or
-        its decay fits no time constant.
+        If force and mass are both stated or both missing, or the record is clipped or has no
+        clear step, or its decay fits no time constant.
     """
     if (force is None) == (mass is None):
         refuse("calibrate(): state either force or mass", "force in N or mass in kg")
@@ -105,7 +104,7 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
             f"calibrate(): force = {newtons:g} N, uncertainty = {uncertainty:g}",
             "a positive force, 0 <= uncertainty < 1",
         )
-    name, symbol, samples, count, sample_rate = open_source(record, channel, unit)
+    name, symbol, samples, count, sample_rate, full_scale = open_source(record, channel, unit)
     if not symbol:
         refuse(f"{name}: the values are without a unit", f"unit = one of {ALLOWED}")
     level = _means(samples, count)
@@ -114,7 +113,7 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
     stated = None
     if time_constant is not None:
         stated = _stated_rate(time_constant, time_constant_uncertainty, interval, name)
-    steps = measure_steps(level, interval, name, stated)
+    steps = measure_steps(level, interval, name, stated, full_scale)
     size, deviation = float(steps.sizes.mean()), steps.uncertainty
     if deviation > MAX_UNCERTAINTY * size:
         refuse(
@@ -123,6 +122,7 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
             f"an uncertainty up to {MAX_UNCERTAINTY:.0%}",
         )
     load = f"{newtons:.6g} N" if mass is None else f"{mass:g} kg (g = {local:g} m/s2)"
+    number = len(steps.sizes)
     warnings = _step_warnings(steps, stated, interval, load)
     spread = 0.0
     if mass is not None and gravity is None:
@@ -133,14 +133,14 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
             f"uncertainty includes {100 * spread:.2g} % for {SEA_LEVEL[0]:.3f} to "
             f"{SEA_LEVEL[1]:.3f} m/s2 at sea level"
         )
-    number = len(steps.sizes)
     return Calibration(
         f"{newtons / size!r} N/{symbol}",
         math.hypot(deviation / size, uncertainty, spread),
         f"{number} step{'s' * (number > 1)} of {load} in {name}",
-        tuple(warnings),
         _time_constant(steps.rate, interval),
+        tuple(warnings),
     )
+
 
 def _require_gravity(gravity: float | None, mass: float | None) -> float:
     """Return the gravity of a mass, m/s2; raise InputError if it is not one on the earth."""
@@ -177,7 +177,6 @@ def _step_warnings(
                 f"shows, {shown_time}, by more than their uncertainties"
             )
     return warnings
-
 
 
 def _stated_rate(value: float, uncertainty: float, interval: float | None, name: str) -> Rate:
@@ -217,6 +216,7 @@ class Source(NamedTuple):
     samples: Callable[[int, int], NDArray[np.float64]]
     n_sample: int
     sample_rate: float | None
+    full_scale: float | None
 
 
 def open_source(
@@ -225,7 +225,9 @@ def open_source(
     """Return the values of a channel of a file, or of a signal, in their own unit."""
     if isinstance(record, Signal):
         symbol = "" if unit is None else require_unit(unit, record.name)
-        return Source(record.name, symbol, record.read, record.n_sample, record.sample_rate)
+        return Source(
+            record.name, symbol, record.read, record.n_sample, record.sample_rate, record.full_scale
+        )
     path = regular_file(record)
     name = shown_path(path)
     channels = choose_channels(read_channels(path), channel, name)
@@ -233,14 +235,20 @@ def open_source(
         refuse(f"{name}: {len(channels)} channels match", "channel = one of them")
     (selected,) = channels
     symbol = find_unit(selected.unit) if unit is None else require_unit(unit, path.name)
-    return Source(name, symbol, selected.samples, selected.n_sample, selected.sample_rate)
+    # Integers are read as fractions of full scale.
+    full_scale = 1.0 if selected.counts else None
+    return Source(
+        name, symbol, selected.samples, selected.n_sample, selected.sample_rate, full_scale
+    )
 
 
-def _means(samples: Callable[[int, int], NDArray[np.float64]], count: int) -> NDArray[np.float64]:
+def _means(samples: Callable[[int, int], NDArray[np.float64]], count: int) -> Level:
+    """Return the means, minima and maxima of the sections of a record."""
     width = max(1, count // MEANS)
     # Blocks of complete sections, few because each read opens the file.
     step = width * max(1, BLOCK // width)
     stop = count - count % width
     blocks = (samples(start, min(start + step, stop)) for start in range(0, stop, step))
-    means = [block.reshape(-1, width).mean(axis=1) for block in blocks]
-    return np.concatenate([np.zeros(0), *means])
+    sections = [block.reshape(-1, width) for block in blocks]
+    reduced = [(part.mean(axis=1), part.min(axis=1), part.max(axis=1)) for part in sections]
+    return Level(*np.concatenate([np.zeros((3, 0)), *map(np.stack, reduced)], axis=1))

@@ -50,8 +50,22 @@ SIGNIFICANT_DRIFT = 2.5
 # Standard deviations beyond which a second time constant is significant. The uncertainty includes
 # its effect.
 SIGNIFICANT_SECOND = 3.0
+# A plateau is clipped if more than this fraction of its sections reach full scale, or the extreme
+# value of the record while the extremes of adjacent sections of another plateau differ by more than
+# this many steps of quantization. Fraction of full scale from which a value is clipped.
+CUT = 0.2
+MIN_NOISE = 3.0
+CLIPPED = 0.999
 # Relative singular values below this are zero.
 NEGLIGIBLE = 1e-6
+
+
+class Level(NamedTuple):
+    """Mean, minimum and maximum of each section of a record."""
+
+    mean: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
 
 
 class Plateau(NamedTuple):
@@ -77,22 +91,28 @@ class Steps(NamedTuple):
     sizes: NDArray[np.float64]
     uncertainty: float
     rate: Rate
+    signs: NDArray[np.float64]
+    shown: Rate | None = None
 
 
 def measure_steps(
-    level: NDArray[np.float64], interval: float | None, name: str, stated: Rate | None = None
+    record: Level,
+    interval: float | None,
+    name: str,
+    stated: Rate | None = None,
+    full_scale: float | None = None,
 ) -> Steps:
     """Return the steps of a record, the interval of whose sections is in s if it is known.
 
     The rate of the droop is fitted unless it is stated as exact. Raise InputError if there is no
-    clear step, or if the level between the steps fits no exponential decay.
+    clear step, if a plateau is clipped, or if the level between the steps fits no exponential
+    decay.
     """
+    level = record.mean
     if not np.isfinite(level).all():
         refuse(f"{name}: a value is not finite", "real numbers")
     longest = max(1, int(MAX_LAG * len(level)))
     lag = longest if interval is None else min(longest, max(1, round(LAG / interval)))
-    signs: NDArray[np.float64]
-    shown: Rate | None = None
     edges = [(0, 0), *_edges(level, lag), (len(level), len(level))]
     middles = [(first + last) // 2 for first, last in edges]
     plateaus = []
@@ -104,6 +124,7 @@ def measure_steps(
         refuse(
             f"{name}: has no clear step", "a record in which a known force is put on or taken off"
         )
+    _refuse_clipped(record, plateaus, name, full_scale)
     steps, misfit = _fit_steps(level, plateaus, lag, stated)
     if MISFIT_WEIGHT * misfit > MAX_MISFIT:
         refuse(
@@ -117,7 +138,39 @@ def measure_steps(
             "the record, too fast for a step to be distinguished from the decay",
             f"a time constant of {lag / MAX_DECAY / len(level):.2g} of the record or more",
         )
+    if stated:
+        steps = steps._replace(shown=_fit_steps(level, plateaus, lag, None)[0].rate)
     return steps
+
+
+def _refuse_clipped(
+    record: Level, plateaus: list[Plateau], name: str, full_scale: float | None
+) -> None:
+    """Raise InputError if a plateau is at full scale, or at one value while another has noise."""
+    for values, extreme, side in (
+        (record.high, float(record.high.max()), "maximum"),
+        (-record.low, float(-record.low.min()), "minimum"),
+    ):
+        parts = [values[plateau.start : plateau.stop] for plateau in plateaus]
+        # The quantization of a record is no noise.
+        levels = np.unique(np.concatenate(parts))
+        step = float(np.diff(levels).min(initial=math.inf))
+        noises = [float(np.median(np.abs(np.diff(part)))) for part in parts]
+        is_noisy = max(noises) > MIN_NOISE * step
+        for plateau, part in zip(plateaus, parts, strict=True):
+            at_scale = full_scale is not None and np.mean(part >= CLIPPED * full_scale) > CUT
+            if at_scale or (is_noisy and np.mean(part == extreme) > CUT):
+                value = extreme if side == "maximum" else -extreme
+                cause = (
+                    "at full scale"
+                    if at_scale
+                    else f"at {value:.5g}, the {side} of the record, while another one has noise"
+                )
+                refuse(
+                    f"{name}: the plateau from {plateau.start / len(values):.0%} to "
+                    f"{plateau.stop / len(values):.0%} of the record is clipped, {cause}",
+                    "a measuring range that includes the known force",
+                )
 
 
 def _edges(level: NDArray[np.float64], lag: int) -> list[tuple[int, int]]:
@@ -138,8 +191,6 @@ def _edges(level: NDArray[np.float64], lag: int) -> list[tuple[int, int]]:
         edges.append((int(top[0] + offset), math.ceil(top[-1] + offset)))
     return edges
 
-    if stated:
-        steps = steps._replace(shown=_fit_steps(level, plateaus, lag, None)[0].rate)
 
 class _Droop:
     """Model of the plateaus behind a first-order high-pass; times are in means.
