@@ -13,6 +13,7 @@ import soundfile
 from conftest import naming
 from scipy import stats
 from scipy.signal import cont2discrete, lfilter
+from synthetic import half_sine
 
 from thud import InputError, cli
 from thud.recordings import load_steps
@@ -352,18 +353,22 @@ def tapped(  # noqa: PLR0913 - what differs between records
     noise: float = 0.002,
     rate: float = 20_000.0,
     hum: float = 0.0,
+    rebound: float = 0.0,
 ) -> Signal:
     """Return taps on a plate with modes: frequency, Hz, quality, share in the static response.
 
-    The response to a force that is linear between the samples is exact.
+    After a rebound, s, the hammer hits the plate again, half as hard. The response to a force
+    that is linear between the samples is exact.
     """
     rng = np.random.default_rng(seed)
     time = np.arange(0, 0.1 + 0.4 * count, 1 / rate)
     force = np.zeros(time.size)
     for k in range(count):
         begin = 0.1 + 0.4 * k + rng.uniform(0, 0.01)
-        phase = np.clip((time - begin) / (duration * rng.uniform(0.8, 1.2)), 0, 1)
-        force += rng.uniform(0.7, 1) * np.sin(np.pi * phase) ** 1.5
+        length, height = duration * rng.uniform(0.8, 1.2), rng.uniform(0.7, 1)
+        for delay, factor in ((0.0, 1.0), (rebound, 0.5))[: 1 + (rebound > 0)]:
+            phase = np.clip((time - begin - delay) / length, 0, 1)
+            force += factor * height * np.sin(np.pi * phase) ** 1.5
     level = (1 - sum(share for *_, share in modes)) * force
     for frequency, quality, share in modes:
         omega = 2 * np.pi * frequency
@@ -418,6 +423,30 @@ def test_taps_that_differ_count_by_their_scatter() -> None:
     assert found.frequency_uncertainty == pytest.approx(6.35 / 1111 * 3.18 / 1.96, rel=0.02)
 
 
+@pytest.mark.parametrize("rebound", [0.008, 0.012, 0.025])
+def test_ringing_after_the_last_blow_counts(rebound: float) -> None:
+    found = calibrate_tap(tapped([(1100.0, 25.0, 1.0)], 1, rebound=rebound))
+    assert not found.warnings
+    assert np.abs(deviations(found, 1100, 25)).max() < 4
+    assert found.frequency_uncertainty < 2e-4
+    assert found.quality_uncertainty < 0.01
+
+
+def test_misfit_of_close_modes_counts_as_uncertainty() -> None:
+    """One resonance is fitted to 1100 and 1120 Hz; the weighted mean of both is 1108 Hz."""
+    record = tapped([(1100.0, 15.0, 0.6), (1120.0, 15.0, 0.4)], 1, noise=1e-4)
+    found = calibrate_tap(record)
+    assert np.abs(deviations(found, 1108, 15)).max() < 3
+    assert found.quality_uncertainty > 0.01
+    assert re.search(naming("ringing", "differs"), *found.warnings)
+
+
+def test_clock_of_the_recorder_limits_the_frequency() -> None:
+    found = calibrate_tap(tapped([(1100.0, 30.0, 1.0)], 1, count=3, noise=1e-6))
+    assert found.frequency_uncertainty == pytest.approx(1e-4, rel=0.01)
+    assert "0.01 % for the clock" in str(found)
+
+
 def test_second_resonance_is_stated() -> None:
     found = calibrate_tap(tapped([(1100.0, 30.0, 0.7), (2300.0, 40.0, 0.3)], 1, duration=5e-4))
     assert np.abs(deviations(found, 1100, 30)).max() < 4
@@ -459,7 +488,20 @@ def test_zeros_of_the_hammer_are_not_those_of_the_plate(seed: int) -> None:
             np.repeat([0.0, 1.0], [9_990, 10_010])
             + np.random.default_rng(1).normal(0, 0.01, 20_000),
             20_000.0,
+            naming("recording", "no tap", "pressed"),
+        ),
+        (
+            half_sine(20_000.0, 0.2, 20_000, 1.0, 0.001)
+            + np.random.default_rng(1).normal(0, 0.01, 20_000),
+            20_000.0,
             naming("recording", "no resonance"),
+        ),
+        # A ball and its bounce.
+        (
+            sum(half_sine(20_000.0, begin, 30_000, 1500.0, 0.02) for begin in (0.2, 0.9))
+            + np.random.default_rng(1).normal(0, 1.0, 30_000),
+            20_000.0,
+            naming("recording", "no tap", "drop"),
         ),
     ],
 )

@@ -208,6 +208,7 @@ def run_calibrate(options: argparse.Namespace) -> int:
         print(plate.lines())
         if not options.quiet:
             print(f"# {plate}")
+        print_notes(plate.warnings)
         return 0
     result = calibrate(
         options.record,
