@@ -314,6 +314,21 @@ def test_steps_in_one_direction_are_each_the_whole_force() -> None:
     assert not calibrated(recorded(math.inf, 1))[0].warnings
 
 
+def test_messages_name_the_decimal_comma_and_the_channels(
+    tmp_path: Path, errors_of: ErrorsOf
+) -> None:
+    path = tmp_path / "cells.csv"
+    path.write_text("Time [s],F1 [N],F2 [N]\n" + "\n".join(f"{k}e-3,{k},2" for k in range(99)))
+    assert re.search(
+        naming("--channel", "2 'F1'", "3 'F2'"), errors_of("calibrate", path, "--mass", "10")
+    )
+    assert "'2,5' has a decimal comma" in errors_of("calibrate", path, "--mass", "2,5")
+    assert "'heavy' is not a number" in errors_of("calibrate", path, "--mass", "heavy")
+    for text in ("400,08", "400,08 N/V"):
+        errors = errors_of("measure", path, "--channel", "F1", "--calibration", text)
+        assert f"{text!r} has a decimal comma" in errors
+
+
 def test_time_constant_needs_a_time_scale(tmp_path: Path) -> None:
     np.savetxt(tmp_path / "weight.csv", recorded(10.0, 1), header="Force [V]", comments="")
     found = calibrate(tmp_path / "weight.csv", force=FORCE)

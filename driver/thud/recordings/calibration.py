@@ -19,7 +19,7 @@ from thud.recordings.force_units import (
 from thud.recordings.formats import read_channels
 from thud.recordings.load_steps import Level, Rate, Steps, measure_steps
 from thud.recordings.signal import Signal
-from thud.recordings.signal_files import choose_channels, regular_file
+from thud.recordings.signal_files import channel_choices, choose_channels, regular_file
 
 if TYPE_CHECKING:
     import os
@@ -232,7 +232,10 @@ def open_source(
     name = shown_path(path)
     channels = choose_channels(read_channels(path), channel, name)
     if len(channels) != 1:
-        refuse(f"{name}: {len(channels)} channels match", "channel = one of them")
+        refuse(
+            f"{name}: has {len(channels)} channels of force",
+            f"channel (--channel) = one of {channel_choices(channels)}",
+        )
     (selected,) = channels
     symbol = find_unit(selected.unit) if unit is None else require_unit(unit, path.name)
     # Integers are read as fractions of full scale.

@@ -137,6 +137,8 @@ def read_chain(text: object) -> list[Factor]:
     for term in terms:
         match = FACTOR.fullmatch(term)
         value = float(match["value"]) if match else 0.0
+        if term.lstrip("+-").isdecimal() and "," in text:
+            refuse(f"calibration: {text[:60]!r} has a decimal comma", f"a point, {EXAMPLES}")
         if not match or not SIZES[0] < abs(value) < SIZES[1]:
             refuse(f"calibration: {term[:60]!r} is not a number with units", EXAMPLES)
         (top, top_factor), (bottom, bottom_factor) = (

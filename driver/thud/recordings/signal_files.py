@@ -246,9 +246,9 @@ def _stored(descriptor: int, size: int) -> int:
     return size
 
 
-def choose_channels(channels: list[Channel], channel: int | str | None, name: str) -> list[Channel]:
-    """Return the selected channels; raise InputError if the selection is ambiguous."""
-    choices = ", ".join(
+def channel_choices(channels: list[Channel]) -> str:
+    """Return the numbers and names of channels for a message."""
+    return ", ".join(
         f"{entry.number}" + (f" {shown_text(entry.name)!r}" if entry.name else "")
         for entry in channels[:20]
     )
@@ -293,6 +293,11 @@ def _signal(path: Path, channel: Channel, stated: _Stated, *, several: bool) -> 
     extremes = scan(channel.samples, channel.n_sample, signal.name)
     sign, changed = find_sign(extremes, scale, stated.polarity, signal.name)
     return replace(
+
+
+def choose_channels(channels: list[Channel], channel: int | str | None, name: str) -> list[Channel]:
+    """Return the selected channels; raise InputError if the selection is ambiguous."""
+    choices = channel_choices(channels)
         signal,
         samples=partial(_read_scaled, channel.samples, sign * scale),
         steps=(*signal.steps, *changed),
