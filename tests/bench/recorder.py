@@ -86,6 +86,8 @@ INCLUDED = re.compile(r"uncertainty not stated, and not included: (.*)")
 # force from 0.02 on, 1 % of an impulse.
 DIFFER = re.compile(r"impulse and by bounces differ by (-?[\d.]+)")
 SUSPECT = 0.02
+# Relative standard deviation of the clock of a recorder.
+CLOCK = 1e-4
 # Keys of the installed package; those it does not know are left out, where a condition is not about
 # them.
 KNOWN = {field.name for kind in (Config, PlateConfig) for field in fields(kind)}
@@ -385,11 +387,14 @@ def _tapped(
         message = "lab.toml: calibrate_tap is not known"
         raise InputError(message) from error
     chain, path = condition.chain, folder / "tap.wav"
-    values = tap_record(condition.taps, chain, generator(condition, seed))
+    rng = generator(condition, seed)
+    values = tap_record(condition.taps, chain, rng)
     write_sound(path, convert(values, chain), chain)
     result, mode = calibrate_tap(path), chain.modes[0]
+    # As an error of the recorder's clock.
+    clock = 1 + CLOCK * rng.normal()
     pairs = {
-        RESONANCE: (result.frequency / mode.frequency, result.frequency_uncertainty),
+        RESONANCE: (clock * result.frequency / mode.frequency, result.frequency_uncertainty),
         QUALITY: (result.quality / mode.quality, result.quality_uncertainty),
     }
     return {key: Value(ratio - 1, u, concerned=False) for key, (ratio, u) in pairs.items()}, ()

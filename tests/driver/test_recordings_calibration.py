@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+import soundfile
 from conftest import naming
 from scipy import stats
 from scipy.signal import cont2discrete, lfilter
+from synthetic import half_sine
 
 from thud import InputError, cli
 from thud.recordings import load_steps
@@ -233,6 +235,100 @@ def test_command_states_the_time_constant(
     assert "(--uncertainty)" in shown.err
 
 
+def test_gravity_of_a_mass_is_stated_or_counts_as_uncertainty(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    level = recorded(math.inf, 1, noise=1e-4)
+    signal = Signal.from_array(level, RATE)
+    stated = calibrate(signal, mass=10.0, gravity=9.798, unit="V")
+    assert float(stated.chain.split()[0]) == pytest.approx(97.98, rel=1e-4)
+    assert stated.origin.startswith("2 steps of 10 kg (g = 9.798 m/s2)")
+    assert not stated.warnings
+    silent = calibrate(signal, mass=10.0, unit="V")
+    assert float(silent.chain.split()[0]) == pytest.approx(98.0665, rel=1e-4)
+    # From 9.780 m/s2 at the equator to 9.833 m/s2 at the poles: a rectangular distribution.
+    spread = (9.833 - 9.780) / 2 / math.sqrt(3) / 9.80665
+    assert stated.uncertainty is not None
+    assert silent.uncertainty == pytest.approx(math.hypot(stated.uncertainty, spread))
+    assert re.search(naming("gravity not stated", "0.16 %"), *silent.warnings)
+    for given, words in (
+        ({"mass": 10.0, "gravity": 98.0}, naming("gravity", "9.76 to 9.84")),
+        ({"mass": 10.0, "gravity": math.nan}, naming("gravity", "nan")),
+        ({"force": 98.0, "gravity": 9.81}, naming("gravity", "mass")),
+    ):
+        with pytest.raises(InputError, match=words):
+            calibrate(signal, unit="V", **given)
+    np.savetxt(tmp_path / "weight.csv", level, header="Force [V]", comments="")
+    arguments = ["calibrate", str(tmp_path / "weight.csv"), "--mass", "10", "--uncertainty", "1e-3"]
+    assert cli.main(arguments) == 0
+    assert "--gravity" in capsys.readouterr().err
+    assert cli.main([*arguments, "--gravity", "9.798"]) == 0
+    shown = capsys.readouterr()
+    assert "(g = 9.798 m/s2)" in shown.out
+    assert not shown.err
+
+
+def test_stated_time_constant_that_the_record_contradicts_raises_a_warning() -> None:
+    level = recorded(12.0, 2, noise=0.001)
+    wrong, _ = calibrated(level, time_constant=11.0, time_constant_uncertainty=0.01)
+    assert re.search(naming("time constant", "11 s", "11.98 s"), *wrong.warnings)
+    for right in (
+        {"time_constant": 11.5, "time_constant_uncertainty": 0.03},
+        {"time_constant": 12.0},
+        {},
+    ):
+        assert not calibrated(level, **right)[0].warnings
+
+
+@pytest.mark.parametrize("limits", [(-1.0, 1.2), (-1.0, 1.3), (0.31, 2.0)])
+def test_clipped_plateaus_are_refused(limits: tuple[float, float]) -> None:
+    """The load, the noise above the load, and the rest; they are 0.3 and 1.3 V."""
+    with pytest.raises(InputError, match=naming("plateau", "clipped")):
+        calibrated(np.clip(recorded(math.inf, 1), *limits))
+
+
+def test_plateau_at_full_scale_is_refused(tmp_path: Path) -> None:
+    level = 1.12 * load([5.0, 13.0], 0.3, 20.0)
+    path = tmp_path / "weight.wav"
+    soundfile.write(path, np.minimum(level, 0.9999), int(RATE), "PCM_16")
+    with pytest.raises(InputError, match=naming("weight.wav", "clipped", "full scale")):
+        calibrate(path, force=FORCE)
+    soundfile.write(path, 0.9 / 1.12 * level, int(RATE), "PCM_16")
+    assert float(calibrate(path, force=FORCE).chain.split()[0]) == pytest.approx(FORCE / 0.9, 1e-4)
+
+
+def test_coarse_record_that_rests_at_one_value_is_not_clipped() -> None:
+    """The rest is the minimum of the record, exactly constant; the loaded level droops."""
+    level = np.rint(1000 * high_pass(load([5.0], 0.3, 20.0), 30.0)) / 1000
+    _, error = calibrated(level)
+    assert abs(error) < 0.005
+
+
+def test_steps_in_one_direction_are_each_the_whole_force() -> None:
+    time = np.arange(0, 15, 1 / RATE)
+    level = sum(np.clip((time - begin) / 0.3, 0, 1) for begin in (4.0, 9.0))
+    level += np.random.default_rng(1).normal(0, 0.01, time.size)
+    found, error = calibrated(level)
+    assert abs(error) < 0.01
+    assert re.search(naming("same direction", "whole", "250 N"), *found.warnings)
+    assert not calibrated(recorded(math.inf, 1))[0].warnings
+
+
+def test_messages_name_the_decimal_comma_and_the_channels(
+    tmp_path: Path, errors_of: ErrorsOf
+) -> None:
+    path = tmp_path / "cells.csv"
+    path.write_text("Time [s],F1 [N],F2 [N]\n" + "\n".join(f"{k}e-3,{k},2" for k in range(99)))
+    assert re.search(
+        naming("--channel", "2 'F1'", "3 'F2'"), errors_of("calibrate", path, "--mass", "10")
+    )
+    assert "'2,5' has a decimal comma" in errors_of("calibrate", path, "--mass", "2,5")
+    assert "'heavy' is not a number" in errors_of("calibrate", path, "--mass", "heavy")
+    for text in ("400,08", "400,08 N/V"):
+        errors = errors_of("measure", path, "--channel", "F1", "--calibration", text)
+        assert f"{text!r} has a decimal comma" in errors
+
+
 def test_time_constant_needs_a_time_scale(tmp_path: Path) -> None:
     np.savetxt(tmp_path / "weight.csv", recorded(10.0, 1), header="Force [V]", comments="")
     found = calibrate(tmp_path / "weight.csv", force=FORCE)
@@ -272,18 +368,22 @@ def tapped(  # noqa: PLR0913 - what differs between records
     noise: float = 0.002,
     rate: float = 20_000.0,
     hum: float = 0.0,
+    rebound: float = 0.0,
 ) -> Signal:
     """Return taps on a plate with modes: frequency, Hz, quality, share in the static response.
 
-    The response to a force that is linear between the samples is exact.
+    After a rebound, s, the hammer hits the plate again, half as hard. The response to a force
+    that is linear between the samples is exact.
     """
     rng = np.random.default_rng(seed)
     time = np.arange(0, 0.1 + 0.4 * count, 1 / rate)
     force = np.zeros(time.size)
     for k in range(count):
         begin = 0.1 + 0.4 * k + rng.uniform(0, 0.01)
-        phase = np.clip((time - begin) / (duration * rng.uniform(0.8, 1.2)), 0, 1)
-        force += rng.uniform(0.7, 1) * np.sin(np.pi * phase) ** 1.5
+        length, height = duration * rng.uniform(0.8, 1.2), rng.uniform(0.7, 1)
+        for delay, factor in ((0.0, 1.0), (rebound, 0.5))[: 1 + (rebound > 0)]:
+            phase = np.clip((time - begin - delay) / length, 0, 1)
+            force += factor * height * np.sin(np.pi * phase) ** 1.5
     level = (1 - sum(share for *_, share in modes)) * force
     for frequency, quality, share in modes:
         omega = 2 * np.pi * frequency
@@ -338,6 +438,30 @@ def test_taps_that_differ_count_by_their_scatter() -> None:
     assert found.frequency_uncertainty == pytest.approx(6.35 / 1111 * 3.18 / 1.96, rel=0.02)
 
 
+@pytest.mark.parametrize("rebound", [0.008, 0.012, 0.025])
+def test_ringing_after_the_last_blow_counts(rebound: float) -> None:
+    found = calibrate_tap(tapped([(1100.0, 25.0, 1.0)], 1, rebound=rebound))
+    assert not found.warnings
+    assert np.abs(deviations(found, 1100, 25)).max() < 4
+    assert found.frequency_uncertainty < 2e-4
+    assert found.quality_uncertainty < 0.01
+
+
+def test_misfit_of_close_modes_counts_as_uncertainty() -> None:
+    """One resonance is fitted to 1100 and 1120 Hz; the weighted mean of both is 1108 Hz."""
+    record = tapped([(1100.0, 15.0, 0.6), (1120.0, 15.0, 0.4)], 1, noise=1e-4)
+    found = calibrate_tap(record)
+    assert np.abs(deviations(found, 1108, 15)).max() < 3
+    assert found.quality_uncertainty > 0.01
+    assert re.search(naming("ringing", "differs"), *found.warnings)
+
+
+def test_clock_of_the_recorder_limits_the_frequency() -> None:
+    found = calibrate_tap(tapped([(1100.0, 30.0, 1.0)], 1, count=3, noise=1e-6))
+    assert found.frequency_uncertainty == pytest.approx(1e-4, rel=0.01)
+    assert "0.01 % for the clock" in str(found)
+
+
 def test_second_resonance_is_stated() -> None:
     found = calibrate_tap(tapped([(1100.0, 30.0, 0.7), (2300.0, 40.0, 0.3)], 1, duration=5e-4))
     assert np.abs(deviations(found, 1100, 30)).max() < 4
@@ -379,7 +503,20 @@ def test_zeros_of_the_hammer_are_not_those_of_the_plate(seed: int) -> None:
             np.repeat([0.0, 1.0], [9_990, 10_010])
             + np.random.default_rng(1).normal(0, 0.01, 20_000),
             20_000.0,
+            naming("recording", "no tap", "pressed"),
+        ),
+        (
+            half_sine(20_000.0, 0.2, 20_000, 1.0, 0.001)
+            + np.random.default_rng(1).normal(0, 0.01, 20_000),
+            20_000.0,
             naming("recording", "no resonance"),
+        ),
+        # A ball and its bounce.
+        (
+            sum(half_sine(20_000.0, begin, 30_000, 1500.0, 0.02) for begin in (0.2, 0.9))
+            + np.random.default_rng(1).normal(0, 1.0, 30_000),
+            20_000.0,
+            naming("recording", "no tap", "drop"),
         ),
     ],
 )

@@ -212,6 +212,60 @@ def test_faults_of_single_load_cells_are_found(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.levels(), expected.levels(), atol=0.02)
 
 
+def loads(**changed: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Return the forces of four load cells, some of them changed."""
+    return list((dict(zip(NAMES, cells(), strict=True)) | changed).values())
+
+
+def cell_warnings(path: Path) -> str:
+    """Return the warnings that name a load cell."""
+    found = thud.read_recording(path, channels="sum")
+    messages = [*found.warnings, *(warning for drop in found.drops for warning in drop.warnings)]
+    return "\n".join(message for message in messages if re.search(r"F\d(:| \[)", message))
+
+
+@pytest.mark.parametrize(("delay", "shown"), [(0.0005, "0.5 ms later"), (-0.003, "3 ms earlier")])
+def test_late_load_cell_raises_a_warning(delay: float, shown: str, tmp_path: Path) -> None:
+    late = np.roll(cells()[1], round(delay * RATE))
+    path = write_table(tmp_path / "late.csv", loads(F2=late), NAMES)
+    assert re.search(rf"F2: the force of this load cell is {shown} than", cell_warnings(path))
+
+
+def test_load_cells_with_other_shapes_are_not_late(tmp_path: Path) -> None:
+    """The ball rolls by 2 % of the share, and a cell rings at 300 Hz with 3 % of its force."""
+    first, second, third, fourth = cells()
+    time = np.arange(len(first)) / RATE
+    tilt = 0.02 * np.sin(2 * np.pi * 25 * (time - 0.11)) * first
+    ringing = 1 + 0.03 * np.sin(2 * np.pi * 300 * time)
+    path = write_table(
+        tmp_path / "shapes.csv", [first + tilt, second - tilt, third * ringing, fourth], NAMES
+    )
+    assert not cell_warnings(path)
+
+
+def test_dead_load_cell_raises_a_warning(tmp_path: Path) -> None:
+    path = write_table(tmp_path / "dead.csv", loads(F3=record(9, share=0.0)), NAMES)
+    assert re.search(r"F3: this load cell carries .* may be dead", cell_warnings(path))
+
+
+def test_sum_with_another_calibration_raises_a_warning(tmp_path: Path) -> None:
+    first, second, third, _ = cells()
+    total = 1.1 * (first + second + third)
+    path = write_table(tmp_path / "total.csv", loads(F4=total), NAMES)
+    assert re.search(r"F4: is 1\.1 times the sum of the other", cell_warnings(path))
+
+
+def test_load_cell_in_another_unit_is_named(tmp_path: Path) -> None:
+    force, noise = cells(), record(1, share=0.0)
+    path = tmp_path / "mixed.csv"
+    table = np.column_stack([np.arange(len(noise)) / RATE, *force[:3], force[3] / 250, noise])
+    head = "t [s],F1 [N],F2 [N],F3 [N],F4 [V],trigger [V]"
+    np.savetxt(path, table, "%.7g", ",", header=head, comments="")
+    (signal,) = open_signals(path, channels="sum")
+    (message,) = signal.warnings
+    assert re.search(r"not included: F4 \[V\];", message)
+
+
 def test_channels_of_unequal_length_are_refused() -> None:
     signals = [Signal.from_array(unit_pulse(RATE)[i:], RATE, f"F{i}") for i in range(2)]
     with pytest.raises(InputError, match=naming("F1", "samples", "recorded together")):

@@ -1000,12 +1000,13 @@ def test_calibration_record_gives_newtons_per_unit(seed: int) -> None:
     volts = rng.normal(0, 0.02, count) + np.linspace(0, 0.03, count) + 0.7
     on = int(rng.integers(12_000, 20_000))
     volts[on : on + 20_000] += 5.02 * 9.81 / 250.0
-    found = calibrate(Signal.from_array(volts, rate), mass=5.02, unit="V", uncertainty=1e-4)
+    record = Signal.from_array(volts, rate)
+    found = calibrate(record, mass=5.02, gravity=9.81, unit="V", uncertainty=1e-4)
     value = float(found.chain.partition(" ")[0])
     # Four standard deviations; one in 16 000 lies outside.
     assert abs(value / 250.0 - 1) < 4.5 * found.uncertainty + 1e-4
     assert 1e-4 < found.uncertainty < 0.02
-    assert found.origin == "2 steps of 5.02 kg in recording"
+    assert found.origin == "2 steps of 5.02 kg (g = 9.81 m/s2) in recording"
 
 
 @pytest.mark.parametrize("count", [0, 5, 10_007, 60_000])
@@ -1024,7 +1025,9 @@ def test_means_of_a_calibration_are_those_of_its_parts_however_it_is_read(
     found = calibration._means(read, count)  # noqa: SLF001
     width = max(1, count // calibration.MEANS)
     parts = values[: count - count % width].reshape(-1, width)
-    np.testing.assert_array_equal(found, [part.mean() for part in parts])
+    np.testing.assert_array_equal(found.mean, [part.mean() for part in parts])
+    np.testing.assert_array_equal(found.low, [part.min() for part in parts])
+    np.testing.assert_array_equal(found.high, [part.max() for part in parts])
     assert len(opened) <= math.ceil(count / max(width, block - width + 1))
 
 

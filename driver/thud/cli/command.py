@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
 import warnings
 from contextlib import contextmanager
@@ -15,7 +16,6 @@ from thud.base.errors import InputError, LockWarning, ReportWarning, ThudError
 from thud.base.files import Results
 
 if TYPE_CHECKING:
-    import argparse
     from collections.abc import Callable, Iterable, Iterator
 
     from thud.floors.mobility_fit import MobilityFit
@@ -40,6 +40,16 @@ class Command(NamedTuple):
 def argument(*names: str, **settings: object) -> Argument:
     """Return an argument from the parameters of ``add_argument``."""
     return names, settings
+
+
+def number(text: str) -> float:
+    """Return the number that an option states; its error names a decimal comma."""
+    try:
+        return float(text)
+    except ValueError as error:
+        comma = " has a decimal comma; allowed: a point" if "," in text else " is not a number"
+        message = f"{text!r}{comma}"
+        raise argparse.ArgumentTypeError(message) from error
 
 
 def output(meaning: str) -> tuple[Argument, Argument]:

@@ -18,6 +18,7 @@ from thud.cli.command import (
     QUIET,
     Command,
     argument,
+    number,
     output,
     print_notes,
     results_of,
@@ -120,14 +121,14 @@ MEASURE = Command(
             "recordings", nargs="+", metavar="FILE", help="recordings of one or more drops each"
         ),
         argument("--source", choices=SOURCES, help="source of the limits (default: rubber_ball)"),
-        argument("--mass", type=float, metavar="KG", help="mass of the source"),
-        argument("--height", type=float, metavar="M", help="drop height"),
+        argument("--mass", type=number, metavar="KG", help="mass of the source"),
+        argument("--height", type=number, metavar="M", help="drop height"),
         argument(
-            "--mass-uncertainty", type=float, metavar="KG", help="standard uncertainty of the mass"
+            "--mass-uncertainty", type=number, metavar="KG", help="standard uncertainty of the mass"
         ),
         argument(
             "--height-uncertainty",
-            type=float,
+            type=number,
             metavar="M",
             help="standard uncertainty of the height",
         ),
@@ -150,7 +151,7 @@ MEASURE = Command(
         ),
         argument(
             "--calibration-uncertainty",
-            type=float,
+            type=number,
             metavar="FRACTION",
             help="relative standard uncertainty of the calibration, such as 0.005",
         ),
@@ -159,7 +160,7 @@ MEASURE = Command(
         ),
         argument(
             "--sample-rate",
-            type=float,
+            type=number,
             metavar="HZ",
             help="sample rate, if the file does not state it",
         ),
@@ -167,9 +168,9 @@ MEASURE = Command(
         argument("--leave-out", action="append", metavar="NUMBERS", help="drops to be left out"),
         argument("--because", action="append", metavar="TEXT", help="why drops are left out"),
         argument(
-            "--from", dest="begin", type=float, metavar="S", help="begin of the searched section"
+            "--from", dest="begin", type=number, metavar="S", help="begin of the searched section"
         ),
-        argument("--to", dest="end", type=float, metavar="S", help="end of the searched section"),
+        argument("--to", dest="end", type=number, metavar="S", help="end of the searched section"),
         argument(
             "--low-pass",
             action="store_true",
@@ -189,7 +190,15 @@ MEASURE = Command(
 
 
 # Options of `calibrate` for a known force.
-OF_A_FORCE = ("mass", "force", "uncertainty", "unit", "time_constant", "time_constant_uncertainty")
+OF_A_FORCE = (
+    "mass",
+    "force",
+    "gravity",
+    "uncertainty",
+    "unit",
+    "time_constant",
+    "time_constant_uncertainty",
+)
 
 
 def run_calibrate(options: argparse.Namespace) -> int:
@@ -205,11 +214,13 @@ def run_calibrate(options: argparse.Namespace) -> int:
         print(plate.lines())
         if not options.quiet:
             print(f"# {plate}")
+        print_notes(plate.warnings)
         return 0
     result = calibrate(
         options.record,
         force=options.force,
         mass=options.mass,
+        gravity=options.gravity,
         channel=channel_of(options.channel),
         unit=options.unit,
         uncertainty=options.uncertainty or 0.0,
@@ -222,6 +233,7 @@ def run_calibrate(options: argparse.Namespace) -> int:
         print(f"# {result.origin}")
         if result.time_constant:
             print(f"# {result.time_constant}")
+    print_notes(result.warnings)
     unknown = "uncertainty of the {} not stated: not included ({})"
     if options.time_constant not in {None, math.inf} and not options.time_constant_uncertainty:
         print_notes([unknown.format("time constant", "--time-constant-uncertainty")])
@@ -239,23 +251,29 @@ CALIBRATE = Command(
             action="store_true",
             help="the record holds taps with a hammer: print the resonance of the plate",
         ),
-        argument("--mass", type=float, metavar="KG", help="mass that exerts the known force"),
-        argument("--force", type=float, metavar="N", help="known force, if no mass is given"),
+        argument("--mass", type=number, metavar="KG", help="mass that exerts the known force"),
+        argument("--force", type=number, metavar="N", help="known force, if no mass is given"),
+        argument(
+            "--gravity",
+            type=number,
+            metavar="M/S2",
+            help="local gravity for --mass, such as 9.798 (default: 9.80665, with an uncertainty)",
+        ),
         argument(
             "--uncertainty",
-            type=float,
+            type=number,
             metavar="FRACTION",
             help="relative standard uncertainty of the mass or force, such as 0.001",
         ),
         argument(
             "--time-constant",
-            type=float,
+            type=number,
             metavar="S",
             help="time constant of the amplifier, inf without droop (default: fitted)",
         ),
         argument(
             "--time-constant-uncertainty",
-            type=float,
+            type=number,
             metavar="FRACTION",
             help="relative standard uncertainty of a stated time constant, such as 0.02",
         ),

@@ -88,12 +88,15 @@ class Calibration:
         Where the calibration comes from, for reports.
     time_constant : TimeConstant or None
         Time constant of the amplifier, if the calibration comes from a record of a known force.
+    warnings : tuple of str
+        What was assumed, and possible faults of the record, a sentence each.
     """
 
     chain: str
     uncertainty: float | None = None
     origin: str = ""
     time_constant: TimeConstant | None = None
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Raise InputError if the chain or the uncertainty are not allowed."""
@@ -134,6 +137,8 @@ def read_chain(text: object) -> list[Factor]:
     for term in terms:
         match = FACTOR.fullmatch(term)
         value = float(match["value"]) if match else 0.0
+        if term.lstrip("+-").isdecimal() and "," in text:
+            refuse(f"calibration: {text[:60]!r} has a decimal comma", f"a point, {EXAMPLES}")
         if not match or not SIZES[0] < abs(value) < SIZES[1]:
             refuse(f"calibration: {term[:60]!r} is not a number with units", EXAMPLES)
         (top, top_factor), (bottom, bottom_factor) = (

@@ -50,8 +50,22 @@ SIGNIFICANT_DRIFT = 2.5
 # Standard deviations beyond which a second time constant is significant. The uncertainty includes
 # its effect.
 SIGNIFICANT_SECOND = 3.0
+# A plateau is clipped if more than this fraction of its sections reach full scale, or the extreme
+# value of the record while the extremes of adjacent sections of another plateau differ by more than
+# this many steps of quantization. Fraction of full scale from which a value is clipped.
+CUT = 0.2
+MIN_NOISE = 3.0
+CLIPPED = 0.999
 # Relative singular values below this are zero.
 NEGLIGIBLE = 1e-6
+
+
+class Level(NamedTuple):
+    """Mean, minimum and maximum of each section of a record."""
+
+    mean: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
 
 
 class Plateau(NamedTuple):
@@ -69,21 +83,32 @@ class Rate(NamedTuple):
 
 
 class Steps(NamedTuple):
-    """Magnitude of each step, standard uncertainty of their mean, and the rate of the droop."""
+    """Magnitude of each step, standard uncertainty of their mean, and the rate of the droop.
+
+    Then the signs of the steps, and if a rate was stated, the one that the record alone shows.
+    """
 
     sizes: NDArray[np.float64]
     uncertainty: float
     rate: Rate
+    signs: NDArray[np.float64]
+    shown: Rate | None = None
 
 
 def measure_steps(
-    level: NDArray[np.float64], interval: float | None, name: str, stated: Rate | None = None
+    record: Level,
+    interval: float | None,
+    name: str,
+    stated: Rate | None = None,
+    full_scale: float | None = None,
 ) -> Steps:
-    """Return the steps of a level, whose interval is in s if it is known.
+    """Return the steps of a record, the interval of whose sections is in s if it is known.
 
     The rate of the droop is fitted unless it is stated as exact. Raise InputError if there is no
-    clear step, or if the level between the steps fits no exponential decay.
+    clear step, if a plateau is clipped, or if the level between the steps fits no exponential
+    decay.
     """
+    level = record.mean
     if not np.isfinite(level).all():
         refuse(f"{name}: a value is not finite", "real numbers")
     longest = max(1, int(MAX_LAG * len(level)))
@@ -99,6 +124,7 @@ def measure_steps(
         refuse(
             f"{name}: has no clear step", "a record in which a known force is put on or taken off"
         )
+    _refuse_clipped(record, plateaus, name, full_scale)
     steps, misfit = _fit_steps(level, plateaus, lag, stated)
     if MISFIT_WEIGHT * misfit > MAX_MISFIT:
         refuse(
@@ -112,7 +138,39 @@ def measure_steps(
             "the record, too fast for a step to be distinguished from the decay",
             f"a time constant of {lag / MAX_DECAY / len(level):.2g} of the record or more",
         )
+    if stated:
+        steps = steps._replace(shown=_fit_steps(level, plateaus, lag, None)[0].rate)
     return steps
+
+
+def _refuse_clipped(
+    record: Level, plateaus: list[Plateau], name: str, full_scale: float | None
+) -> None:
+    """Raise InputError if a plateau is at full scale, or at one value while another has noise."""
+    for values, extreme, side in (
+        (record.high, float(record.high.max()), "maximum"),
+        (-record.low, float(-record.low.min()), "minimum"),
+    ):
+        parts = [values[plateau.start : plateau.stop] for plateau in plateaus]
+        # The quantization of a record is no noise.
+        levels = np.unique(np.concatenate(parts))
+        step = float(np.diff(levels).min(initial=math.inf))
+        noises = [float(np.median(np.abs(np.diff(part)))) for part in parts]
+        is_noisy = max(noises) > MIN_NOISE * step
+        for plateau, part in zip(plateaus, parts, strict=True):
+            at_scale = full_scale is not None and np.mean(part >= CLIPPED * full_scale) > CUT
+            if at_scale or (is_noisy and np.mean(part == extreme) > CUT):
+                value = extreme if side == "maximum" else -extreme
+                cause = (
+                    "at full scale"
+                    if at_scale
+                    else f"at {value:.5g}, the {side} of the record, while another one has noise"
+                )
+                refuse(
+                    f"{name}: the plateau from {plateau.start / len(values):.0%} to "
+                    f"{plateau.stop / len(values):.0%} of the record is clipped, {cause}",
+                    "a measuring range that includes the known force",
+                )
 
 
 def _edges(level: NDArray[np.float64], lag: int) -> list[tuple[int, int]]:
@@ -272,7 +330,7 @@ def _fit_steps(
     if abs(parameters[last]) > SIGNIFICANT_DRIFT * math.sqrt(covariance[last, last]):
         effect = parameters[last] * (gradient @ covariance)[last] / covariance[last, last]
         deviation = math.hypot(deviation, effect)
-    sizes = np.abs(sizes)
+    signs, sizes = np.sign(sizes), np.abs(sizes)
     if len(sizes) > 1:
         deviation = max(deviation, float(sizes.std(ddof=1)) / math.sqrt(len(sizes)))
     # A rate at its bound fits nothing.
@@ -287,8 +345,8 @@ def _fit_steps(
             first = other.best_rate(noise, 1 / lag)
             changed = np.abs(other.steps(first, other.solve(first, noise)[0])[0])
             deviation = math.hypot(deviation, float(changed.mean() - sizes.mean()))
-    steps = Steps(sizes, deviation, Rate(rate, 0.0 if fixed else math.sqrt(covariance[-1, -1])))
-    return steps, misfit / float(sizes.mean())
+    fitted = Rate(rate, 0.0 if fixed else math.sqrt(covariance[-1, -1]))
+    return Steps(sizes, deviation, fitted, signs), misfit / float(sizes.mean())
 
 
 def _lost_level(

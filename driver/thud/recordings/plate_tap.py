@@ -36,6 +36,18 @@ QUIET = 0.03
 # Longest time from the peak of a tap to the end of the contact and to that of its section, s.
 CONTACT = 6e-3
 AFTER = 0.5
+# Times after the peak from which the ringing is fitted in turn, s, until what remains is noise: the
+# hammer may have touched the plate again.
+WAITS = (CONTACT, 12e-3, 20e-3, 32e-3, 50e-3)
+# What remains is no noise if its power around the resonance exceeds that before the tap, within
+# this time, s, by this factor. The uncertainties then include its amplitude times MISFIT_WEIGHT,
+# and a warning states it from this fraction of the oscillation on.
+BEFORE = 0.1
+MAX_POWER = 2.0
+MISFIT_WEIGHT = 2.0
+MIN_MISFIT = 0.01
+# Relative standard uncertainty of the clock of a recorder.
+CLOCK = 1e-4
 # The contact ends where the level differs from the decaying resonance by this fraction of the peak
 # or by this many standard deviations of the noise, and a margin, s.
 MIN_CONTACT = 0.01
@@ -92,7 +104,8 @@ class TappedPlate:
     frequency, quality : float
         Natural frequency, Hz, and quality factor.
     frequency_uncertainty, quality_uncertainty : float
-        Their relative standard uncertainties.
+        Their relative standard uncertainties; that of the frequency includes 1e-4 for the clock of
+        the recorder.
     count : int
         Number of taps.
     others : tuple of float
@@ -105,6 +118,8 @@ class TappedPlate:
         Minimum of the share: no antiresonance is nearer.
     name : str
         Name of the record.
+    warnings : tuple of str
+        Possible faults of the taps, a sentence each.
     """
 
     frequency: float
@@ -117,6 +132,7 @@ class TappedPlate:
     share_uncertainty: float
     minimum_share: float
     name: str
+    warnings: tuple[str, ...] = ()
 
     def lines(self) -> str:
         """Return the lines of a configuration, the table ``[plate]``."""
@@ -129,6 +145,7 @@ class TappedPlate:
         """Return a sentence for reports."""
         taps = f"{self.count} tap{'s' * (self.count > 1)} in {self.name}"
         text = f"{taps}: Q within {100 * self.quality_uncertainty:.2g} % (standard uncertainty)"
+        text += f"; f0_uncertainty includes {100 * CLOCK:g} % for the clock of the recorder"
         text += (
             f"; share in the static response {self.minimum_share:.2f} to 1"
             if self.share is None
@@ -140,11 +157,12 @@ class TappedPlate:
 
 
 class _Tap(NamedTuple):
-    """Index of the peak of a tap, stop index of its section, and its height."""
+    """Index of the peak of a tap, stop index of its section, its height, and the level before."""
 
     top: int
     stop: int
     height: float
+    before: NDArray[np.float64]
 
 
 class _Mode(NamedTuple):
@@ -160,13 +178,15 @@ class _Mode(NamedTuple):
 class _Fit(NamedTuple):
     """Decaying oscillations: frequency, Hz, and logarithm of the decay rate, 1/s, of each.
 
-    The factors are those of the columns; the noise is the standard deviation of the residual.
+    The factors are those of the columns; the noise is the standard deviation of the residual. The
+    misfit is the amplitude of a residual that is no noise, as a fraction of the oscillation.
     """
 
     rates: NDArray[np.float64]
     factors: NDArray[np.float64]
     noise: float
     modes: list[_Mode]
+    misfit: float
 
 
 def calibrate_tap(
@@ -204,18 +224,20 @@ def calibrate_tap(
     if not np.isfinite(level).all():
         refuse(f"{source.name}: a value is not finite", "real numbers")
     taps = _find_taps(level, rate, source.name)
-    fits = [_fit_tap(level, tap, rate) for tap in taps]
-    rings = [modes for modes in fits if modes]
-    if not rings:
+    fits = [(tap, fit) for tap in taps if (fit := _fit_tap(level, tap, rate))]
+    if not fits:
         refuse(
             f"{source.name}: no resonance stands out after {len(taps)} tap{'s' * (len(taps) > 1)}",
             "a tap of a hard hammer after which the plate rings",
         )
     # Weaker taps may show another resonance first.
-    strongest = max((modes[0] for modes in rings), key=lambda mode: mode.response).frequency
-    nearest = [min(modes, key=lambda mode: abs(mode.frequency - strongest)) for modes in rings]
-    firsts = [mode for mode in nearest if abs(mode.frequency / strongest - 1) < SAME]
-    tops = [tap.top for tap, modes in zip(taps, fits, strict=True) if modes]
+    strongest = max((fit.modes[0] for _, fit in fits), key=lambda mode: mode.response).frequency
+    nearest = [
+        (min(fit.modes, key=lambda mode: abs(mode.frequency - strongest)), fit) for _, fit in fits
+    ]
+    same = [pair for pair in nearest if abs(pair[0].frequency / strongest - 1) < SAME]
+    firsts = [mode for mode, _ in same]
+    tops = [tap.top for tap, _ in fits]
     frequency, u_frequency = _mean(
         [math.log(mode.frequency) for mode in firsts],
         [mode.frequency_uncertainty for mode in firsts],
@@ -229,17 +251,27 @@ def calibrate_tap(
             f"{100 * u_frequency:.2g} % only",
             f"an uncertainty up to {MAX_UNCERTAINTY:.0%}",
         )
-    others = max(rings, key=len)
+    others = max((fit.modes for _, fit in same), key=len)
+    misfit = max(fit.misfit for _, fit in same)
+    warnings: tuple[str, ...] = ()
+    if misfit > MIN_MISFIT:
+        message = (
+            f"{source.name}: the ringing differs from decaying oscillations by {misfit:.1%}, as by "
+            "modes close to each other or a hammer that touches the plate again; the uncertainties "
+            "include it"
+        )
+        warnings = (message,)
     plate = Plate(math.exp(frequency), math.exp(quality))
     return TappedPlate(
         plate.frequency,
         plate.quality,
-        u_frequency,
+        math.hypot(u_frequency, CLOCK),
         u_quality,
         len(firsts),
         tuple(m.frequency for m in others if abs(m.frequency / strongest - 1) >= SAME),
         *_share(level, tops, rate, plate),
         source.name,
+        warnings,
     )
 
 
@@ -334,20 +366,67 @@ def _find_taps(level: NDArray[np.float64], rate: float, name: str) -> list[_Tap]
         contact = level[begin : begin + round(CONTACT * rate)] - offset
         peak = int(np.argmax(np.abs(contact)))
         stop = min(following - width, begin + round(AFTER * rate), len(level))
-        taps.append(_Tap(int(begin) + peak, int(stop), abs(float(contact[peak]))))
+        height = abs(float(contact[peak]))
+        pulse = np.abs(level[begin : begin + 3 * round(CONTACT * rate)] - offset)
+        if _width_at_half(pulse, peak) > CONTACT * rate:
+            continue
+        # Between the last cell of the previous tap, and the cell before this one.
+        index = int(np.searchsorted(above, begin // width))
+        first = width * (int(above[index - 1]) + 1) if index else 0
+        first = max(first, int(begin) - round(BEFORE * rate))
+        quiet_section = level[first : max(first, begin - width)]
+        taps.append(_Tap(int(begin) + peak, int(stop), height, quiet_section))
+    if not taps:
+        refuse(
+            f"{name}: no tap, but the plate is pressed for more than {1e3 * CONTACT:g} ms, as by a "
+            "drop",
+            "a record in which a hard hammer taps the plate",
+        )
     return taps
 
 
-def _fit_tap(level: NDArray[np.float64], tap: _Tap, rate: float) -> list[_Mode]:
-    """Return the resonances after a tap, that with the largest static response first."""
-    latest = tap.top + round(CONTACT * rate)
-    start = latest
-    modes: list[_Mode] = []
+def _width_at_half(pulse: NDArray[np.float64], peak: int) -> int:
+    """Return the number of samples around a peak that are above half of it."""
+    below = np.flatnonzero(pulse < pulse[peak] / 2)
+    index = int(np.searchsorted(below, peak))
+    first = int(below[index - 1]) if index else -1
+    stop = int(below[index]) if index < len(below) else len(pulse)
+    return stop - first - 1
+
+
+def _fit_tap(level: NDArray[np.float64], tap: _Tap, rate: float) -> _Fit | None:
+    """Return the fit to the ringing after a tap; None if no resonance stands out.
+
+    If what remains of a fit is not noise, the hammer may have touched the plate again: the ringing
+    after the last touch is fitted instead.
+    """
+    quiet = np.zeros(0)
+    if len(tap.before) >= MIN_LENGTH:
+        quiet = tap.before - _solve(np.zeros((0, 2)), tap.before, rate)[0]
+    fits = []
+    for wait in WAITS:
+        fit = _fit_ringing(level, tap, rate, tap.top + round(wait * rate), quiet)
+        if fit is not None:
+            fits.append(fit)
+            if not fit.misfit:
+                break
+    return min(fits, key=lambda fit: fit.misfit) if fits else None
+
+
+def _fit_ringing(
+    level: NDArray[np.float64],
+    tap: _Tap,
+    rate: float,
+    latest: int,
+    quiet: NDArray[np.float64],
+) -> _Fit | None:
+    """Fit the ringing from an index on, or from the end of the contact before it."""
+    start, best = latest, None
     for _ in range(3):
-        fit = _fit_decay(level[start : tap.stop], rate, (start - tap.top) / rate)
+        fit = _fit_decay(level[start : tap.stop], rate, (start - tap.top) / rate, quiet)
         if fit is None:
             break
-        modes = fit.modes
+        best = fit
         # Continued back, the decay ends where the contact does.
         time = np.arange(tap.top - start, latest - start) / rate
         deviation = np.abs(level[tap.top : latest] - _columns(fit.rates, time) @ fit.factors)
@@ -357,13 +436,18 @@ def _fit_tap(level: NDArray[np.float64], tap: _Tap, rate: float) -> list[_Mode]:
         if earlier >= start:
             break
         start = earlier
-    return modes
+    return best
 
 
-def _fit_decay(level: NDArray[np.float64], rate: float, delay: float) -> _Fit | None:
-    """Fit decaying oscillations to a level that begins at a delay, s, after a tap."""
+def _fit_decay(
+    level: NDArray[np.float64], rate: float, delay: float, quiet: NDArray[np.float64]
+) -> _Fit | None:
+    """Fit decaying oscillations to a level that begins at a delay, s, after a tap.
+
+    `quiet` is the noise before the tap, empty if it is not known.
+    """
     fit = None
-    rates, used = np.zeros((0, 2)), level
+    rates, used, log_rate = np.zeros((0, 2)), level, math.log(rate)
     while len(rates) < MAX_MODES and len(used) >= MIN_LENGTH:
         trial = _strongest(used - _solve(rates, used, rate)[0], rate)
         if trial is None or (np.abs(rates[:, 0] / trial[0] - 1) < SAME).any():
@@ -372,9 +456,17 @@ def _fit_decay(level: NDArray[np.float64], rate: float, delay: float) -> _Fit | 
         length = round(DECAY_TIMES / math.exp(rates[:, 1].min()) * rate)
         used = level[: max(length, MIN_LENGTH)]
         scale = np.column_stack([np.exp(rates[:, 1]), np.ones(len(rates))])
-        rates = least_squares(_residual, rates.ravel(), x_scale=scale.ravel(), args=(used, rate))
+        # Beyond these bounds the columns overflow.
+        low, high = (np.tile(bound, len(rates)) for bound in ((0.0, -5.0), (rate / 2, log_rate)))
+        rates = least_squares(
+            _residual,
+            rates.ravel(),
+            bounds=(low, high),
+            x_scale=scale.ravel(),
+            args=(used, rate),
+        )
         rates = rates.x.reshape(-1, 2)
-        found = _describe(rates, used, rate, delay)
+        found = _describe(rates, used, rate, delay, quiet)
         if found is None:
             break
         fit = found
@@ -422,7 +514,11 @@ def _strongest(level: NDArray[np.float64], rate: float) -> tuple[float, float] |
 
 
 def _describe(
-    rates: NDArray[np.float64], level: NDArray[np.float64], rate: float, delay: float
+    rates: NDArray[np.float64],
+    level: NDArray[np.float64],
+    rate: float,
+    delay: float,
+    quiet: NDArray[np.float64],
 ) -> _Fit | None:
     """Return a fit with its resonances; None if one of them is none."""
     fitted, factors = _solve(rates, level, rate)
@@ -439,9 +535,9 @@ def _describe(
     scale = np.linalg.norm(jacobian, axis=0)
     inverse = np.linalg.pinv(jacobian / scale) / scale[:, None]
     residual = level - fitted
-    power = np.abs(np.fft.rfft(residual)) ** 2 / len(level)
-    frequencies = np.fft.rfftfreq(len(level), 1 / rate)
-    modes = []
+    frequencies, power = _spectrum(residual, rate)
+    quiet_frequencies, quiet_power = _spectrum(quiet, rate)
+    modes, misfits = [], []
     for k, (frequency, log_decay) in enumerate(rates):
         decay = math.exp(min(log_decay, 50.0))
         natural, quality = resonance(frequency, 1 / decay)
@@ -455,6 +551,15 @@ def _describe(
             if near.size >= MIN_NEAR
             else float(residual @ residual) / (len(level) - jacobian.shape[1])
         )
+        usual = quiet_power[np.abs(quiet_frequencies / natural - 1) < AROUND]
+        excess = 0.0
+        if usual.size and noise**2 > MAX_POWER * usual.mean():
+            # A frequency of a real signal counts twice.
+            excess = math.sqrt(max(2 * float((near - usual.mean()).sum()), 0.0))
+        pair = columns[:, BACKGROUND + 2 * k : BACKGROUND + 2 * k + 2]
+        misfits.append(excess / float(np.linalg.norm(pair @ waves[k])))
+        # Noise is distributed over all samples, a misfit is not.
+        noise = math.hypot(noise, MISFIT_WEIGHT * excess)
         deviation = noise * np.linalg.norm(inverse[2 * k : 2 * k + 2], axis=1)
         amplitude = float(np.hypot(*waves[k])) * math.exp(decay * delay)
         u_frequency = float(deviation[0]) / natural
@@ -465,4 +570,14 @@ def _describe(
     ):
         return None
     modes.sort(key=lambda mode: -mode.response)
-    return _Fit(rates, factors, math.sqrt(float(power.mean())), modes)
+    return _Fit(rates, factors, math.sqrt(float(power.mean())), modes, max(misfits))
+
+
+def _spectrum(
+    values: NDArray[np.float64], rate: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return frequencies, Hz, and power; that of white noise is its variance at each of them."""
+    if not values.size:
+        return np.zeros(0), np.zeros(0)
+    power = np.abs(np.fft.rfft(values)) ** 2 / len(values)
+    return np.asarray(np.fft.rfftfreq(len(values), 1 / rate), dtype=np.float64), power

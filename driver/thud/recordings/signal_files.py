@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import math
 import os
 import stat
 from collections.abc import Sequence
@@ -36,7 +37,7 @@ from thud.recordings.load_cells import (
     refuse_directions,
     require_channels,
 )
-from thud.recordings.polarity import POLARITIES, check_peak, find_sign, scan
+from thud.recordings.polarity import BLOCK, POLARITIES, check_peak, find_sign, scan
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
@@ -51,6 +52,8 @@ RATES = (2500.0, 1e8)
 # Minimum stored fraction of a file, below which it is sparse, and maximum number of pieces counted.
 MIN_STORED = 0.01
 MAX_PIECES = 1000
+# Minimum correlation with the sum of a channel in another unit that raises a warning.
+MIN_SIMILAR = 0.9
 # Minimum peak of a channel of force that was not chosen, as a fraction of the chosen peak, that
 # raises a warning, and maximum deviation of the sum of such peaks from the chosen peak if it is
 # their sum.
@@ -115,7 +118,7 @@ def open_signals(  # noqa: PLR0913 - the keys of the configuration
         cells = _choose_cells(entries, require_channels(channels), name)
         each = _calibrations(calibration, len(cells), name)
         stated = [_Stated(stated_unit, entry, polarity, sample_rate) for entry in each]
-        signal = _sum(file, cells, stated)
+        signal = _with_others(_sum(file, cells, stated), cells, entries)
         return [signal if any(each) else _with_missing(signal, cells, entries)]
     chosen = choose_channels(entries, channel, name)
     each = _calibrations(calibration, 1, name)
@@ -197,6 +200,44 @@ def _with_missing(signal: Signal, chosen: list[Channel], entries: list[Channel])
     return replace(signal, warnings=(*signal.warnings, warning))
 
 
+def _with_others(signal: Signal, chosen: list[Channel], entries: list[Channel]) -> Signal:
+    """Return a sum with a warning if a channel in another unit has the same shape."""
+    numbers = {entry.number for entry in chosen}
+    others = [
+        entry
+        for entry in entries
+        if entry.number not in numbers and find_unit(entry.unit) and not _is_force(entry)
+    ]
+    similar = [
+        f"{shown_text(entry.name) or entry.number} [{shown_text(entry.unit)}]"
+        for entry in others
+        if entry.n_sample == signal.n_sample and _correlation(signal, entry) > MIN_SIMILAR
+    ]
+    if not similar:
+        return signal
+    warning = (
+        f"{signal.name}: channels in another unit resemble the force, but are not included: "
+        f"{', '.join(similar)}; if they are load cells, name all channels and state a calibration "
+        "for each"
+    )
+    return replace(signal, warnings=(*signal.warnings, warning))
+
+
+def _correlation(signal: Signal, channel: Channel) -> float:
+    """Return the magnitude of the correlation coefficient of a force and a channel."""
+    sums = np.zeros((3, 3))
+    for start in range(0, signal.n_sample, BLOCK):
+        stop = min(start + BLOCK, signal.n_sample)
+        rows = np.stack(
+            [np.ones(stop - start), signal.read(start, stop), channel.samples(start, stop)]
+        )
+        sums += rows @ rows.T
+    covariance = sums[1:, 1:] - np.outer(sums[0, 1:], sums[0, 1:]) / signal.n_sample
+    variance = float(covariance[0, 0] * covariance[1, 1])
+    # A channel may be constant or not finite.
+    return abs(float(covariance[0, 1])) / math.sqrt(variance) if variance > 0 else 0.0
+
+
 def _is_force(channel: Channel) -> bool:
     return UNITS.get(find_unit(channel.unit), ("",))[0] == "N"
 
@@ -246,12 +287,17 @@ def _stored(descriptor: int, size: int) -> int:
     return size
 
 
-def choose_channels(channels: list[Channel], channel: int | str | None, name: str) -> list[Channel]:
-    """Return the selected channels; raise InputError if the selection is ambiguous."""
-    choices = ", ".join(
+def channel_choices(channels: list[Channel]) -> str:
+    """Return the numbers and names of channels for a message."""
+    return ", ".join(
         f"{entry.number}" + (f" {shown_text(entry.name)!r}" if entry.name else "")
         for entry in channels[:20]
     )
+
+
+def choose_channels(channels: list[Channel], channel: int | str | None, name: str) -> list[Channel]:
+    """Return the selected channels; raise InputError if the selection is ambiguous."""
+    choices = channel_choices(channels)
     if channel is None:
         forces = [entry for entry in channels if _is_force(entry)]
         if not forces and len(channels) > 1:
