@@ -1,4 +1,4 @@
-"""Damaged recordings: what the campaign of tests/faults has found."""
+"""Damaged recordings: files of the campaign of tests/faults, and faults of a force."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ import pytest
 from conftest import REPOSITORY, naming, python
 from recording_files import WRITERS, half_sine
 
+import thud
 from thud.base.errors import InputError
 from thud.recordings import probe
 from thud.recordings.signal_files import open_signals
@@ -122,3 +123,76 @@ def test_library_of_tdms_writes_no_warnings(tmp_path: Path) -> None:
     loggers = [name for name in logging.root.manager.loggerDict if name.startswith("nptdms.")]
     assert loggers
     assert not any(logging.getLogger(name).isEnabledFor(logging.WARNING) for name in loggers)
+
+
+def drop_force(  # noqa: PLR0913 - each is one property of the force
+    rate: float,
+    *,
+    power: float = 1.3,
+    peak: float = 1500.0,
+    noise: float = 0.5,
+    skew: float = 0.0,
+    seed: int = 1,
+) -> np.ndarray:
+    """Return the force of a drop at 0.2 s with a contact of 18 ms, N, and white noise."""
+    time = np.arange(round(0.6 * rate)) / rate
+    phase = np.clip((time - 0.2) / 0.018, 0, 1)
+    pulse = np.sin(np.pi * phase) ** power * (1 + skew * np.cos(np.pi * phase))
+    return peak * pulse + np.random.default_rng(seed).normal(0, noise, len(time))
+
+
+def measured(force: np.ndarray, rate: float) -> thud.Recording:
+    return thud.Recording.from_array(force, rate)
+
+
+@pytest.mark.parametrize("rate", [8e3, 51.2e3])
+@pytest.mark.parametrize("size", [300.0, -1500.0, 10e3])
+@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("after", [0.0031, 0.0092])
+def test_spikes_in_a_contact_are_filled(rate: float, size: float, count: int, after: float) -> None:
+    whole = drop_force(rate)
+    force = whole.copy()
+    first = round((0.2 + after) * rate)
+    force[first : first + count] += size
+    found, expected = measured(force, rate), measured(whole, rate)
+    (drop,) = found.drops
+    summary = f"1 spikes of {1e3 * count / rate:.3g} ms in all"
+    assert f"{summary} were filled by linear interpolation" in drop.steps
+    assert f"the contact has {summary}" in drop.warnings
+    # A line over three samples at 8 kHz.
+    np.testing.assert_allclose(found.levels(), expected.levels(), rtol=0, atol=0.05)
+
+
+def test_spikes_of_more_than_a_millisecond_are_refused() -> None:
+    force = drop_force(8e3)
+    force[1606:1751:16] += 400.0
+    with pytest.raises(InputError, match=naming("10 spikes of 1.25 ms", "up to 1 ms")):
+        measured(force, 8e3)
+
+
+def ringing(rate: float, frequency: float, size: float) -> np.ndarray:
+    """Return the ringing of a plate that the touch excites, N."""
+    time = np.arange(round(0.6 * rate)) / rate - 0.2
+    decay = np.exp(-np.maximum(time, 0) * np.pi * frequency / 25)
+    return np.where(time > 0, size * np.sin(2 * np.pi * frequency * time) * decay, 0.0)
+
+
+@pytest.mark.parametrize("rate", [2.5e3, 8e3, 51.2e3])
+@pytest.mark.parametrize(
+    "fault",
+    [
+        lambda rate: drop_force(rate, power=1.0, noise=0.0),
+        lambda rate: drop_force(rate, power=2.4, noise=0.01),
+        lambda rate: drop_force(rate, noise=50.0),
+        lambda rate: drop_force(rate) + ringing(rate, 0.42 * rate, 30.0),
+        lambda rate: drop_force(rate) + ringing(rate, 1100.0, 60.0),
+        lambda rate: drop_force(rate) - 30.0 * (np.arange(round(0.6 * rate)) > 0.2085 * rate),
+        lambda rate: np.round(drop_force(rate, noise=8.0) / 40.0) * 40.0,
+    ],
+    ids=["kink", "foot", "noise", "high ringing", "ringing", "step", "coarse steps"],
+)
+def test_steep_noisy_and_ringing_forces_have_no_spikes(
+    rate: float, fault: Callable[[float], np.ndarray]
+) -> None:
+    (drop,) = measured(fault(rate), rate).drops
+    assert not any("spikes" in step or "dropouts" in step for step in drop.steps)

@@ -1,4 +1,4 @@
-"""Faults of a pulse: clipped, cut off, doubled, or dropouts, of which short ones are repaired."""
+"""Faults of a pulse: clipped, cut off or doubled; dropouts and spikes, which are repaired."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.ndimage import median_filter
 
 from thud.base.checks import refuse
 
@@ -31,14 +33,30 @@ MIN_JUMP = 0.04
 MIN_STEPS = 3.5
 # Minimum number of equal samples of a dropout.
 MIN_FROZEN = 3
-# Maximum total length of dropouts that are repaired, s.
+# Maximum total length of dropouts and spikes that are repaired, s.
 MAX_REPAIRED = 1e-3
+# A spike of one or two samples deviates from the cubic through samples 2 and 3 away, with these
+# weights, and from the median of MEDIAN samples: at a kink of the force only the cubic deviates, at
+# a smooth maximum only the median. It deviates by more than a step does: than the jump from the line
+# through the samples before it to the line through those after it, with these weights.
+MEDIAN = 5
+CUBIC = np.array([-0.4, 0.9, 0.0, 0.0, 0.0, 0.9, -0.4])
+LINES = np.array([2.0, -3.0, 0.0, 0.0, 0.0, 3.0, -2.0])
+# The deviations exceed MIN_SPIKE_RATIO times the largest one from the cubic at samples that a spike
+# does not change, CLEAN samples away; MIN_SPIKE_DEVIATIONS robust standard deviations of all of
+# them; and MIN_SPIKE times the peak.
+MIN_SPIKE_RATIO = 4.0
+MIN_SPIKE_DEVIATIONS = 8.0
+MIN_SPIKE = 0.005
+CLEAN = (5, 12)
+# Time before and after the contact that is searched for spikes, s.
+SPIKE_MARGIN = 3e-3
 
 
 def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
-    """Return the force with its dropouts filled, notes, and warnings.
+    """Return the force with its dropouts and spikes filled, notes, and warnings.
 
-    Raise InputError if the pulse is cut off, clipped or doubled, or has long dropouts.
+    Raise InputError if the pulse is cut off, clipped or doubled, or has long dropouts or spikes.
     """
     rate, (first, stop), name = window.sample_rate, window.contact, window.name
     minimum = min_background(rate)
@@ -99,49 +117,92 @@ def refuse_clipped(window: Window, record: NDArray[np.float64]) -> None:
 def fill_dropouts(
     window: Window, force: NDArray[np.float64], peak: float | None = None
 ) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
-    """Return the force with dropouts interpolated, notes, and warnings.
+    """Return the force with dropouts and spikes interpolated, notes, and warnings.
 
-    A jump of a dropout is relative to the peak, N: that of the force, if None.
+    A jump of a dropout is relative to the peak, N: that of the force, if None. Raise InputError if
+    they last too long.
     """
-    first, stop = window.contact
     rate = window.sample_rate
-    margin = int(MIN_BACKGROUND * rate)
-    first, stop = first + margin, stop - margin
-    level = force - np.median(
-        np.concatenate([force[: window.contact[0]], force[window.contact[1] :]])
+    background = np.concatenate([force[: window.contact[0]], force[window.contact[1] :]])
+    offset = float(np.median(background))
+    if peak is None:
+        contact = force[slice(*window.contact)]
+        peak = float(median_filter(contact, MEDIAN).max()) - offset
+    dropouts = _find_dropouts(window, force, offset, peak)
+    filled = _interpolated(force, dropouts)
+    spikes = _find_spikes(window, filled, peak)
+    filled = _interpolated(filled, dropouts | spikes)
+    summaries = [
+        f"{len(np.flatnonzero(np.diff(bad, prepend=False)[bad]))} {name} of "
+        f"{1e3 * np.count_nonzero(bad) / rate:.3g} ms in all"
+        for name, bad in (("dropouts", dropouts), ("spikes", spikes))
+        if bad.any()
+    ]
+    if np.count_nonzero(dropouts | spikes) > MAX_REPAIRED * rate:
+        refuse(
+            f"{window.name}: the contact has {' and '.join(summaries)}",
+            f"up to {1e3 * MAX_REPAIRED:g} ms",
+        )
+    return (
+        filled,
+        tuple(f"{summary} were filled by linear interpolation" for summary in summaries),
+        tuple(f"the contact has {summary}" for summary in summaries),
     )
-    pulse = level[first:stop]
+
+
+def _interpolated(force: NDArray[np.float64], bad: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return a force, N, with a line in place of bad samples."""
+    result = force.copy()
+    good = np.flatnonzero(~bad)
+    result[bad] = np.interp(np.flatnonzero(bad), good, force[good])
+    return result
+
+
+def _find_dropouts(
+    window: Window, force: NDArray[np.float64], offset: float, peak: float
+) -> NDArray[np.bool_]:
+    """Return whether samples of a force, N, are lost: held, or zero between jumps."""
+    lost = np.zeros(len(force), dtype=bool)
+    margin = int(MIN_BACKGROUND * window.sample_rate)
+    first, stop = window.contact[0] + margin, window.contact[1] - margin
+    pulse = force[first:stop] - offset
     if not pulse.size:
-        return force, (), ()
+        return lost
     starts, lengths = _runs(pulse)
     before = np.abs(pulse[starts] - pulse[np.maximum(starts - 1, 0)])
     ends = starts + lengths - 1
     after = np.abs(pulse[np.minimum(ends + 1, len(pulse) - 1)] - pulse[ends])
-    limit = MIN_JUMP * (pulse.max() if peak is None else peak)
-    limit = max(limit, MIN_STEPS * window.quantization.step)
+    limit = max(MIN_JUMP * peak, MIN_STEPS * window.quantization.step)
     zero = (force[first:stop][starts] == 0) & (before > limit) & (after > limit)
     # A constant background next to a steep flank is no dropout: it has one jump.
     is_background = np.abs(pulse[starts]) < limit / 2
     jumps = (before > limit).astype(int) + (after > limit)
     frozen = (lengths >= MIN_FROZEN) & (jumps > is_background)
-    lost = np.flatnonzero(zero | frozen)
-    total = int(lengths[lost].sum())
-    if not total:
-        return force, (), ()
-    summary = f"{len(lost)} dropouts of {1e3 * total / rate:.3g} ms in all"
-    if total > MAX_REPAIRED * rate:
-        refuse(f"{window.name}: the contact has {summary}", f"up to {1e3 * MAX_REPAIRED:g} ms")
-    good = np.ones(len(force), dtype=bool)
-    for k in lost:
-        good[first + starts[k] : first + starts[k] + lengths[k]] = False
-    filled = force.copy()
-    index = np.arange(len(force))
-    filled[~good] = np.interp(index[~good], index[good], force[good])
-    return (
-        filled,
-        (f"{summary} were filled by linear interpolation",),
-        (f"the contact has {summary}",),
+    lost[first:stop] = np.repeat(zero | frozen, lengths)
+    return lost
+
+
+def _find_spikes(window: Window, force: NDArray[np.float64], peak: float) -> NDArray[np.bool_]:
+    """Return whether samples of a force, N, stand out alone or in pairs."""
+    spikes = np.zeros(len(force), dtype=bool)
+    margin = int(SPIKE_MARGIN * window.sample_rate)
+    section = slice(max(window.contact[0] - margin, 0), window.contact[1] + margin)
+    part = force[section]
+    padded = np.pad(part, 3, mode="edge")
+    from_cubic = np.abs(part - np.convolve(padded, CUBIC, mode="valid"))
+    from_median = np.abs(part - median_filter(part, MEDIAN, mode="nearest"))
+    jump = np.abs(np.convolve(padded, LINES, mode="valid"))
+    near, far = CLEAN
+    extended = np.pad(from_cubic, far, mode="edge")
+    largest = sliding_window_view(extended, far - near + 1).max(axis=1)
+    around = np.maximum(largest[: len(part)], largest[-len(part) :])
+    usual = 1.4826 * float(np.median(from_cubic))
+    least = max(
+        MIN_SPIKE_DEVIATIONS * usual, MIN_SPIKE * peak, MIN_STEPS * window.quantization.step
     )
+    limit = np.maximum(MIN_SPIKE_RATIO * around, least)
+    spikes[section] = (np.minimum(from_cubic, from_median) > limit) & (jump < from_cubic)
+    return spikes
 
 
 def read_repaired(
