@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import logging
 import os
+import re
 import struct
 import sys
 import time
@@ -196,3 +197,31 @@ def test_steep_noisy_and_ringing_forces_have_no_spikes(
 ) -> None:
     (drop,) = measured(fault(rate), rate).drops
     assert not any("spikes" in step or "dropouts" in step for step in drop.steps)
+
+
+@pytest.mark.parametrize("rate", [8e3, 51.2e3])
+@pytest.mark.parametrize("limit", [1450.0, 1200.0, 1000.0])
+@pytest.mark.parametrize("step", [0.0, 0.3])
+def test_force_that_an_amplifier_clips_is_named(rate: float, limit: float, step: float) -> None:
+    noise = np.random.default_rng(2).normal(0, 0.3, round(0.6 * rate))
+    force = np.minimum(drop_force(rate, noise=0.0), limit) + noise
+    force = np.round(force / step) * step if step else force
+    (drop,) = measured(force, rate).drops
+    (warning,) = [text for text in drop.warnings if "clipped" in text]
+    assert re.search(rf"flat within .* at its maximum of {limit / 100:.0f}\d\d", warning)
+
+
+@pytest.mark.parametrize("rate", [8e3, 51.2e3])
+@pytest.mark.parametrize("noise", [0.0, 0.3, 10.0])
+@pytest.mark.parametrize("top", [2, 4, 6, "one hump", "two humps", "steps"])
+def test_smooth_tops_are_not_clipped(rate: float, noise: float, top: int | str) -> None:
+    phase = np.clip((np.arange(round(0.6 * rate)) / rate - 0.2) / 0.018, 0, 1)
+    if isinstance(top, int):
+        force = 1 - np.abs(2 * phase - 1) ** top
+    else:
+        third = {"one hump": 1 / 9, "two humps": 0.25, "steps": 0.0}[top]
+        force = np.sin(np.pi * phase) + third * np.sin(3 * np.pi * phase)
+    force = 1500 * force + np.random.default_rng(3).normal(0, noise, len(force))
+    force = np.round(force / 20) * 20 if top == "steps" else force
+    (drop,) = measured(force, rate).drops
+    assert not any("clipped" in warning for warning in drop.warnings)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.ndimage import median_filter
+from scipy.ndimage import median_filter, uniform_filter1d
 
 from thud.base.checks import refuse
 
@@ -24,6 +24,18 @@ MIN_SAMPLES = 4
 # is lower by more than MIN_FALL quantization steps. At a smooth top it is lower by 4.
 MIN_CLIPPED = 4
 MIN_FALL = 12.0
+# The force, averaged over SMOOTHING, s, is flat at its top if it is above (1 - a) of its maximum
+# almost as long as above (1 - 4 a). The ratio of the times is 1 for a top that an amplifier clips,
+# 1.41 and at least 1.22 for tops of fourth order with one and two maxima, and 2 for parabolas.
+# The fractions a are the lowest one, MIN_FLAT standard deviations of the noise or quantization
+# steps, times powers of 2 up to MAX_FLAT. The noise is at least MIN_NOISE times the
+# peak. The top must be flat for MIN_TOP, s.
+SMOOTHING = 3e-4
+MAX_RATIO = 1.15
+MIN_FLAT = 4.0
+MAX_FLAT = 0.02
+MIN_NOISE = 4e-5
+MIN_TOP = 5e-4
 # Fraction of full scale from which a sample is clipped.
 CLIPPED_FRACTION = 0.999
 # Minimum jump into or out of the equal samples of a dropout, as a fraction of the peak force: no
@@ -35,12 +47,12 @@ MIN_STEPS = 3.5
 MIN_FROZEN = 3
 # Maximum total length of dropouts and spikes that are repaired, s.
 MAX_REPAIRED = 1e-3
-# A spike of one or two samples deviates from the cubic through samples 2 and 3 away, with these
-# weights, and from the median of MEDIAN samples: at a kink of the force only the cubic deviates, at
-# a smooth maximum only the median. It deviates by more than a step does: than the jump from the line
-# through the samples before it to the line through those after it, with these weights.
+# A spike of one or two samples deviates from the cubic through samples 2 and 3 away (by the
+# weighted sum DIFFERENCE) and from the median of MEDIAN samples: at a kink of the force only the
+# cubic deviates, at a smooth maximum only the median. It deviates by more than the jump, as of a
+# step, from the line through the samples before it to the line through those after it (LINES).
 MEDIAN = 5
-CUBIC = np.array([-0.4, 0.9, 0.0, 0.0, 0.0, 0.9, -0.4])
+DIFFERENCE = np.array([0.4, -0.9, 0.0, 1.0, 0.0, -0.9, 0.4])
 LINES = np.array([2.0, -3.0, 0.0, 0.0, 0.0, 3.0, -2.0])
 # The deviations exceed MIN_SPIKE_RATIO times the largest one from the cubic at samples that a spike
 # does not change, CLEAN samples away; MIN_SPIKE_DEVIATIONS robust standard deviations of all of
@@ -71,6 +83,9 @@ def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[
         if warning.startswith("two impacts"):
             refuse(f"{name}: {warning}", "one impact, with background before and after it")
     force = window.force
+    if window.chain is not None:
+        # The recorded force is repaired; its correction rings next to a fault.
+        return force, (), ()
     refuse_clipped(window, force)
     return fill_dropouts(window, force)
 
@@ -119,8 +134,8 @@ def fill_dropouts(
 ) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
     """Return the force with dropouts and spikes interpolated, notes, and warnings.
 
-    A jump of a dropout is relative to the peak, N: that of the force, if None. Raise InputError if
-    they last too long.
+    A flat top raises a warning, too. A jump of a dropout is relative to the peak, N: that of the
+    force, if None. Raise InputError if dropouts and spikes last too long.
     """
     rate = window.sample_rate
     background = np.concatenate([force[: window.contact[0]], force[window.contact[1] :]])
@@ -146,8 +161,47 @@ def fill_dropouts(
     return (
         filled,
         tuple(f"{summary} were filled by linear interpolation" for summary in summaries),
-        tuple(f"the contact has {summary}" for summary in summaries),
+        (
+            *(f"the contact has {summary}" for summary in summaries),
+            *_check_top(window, filled[slice(*window.contact)] - offset),
+        ),
     )
+
+
+def _check_top(window: Window, force: NDArray[np.float64]) -> tuple[str, ...]:
+    """Return a warning if the top of a force without offset, N, is flat."""
+    rate = window.sample_rate
+    width = max(1, round(SMOOTHING * rate))
+    if len(force) < 2 * width + len(DIFFERENCE):
+        return ()
+    smooth = uniform_filter1d(force, width)
+    peak = smooth.max()
+    noise, step = _deviation(force), window.quantization.step
+    # Noise averages the steps.
+    least = max(noise / math.sqrt(width), step if noise < step / 2 else 0.0, MIN_NOISE * peak)
+    lowest = MIN_FLAT * least / peak
+    for fraction in lowest * 2.0 ** np.arange(math.log2(max(MAX_FLAT / lowest, 0.5)) + 1):
+        inner, outer = (_count_above(smooth, (1 - k * fraction) * peak) for k in (1, 4))
+        if outer < MAX_RATIO * inner and inner > MIN_TOP * rate:
+            warning = (
+                f"the force is flat within {100 * fraction:.2g} % for {1e3 * inner / rate:.3g} ms "
+                f"at its maximum of {peak:.4g} N: it may be clipped ahead of the recorder"
+            )
+            return (warning,)
+    return ()
+
+
+def _count_above(force: NDArray[np.float64], level: float) -> float:
+    """Return the number of samples, with fractions, for which a force, N, is above a level."""
+    ends = np.array([force[1:], force[:-1]]) - level
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    return float(np.clip(high / np.maximum(high - low, 1e-300), 0, 1).sum())
+
+
+def _deviation(force: NDArray[np.float64]) -> float:
+    """Return the standard deviation of the white noise of a force, N, by its median."""
+    deviation = np.convolve(force, DIFFERENCE, mode="valid")
+    return 1.4826 * float(np.median(np.abs(deviation))) / math.sqrt(float(DIFFERENCE @ DIFFERENCE))
 
 
 def _interpolated(force: NDArray[np.float64], bad: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -189,7 +243,7 @@ def _find_spikes(window: Window, force: NDArray[np.float64], peak: float) -> NDA
     section = slice(max(window.contact[0] - margin, 0), window.contact[1] + margin)
     part = force[section]
     padded = np.pad(part, 3, mode="edge")
-    from_cubic = np.abs(part - np.convolve(padded, CUBIC, mode="valid"))
+    from_cubic = np.abs(np.convolve(padded, DIFFERENCE, mode="valid"))
     from_median = np.abs(part - median_filter(part, MEDIAN, mode="nearest"))
     jump = np.abs(np.convolve(padded, LINES, mode="valid"))
     near, far = CLEAN
