@@ -225,3 +225,27 @@ def test_smooth_tops_are_not_clipped(rate: float, noise: float, top: int | str) 
     force = np.round(force / 20) * 20 if top == "steps" else force
     (drop,) = measured(force, rate).drops
     assert not any("clipped" in warning for warning in drop.warnings)
+
+
+@pytest.mark.parametrize("step", [0.0, 0.3, 0.5])
+@pytest.mark.parametrize("after", [0.0065, 0.0105])
+def test_held_samples_are_filled_where_noise_excludes_them(step: float, after: float) -> None:
+    whole = drop_force(48e3, noise=0.3)
+    whole = np.round(whole / step) * step if step else whole
+    force = whole.copy()
+    first = round((0.2 + after) * 48e3) - 20
+    force[first : first + 40] = force[first]
+    found, expected = measured(force, 48e3), measured(whole, 48e3)
+    (drop,) = found.drops
+    assert any("1 dropouts of 0.833 ms" in warning for warning in drop.warnings)
+    # A line in place of 40 samples is too low by up to 2.6 N, as seen at 500 Hz.
+    np.testing.assert_allclose(found.levels()[:4], expected.levels()[:4], rtol=0, atol=0.1)
+    assert drop.peak_force.value == pytest.approx(1500, rel=0.005)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1, 0.3, 2.0])
+@pytest.mark.parametrize("repeats", [1, 4])
+def test_equal_samples_of_steps_or_of_a_lower_rate_are_not_held(noise: float, repeats: int) -> None:
+    force = np.repeat(np.round(drop_force(48e3 / repeats, noise=noise)), repeats)
+    (drop,) = measured(force, 48e3).drops
+    assert not any("dropouts" in step or "spikes" in step for step in drop.steps)

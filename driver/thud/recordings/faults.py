@@ -28,14 +28,14 @@ MIN_FALL = 12.0
 # almost as long as above (1 - 4 a). The ratio of the times is 1 for a top that an amplifier clips,
 # 1.41 and at least 1.22 for tops of fourth order with one and two maxima, and 2 for parabolas.
 # The fractions a are the lowest one, MIN_FLAT standard deviations of the noise or quantization
-# steps, times powers of 2 up to MAX_FLAT. The noise is at least MIN_NOISE times the
-# peak. The top must be flat for MIN_TOP, s.
+# steps, times powers of 2 up to MAX_FLAT. The top must be flat for MIN_TOP, s.
 SMOOTHING = 3e-4
 MAX_RATIO = 1.15
 MIN_FLAT = 4.0
 MAX_FLAT = 0.02
-MIN_NOISE = 4e-5
 MIN_TOP = 5e-4
+# Minimum noise as a fraction of the peak: smaller steps of quantization are not known.
+MIN_NOISE = 4e-5
 # Fraction of full scale from which a sample is clipped.
 CLIPPED_FRACTION = 0.999
 # Minimum jump into or out of the equal samples of a dropout, as a fraction of the peak force: no
@@ -45,6 +45,8 @@ MIN_JUMP = 0.04
 MIN_STEPS = 3.5
 # Minimum number of equal samples of a dropout.
 MIN_FROZEN = 3
+# Samples are also held if chance would give so many equal ones less often than this in a contact.
+MAX_CHANCE = 1e-6
 # Maximum total length of dropouts and spikes that are repaired, s.
 MAX_REPAIRED = 1e-3
 # A spike of one or two samples deviates from the cubic through samples 2 and 3 away (by the
@@ -232,8 +234,19 @@ def _find_dropouts(
     is_background = np.abs(pulse[starts]) < limit / 2
     jumps = (before > limit).astype(int) + (after > limit)
     frozen = (lengths >= MIN_FROZEN) & (jumps > is_background)
-    lost[first:stop] = np.repeat(zero | frozen, lengths)
+    held = _is_held(pulse, lengths, window.quantization.step, peak) & ~is_background
+    lost[first:stop] = np.repeat(zero | frozen | held, lengths)
     return lost
+
+
+def _is_held(
+    force: NDArray[np.float64], lengths: NDArray[np.intp], step: float, peak: float
+) -> NDArray[np.bool_]:
+    """Return whether runs of equal samples are too long for the noise and the step, N."""
+    equal = max(1 - len(lengths) / len(force), 1 / len(force))
+    # Without noise, the force may stay within a step.
+    has_noise = _deviation(force) > max(step / 2, MIN_NOISE * peak)
+    return has_noise & (len(force) * equal ** (lengths - 1.0) < MAX_CHANCE)
 
 
 def _find_spikes(window: Window, force: NDArray[np.float64], peak: float) -> NDArray[np.bool_]:
