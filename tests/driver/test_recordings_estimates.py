@@ -577,7 +577,7 @@ def test_short_dropouts_are_filled_and_long_ones_refused() -> None:
         lost = force.copy()
         lost[5200:5202] = value
         (window,) = search_drops(Signal.from_array(lost, 48e3, "file.wav")).windows
-        assert bool(repair(window)[1]) == told
+        assert any("dropouts" in step for step in repair(window)[1]) == told
 
 
 @pytest.mark.parametrize("offset", [-3000.0, 0.0, 3000.0])

@@ -1,10 +1,11 @@
-"""Damaged recordings: what the campaign of tests/faults has found."""
+"""Damaged recordings: files of the campaign of tests/faults, and faults of a force."""
 
 from __future__ import annotations
 
 import errno
 import logging
 import os
+import re
 import struct
 import sys
 import time
@@ -17,6 +18,7 @@ import pytest
 from conftest import REPOSITORY, naming, python
 from recording_files import WRITERS, half_sine
 
+import thud
 from thud.base.errors import InputError
 from thud.recordings import probe
 from thud.recordings.signal_files import open_signals
@@ -122,3 +124,128 @@ def test_library_of_tdms_writes_no_warnings(tmp_path: Path) -> None:
     loggers = [name for name in logging.root.manager.loggerDict if name.startswith("nptdms.")]
     assert loggers
     assert not any(logging.getLogger(name).isEnabledFor(logging.WARNING) for name in loggers)
+
+
+def drop_force(  # noqa: PLR0913 - each is one property of the force
+    rate: float,
+    *,
+    power: float = 1.3,
+    peak: float = 1500.0,
+    noise: float = 0.5,
+    skew: float = 0.0,
+    seed: int = 1,
+) -> np.ndarray:
+    """Return the force of a drop at 0.2 s with a contact of 18 ms, N, and white noise."""
+    time = np.arange(round(0.6 * rate)) / rate
+    phase = np.clip((time - 0.2) / 0.018, 0, 1)
+    pulse = np.sin(np.pi * phase) ** power * (1 + skew * np.cos(np.pi * phase))
+    return peak * pulse + np.random.default_rng(seed).normal(0, noise, len(time))
+
+
+def measured(force: np.ndarray, rate: float) -> thud.Recording:
+    return thud.Recording.from_array(force, rate)
+
+
+@pytest.mark.parametrize("rate", [8e3, 51.2e3])
+@pytest.mark.parametrize("size", [300.0, -1500.0, 10e3])
+@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("after", [0.0031, 0.0092])
+def test_spikes_in_a_contact_are_filled(rate: float, size: float, count: int, after: float) -> None:
+    whole = drop_force(rate)
+    force = whole.copy()
+    first = round((0.2 + after) * rate)
+    force[first : first + count] += size
+    found, expected = measured(force, rate), measured(whole, rate)
+    (drop,) = found.drops
+    summary = f"1 spikes of {1e3 * count / rate:.3g} ms in all"
+    assert f"{summary} were filled by linear interpolation" in drop.steps
+    assert f"the contact has {summary}" in drop.warnings
+    # A line over three samples at 8 kHz.
+    np.testing.assert_allclose(found.levels(), expected.levels(), rtol=0, atol=0.05)
+
+
+def test_spikes_of_more_than_a_millisecond_are_refused() -> None:
+    force = drop_force(8e3)
+    force[1606:1751:16] += 400.0
+    with pytest.raises(InputError, match=naming("10 spikes of 1.25 ms", "up to 1 ms")):
+        measured(force, 8e3)
+
+
+def ringing(rate: float, frequency: float, size: float) -> np.ndarray:
+    """Return the ringing of a plate that the touch excites, N."""
+    time = np.arange(round(0.6 * rate)) / rate - 0.2
+    decay = np.exp(-np.maximum(time, 0) * np.pi * frequency / 25)
+    return np.where(time > 0, size * np.sin(2 * np.pi * frequency * time) * decay, 0.0)
+
+
+@pytest.mark.parametrize("rate", [2.5e3, 8e3, 51.2e3])
+@pytest.mark.parametrize(
+    "fault",
+    [
+        lambda rate: drop_force(rate, power=1.0, noise=0.0),
+        lambda rate: drop_force(rate, power=2.4, noise=0.01),
+        lambda rate: drop_force(rate, noise=50.0),
+        lambda rate: drop_force(rate) + ringing(rate, 0.42 * rate, 30.0),
+        lambda rate: drop_force(rate) + ringing(rate, 1100.0, 60.0),
+        lambda rate: drop_force(rate) - 30.0 * (np.arange(round(0.6 * rate)) > 0.2085 * rate),
+        lambda rate: np.round(drop_force(rate, noise=8.0) / 40.0) * 40.0,
+    ],
+    ids=["kink", "foot", "noise", "high ringing", "ringing", "step", "coarse steps"],
+)
+def test_steep_noisy_and_ringing_forces_have_no_spikes(
+    rate: float, fault: Callable[[float], np.ndarray]
+) -> None:
+    (drop,) = measured(fault(rate), rate).drops
+    assert not any("spikes" in step or "dropouts" in step for step in drop.steps)
+
+
+@pytest.mark.parametrize("rate", [8e3, 51.2e3])
+@pytest.mark.parametrize("limit", [1450.0, 1200.0, 1000.0])
+@pytest.mark.parametrize("step", [0.0, 0.3])
+def test_force_that_an_amplifier_clips_is_named(rate: float, limit: float, step: float) -> None:
+    noise = np.random.default_rng(2).normal(0, 0.3, round(0.6 * rate))
+    force = np.minimum(drop_force(rate, noise=0.0), limit) + noise
+    force = np.round(force / step) * step if step else force
+    (drop,) = measured(force, rate).drops
+    (warning,) = [text for text in drop.warnings if "clipped" in text]
+    assert re.search(rf"flat within .* at its maximum of {limit / 100:.0f}\d\d", warning)
+
+
+@pytest.mark.parametrize("rate", [8e3, 51.2e3])
+@pytest.mark.parametrize("noise", [0.0, 0.3, 10.0])
+@pytest.mark.parametrize("top", [2, 4, 6, "one hump", "two humps", "steps"])
+def test_smooth_tops_are_not_clipped(rate: float, noise: float, top: int | str) -> None:
+    phase = np.clip((np.arange(round(0.6 * rate)) / rate - 0.2) / 0.018, 0, 1)
+    if isinstance(top, int):
+        force = 1 - np.abs(2 * phase - 1) ** top
+    else:
+        third = {"one hump": 1 / 9, "two humps": 0.25, "steps": 0.0}[top]
+        force = np.sin(np.pi * phase) + third * np.sin(3 * np.pi * phase)
+    force = 1500 * force + np.random.default_rng(3).normal(0, noise, len(force))
+    force = np.round(force / 20) * 20 if top == "steps" else force
+    (drop,) = measured(force, rate).drops
+    assert not any("clipped" in warning for warning in drop.warnings)
+
+
+@pytest.mark.parametrize("step", [0.0, 0.3, 0.5])
+@pytest.mark.parametrize("after", [0.0065, 0.0105])
+def test_held_samples_are_filled_where_noise_excludes_them(step: float, after: float) -> None:
+    whole = drop_force(48e3, noise=0.3)
+    whole = np.round(whole / step) * step if step else whole
+    force = whole.copy()
+    first = round((0.2 + after) * 48e3) - 20
+    force[first : first + 40] = force[first]
+    found, expected = measured(force, 48e3), measured(whole, 48e3)
+    (drop,) = found.drops
+    assert any("1 dropouts of 0.833 ms" in warning for warning in drop.warnings)
+    # A line in place of 40 samples is too low by up to 2.6 N, as seen at 500 Hz.
+    np.testing.assert_allclose(found.levels()[:4], expected.levels()[:4], rtol=0, atol=0.1)
+    assert drop.peak_force.value == pytest.approx(1500, rel=0.005)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1, 0.3, 2.0])
+@pytest.mark.parametrize("repeats", [1, 4])
+def test_equal_samples_of_steps_or_of_a_lower_rate_are_not_held(noise: float, repeats: int) -> None:
+    force = np.repeat(np.round(drop_force(48e3 / repeats, noise=noise)), repeats)
+    (drop,) = measured(force, 48e3).drops
+    assert not any("dropouts" in step or "spikes" in step for step in drop.steps)

@@ -664,6 +664,17 @@ def test_values_that_are_not_finite_are_refused(name: str, value: float, tmp_pat
     assert re.search(naming("sample 101", "finite"), refusal(path))
 
 
+@pytest.mark.parametrize("cell", ["-1.#IND", "1.#QNAN", "1.#INF", "1,#INF00"])
+def test_values_that_are_not_finite_as_programs_of_microsoft_write_them(
+    cell: str, tmp_path: Path
+) -> None:
+    lines = [f"{i / 8000:.6f};{force:.3f}" for i, force in enumerate(half_sine(8000.0))]
+    lines[100] = f"0.012500;{cell}"
+    path = tmp_path / "plate.csv"
+    path.write_text("\n".join(["Time [s];Force [N]  # INFO", *lines]), encoding="utf-8")
+    assert re.search(naming("line 102", cell, "not a number"), refusal(path))
+
+
 def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.wav")
     (tmp_path / "loop.wav").symlink_to(tmp_path / "loop.wav")

@@ -26,6 +26,9 @@ SEPARATORS = ("\t", ";", ",")
 MARKS = {".": "point", ",": "comma"}
 GROUPING = " \N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}'\N{RIGHT SINGLE QUOTATION MARK}"
 QUOTED = re.compile(r'"[^"]*"')
+# Begin of a comment. Programs by Microsoft's compilers write 1.#IND, 1.#QNAN and 1.#INF for NaN and
+# infinity, which are no numbers here.
+COMMENT = re.compile(r"#(?!(?<=\d[.,]#)(?:IND|QNAN|SNAN|INF))")
 # Maximum length of a line.
 MAX_LINE = 2**16
 ALLOWED = (
@@ -136,7 +139,7 @@ def read_lines(text: TextIO, name: str, allowed: str) -> Iterator[str]:
 
 def strip_comment(line: str) -> str:
     """Return a line without its comment and its trailing semicolons."""
-    return line.partition("#")[0].strip().rstrip(";").rstrip()
+    return COMMENT.split(line, 1)[0].strip().rstrip(";").rstrip()
 
 
 def find_separator(line: str) -> str | None:

@@ -1,4 +1,4 @@
-"""Faults of a pulse: clipped, cut off, doubled, or dropouts, of which short ones are repaired."""
+"""Faults of a pulse: clipped, cut off or doubled; dropouts and spikes, which are repaired."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.ndimage import median_filter, uniform_filter1d
 
 from thud.base.checks import refuse
 
@@ -22,6 +24,18 @@ MIN_SAMPLES = 4
 # is lower by more than MIN_FALL quantization steps. At a smooth top it is lower by 4.
 MIN_CLIPPED = 4
 MIN_FALL = 12.0
+# The force, averaged over SMOOTHING, s, is flat at its top if it is above (1 - a) of its maximum
+# almost as long as above (1 - 4 a). The ratio of the times is 1 for a top that an amplifier clips,
+# 1.41 and at least 1.22 for tops of fourth order with one and two maxima, and 2 for parabolas.
+# The fractions a are the lowest one, MIN_FLAT standard deviations of the noise or quantization
+# steps, times powers of 2 up to MAX_FLAT. The top must be flat for MIN_TOP, s.
+SMOOTHING = 3e-4
+MAX_RATIO = 1.15
+MIN_FLAT = 4.0
+MAX_FLAT = 0.02
+MIN_TOP = 5e-4
+# Minimum noise as a fraction of the peak: smaller steps of quantization are not known.
+MIN_NOISE = 4e-5
 # Fraction of full scale from which a sample is clipped.
 CLIPPED_FRACTION = 0.999
 # Minimum jump into or out of the equal samples of a dropout, as a fraction of the peak force: no
@@ -31,14 +45,32 @@ MIN_JUMP = 0.04
 MIN_STEPS = 3.5
 # Minimum number of equal samples of a dropout.
 MIN_FROZEN = 3
-# Maximum total length of dropouts that are repaired, s.
+# Samples are also held if chance would give so many equal ones less often than this in a contact.
+MAX_CHANCE = 1e-6
+# Maximum total length of dropouts and spikes that are repaired, s.
 MAX_REPAIRED = 1e-3
+# A spike of one or two samples deviates from the cubic through samples 2 and 3 away (by the
+# weighted sum DIFFERENCE) and from the median of MEDIAN samples: at a kink of the force only the
+# cubic deviates, at a smooth maximum only the median. It deviates by more than the jump, as of a
+# step, from the line through the samples before it to the line through those after it (LINES).
+MEDIAN = 5
+DIFFERENCE = np.array([0.4, -0.9, 0.0, 1.0, 0.0, -0.9, 0.4])
+LINES = np.array([2.0, -3.0, 0.0, 0.0, 0.0, 3.0, -2.0])
+# The deviations exceed MIN_SPIKE_RATIO times the largest one from the cubic at samples that a spike
+# does not change, CLEAN samples away; MIN_SPIKE_DEVIATIONS robust standard deviations of all of
+# them; and MIN_SPIKE times the peak.
+MIN_SPIKE_RATIO = 4.0
+MIN_SPIKE_DEVIATIONS = 8.0
+MIN_SPIKE = 0.005
+CLEAN = (5, 12)
+# Time before and after the contact that is searched for spikes, s.
+SPIKE_MARGIN = 3e-3
 
 
 def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
-    """Return the force with its dropouts filled, notes, and warnings.
+    """Return the force with its dropouts and spikes filled, notes, and warnings.
 
-    Raise InputError if the pulse is cut off, clipped or doubled, or has long dropouts.
+    Raise InputError if the pulse is cut off, clipped or doubled, or has long dropouts or spikes.
     """
     rate, (first, stop), name = window.sample_rate, window.contact, window.name
     minimum = min_background(rate)
@@ -53,6 +85,9 @@ def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[
         if warning.startswith("two impacts"):
             refuse(f"{name}: {warning}", "one impact, with background before and after it")
     force = window.force
+    if window.chain is not None:
+        # The recorded force is repaired; its correction rings next to a fault.
+        return force, (), ()
     refuse_clipped(window, force)
     return fill_dropouts(window, force)
 
@@ -99,49 +134,142 @@ def refuse_clipped(window: Window, record: NDArray[np.float64]) -> None:
 def fill_dropouts(
     window: Window, force: NDArray[np.float64], peak: float | None = None
 ) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
-    """Return the force with dropouts interpolated, notes, and warnings.
+    """Return the force with dropouts and spikes interpolated, notes, and warnings.
 
-    A jump of a dropout is relative to the peak, N: that of the force, if None.
+    A flat top raises a warning, too. A jump of a dropout is relative to the peak, N: that of the
+    force, if None. Raise InputError if dropouts and spikes last too long.
     """
-    first, stop = window.contact
     rate = window.sample_rate
-    margin = int(MIN_BACKGROUND * rate)
-    first, stop = first + margin, stop - margin
-    level = force - np.median(
-        np.concatenate([force[: window.contact[0]], force[window.contact[1] :]])
+    background = np.concatenate([force[: window.contact[0]], force[window.contact[1] :]])
+    offset = float(np.median(background))
+    if peak is None:
+        contact = force[slice(*window.contact)]
+        peak = float(median_filter(contact, MEDIAN).max()) - offset
+    dropouts = _find_dropouts(window, force, offset, peak)
+    filled = _interpolated(force, dropouts)
+    spikes = _find_spikes(window, filled, peak)
+    filled = _interpolated(filled, dropouts | spikes)
+    summaries = [
+        f"{len(np.flatnonzero(np.diff(bad, prepend=False)[bad]))} {name} of "
+        f"{1e3 * np.count_nonzero(bad) / rate:.3g} ms in all"
+        for name, bad in (("dropouts", dropouts), ("spikes", spikes))
+        if bad.any()
+    ]
+    if np.count_nonzero(dropouts | spikes) > MAX_REPAIRED * rate:
+        refuse(
+            f"{window.name}: the contact has {' and '.join(summaries)}",
+            f"up to {1e3 * MAX_REPAIRED:g} ms",
+        )
+    return (
+        filled,
+        tuple(f"{summary} were filled by linear interpolation" for summary in summaries),
+        (
+            *(f"the contact has {summary}" for summary in summaries),
+            *_check_top(window, filled[slice(*window.contact)] - offset),
+        ),
     )
-    pulse = level[first:stop]
+
+
+def _check_top(window: Window, force: NDArray[np.float64]) -> tuple[str, ...]:
+    """Return a warning if the top of a force without offset, N, is flat."""
+    rate = window.sample_rate
+    width = max(1, round(SMOOTHING * rate))
+    if len(force) < 2 * width + len(DIFFERENCE):
+        return ()
+    smooth = uniform_filter1d(force, width)
+    peak = smooth.max()
+    noise, step = _deviation(force), window.quantization.step
+    # Noise averages the steps.
+    least = max(noise / math.sqrt(width), step if noise < step / 2 else 0.0, MIN_NOISE * peak)
+    lowest = MIN_FLAT * least / peak
+    for fraction in lowest * 2.0 ** np.arange(math.log2(max(MAX_FLAT / lowest, 0.5)) + 1):
+        inner, outer = (_count_above(smooth, (1 - k * fraction) * peak) for k in (1, 4))
+        if outer < MAX_RATIO * inner and inner > MIN_TOP * rate:
+            warning = (
+                f"the force is flat within {100 * fraction:.2g} % for {1e3 * inner / rate:.3g} ms "
+                f"at its maximum of {peak:.4g} N: it may be clipped ahead of the recorder"
+            )
+            return (warning,)
+    return ()
+
+
+def _count_above(force: NDArray[np.float64], level: float) -> float:
+    """Return the number of samples, with fractions, for which a force, N, is above a level."""
+    ends = np.array([force[1:], force[:-1]]) - level
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    return float(np.clip(high / np.maximum(high - low, 1e-300), 0, 1).sum())
+
+
+def _deviation(force: NDArray[np.float64]) -> float:
+    """Return the standard deviation of the white noise of a force, N, by its median."""
+    deviation = np.convolve(force, DIFFERENCE, mode="valid")
+    return 1.4826 * float(np.median(np.abs(deviation))) / math.sqrt(float(DIFFERENCE @ DIFFERENCE))
+
+
+def _interpolated(force: NDArray[np.float64], bad: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return a force, N, with a line in place of bad samples."""
+    result = force.copy()
+    good = np.flatnonzero(~bad)
+    result[bad] = np.interp(np.flatnonzero(bad), good, force[good])
+    return result
+
+
+def _find_dropouts(
+    window: Window, force: NDArray[np.float64], offset: float, peak: float
+) -> NDArray[np.bool_]:
+    """Return whether samples of a force, N, are lost: held, or zero between jumps."""
+    lost = np.zeros(len(force), dtype=bool)
+    margin = int(MIN_BACKGROUND * window.sample_rate)
+    first, stop = window.contact[0] + margin, window.contact[1] - margin
+    pulse = force[first:stop] - offset
     if not pulse.size:
-        return force, (), ()
+        return lost
     starts, lengths = _runs(pulse)
     before = np.abs(pulse[starts] - pulse[np.maximum(starts - 1, 0)])
     ends = starts + lengths - 1
     after = np.abs(pulse[np.minimum(ends + 1, len(pulse) - 1)] - pulse[ends])
-    limit = MIN_JUMP * (pulse.max() if peak is None else peak)
-    limit = max(limit, MIN_STEPS * window.quantization.step)
+    limit = max(MIN_JUMP * peak, MIN_STEPS * window.quantization.step)
     zero = (force[first:stop][starts] == 0) & (before > limit) & (after > limit)
     # A constant background next to a steep flank is no dropout: it has one jump.
     is_background = np.abs(pulse[starts]) < limit / 2
     jumps = (before > limit).astype(int) + (after > limit)
     frozen = (lengths >= MIN_FROZEN) & (jumps > is_background)
-    lost = np.flatnonzero(zero | frozen)
-    total = int(lengths[lost].sum())
-    if not total:
-        return force, (), ()
-    summary = f"{len(lost)} dropouts of {1e3 * total / rate:.3g} ms in all"
-    if total > MAX_REPAIRED * rate:
-        refuse(f"{window.name}: the contact has {summary}", f"up to {1e3 * MAX_REPAIRED:g} ms")
-    good = np.ones(len(force), dtype=bool)
-    for k in lost:
-        good[first + starts[k] : first + starts[k] + lengths[k]] = False
-    filled = force.copy()
-    index = np.arange(len(force))
-    filled[~good] = np.interp(index[~good], index[good], force[good])
-    return (
-        filled,
-        (f"{summary} were filled by linear interpolation",),
-        (f"the contact has {summary}",),
+    held = _is_held(pulse, lengths, window.quantization.step, peak) & ~is_background
+    lost[first:stop] = np.repeat(zero | frozen | held, lengths)
+    return lost
+
+
+def _is_held(
+    force: NDArray[np.float64], lengths: NDArray[np.intp], step: float, peak: float
+) -> NDArray[np.bool_]:
+    """Return whether runs of equal samples are too long for the noise and the step, N."""
+    equal = max(1 - len(lengths) / len(force), 1 / len(force))
+    # Without noise, the force may stay within a step.
+    has_noise = _deviation(force) > max(step / 2, MIN_NOISE * peak)
+    return has_noise & (len(force) * equal ** (lengths - 1.0) < MAX_CHANCE)
+
+
+def _find_spikes(window: Window, force: NDArray[np.float64], peak: float) -> NDArray[np.bool_]:
+    """Return whether samples of a force, N, stand out alone or in pairs."""
+    spikes = np.zeros(len(force), dtype=bool)
+    margin = int(SPIKE_MARGIN * window.sample_rate)
+    section = slice(max(window.contact[0] - margin, 0), window.contact[1] + margin)
+    part = force[section]
+    padded = np.pad(part, 3, mode="edge")
+    from_cubic = np.abs(np.convolve(padded, DIFFERENCE, mode="valid"))
+    from_median = np.abs(part - median_filter(part, MEDIAN, mode="nearest"))
+    jump = np.abs(np.convolve(padded, LINES, mode="valid"))
+    near, far = CLEAN
+    extended = np.pad(from_cubic, far, mode="edge")
+    largest = sliding_window_view(extended, far - near + 1).max(axis=1)
+    around = np.maximum(largest[: len(part)], largest[-len(part) :])
+    usual = 1.4826 * float(np.median(from_cubic))
+    least = max(
+        MIN_SPIKE_DEVIATIONS * usual, MIN_SPIKE * peak, MIN_STEPS * window.quantization.step
     )
+    limit = np.maximum(MIN_SPIKE_RATIO * around, least)
+    spikes[section] = (np.minimum(from_cubic, from_median) > limit) & (jump < from_cubic)
+    return spikes
 
 
 def read_repaired(

@@ -31,6 +31,7 @@ from thud.recordings.same_drops import (
     refuse_same_drops,
     refuse_simultaneous_channels,
 )
+from thud.recordings.tones import remove_tones
 
 if TYPE_CHECKING:
     import os
@@ -210,6 +211,8 @@ def measure_window(window: Window, config: Config) -> Drop:
     window = replace(window, quantization=find_quantization(window))
     if window.signal.cells:
         window, steps, warnings = repair_cells(window)
+    window, notes, further = remove_tones(window)
+    steps, warnings = (*steps, *notes), (*warnings, *further)
     chain, plate, recorded = config.chain, config.resonance, window
     if chain is not None:
         window, notes, further = correct_window(window, chain)
@@ -222,7 +225,10 @@ def measure_window(window: Window, config: Config) -> Drop:
         drop,
         contact=contact,
         steps=(*steps, *drop.steps),
-        warnings=(*warnings, *drop.warnings, *([str(ringing)] if ringing else [])),
+        # A flat top stays flat without tones.
+        warnings=tuple(
+            dict.fromkeys((*warnings, *drop.warnings, *([str(ringing)] if ringing else [])))
+        ),
         ringing=ringing,
         plate_recorded=None if plate is None else is_in_record(recorded, contact, plate),
     )
