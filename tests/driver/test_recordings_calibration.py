@@ -456,6 +456,14 @@ def test_misfit_of_close_modes_counts_as_uncertainty() -> None:
     assert re.search(naming("ringing", "differs"), *found.warnings)
 
 
+def test_ringing_that_changes_later_counts_as_uncertainty() -> None:
+    """Late ringing of two modes is one mode within the noise, but not the same one later."""
+    found = calibrate_tap(tapped([(1100.0, 20.0, 0.6), (1140.0, 20.0, 0.4)], 1, count=3))
+    assert 1100 < found.frequency < 1140
+    assert found.frequency_uncertainty > 1e-3
+    assert abs(math.log(found.quality / 20)) < 3.5 * found.quality_uncertainty
+
+
 def test_clock_of_the_recorder_limits_the_frequency() -> None:
     found = calibrate_tap(tapped([(1100.0, 30.0, 1.0)], 1, count=3, noise=1e-6))
     assert found.frequency_uncertainty == pytest.approx(1e-4, rel=0.01)

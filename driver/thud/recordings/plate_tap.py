@@ -179,7 +179,8 @@ class _Fit(NamedTuple):
     """Decaying oscillations: frequency, Hz, and logarithm of the decay rate, 1/s, of each.
 
     The factors are those of the columns; the noise is the standard deviation of the residual. The
-    misfit is the amplitude of a residual that is no noise, as a fraction of the oscillation.
+    misfit is the amplitude of a residual that is no noise, as a fraction of the oscillation; the
+    start is the index of the level from which it was fitted.
     """
 
     rates: NDArray[np.float64]
@@ -187,6 +188,7 @@ class _Fit(NamedTuple):
     noise: float
     modes: list[_Mode]
     misfit: float
+    start: int = 0
 
 
 def calibrate_tap(
@@ -403,14 +405,38 @@ def _fit_tap(level: NDArray[np.float64], tap: _Tap, rate: float) -> _Fit | None:
     quiet = np.zeros(0)
     if len(tap.before) >= MIN_LENGTH:
         quiet = tap.before - _solve(np.zeros((0, 2)), tap.before, rate)[0]
-    fits = []
+    fits: list[_Fit] = []
     for wait in WAITS:
         fit = _fit_ringing(level, tap, rate, tap.top + round(wait * rate), quiet)
         if fit is not None:
-            fits.append(fit)
+            # One mode decays at the same rate later, several do not.
+            fits.append(_with_change(fit, level, tap, rate, quiet) if fits else fit)
             if not fit.misfit:
                 break
     return min(fits, key=lambda fit: fit.misfit) if fits else None
+
+
+def _with_change(
+    fit: _Fit, level: NDArray[np.float64], tap: _Tap, rate: float, quiet: NDArray[np.float64]
+) -> _Fit:
+    """Return a fit whose uncertainties include what changes one decay time later."""
+    mode = fit.modes[0]
+    start = fit.start + round(mode.quality / (math.pi * mode.frequency) * rate)
+    later = _fit_decay(level[start : tap.stop], rate, (start - tap.top) / rate, quiet)
+    if later is None:
+        return fit
+    other = min(later.modes, key=lambda one: abs(one.frequency - mode.frequency))
+    if abs(other.frequency / mode.frequency - 1) > SAME:
+        return fit
+    changed = mode._replace(
+        frequency_uncertainty=math.hypot(
+            mode.frequency_uncertainty, math.log(other.frequency / mode.frequency)
+        ),
+        quality_uncertainty=math.hypot(
+            mode.quality_uncertainty, math.log(other.quality / mode.quality)
+        ),
+    )
+    return fit._replace(modes=[changed, *fit.modes[1:]])
 
 
 def _fit_ringing(
@@ -426,7 +452,7 @@ def _fit_ringing(
         fit = _fit_decay(level[start : tap.stop], rate, (start - tap.top) / rate, quiet)
         if fit is None:
             break
-        best = fit
+        best = fit._replace(start=start)
         # Continued back, the decay ends where the contact does.
         time = np.arange(tap.top - start, latest - start) / rate
         deviation = np.abs(level[tap.top : latest] - _columns(fit.rates, time) @ fit.factors)
