@@ -8,6 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.fft import next_fast_len
 from scipy.ndimage import median_filter
 
 from thud.level.levels import RECORDED_BAND
@@ -102,7 +103,7 @@ def _find_tones(
     values = np.concatenate([means[side] - np.median(means[side]) for side in sides])
     is_before = index < first
     time = (index - np.average(index, weights=window)) / rate
-    weighted = np.zeros(2 * len(means))
+    weighted = np.zeros(next_fast_len(2 * len(means), real=True))
     frequencies = np.fft.rfftfreq(len(weighted), 1 / rate)
     highest = min(RECORDED_BAND, 0.4 * rate)
     band = slice(*np.searchsorted(frequencies, [MIN_FREQUENCY, highest]))
