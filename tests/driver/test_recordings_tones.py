@@ -70,6 +70,11 @@ def test_noise_of_a_band_and_hum_are_no_tones() -> None:
     assert not notes(FORCE + sum(30 / k * np.sin(2 * np.pi * 50 * k * TIME) for k in range(1, 6)))
 
 
+@pytest.mark.parametrize("frequency", [5600.0, 6400.0, 11600.0])
+def test_tones_near_multiples_of_the_rate_of_the_search_stay(frequency: float) -> None:
+    assert not notes(FORCE + 20 * np.sin(2 * np.pi * frequency * TIME))
+
+
 def test_dropout_is_found_beside_a_tone() -> None:
     force = FORCE + 3 * np.sin(2 * np.pi * 450 * TIME)
     force[14800:14820] = force[14800]

@@ -8,6 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.fft import next_fast_len
 from scipy.ndimage import median_filter
 
 from thud.level.levels import RECORDED_BAND
@@ -36,6 +37,8 @@ MEDIAN_WIDTH = 150.0
 MAX_CHANGE = 0.1
 MAX_DEVIATIONS = 4.0
 MAX_TONES = 12
+# Power of a background without noise.
+MIN_NORMAL = 1e-30
 
 
 def remove_tones(window: Window) -> tuple[Window, tuple[str, ...], tuple[str, ...]]:
@@ -50,21 +53,24 @@ def remove_tones(window: Window) -> tuple[Window, tuple[str, ...], tuple[str, ..
     )
     if min(first, len(force) - stop) < MIN_LENGTH * rate:
         return window, (), ()
-    frequencies = _find_frequencies(force, first, stop, rate)
-    if not frequencies:
+    found = _find_tones(force, first, stop, rate)
+    if not found:
         return window, (), ()
     # Equal samples, which show faults, differ without the tone.
     force, steps, warnings = repair(window)
-    waves = np.vstack([_wave(frequency, len(force), rate) for frequency in frequencies])
+    waves = np.vstack([_wave(frequency, len(force), rate) for frequency in found])
     sides = slice(0, first), slice(stop, None)
     offset = np.median(np.concatenate([force[side] for side in sides]))
     gram = sum(waves[:, side] @ waves[:, side].T for side in sides)
     product = sum(waves[:, side] @ (force[side] - offset) for side in sides)
     coefficients = np.linalg.solve(gram, product).reshape(-1, 2)
     amplitudes = np.hypot(*coefficients.T)
+    # The averages of the search also show a tone near multiples of their rate.
+    coefficients[amplitudes < np.array([*found.values()]) / 2] = 0.0
     notes = tuple(
         f"a tone of {frequency:.4g} Hz with an amplitude of {amplitude:.3g} N was removed"
-        for frequency, amplitude in sorted(zip(frequencies, amplitudes, strict=True))
+        for frequency, amplitude in sorted(zip(found, amplitudes, strict=True))
+        if amplitude > found[frequency] / 2
     )
     samples = partial(
         read_repaired, window.signal, window.start, force - coefficients.ravel() @ waves
@@ -82,10 +88,10 @@ def _wave(frequency: float, count: int, rate: float) -> NDArray[np.float64]:
     return np.array([wave.real, wave.imag])
 
 
-def _find_frequencies(
+def _find_tones(
     force: NDArray[np.float64], first: int, stop: int, rate: float
-) -> list[float]:
-    """Return the frequencies, Hz, of tones in a force, N, outside a range of indices."""
+) -> dict[float, float]:
+    """Return amplitudes, N, by frequency, Hz, of tones in a force outside a range of indices."""
     width = max(1, int(rate / SEARCH_RATE))
     rate /= width
     means = force[: len(force) // width * width].reshape(-1, width).mean(axis=1)
@@ -96,24 +102,23 @@ def _find_frequencies(
     window = np.concatenate([np.hanning(len(side) + 2)[1:-1] for side in sides])
     values = np.concatenate([means[side] - np.median(means[side]) for side in sides])
     is_before = index < first
-    time = (index - (first + stop) / 2) / rate
-    n = 2 * len(means)
-    weighted = np.zeros(n)
-    spectrum_frequency = np.fft.rfftfreq(n, 1 / rate)
-    in_band = (spectrum_frequency > MIN_FREQUENCY) & (
-        spectrum_frequency < min(RECORDED_BAND, 0.4 * rate)
-    )
-    frequencies: list[float] = []
-    while len(frequencies) < MAX_TONES:
+    time = (index - np.average(index, weights=window)) / rate
+    weighted = np.zeros(next_fast_len(2 * len(means), real=True))
+    frequencies = np.fft.rfftfreq(len(weighted), 1 / rate)
+    highest = min(RECORDED_BAND, 0.4 * rate)
+    band = slice(*np.searchsorted(frequencies, [MIN_FREQUENCY, highest]))
+    tones: dict[float, float] = {}
+    local = np.empty(0)
+    while len(tones) < MAX_TONES:
         weighted[index] = window * values
-        power = np.abs(np.fft.rfft(weighted)) ** 2
-        size = round(MEDIAN_WIDTH * n / rate)
-        power = power[in_band]
-        local = median_filter(power, size, mode="nearest")
+        power = np.abs(np.fft.rfft(weighted))[band] ** 2
+        if not tones:
+            size = round(MEDIAN_WIDTH / frequencies[1])
+            local = np.maximum(median_filter(power, size, mode="nearest"), MIN_NORMAL)
         k = int(np.argmax(power / local))
         if not power[k] > MIN_POWER * local[k]:
             break
-        frequency = float(spectrum_frequency[in_band][k])
+        frequency = float(frequencies[band][k])
         # Newton's step: the slope of the phase over time.
         for _ in range(2):
             demodulated = window * values * np.exp(-2j * np.pi * frequency * time)
@@ -136,8 +141,8 @@ def _find_frequencies(
         limit = MAX_DEVIATIONS * math.hypot(*deviations)
         if abs(after - before) > MAX_CHANGE * amplitude + limit or amplitude < limit:
             break
-        frequencies.append(frequency)
+        tones[frequency] = amplitude
         wave = np.exp(2j * np.pi * frequency * time)
         columns = np.column_stack([wave.real, wave.imag])
         values = values - columns @ np.linalg.solve(columns.T @ columns, columns.T @ values)
-    return frequencies
+    return tones
