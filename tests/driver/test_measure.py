@@ -518,7 +518,7 @@ def test_calibration_record_gives_lines_of_a_configuration(
     volt = np.repeat([0.0, 0.4, 0.0], 4000) + rng.normal(0, 1e-4, 12000)
     rows = "\n".join(f"{i / 4000:.6f},{one:.6f}" for i, one in enumerate(volt))
     (tmp_path / "weight.csv").write_text(f"Time [s],Force [V]\n{rows}\n")
-    arguments = ["calibrate", str(tmp_path / "weight.csv"), "--mass", "10"]
+    arguments = ["calibrate", str(tmp_path / "weight.csv"), "--mass", "10", "--gravity", "9.81"]
     assert cli.main([*arguments, "--uncertainty", "0.002"]) == 0
     said = capsys.readouterr()
     found = tomllib.loads(said.out)
