@@ -44,6 +44,12 @@ def test_tones_are_removed(tones: dict[float, float]) -> None:
 def test_levels_without_noise_and_tones_have_no_notes() -> None:
     assert not notes(FORCE)
     assert not notes(FORCE - NOISE)
+    # The noise at 306 Hz is below that around it.
+    draws = np.random.default_rng(81).normal(0, 0.3, 30720)
+    time = np.arange(len(draws)) / 51.2e3
+    pulse = 1500 * np.sin(np.pi * np.clip((time - 0.2) / 0.018, 0, 1))
+    (drop,) = thud.Recording.from_array(pulse + draws, 51.2e3).drops
+    assert not any("tone" in step for step in drop.steps)
 
 
 @pytest.mark.parametrize("frequency", [400.0, 1100.0])

@@ -114,7 +114,7 @@ def _find_tones(
         power = np.abs(np.fft.rfft(weighted))[band] ** 2
         if not tones:
             size = round(MEDIAN_WIDTH / frequencies[1])
-            local = np.maximum(median_filter(power, size, mode="nearest"), MIN_NORMAL)
+            local = np.maximum(median_filter(power, size, mode="reflect"), MIN_NORMAL)
         k = int(np.argmax(power / local))
         if not power[k] > MIN_POWER * local[k]:
             break
