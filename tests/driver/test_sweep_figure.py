@@ -11,6 +11,8 @@ import thud
 from thud.plot import draw_sweep
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -115,3 +117,19 @@ def test_figure_is_a_column_wide(tmp_path: Any) -> None:  # noqa: ANN401 - a pat
     thud.plot.save(figure, tmp_path / "sweep.png")
     titles = [axes.title.get_window_extent() for axes in figure.axes]
     assert titles[0].x1 < titles[1].x0
+
+
+def test_case_with_a_room_is_drawn(tmp_path: Path) -> None:
+    case = tmp_path / "case.nml"
+    case.write_text("&model /\n&floor name = 'plate' /\n&plate /\n&room /\n")
+    thickness = {"values": [0.14, 0.18, 0.22], "unit": "m"}
+    figure = draw(case=str(case), parameters={"plate.thickness": thickness})
+    (axes,) = figure.axes
+    assert axes.get_xlabel() == "Plate thickness, m"
+    result = thud.sweep({"case": str(case), "parameters": {"plate.thickness": thickness}})
+    drawn = {str(line.get_label()): line.get_ydata() for line in axes.lines}
+    ratings = result.dataset["room_rating"].values, result.dataset["standardized_rating"].values
+    for name, rating in zip(("in the room", "standardized (ISO 16283-2)"), ratings, strict=True):
+        assert drawn[name] == pytest.approx(rating)
+    assert len(drawn) == 2
+    assert figure.get_supylabel().startswith("L_iA,Fmax")

@@ -18,7 +18,7 @@ from thud.base.units import display_unit
 from thud.case.keys import humanize
 from thud.impact.quantities import RATING
 from thud.level.assessment import octave_limits
-from thud.level.levels import BANDWIDTHS, FORCES, get_bands
+from thud.level.levels import FORCES, get_bands
 from thud.plot.style import (
     COLORS,
     FORCE_NAMES,
@@ -112,18 +112,24 @@ _MAX_PANELS = 6
 _MIN_RANGE = 0.05
 
 
-class _RelativeLevels(NamedTuple):
-    """Levels minus nominal levels of each sample, minimum and maximum tolerance, dB."""
+class _Curves(NamedTuple):
+    """Levels of each sample, dB, shape (n_sample, n_curve), names of the curves, and their axis.
+
+    The tolerance is the minimum and the maximum one of levels relative to nominal ones, dB.
+    """
 
     level: NDArray[np.float64]
-    tolerance: tuple[float, float]
+    names: list[str]
+    label: str
+    tolerance: tuple[float, float] | None = None
 
 
 @own_style()
 def draw_sweep(result: Sweep) -> Figure:
     """Draw octave levels against the first numeric parameter that has several values.
 
-    Levels are those of the assessed force relative to the nominal ones, dB. The first text
+    Levels are those of the assessed force relative to the nominal ones, dB; for a case with a room
+    the ratings of the levels in it are drawn instead. The first text
     parameter with up to six values has a panel for each. Lines are medians over the other
     parameters; shades extend from the minimum to the maximum.
     """
@@ -134,7 +140,11 @@ def draw_sweep(result: Sweep) -> Figure:
     name = (numeric or varied or list(columns))[0]
     texts = [n for n in varied if n not in numeric and n != name]
     panel_parameter = next((n for n in texts if len(np.unique(columns[n])) <= _MAX_PANELS), None)
-    relative = _get_relative_levels(dataset, columns)
+    drawn = (
+        _get_ratings(dataset)
+        if "room_rating" in dataset
+        else _get_relative_levels(dataset, columns)
+    )
     masks = {"": np.ones(len(columns[name]), dtype=bool)}
     if panel_parameter:
         masks = {
@@ -148,30 +158,30 @@ def draw_sweep(result: Sweep) -> Figure:
         row_count, column_count, sharex=True, sharey=True, squeeze=False
     ).ravel()
     for i, (axes, (title, mask)) in enumerate(zip(panels, masks.items(), strict=False)):
-        _draw_tolerance(axes, relative.tolerance)
-        levels = np.where(mask[:, np.newaxis], relative.level, np.nan)
-        _draw_octaves(axes, dataset[name], columns[name], levels, _MAX_MARKERS // column_count)
+        if drawn.tolerance:
+            _draw_tolerance(axes, drawn.tolerance)
+        curves = drawn._replace(level=np.where(mask[:, np.newaxis], drawn.level, np.nan))
+        _draw_curves(axes, dataset[name], columns[name], curves, _MAX_MARKERS // column_count)
         axes.set_title(title.replace("_", " "))
         lowest = i + column_count >= len(masks)
         axes.tick_params(axis="x", labelbottom=lowest)
         axes.xaxis.label.set_visible(lowest)
     for axes in panels[len(masks) :]:
         axes.remove()
-    force = "assessed force" if "force" in columns else FORCE_NAMES[dataset.attrs["assessed_force"]]
-    figure.supylabel(f"Level − nominal, dB\n({force})")
+    figure.supylabel(drawn.label)
     others = [n for n in varied if n not in {name, panel_parameter}]
-    legend_above(panels[0], title=_get_explanation(relative, panel_parameter, others))
+    legend_above(panels[0], title=_get_explanation(drawn, panel_parameter, others))
     return figure
 
 
 def _columns(dataset: xr.Dataset) -> Columns:
     """Return the parameters of each sample."""
-    names = [str(name) for name in dataset.coords if name not in BANDWIDTHS]
     whole = dataset["status"]
+    names = [str(name) for name in dataset.coords if set(dataset[name].dims) <= set(whole.dims)]
     return {name: dataset[name].broadcast_like(whole).values.ravel() for name in names}
 
 
-def _get_relative_levels(dataset: xr.Dataset, columns: Columns) -> _RelativeLevels:
+def _get_relative_levels(dataset: xr.Dataset, columns: Columns) -> _Curves:
     """Return the levels of the assessed force relative to the nominal levels of the source."""
     levels = {
         force: dataset[f"{force}_level"].values.reshape(-1, len(dataset["octave"]))
@@ -186,7 +196,17 @@ def _get_relative_levels(dataset: xr.Dataset, columns: Columns) -> _RelativeLeve
         lower, upper = octave_limits(source)
         level[sources == source] -= (lower + upper) / 2
         tolerances.extend((upper - lower) / 2)
-    return _RelativeLevels(level, (min(tolerances), max(tolerances)))
+    force = "assessed force" if "force" in columns else FORCE_NAMES[dataset.attrs["assessed_force"]]
+    names = [f"{band:g} Hz" for band in get_bands().nominal]
+    label = f"Level − nominal, dB\n({force})"
+    return _Curves(level, names, label, (min(tolerances), max(tolerances)))
+
+
+def _get_ratings(dataset: xr.Dataset) -> _Curves:
+    """Return the ratings of the levels in the room, as predicted and standardized."""
+    names = {"in the room": "room_rating", "standardized (ISO 16283-2)": "standardized_rating"}
+    level = np.column_stack([dataset[rating].values.ravel() for rating in names.values()])
+    return _Curves(level, list(names), "L_iA,Fmax in the room below,\ndB re 20 µPa")
 
 
 def _draw_tolerance(axes: Axes, tolerance: tuple[float, float]) -> None:
@@ -196,14 +216,14 @@ def _draw_tolerance(axes: Axes, tolerance: tuple[float, float]) -> None:
     axes.axhline(0, color="0.45", linewidth=0.8)
 
 
-def _draw_octaves(
+def _draw_curves(
     axes: Axes,
     parameter: xr.DataArray,
     values: NDArray[Any],
-    levels: NDArray[np.float64],
+    curves: _Curves,
     max_markers: int,
 ) -> None:
-    """Draw the octave levels of samples against a parameter, without levels that are NaN."""
+    """Draw the levels of samples against a parameter, without levels that are NaN."""
     positions, members, names = _group_values(values)
     if names is None:
         positions = positions * show_parameter(axes, "x", parameter)
@@ -211,14 +231,14 @@ def _draw_octaves(
         axes.set_xticks(positions, names)
         axes.tick_params(axis="x", labelrotation=20)
         axes.set_xlabel(parameter_label(parameter))
-    for i, band in enumerate(get_bands().nominal):
-        groups = [levels[chosen, i] for chosen in members]
+    for i, title in enumerate(curves.names):
+        groups = [curves.level[chosen, i] for chosen in members]
         middle, lower, upper = (
             np.array([_of_finite(group, f) for group in groups])
             for f in (np.median, np.min, np.max)
         )
         marks = marker_style(i, 3) if len(positions) <= max_markers else {}
-        axes.plot(positions, middle, label=f"{band:g} Hz", **line_style(i), **marks)
+        axes.plot(positions, middle, label=title, **line_style(i), **marks)
         if np.nanmax(upper - lower, initial=0) > _MIN_RANGE:
             axes.fill_between(positions, lower, upper, color=COLORS[i], alpha=0.15, linewidth=0)
 
@@ -245,12 +265,12 @@ def _of_finite(values: NDArray[np.float64], function: Any) -> float:  # noqa: AN
     return float(function(finite)) if finite.size else np.nan
 
 
-def _get_explanation(
-    relative: _RelativeLevels, panel_parameter: str | None, others: list[str]
-) -> str:
+def _get_explanation(drawn: _Curves, panel_parameter: str | None, others: list[str]) -> str:
     """Return the explanation of panels, lines, shades and gray areas."""
-    minimum, maximum = relative.tolerance
-    lines = [f"Gray: tolerances of the octaves, ±{minimum:g} to ±{maximum:g} dB"]
+    lines = []
+    if drawn.tolerance:
+        minimum, maximum = drawn.tolerance
+        lines = [f"Gray: tolerances of the octaves, ±{minimum:g} to ±{maximum:g} dB"]
     if others:
         over = humanize(others[0]) if len(others) == 1 else f"{len(others)} other parameters"
         lines.insert(0, f"Lines: median over {over}; shades: range")
