@@ -303,3 +303,13 @@ def test_no_mode_of_an_orthotropic_plate_is_missing(shell: thud.Impact, ratio: f
     found = thud.modal_room(shell, plate, ROOM, balls=1, microphones=1).floor_frequency
     numbers = list(itertools.product(range(1, 60), repeat=2))
     assert len(found) == (plate_frequencies(plate, numbers) <= 400).sum()
+
+
+def test_walls_and_ceiling_are_left_out_of_both_levels(found: thud.ModalRoom) -> None:
+    room = replace(found.prediction.room, wall_lengths=(3.0, 2.0), ceiling_mass=20.0)
+    both = [
+        thud.modal_room(found.prediction.source, found.prediction.floor, r, balls=1, microphones=1)  # type: ignore[arg-type]
+        for r in (found.prediction.room, room)
+    ]
+    np.testing.assert_array_equal(both[0].level, both[1].level)
+    np.testing.assert_array_equal(both[0].statistical, both[1].statistical)

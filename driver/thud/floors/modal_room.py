@@ -9,7 +9,7 @@ the air is included only as radiation in the loss factor of the plate.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -161,7 +161,8 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
     """Compute modal levels below a floor for pairs of positions, in bands up to 160 Hz.
 
     The floor is simply supported and covers the room, whose height is its volume divided by the
-    area of the floor. Walls and ceilings of `room` are not used. The energy of floor modes decays
+    area of the floor. Walls and ceilings of `room` are left out, in the statistical prediction
+    beside it, too. The energy of floor modes decays
     at the rate omega eta of the statistical prediction, the energy of room modes at 6 ln 10/T.
 
     Parameters
@@ -201,6 +202,9 @@ def positions_below(
     seed: int = 0,
 ) -> ModalRoom:
     """Compute the `modal_room` for the impact, floor and room of a prediction."""
+    bare = replace(prediction.room, wall_lengths=(), ceiling_mass=0.0)
+    if prediction.room != bare:
+        prediction = predict_level(prediction.source, prediction.floor, bare)
     floor, room = prediction.floor, prediction.room
     require_kind("floor", floor, Plate)
     assert isinstance(floor, Plate)  # noqa: S101 - for the type checker
