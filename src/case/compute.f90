@@ -22,7 +22,7 @@ module thud_compute
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, is_inconclusive, source_limits_type
    use thud_system, only: is_forked
-   use thud_warnings, only: get_warnings, warning_length
+   use thud_warnings, only: add_source_warning, get_warnings, warning_length
    implicit none (type, external)
    private
 
@@ -100,6 +100,10 @@ contains
       if (case%has_impact .and. .not. allocated(error)) call assess_floor(case, scope, results%impact, results%on_floor, &
          results%floor, results%room, error)
       if (.not. allocated(error)) call get_warnings(case, results%impact%history, results%warning, results%on_floor)
+      if (case%has_impact .and. case%has_room .and. scope%room .and. scope%levels .and. .not. allocated(error)) then
+         call add_source_warning(results%impact%assessment%criteria(:, findloc(force_names == 'floor', .true., dim=1)), &
+            results%warning)
+      end if
    end subroutine compute
 
    !> The drop of a case on a rigid floor, and its assessment.

@@ -10,14 +10,16 @@ module thud_warnings
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_numerical_error, only: finer_quantities, get_resolution_keys
+   use thud_plate, only: plate_type
    use thud_registry, only: floor_names, model_names
    use thud_sampling, only: get_rate_limit
+   use thud_source_limits, only: conforms, criterion_type
    use thud_text, only: fixed, quoted, to_text
    use thud_validity_limit, only: get_limit_message, is_outside, validity_limit_type
    implicit none (type, external)
    private
 
-   public :: add_floor_warning, get_warnings, warning_length
+   public :: add_floor_warning, add_height_warning, add_source_warning, get_warnings, warning_length
 
    !> Maximum length of a warning.
    integer, parameter :: warning_length = 240
@@ -46,6 +48,9 @@ module thud_warnings
 
    !> An octave level this far below the level over all frequencies is affected by rounding errors, dB.
    real(wp), parameter :: max_decline = 120.0_wp
+
+   !> Range of usual heights of rooms, m: [2].
+   real(wp), parameter :: usual_height(2) = [2.0_wp, 6.0_wp]
 
    !> Numerical error of an octave level above which a warning is raised, dB.
    real(wp), parameter :: max_error = 0.2_wp
@@ -83,6 +88,7 @@ contains
          '&floor: name = '//quoted(case%floor)//' does not move under the model '//quoted(case%model) &
          //': its force is that on a rigid floor')
       if (case%has_floor) call add_floor_warning(case, warnings)
+      if (case%has_room) call add_height_warning(case, warnings)
       call add_limit_warnings(case, history, warnings)
       call add_level_warnings(history, warnings)
       call add_error_warning(history, '', warnings)
@@ -186,6 +192,48 @@ contains
       if (highest < standard_band(2)) call add(warnings, '&'//trim(case%floor)//': above '//fixed(highest, 0)//' Hz ' &
          //trim(reason))
    end subroutine add_floor_warning
+
+   !> Adds a warning on a source that does not conform, for a case with a room.
+   subroutine add_source_warning(criteria, warnings)
+      !> Criteria of the force on the floor, octave levels first: [n].
+      type(criterion_type), intent(in) :: criteria(:)
+      !> Messages: [n].
+      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
+      type(band_type) :: bands(octave_count)
+      character(len=:), allocatable :: octaves
+      integer :: i
+
+      bands = get_octaves()
+      octaves = ''
+      do i = 1, octave_count
+         if (.not. conforms(criteria(i))) octaves = octaves//', '//trim(get_band_name(bands(i)))//' Hz ' &
+            //fixed(criteria(i)%value - (criteria(i)%lower + criteria(i)%upper)/2, 1)//' dB'
+      end do
+      if (octaves /= '') call add(warnings, '&room: the source does not conform ('//octaves(3:)//' from the nominal levels): ' &
+         //'the level in the room is not that of a standard source')
+   end subroutine add_source_warning
+
+   !> Adds a warning on a room of unusual height.
+   subroutine add_height_warning(case, warnings)
+      !> A case with floor and room.
+      type(case_type), intent(in) :: case
+      !> Messages: [n].
+      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
+      type(band_type) :: bands(octave_count)
+      type(plate_type) :: plate
+      type(error_type), allocatable :: error
+      real(wp) :: conductance(octave_count), height
+
+      bands = get_octaves()
+      associate (floor => case%floors(get_floor_number(case))%model)
+         call floor%get_radiator(bands%center, plate, conductance, error)
+      end associate
+      if (allocated(error)) return
+      height = case%room%volume/(plate%length*plate%width)
+      if (height < usual_height(1) .or. height > usual_height(2)) call add(warnings, '&room: volume: below ' &
+         //fixed(plate%length*plate%width, 1)//' m2 of floor the room is '//fixed(height, 2)//' m high; usual are ' &
+         //fixed(usual_height(1), 1)//' to '//fixed(usual_height(2), 1)//' m')
+   end subroutine add_height_warning
 
    !> Adds warnings on density, modulus and Poisson's ratio of the ball, for models that use them.
    subroutine add_ball_warnings(case, model, warnings)

@@ -62,7 +62,8 @@ contains
       type(field_type) :: fields(2)
 
       fields = [ &
-         real_field('source_x', options%source_x, '', 'relative source position along the length', '(0, 1)'), &
+         real_field('source_x', options%source_x, '', 'relative source position along the length; ' &
+         //'levels in the room are means', '(0, 1)'), &
          real_field('source_y', options%source_y, '', 'relative source position along the width', '(0, 1)')]
    end function get_source_fields
 

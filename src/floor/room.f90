@@ -6,10 +6,10 @@ module thud_room
    use thud_constants, only: pi
    use thud_energy_flow, only: add_subsystem, connect, energy_flow_type, get_loss_matrix, new_energy_flow
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, list_type
+   use thud_field, only: field_type, list_type, name_length
    use thud_flanking, only: get_junction_rate, get_vibration_reduction, get_wall_fields, get_walls, walls_type
    use thud_kinds, only: wp
-   use thud_new_field, only: list_field, real_field
+   use thud_new_field, only: choice_field, list_field, real_field
    use thud_plate, only: air_type, get_mode_density, get_plate_radiation, get_surface_mass, get_total_loss, plate_type
    use thud_rating, only: fast_reverberation, find_rated_bands, get_a_weighted_level
    use thud_response_spread, only: get_band_variance, get_level_spread
@@ -19,6 +19,9 @@ module thud_room
    private
 
    public :: check_below, check_room, few_modes, get_room_bands, get_room_fields, get_room_level, room_level_type, room_type
+
+   !> A room whose reverberation time contains all its losses, as measured ones do.
+   character(len=*), parameter :: finished_room = 'finished'
 
    !> Band sets of a prediction.
    character(len=*), parameter :: third_set = 'third', octave_set = 'octave'
@@ -46,6 +49,9 @@ module thud_room
       real(wp) :: reverberation_time = 0.5_wp
       !> Reverberation time of each one-third-octave band, s; empty: the same for all bands.
       type(list_type) :: reverberation_times
+      !> What the reverberation times contain: all losses of the finished room (`finished`), or those of its own without
+      !> the flow into floor, walls and ceiling (`bare`).
+      character(len=name_length) :: reverberation_of = finished_room
       !> Air in the room.
       type(air_type) :: air
       !> Flanking walls.
@@ -97,7 +103,7 @@ contains
    function get_room_fields(room) result(fields)
       !> The room that the fields read and set.
       type(room_type), intent(in), target :: room
-      !> One field per component: [16].
+      !> One field per component: [17].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
@@ -105,6 +111,8 @@ contains
          real_field('reverberation_time', room%reverberation_time, 's', 'reverberation time of the room', '[0.05, 20]'), &
          list_field('reverberation_times', room%reverberation_times, 's', &
          'reverberation time in each one-third-octave band from 50 to 630 Hz', '[0.05, 20]'), &
+         choice_field('reverberation_of', room%reverberation_of, 'room of the reverberation time: finished, or bare, ' &
+         //'without floor, walls and ceiling', [character(len=8) :: finished_room, 'bare']), &
          real_field('air_density', room%air%density, 'kg/m3', 'density of the air', '[0.5, 2]'), &
          real_field('sound_speed', room%air%sound_speed, 'm/s', 'speed of sound in the air', '[200, 500]'), &
          get_wall_fields(room%walls), get_ceiling_fields(room%ceiling)]
@@ -254,7 +262,7 @@ contains
    !> Energies of a band: floor, walls, room and ceiling cavity, with the flows between them.
    !>
    !> A plate loses omega eta in total; it radiates rho0 c0 sigma/m'' into the room and as much to the other side. The room
-   !> loses 6 ln 10/T plus the flow back into the plates. With a ceiling of transmission t, a fraction of the floor's
+   !> loses 6 ln 10/T, which contains the flow back into the plates in a finished room and excludes it in a bare one. With a ceiling of transmission t, a fraction of the floor's
    !> radiation reaches the room through the stiffness of the air. Of the rest, t**2 reaches the room directly and 1 - t**2
    !> the cavity, from which sound leaves through the ceiling (Craik and Smith 2000). The cavity receives t (1 - t) of the
    !> sound that the room sends to the ceiling. A ceiling without mass, t = 1, has no effect.
@@ -269,7 +277,7 @@ contains
       type(energy_flow_type) :: flow
       type(plate_type) :: plates(1 + room%walls%lengths%count)
       real(wp), dimension(size(plates)) :: radiated
-      real(wp) :: transmission, forced, free
+      real(wp) :: decay, transmission, forced, free
       integer :: i, at_room, at_cavity
 
       plates = [plate, get_walls(room%walls)]
@@ -278,9 +286,10 @@ contains
       associate (f => prediction%bands(band)%center, third => prediction%bands(band), air => room%air, &
          ceiling => room%ceiling, area => plate%length*plate%width)
          radiated = air%density*air%sound_speed/get_surface_mass(plates)*get_plate_radiation(plates, air, f)
+         decay = decay_of_60_db/prediction%reverberation_time(band)
          flow = new_energy_flow([get_mode_density(plates), get_room_mode_density(room, f)], &
-            2*pi*f*get_total_loss(plates, air, f), &
-            [2*pi*f*plates%loss_factor + radiated, decay_of_60_db/prediction%reverberation_time(band)])
+            [2*pi*f*get_total_loss(plates, air, f), decay], &
+            [2*pi*f*plates%loss_factor + radiated, merge(0.0_wp, decay, room%reverberation_of == finished_room)])
          if (ceiling%mass > 0.0_wp) then
             transmission = get_mass_law(ceiling, air, f)
             forced = get_forced_velocity_ratio(ceiling, air, prediction%radiation_factor(band), third%lower, third%upper)

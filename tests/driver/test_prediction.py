@@ -17,6 +17,7 @@ from thud.base import bridge
 from thud.base.errors import ReportWarning
 from thud.cli import main
 from thud.floors.prediction import _force_change
+from thud.level.assessment import octave_limits
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,6 +28,8 @@ FLOORS = REPOSITORY / "inputs" / "floors"
 PLATE = "&plate\n thickness = 0.2\n/\n"
 FLOOR_CASE = f"&ball /\n&drop /\n&model /\n&floor name = 'plate' /\n{PLATE}"
 ROOM_CASE = f"{FLOOR_CASE}&room\n volume = 40\n/\n"
+# Exact mid frequencies of the one-third-octave bands from 50 to 630 Hz, Hz.
+BAND_CENTERS = 1000 * 10 ** (np.arange(-13, -1) / 10)
 RIGID_CASE = ROOM_CASE.replace("'plate'", "'rigid'")
 
 
@@ -43,6 +46,7 @@ def test_executable_and_python_predict_the_same(run: Run, case_file: CaseFile) -
     assert [float(row["nominal_Hz"]) for row in rows] == found.frequency.tolist()
     shown = re.search(r"L_iA,Fmax (\d+) dB \((\S+)\)", done.stdout)
     assert shown is not None
+    assert f"&room: {found.source_warnings[0]}" in done.stderr
     assert int(shown[1]) == found.rating.rounded
     assert float(shown[2]) == pytest.approx(found.rating.a_weighted, abs=0.006)
 
@@ -190,7 +194,7 @@ def test_walls_ceiling_octaves_and_history_are_written(
     done = run(case_file(ROOM_CASE.replace("volume = 40", more)), "-o", "out")
     assert done.returncode == 0, done.stderr
     assert "Room of 40.0 m3, reverberation time 0.80 s." in done.stdout
-    assert "no class (KS F 2863-2)" in done.stdout
+    assert re.search(r"KS F 2863-2, of octaves: L_iA,Fmax \d\d\.\d\d dB, no class", done.stdout)
     folder = case_file(ROOM_CASE).parent / "out"
     octaves = np.genfromtxt(folder / "room_octaves.csv", delimiter=",", names=True)
     history = np.genfromtxt(folder / "room_history.csv", delimiter=",", skip_header=1)
@@ -313,6 +317,7 @@ def test_maxima_are_drawn_on_their_decays(shell: thud.Impact) -> None:
 
 def test_few_modes_of_floor_or_room_raise_a_warning(shell: thud.Impact) -> None:
     found = thud.predict_level(shell, thud.Plate(), thud.Room())
+    found = replace(found, source_warnings=())
     many = np.full(12, found.few_modes)
     for change in ({"floor_modes": many - 1e-9}, {"room_modes": many - 1e-9}):
         one = replace(found, **{"floor_modes": many, "room_modes": many} | change)
@@ -364,3 +369,56 @@ def test_force_that_just_does_not_swing_has_the_limit_of_both_sides() -> None:
     for factor in (1 - 1e-9, 1.0, 1 + 1e-9):
         found = _force_change(2.5, 0.02, critical * factor)
         assert found == pytest.approx(-20 / np.log(10), abs=1e-3)
+
+
+@pytest.mark.parametrize("kind", ["finished", "bare"])
+def test_reverberation_time_holds_the_losses_that_its_room_has(
+    shell: thud.Impact,
+    kind: Any,  # noqa: ANN401
+) -> None:
+    room = thud.Room(volume=30.0, reverberation_time=0.9, reverberation_of=kind)
+    found = thud.predict_level(shell, thud.Plate(thickness=0.1), room)
+    air = room.air_density * room.sound_speed
+    radiated = air * found.radiation_factor / found.mass_per_area
+    returned = radiated * found.floor_modes / found.room_modes
+    decay = 6 * np.log(10) / 0.9
+    for k, band in enumerate(found.frequency):
+        loss = 2 * np.pi * BAND_CENTERS[k] * found.loss_factor[k]
+        room_loss = decay if kind == "finished" else decay + returned[k]
+        pressure = air * room.sound_speed / room.volume
+        # Energies of floor and room, and the square of the pressure after the detector.
+        rates = [[-loss, returned[k], 0], [radiated[k], -room_loss, 0], [0, 8 * pressure, -8]]
+        values, vectors = np.linalg.eig(np.array(rates))
+        parts = vectors[2] * np.linalg.solve(vectors, [found.energy[k], 0, 0])
+        square = (parts * np.exp(np.outer(found.history_time, values))).sum(axis=1).real
+        expected = 10 * np.log10(square / 2e-5**2)
+        assert found.history[:, k] == pytest.approx(expected, abs=1e-6), band
+
+
+def test_source_that_does_not_conform_is_named(shell: thud.Impact) -> None:
+    (text,) = [
+        w for w in thud.predict_level(shell, thud.Plate(), thud.Room()).warnings if "source" in w
+    ]
+    impact = thud.solve(replace(shell.case, floor=thud.Plate(), room=thud.Room()))
+    assert thud.predict_level(impact.on_floor).source_warnings == (text,)  # type: ignore[arg-type]
+    lower, upper = octave_limits("rubber_ball")
+    for band, level, low, high in zip(
+        ("31.5", "63", "125", "250", "500"), shell.levels(force="floor"), lower, upper, strict=True
+    ):
+        shown = f"{band} Hz {level - (low + high) / 2:.1f} dB"
+        assert (shown in text) == (not low <= level <= high)
+    assert "does not conform" in text
+    viscous = thud.read_case(REPOSITORY / "inputs/rubber_ball_fe_viscous.nml")
+    conforming = thud.predict_level(thud.solve(viscous), thud.Plate(), thud.Room())
+    assert conforming.source_warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("volume", "height"), [(39.0, "1.95"), (41.0, ""), (119.0, ""), (121.0, "6.05")]
+)
+def test_unusual_height_of_the_room_is_named(
+    shell: thud.Impact, volume: float, height: str
+) -> None:
+    prediction = thud.predict_level(shell, thud.Plate(), thud.Room(volume=volume))
+    found = [warning for warning in prediction.warnings if "m high" in warning]
+    assert [f"{height} m high" in warning for warning in found] == [True] * bool(height)

@@ -76,6 +76,7 @@ FloorName = Literal[
 PlateEdges = Literal["laboratory", "absorption"]
 FloatingFloorEdges = Literal["laboratory", "absorption"]
 JoistFloorSourceOn = Literal["sheathing", "joist"]
+RoomReverberationOf = Literal["finished", "bare"]
 RoomWallJunction = Literal["cross", "t", "index"]
 BandSet = Literal["octave", "third"]
 
@@ -276,6 +277,9 @@ class Room(Group):
     reverberation_times : sequence of float
         Reverberation time in each one-third-octave band from 50 to 630 Hz, s; 0.05 <=
         reverberation_times <= 20.
+    reverberation_of : str
+        Room of the reverberation time: finished, or bare, without floor, walls and ceiling;
+        "finished", "bare".
     air_density : float
         Density of the air, kg/m3; 0.5 <= air_density <= 2.
     sound_speed : float
@@ -310,6 +314,7 @@ class Room(Group):
     volume: float = 50.0
     reverberation_time: float = 0.5
     reverberation_times: Sequence[float] = ()
+    reverberation_of: RoomReverberationOf = "finished"
     air_density: float = 1.2
     sound_speed: float = 343.0
     wall_lengths: Sequence[float] = ()
@@ -619,7 +624,7 @@ class Plate(Group):
         Sum of edge lengths times absorption coefficients, for absorption, m; 0 <= edge_absorption
         <= 1000.
     source_x : float
-        Relative source position along the length; 0 < source_x < 1.
+        Relative source position along the length; levels in the room are means; 0 < source_x < 1.
     source_y : float
         Relative source position along the width; 0 < source_y < 1.
     point_x : sequence of float
@@ -688,7 +693,7 @@ class FloatingFloor(Group):
     layer_loss_factor : float
         Loss factor of the resilient layer; 0 <= layer_loss_factor <= 1.
     source_x : float
-        Relative source position along the length; 0 < source_x < 1.
+        Relative source position along the length; levels in the room are means; 0 < source_x < 1.
     source_y : float
         Relative source position along the width; 0 < source_y < 1.
     point_x : sequence of float
@@ -752,7 +757,7 @@ class JoistFloor(Group):
     loss_factor : float
         Loss factor of the floor including its edges, without radiation; 0 < loss_factor <= 1.
     source_x : float
-        Relative source position along the length; 0 < source_x < 1.
+        Relative source position along the length; levels in the room are means; 0 < source_x < 1.
     source_y : float
         Relative source position along the width; 0 < source_y < 1.
     source_on : str
@@ -1107,7 +1112,7 @@ KEYS = (
     Key("plate", "plate", "loss_factor", "real", "", "internal loss factor of the floor", (), 0.0, 1.0),
     Key("plate", "plate", "edges", "choice", "", "losses at the edges of the floor", ('laboratory', 'absorption')),
     Key("plate", "plate", "edge_absorption", "real", "m", "sum of edge lengths times absorption coefficients, for absorption", (), 0.0, 1000.0),
-    Key("plate", "plate", "source_x", "real", "", "relative source position along the length", (), 0.0, 1.0),
+    Key("plate", "plate", "source_x", "real", "", "relative source position along the length; levels in the room are means", (), 0.0, 1.0),
     Key("plate", "plate", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
     Key("plate", "plate", "point_x", "list", "m", "positions along the length of points whose velocity is computed", (), 0.0, 1000.0),
     Key("plate", "plate", "point_y", "list", "m", "positions of these points along the width", (), 0.0, 1000.0),
@@ -1127,7 +1132,7 @@ KEYS = (
     Key("floating_floor", "floating_floor", "screed_loss_factor", "real", "", "loss factor of the floating plate", (), 0.0, 1.0),
     Key("floating_floor", "floating_floor", "layer_stiffness", "real", "N/m3", "dynamic stiffness of the resilient layer per unit area (ISO 9052-1)", (), 10000.0, 1000000000000.0),
     Key("floating_floor", "floating_floor", "layer_loss_factor", "real", "", "loss factor of the resilient layer", (), 0.0, 1.0),
-    Key("floating_floor", "floating_floor", "source_x", "real", "", "relative source position along the length", (), 0.0, 1.0),
+    Key("floating_floor", "floating_floor", "source_x", "real", "", "relative source position along the length; levels in the room are means", (), 0.0, 1.0),
     Key("floating_floor", "floating_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
     Key("floating_floor", "floating_floor", "point_x", "list", "m", "positions along the length of points whose velocity is computed", (), 0.0, 1000.0),
     Key("floating_floor", "floating_floor", "point_y", "list", "m", "positions of these points along the width", (), 0.0, 1000.0),
@@ -1143,7 +1148,7 @@ KEYS = (
     Key("joist_floor", "joist_floor", "joist_modulus", "real", "Pa", "modulus of elasticity of the joists", (), 10000000.0, 1000000000000.0),
     Key("joist_floor", "joist_floor", "connection", "real", "", "composite action of sheathing and joists, 0 (loose) to 1 (glued), EN 1995-1-1 annex B", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "loss_factor", "real", "", "loss factor of the floor including its edges, without radiation", (), 0.0, 1.0),
-    Key("joist_floor", "joist_floor", "source_x", "real", "", "relative source position along the length", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "source_x", "real", "", "relative source position along the length; levels in the room are means", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_on", "choice", "", "impact location: sheathing between joists, or a joist", ('sheathing', 'joist')),
     Key("joist_floor", "joist_floor", "point_x", "list", "m", "positions along the length of points whose velocity is computed", (), 0.0, 1000.0),
@@ -1158,6 +1163,7 @@ KEYS = (
     Key("room", "room", "volume", "real", "m3", "volume of the room", (), 1.0, 100000.0),
     Key("room", "room", "reverberation_time", "real", "s", "reverberation time of the room", (), 0.05, 20.0),
     Key("room", "room", "reverberation_times", "list", "s", "reverberation time in each one-third-octave band from 50 to 630 Hz", (), 0.05, 20.0),
+    Key("room", "room", "reverberation_of", "choice", "", "room of the reverberation time: finished, or bare, without floor, walls and ceiling", ('finished', 'bare')),
     Key("room", "room", "air_density", "real", "kg/m3", "density of the air", (), 0.5, 2.0),
     Key("room", "room", "sound_speed", "real", "m/s", "speed of sound in the air", (), 200.0, 500.0),
     Key("room", "room", "wall_lengths", "list", "m", "lengths of the flanking walls along the floor (default: no walls)", (), 0.1, 100.0),

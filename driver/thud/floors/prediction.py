@@ -16,7 +16,7 @@ from thud.floors.survey import RoomLevels
 from thud.impact.floor_impact import FloorImpact, new_floor_impact
 from thud.impact.room_level import RoomLevel, new_room_level
 from thud.level.impact_result import ImpactResult
-from thud.level.levels import BANDWIDTHS, get_bands
+from thud.level.levels import BANDWIDTHS, force_exposure_levels, get_bands
 from thud.level.rating import Rating, rated_bands, rating, standardized_level
 
 if TYPE_CHECKING:
@@ -50,6 +50,8 @@ class RoomPrediction(RoomLevel, Displayed):
     force_change : float
         Change of the peak force by the floor, dB. If the force is blocked: the change for a linear
         source with the mass and the contact time of the impact.
+    source_warnings : tuple of str
+        Sentences on a source that does not conform to the standards.
     """
 
     floor: FloorOptions
@@ -57,6 +59,7 @@ class RoomPrediction(RoomLevel, Displayed):
     source: ImpactResult
     force: Literal["contact", "blocked"]
     force_change: float
+    source_warnings: tuple[str, ...]
 
     @property
     def rating(self) -> Rating:
@@ -111,7 +114,7 @@ class RoomPrediction(RoomLevel, Displayed):
                 f"the floor is not rigid: its motion would change the peak force by about "
                 f"{self.force_change:.1f} dB, but the force on a rigid floor is used"
             )
-        return tuple(result)
+        return (*result, *self.source_warnings)
 
     def difference(self, measured: RoomLevels) -> Array:
         """Return measured − predicted level, dB, shape (12,), without standardization.
@@ -147,8 +150,8 @@ class RoomPrediction(RoomLevel, Displayed):
     def __repr__(self) -> str:
         """Return the single-number ratings."""
         return (
-            f"<RoomPrediction: L_iA,Fmax {self.rating.rounded} dB, "
-            f"standardized {self.standardized_rating.rounded} dB>"
+            f"<RoomPrediction: L_iA,Fmax {self.rating.rounded} dB (ISO 717-2), "
+            f"standardized {self.standardized_rating.rounded} dB (ISO 16283-2)>"
         )
 
 
@@ -204,7 +207,30 @@ def predict_level(
         source=impact or source,
         force="contact" if impact else "blocked",
         force_change=change,
+        source_warnings=_source_warnings(source),
     )
+
+
+def _source_warnings(source: ImpactResult) -> tuple[str, ...]:
+    """Return a warning if octave levels of the force on a rigid floor do not conform."""
+    levels = (
+        force_exposure_levels(source.blocked_force, source.sample_rate)
+        if isinstance(source, FloorImpact)
+        else source.levels(BANDWIDTHS[0], force="floor")
+    )
+    octaves = [c for c in source.assess(force="floor").criteria if c.name.startswith("octave_")]
+    outside = [
+        f"{octave.quantity.title} {level - (octave.lower + octave.upper) / 2:.1f} dB"
+        for octave, level in zip(octaves, levels, strict=True)
+        if not octave.lower <= level <= octave.upper
+    ]
+    if not outside:
+        return ()
+    warning = (
+        f"the source does not conform ({', '.join(outside)} from the nominal levels): the level in "
+        "the room is not that of a standard source"
+    )
+    return (warning,)
 
 
 def _on_floor(source: ImpactResult, case: Case) -> FloorImpact | None:

@@ -359,11 +359,11 @@ def _draw_classes(axes: Axes, comparison: FloorComparison) -> None:
     ]
     axes.bar(
         x - 0.2, room, 0.36, color=COLORS[5], edgecolor="black", linewidth=0.5,
-        label="in the room, of octaves",
+        label="KS F 2863-2: in the room, of octaves",
     )  # fmt: skip
     axes.bar(
         x + 0.2, standardized, 0.36, color="white", edgecolor="black", linewidth=0.5,
-        hatch="//////", label="standardized, of one-third-octave bands",
+        hatch="//////", label="ISO 717-2: standardized, of thirds",
     )  # fmt: skip
     for number, limit in enumerate(CLASS_LIMITS, 1):
         axes.axhline(limit, color=COLORS[1], linewidth=0.8, linestyle="--")

@@ -10,7 +10,7 @@ module thud_result_bundle
    use thud_quantities, only: get_quantities, history_quantity_count, quantities
    use thud_room, only: few_modes, room_level_type
    use thud_text, only: to_text
-   use thud_warnings, only: add_floor_warning, warning_length
+   use thud_warnings, only: add_floor_warning, add_height_warning, warning_length
    implicit none (type, external)
    private
 
@@ -124,6 +124,7 @@ contains
       call bundle%add_array('room_history.level', shape(room%history), room%history)
       allocate (warnings(0))
       call add_floor_warning(case, warnings)
+      call add_height_warning(case, warnings)
       call add_warnings(bundle, 'room_warnings.', warnings)
    end subroutine add_room_level
 
