@@ -209,8 +209,8 @@ contains
          if (.not. conforms(criteria(i))) octaves = octaves//', '//trim(get_band_name(bands(i)))//' Hz ' &
             //fixed(criteria(i)%value - (criteria(i)%lower + criteria(i)%upper)/2, 1)//' dB'
       end do
-      if (octaves /= '') call add(warnings, '&room: the source does not conform ('//octaves(3:)//' from the nominal levels): ' &
-         //'the level in the room is not that of a standard source')
+      if (octaves /= '') call add(warnings, '&room: the source does not conform ('//octaves(3:) &
+         //' from the nominal levels): the level in the room is not that of a standard source')
    end subroutine add_source_warning
 
    !> Adds a warning on a room of unusual height.
@@ -222,7 +222,8 @@ contains
       type(band_type) :: bands(octave_count)
       type(plate_type) :: plate
       type(error_type), allocatable :: error
-      real(wp) :: conductance(octave_count), height
+      real(wp) :: conductance(octave_count)
+      real(wp) :: height
 
       bands = get_octaves()
       associate (floor => case%floors(get_floor_number(case))%model)

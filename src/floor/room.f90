@@ -262,10 +262,12 @@ contains
    !> Energies of a band: floor, walls, room and ceiling cavity, with the flows between them.
    !>
    !> A plate loses omega eta in total; it radiates rho0 c0 sigma/m'' into the room and as much to the other side. The room
-   !> loses 6 ln 10/T, which contains the flow back into the plates in a finished room and excludes it in a bare one. With a ceiling of transmission t, a fraction of the floor's
-   !> radiation reaches the room through the stiffness of the air. Of the rest, t**2 reaches the room directly and 1 - t**2
-   !> the cavity, from which sound leaves through the ceiling (Craik and Smith 2000). The cavity receives t (1 - t) of the
-   !> sound that the room sends to the ceiling. A ceiling without mass, t = 1, has no effect.
+   !> loses 6 ln 10/T, which contains the flow back into the plates in a finished room and excludes it in a bare one.
+   !>
+   !> With a ceiling of transmission t, a fraction of the floor's radiation reaches the room through the stiffness of the
+   !> air. Of the rest, t**2 reaches the room directly and 1 - t**2 the cavity, from which sound leaves through the ceiling
+   !> (Craik and Smith 2000). The cavity receives t (1 - t) of the sound that the room sends to the ceiling. A ceiling
+   !> without mass, t = 1, has no effect.
    pure function get_band_energies(plate, room, prediction, band) result(energies)
       type(plate_type), intent(in) :: plate
       type(room_type), intent(in) :: room

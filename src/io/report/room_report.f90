@@ -99,8 +99,8 @@ contains
       real(wp) :: level
       integer :: korean_class
 
-      text = text//newline//'  ISO 717-2, of one-third octaves: L_iA,Fmax '//to_text(get_rounded(prediction%a_weighted))//' dB (' &
-         //fixed(prediction%a_weighted, 2)//')'//newline
+      text = text//newline//'  ISO 717-2, of one-third octaves: L_iA,Fmax ' &
+         //to_text(get_rounded(prediction%a_weighted))//' dB ('//fixed(prediction%a_weighted, 2)//')'//newline
       level = get_a_weighted_level(prediction%octaves(1)%set, prediction%octave_level)
       korean_class = get_class(level)
       text = text//'  KS F 2863-2, of octaves: L_iA,Fmax '//fixed(level, 2)//' dB, '
@@ -109,8 +109,8 @@ contains
       else
          text = text//'no class'
       end if
-      text = text//newline//'  Statistical means over positions, by the '//trim(merge('contact force', 'blocked force', coupled)) &
-         //'.'//newline
+      text = text//newline//'  Statistical means over positions, by the ' &
+         //trim(merge('contact force', 'blocked force', coupled))//'.'//newline
    end subroutine add_ratings
 
    !> A text padded to the width of a column.
