@@ -33,7 +33,7 @@ MEANS = 4096
 BLOCK = 2**20
 # Standard gravity, m/s2, with which a mass is weighed if the local gravity is not stated; its range
 # at sea level, from the equator to the poles; and that of stated values, also on high mountains.
-GRAVITY = 9.80665
+STANDARD_GRAVITY = 9.80665
 SEA_LEVEL = (9.780, 9.833)
 ALLOWED_GRAVITY = (9.76, 9.84)
 # Maximum relative uncertainty of the step, and of a stated time constant.
@@ -127,10 +127,10 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
     spread = 0.0
     if mass is not None and gravity is None:
         # The standard deviation of a rectangular distribution.
-        spread = (SEA_LEVEL[1] - SEA_LEVEL[0]) / math.sqrt(12) / GRAVITY
+        spread = (SEA_LEVEL[1] - SEA_LEVEL[0]) / math.sqrt(12) / STANDARD_GRAVITY
         warnings.append(
-            f"local gravity not stated (gravity, --gravity): {GRAVITY} m/s2 is used, and the "
-            f"uncertainty includes {100 * spread:.2g} % for {SEA_LEVEL[0]:.3f} to "
+            f"local gravity not stated (gravity, --gravity): {STANDARD_GRAVITY} m/s2 is used, and "
+            f"the uncertainty includes {100 * spread:.2g} % for {SEA_LEVEL[0]:.3f} to "
             f"{SEA_LEVEL[1]:.3f} m/s2 at sea level"
         )
     return Calibration(
@@ -145,7 +145,7 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
 def _require_gravity(gravity: float | None, mass: float | None) -> float:
     """Return the gravity of a mass, m/s2; raise InputError if it is not one on the earth."""
     if gravity is None:
-        return GRAVITY
+        return STANDARD_GRAVITY
     if mass is None:
         refuse("calibrate(): gravity is stated with a force", "gravity with a mass")
     require_number("calibrate(): gravity", gravity)
