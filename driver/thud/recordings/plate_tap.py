@@ -8,13 +8,20 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.fft import next_fast_len
-from scipy.optimize import least_squares
 from scipy.special import chdtrc, stdtrit
 
 from thud.base.checks import refuse
 from thud.level.estimate import NORMAL_FACTOR
 from thud.recordings.calibration import open_source
-from thud.recordings.free_oscillation import matched_energy, resonance
+from thud.recordings.decay_fit import (
+    MAX_FREQUENCY,
+    MIN_LENGTH,
+    SAME,
+    Fit,
+    closest_decay,
+    columns_of,
+    fit_decay,
+)
 from thud.recordings.plate import Plate
 
 if TYPE_CHECKING:
@@ -39,12 +46,9 @@ AFTER = 0.5
 # Times after the peak from which the ringing is fitted in turn, s, until what remains is noise: the
 # hammer may have touched the plate again.
 WAITS = (CONTACT, 12e-3, 20e-3, 32e-3, 50e-3)
-# What remains is no noise if its power around the resonance exceeds that before the tap, within
-# this time, s, by this factor. The uncertainties then include its amplitude times MISFIT_WEIGHT,
-# and a warning states it from this fraction of the oscillation on.
+# Time before a tap from which its noise is known, s, and fraction of an oscillation from which on a
+# warning states what remains of it.
 BEFORE = 0.1
-MAX_POWER = 2.0
-MISFIT_WEIGHT = 2.0
 MIN_MISFIT = 0.01
 # Relative standard uncertainty of the clock of a recorder.
 CLOCK = 1e-4
@@ -53,30 +57,6 @@ CLOCK = 1e-4
 MIN_CONTACT = 0.01
 NOISE_LEVEL = 4.0
 MARGIN = 2e-4
-# Trial decay times to 1/e, s.
-DECAYS = np.array([0.001, 0.002, 0.004, 0.008, 0.016, 0.032, 0.064])
-# Minimum frequency of a resonance, Hz, and its maximum as a fraction of the sample rate.
-MIN_FREQUENCY = 200.0
-MAX_FREQUENCY = 0.4
-# Minimum ratio of the energy of a resonance to that of the noise. Minimum quality factor.
-MIN_ENERGY = 60.0
-MIN_QUALITY = 2.0
-# Maximum number of resonances, and minimum amplitude as a fraction of the highest.
-MAX_MODES = 4
-MIN_AMPLITUDE = 0.01
-# Resonances are the same if their frequencies differ by less, and the noise is taken from this
-# relative distance around them.
-SAME = 0.05
-AROUND = 0.3
-MIN_NEAR = 12
-# Background: degree of the drift, its time scale, s, and frequencies of hum, Hz.
-DEGREE = 2
-TIME_SCALE = 0.1
-HUM = (50.0, 60.0)
-BACKGROUND = DEGREE + 1 + 2 * len(HUM)
-# Length of a fit in decay times and in samples.
-DECAY_TIMES = 10.0
-MIN_LENGTH = 100
 # An antiresonance is possible where the spectrum is below POSSIBLE of its maxima within a factor of
 # NEAR on both sides, unless these are below CLEAR times the noise, in all taps. It is one if it is
 # below ZERO in each at frequencies that scatter by less than SAME_ZERO, although the spectra
@@ -163,32 +143,6 @@ class _Tap(NamedTuple):
     stop: int
     height: float
     before: NDArray[np.float64]
-
-
-class _Mode(NamedTuple):
-    """Natural frequency, Hz, quality factor, their relative uncertainties, and static response."""
-
-    frequency: float
-    quality: float
-    frequency_uncertainty: float
-    quality_uncertainty: float
-    response: float
-
-
-class _Fit(NamedTuple):
-    """Decaying oscillations: frequency, Hz, and logarithm of the decay rate, 1/s, of each.
-
-    The factors are those of the columns; the noise is the standard deviation of the residual. The
-    misfit is the amplitude of a residual that is no noise, as a fraction of the oscillation; the
-    start is the index of the level from which it was fitted.
-    """
-
-    rates: NDArray[np.float64]
-    factors: NDArray[np.float64]
-    noise: float
-    modes: list[_Mode]
-    misfit: float
-    start: int = 0
 
 
 def calibrate_tap(
@@ -396,7 +350,7 @@ def _width_at_half(pulse: NDArray[np.float64], peak: int) -> int:
     return stop - first - 1
 
 
-def _fit_tap(level: NDArray[np.float64], tap: _Tap, rate: float) -> _Fit | None:
+def _fit_tap(level: NDArray[np.float64], tap: _Tap, rate: float) -> Fit | None:
     """Return the fit to the ringing after a tap; None if no resonance stands out.
 
     If what remains of a fit is not noise, the hammer may have touched the plate again: the ringing
@@ -404,8 +358,8 @@ def _fit_tap(level: NDArray[np.float64], tap: _Tap, rate: float) -> _Fit | None:
     """
     quiet = np.zeros(0)
     if len(tap.before) >= MIN_LENGTH:
-        quiet = tap.before - _solve(np.zeros((0, 2)), tap.before, rate)[0]
-    fits: list[_Fit] = []
+        quiet = tap.before - closest_decay(np.zeros((0, 2)), tap.before, rate)[0]
+    fits: list[Fit] = []
     for wait in WAITS:
         fit = _fit_ringing(level, tap, rate, tap.top + round(wait * rate), quiet)
         if fit is not None:
@@ -417,12 +371,12 @@ def _fit_tap(level: NDArray[np.float64], tap: _Tap, rate: float) -> _Fit | None:
 
 
 def _with_change(
-    fit: _Fit, level: NDArray[np.float64], tap: _Tap, rate: float, quiet: NDArray[np.float64]
-) -> _Fit:
+    fit: Fit, level: NDArray[np.float64], tap: _Tap, rate: float, quiet: NDArray[np.float64]
+) -> Fit:
     """Return a fit whose uncertainties include what changes one decay time later."""
     mode = fit.modes[0]
     start = fit.start + round(mode.quality / (math.pi * mode.frequency) * rate)
-    later = _fit_decay(level[start : tap.stop], rate, (start - tap.top) / rate, quiet)
+    later = fit_decay(level[start : tap.stop], rate, (start - tap.top) / rate, quiet)
     if later is None:
         return fit
     other = min(later.modes, key=lambda one: abs(one.frequency - mode.frequency))
@@ -445,17 +399,17 @@ def _fit_ringing(
     rate: float,
     latest: int,
     quiet: NDArray[np.float64],
-) -> _Fit | None:
+) -> Fit | None:
     """Fit the ringing from an index on, or from the end of the contact before it."""
     start, best = latest, None
     for _ in range(3):
-        fit = _fit_decay(level[start : tap.stop], rate, (start - tap.top) / rate, quiet)
+        fit = fit_decay(level[start : tap.stop], rate, (start - tap.top) / rate, quiet)
         if fit is None:
             break
         best = fit._replace(start=start)
         # Continued back, the decay ends where the contact does.
         time = np.arange(tap.top - start, latest - start) / rate
-        deviation = np.abs(level[tap.top : latest] - _columns(fit.rates, time) @ fit.factors)
+        deviation = np.abs(level[tap.top : latest] - columns_of(fit.rates, time) @ fit.factors)
         limit = max(MIN_CONTACT * tap.height, NOISE_LEVEL * fit.noise)
         contact = np.flatnonzero(deviation > limit)
         earlier = tap.top + int(contact[-1] if contact.size else 0) + max(1, round(MARGIN * rate))
@@ -463,147 +417,3 @@ def _fit_ringing(
             break
         start = earlier
     return best
-
-
-def _fit_decay(
-    level: NDArray[np.float64], rate: float, delay: float, quiet: NDArray[np.float64]
-) -> _Fit | None:
-    """Fit decaying oscillations to a level that begins at a delay, s, after a tap.
-
-    `quiet` is the noise before the tap, empty if it is not known.
-    """
-    fit = None
-    rates, used, log_rate = np.zeros((0, 2)), level, math.log(rate)
-    while len(rates) < MAX_MODES and len(used) >= MIN_LENGTH:
-        trial = _strongest(used - _solve(rates, used, rate)[0], rate)
-        if trial is None or (np.abs(rates[:, 0] / trial[0] - 1) < SAME).any():
-            break
-        rates = np.vstack([rates, trial])
-        length = round(DECAY_TIMES / math.exp(rates[:, 1].min()) * rate)
-        used = level[: max(length, MIN_LENGTH)]
-        scale = np.column_stack([np.exp(rates[:, 1]), np.ones(len(rates))])
-        # Beyond these bounds the columns overflow.
-        low, high = (np.tile(bound, len(rates)) for bound in ((0.0, -5.0), (rate / 2, log_rate)))
-        rates = least_squares(
-            _residual,
-            rates.ravel(),
-            bounds=(low, high),
-            x_scale=scale.ravel(),
-            args=(used, rate),
-        )
-        rates = rates.x.reshape(-1, 2)
-        found = _describe(rates, used, rate, delay, quiet)
-        if found is None:
-            break
-        fit = found
-    return fit
-
-
-def _residual(
-    rates: NDArray[np.float64], level: NDArray[np.float64], rate: float
-) -> NDArray[np.float64]:
-    return level - _solve(rates.reshape(-1, 2), level, rate)[0]
-
-
-def _solve(
-    rates: NDArray[np.float64], level: NDArray[np.float64], rate: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the level of decaying oscillations that is closest to a level, and its factors."""
-    columns = _columns(rates, np.arange(len(level)) / rate)
-    factors = np.asarray(np.linalg.lstsq(columns, level, rcond=None)[0], dtype=np.float64)
-    return columns @ factors, factors
-
-
-def _columns(rates: NDArray[np.float64], time: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the columns of a background and of decaying oscillations at times, s."""
-    columns = [(time / TIME_SCALE) ** power for power in range(DEGREE + 1)]
-    steady = [(frequency, -np.inf) for frequency in HUM]
-    for frequency, log_decay in [*steady, *rates]:
-        decaying = np.exp(-np.exp(log_decay) * time)
-        phase = 2 * np.pi * frequency * time
-        columns += [decaying * np.cos(phase), decaying * np.sin(phase)]
-    return np.column_stack(columns)
-
-
-def _strongest(level: NDArray[np.float64], rate: float) -> tuple[float, float] | None:
-    """Return frequency, Hz, and logarithm of the decay rate of the strongest oscillation.
-
-    Its energy is compared with the usual one, that of the noise.
-    """
-    frequency, energy = matched_energy(level, rate, DECAYS)
-    energy = energy[:, (frequency >= MIN_FREQUENCY) & (frequency <= MAX_FREQUENCY * rate)]
-    k, index = np.unravel_index(np.argmax(energy), energy.shape)
-    if not energy[k, index] > MIN_ENERGY * np.median(energy[k]):
-        return None
-    first = int(np.searchsorted(frequency, MIN_FREQUENCY))
-    return float(frequency[first + index]), -math.log(DECAYS[k])
-
-
-def _describe(
-    rates: NDArray[np.float64],
-    level: NDArray[np.float64],
-    rate: float,
-    delay: float,
-    quiet: NDArray[np.float64],
-) -> _Fit | None:
-    """Return a fit with its resonances; None if one of them is none."""
-    fitted, factors = _solve(rates, level, rate)
-    time = np.arange(len(level)) / rate
-    columns, waves = _columns(rates, time), factors[BACKGROUND:].reshape(-1, 2)
-    slopes = []
-    for k, ((_, log_decay), (cosine, sine)) in enumerate(zip(rates, waves, strict=True)):
-        pair = columns[:, BACKGROUND + 2 * k : BACKGROUND + 2 * k + 2]
-        slopes += [
-            2 * np.pi * time * (pair @ [sine, -cosine]),
-            -math.exp(log_decay) * time * (pair @ [cosine, sine]),
-        ]
-    jacobian = np.column_stack([*slopes, columns])
-    scale = np.linalg.norm(jacobian, axis=0)
-    inverse = np.linalg.pinv(jacobian / scale) / scale[:, None]
-    residual = level - fitted
-    frequencies, power = _spectrum(residual, rate)
-    quiet_frequencies, quiet_power = _spectrum(quiet, rate)
-    modes, misfits = [], []
-    for k, (frequency, log_decay) in enumerate(rates):
-        decay = math.exp(min(log_decay, 50.0))
-        natural, quality = resonance(frequency, 1 / decay)
-        if not (MIN_FREQUENCY <= natural <= MAX_FREQUENCY * rate and quality > MIN_QUALITY):
-            return None
-        # Of colored noise that around the resonance counts.
-        near = power[np.abs(frequencies / natural - 1) < AROUND]
-        # An oscillation takes two values from the residual, the other columns one each.
-        noise = math.sqrt(
-            float(near.sum()) / (near.size - 2)
-            if near.size >= MIN_NEAR
-            else float(residual @ residual) / (len(level) - jacobian.shape[1])
-        )
-        usual = quiet_power[np.abs(quiet_frequencies / natural - 1) < AROUND]
-        excess = 0.0
-        if usual.size and noise**2 > MAX_POWER * usual.mean():
-            # A frequency of a real signal counts twice.
-            excess = math.sqrt(max(2 * float((near - usual.mean()).sum()), 0.0))
-        pair = columns[:, BACKGROUND + 2 * k : BACKGROUND + 2 * k + 2]
-        misfits.append(excess / float(np.linalg.norm(pair @ waves[k])))
-        # Noise is distributed over all samples, a misfit is not.
-        noise = math.hypot(noise, MISFIT_WEIGHT * excess)
-        deviation = noise * np.linalg.norm(inverse[2 * k : 2 * k + 2], axis=1)
-        amplitude = float(np.hypot(*waves[k])) * math.exp(decay * delay)
-        u_frequency = float(deviation[0]) / natural
-        u_quality = math.hypot(u_frequency, float(deviation[1]))
-        modes.append(_Mode(natural, quality, u_frequency, u_quality, amplitude / natural))
-    if min(mode.response * mode.frequency for mode in modes) < MIN_AMPLITUDE * max(
-        mode.response * mode.frequency for mode in modes
-    ):
-        return None
-    modes.sort(key=lambda mode: -mode.response)
-    return _Fit(rates, factors, math.sqrt(float(power.mean())), modes, max(misfits))
-
-
-def _spectrum(
-    values: NDArray[np.float64], rate: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return frequencies, Hz, and power; that of white noise is its variance at each of them."""
-    if not values.size:
-        return np.zeros(0), np.zeros(0)
-    power = np.abs(np.fft.rfft(values)) ** 2 / len(values)
-    return np.asarray(np.fft.rfftfreq(len(values), 1 / rate), dtype=np.float64), power
