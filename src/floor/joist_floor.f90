@@ -44,6 +44,7 @@ module thud_joist_floor
       procedure, pass(options) :: get_source
       procedure, pass(options) :: get_radiator
       procedure, pass(options) :: get_validity
+      procedure, pass(options) :: has_modal_conductance
    end type joist_floor_type
 
 contains
@@ -265,5 +266,13 @@ contains
       if (options%source_on == 'sheathing') conductance = conductance + 1/(get_sheathing_resistance(options) &
          *(1 + (get_local_corner(options)/(2*pi*frequency))**4))
    end subroutine get_radiator
+
+   !> No homogeneous plate represents the floor.
+   pure function has_modal_conductance(options) result(yes)
+      class(joist_floor_type), intent(in) :: options
+      logical :: yes
+
+      yes = .true.
+   end function has_modal_conductance
 
 end module thud_joist_floor

@@ -41,6 +41,7 @@ module thud_laminate_floor
       procedure, pass(options) :: get_base
       procedure, pass(options) :: get_radiator
       procedure, pass(options) :: get_validity
+      procedure, pass(options) :: has_modal_conductance
    end type laminate_floor_type
 
 contains
@@ -189,5 +190,13 @@ contains
       highest = sqrt(minval(base%shear)/base%mass)/(2*plate%thickness)
       reason = 'shear waves are shorter than two thicknesses, and layers deform by themselves'
    end subroutine get_validity
+
+   !> No homogeneous plate represents the floor.
+   pure function has_modal_conductance(options) result(yes)
+      class(laminate_floor_type), intent(in) :: options
+      logical :: yes
+
+      yes = .true.
+   end function has_modal_conductance
 
 end module thud_laminate_floor

@@ -46,6 +46,9 @@ module thud_rectangular_floor
       procedure, pass(options) :: get_source
       procedure, pass(options) :: get_modes
       procedure, pass(options) :: get_validity
+      procedure, pass(options) :: has_modes
+      procedure, pass(options) :: get_room_modes
+      procedure, pass(options) :: get_support
       procedure(get_base), deferred, pass(options) :: get_base
    end type rectangular_floor_type
 
@@ -241,7 +244,7 @@ contains
    end function get_source
 
    !> Modes of the floor.
-   subroutine get_modes(options, group, plate, modes, error)
+   subroutine get_modes(options, group, plate, modes, error, support)
       class(rectangular_floor_type), intent(in) :: options
       !> Namelist group of the floor.
       character(len=key_length), intent(out) :: group
@@ -250,12 +253,17 @@ contains
       type(floor_modes_type), intent(out) :: modes
       !> Set if they cannot be computed.
       type(error_type), allocatable, intent(out) :: error
+      !> Support of the edges (default: its own).
+      character(len=*), intent(in), optional :: support
       type(plate_stack_type) :: stack
       type(orthotropic_type) :: base
-      integer :: i
 
       call options%get_base(group, plate, base)
-      base%edge = get_edges(options)
+      if (present(support)) then
+         base%edge = get_edges(options, support)
+      else
+         base%edge = get_edges(options, options%support)
+      end if
       base%line_x = options%line_x%values(:options%line_x%count)
       base%line_y = options%line_y%values(:options%line_y%count)
       stack%length = plate%length
@@ -272,12 +280,42 @@ contains
       call get_floor_modes(trim(group), stack, plate, modes, error)
    end subroutine get_modes
 
-   !> Supports of the edges: [4].
-   pure function get_edges(options) result(edge)
+   !> Rectangular floors have modes.
+   pure function has_modes(options) result(yes)
       class(rectangular_floor_type), intent(in) :: options
+      logical :: yes
+
+      yes = .true.
+   end function has_modes
+
+   !> Modes of the floor with a support of its edges.
+   subroutine get_room_modes(options, support, plate, modes, error)
+      class(rectangular_floor_type), intent(in) :: options
+      character(len=*), intent(in) :: support
+      type(plate_type), intent(out) :: plate
+      type(floor_modes_type), intent(out) :: modes
+      type(error_type), allocatable, intent(out) :: error
+      character(len=key_length) :: group
+
+      call options%get_modes(group, plate, modes, error, support)
+   end subroutine get_room_modes
+
+   !> Support of the edges.
+   pure function get_support(options) result(support)
+      class(rectangular_floor_type), intent(in) :: options
+      character(len=name_length) :: support
+
+      support = options%support
+   end function get_support
+
+   !> Supports of the edges: [4].
+   pure function get_edges(options, support) result(edge)
+      class(rectangular_floor_type), intent(in) :: options
+      !> One of `supports`.
+      character(len=*), intent(in) :: support
       type(edge_type) :: edge(4)
 
-      select case (options%support)
+      select case (support)
        case ('simple')
          edge = edge_type(rigid_support, 0.0_wp)
        case ('clamped')

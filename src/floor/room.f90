@@ -18,10 +18,13 @@ module thud_room
    implicit none (type, external)
    private
 
-   public :: check_below, check_room, few_modes, get_room_bands, get_room_fields, get_room_level, room_level_type, room_type
+   public :: check_below, check_room, few_modes, modal_radiation, get_room_bands, get_room_fields, get_room_level, room_level_type, room_type
 
    !> A room whose reverberation time contains all its losses, as measured ones do.
    character(len=*), parameter :: finished_room = 'finished'
+
+   !> Radiation factor by the modes of the floor; positions of the standards.
+   character(len=*), parameter :: modal_radiation = 'modes', standard_positions = 'standard'
 
    !> Band sets of a prediction.
    character(len=*), parameter :: third_set = 'third', octave_set = 'octave'
@@ -58,6 +61,12 @@ module thud_room
       type(walls_type) :: walls
       !> Suspended ceiling.
       type(ceiling_type) :: ceiling
+      !> Position of the corner of the room below the floor, m.
+      real(wp) :: corner_x = 0.0_wp, corner_y = 0.0_wp
+      !> Radiation factor of the floor: by its `modes`, or by `iso_12354`.
+      character(len=name_length) :: radiation = modal_radiation
+      !> Positions of ball and microphone: `standard` or `even` ones.
+      character(len=name_length) :: positions = standard_positions
    end type room_type
 
    !> A prediction in one-third-octave bands.
@@ -85,6 +94,14 @@ module thud_room
       !> Octave bands, their levels and times, as above: [n_octave].
       type(band_type), allocatable :: octaves(:)
       real(wp), allocatable :: octave_level(:), octave_time(:)
+      !> Levels by the modes of floor and room, dB, and spread of positions, dB: [n_band]; not allocated for floors without
+      !> modes. From band `n_modal` + 1 on, they are statistical.
+      integer :: n_modal = 0
+      real(wp), allocatable :: modal_level(:), modal_spread(:)
+      !> The same for simply supported and for clamped edges: [n_band, 2].
+      real(wp), allocatable :: edge_level(:, :)
+      !> Contributions to the interval of the A-weighted level, differences from it, dB: [2, n_contribution].
+      real(wp), allocatable :: contribution(:, :)
       !> Times after the impact, s: [n_time], and level of the Fast detector in each band, dB: [n_time, n_band].
       real(wp), allocatable :: history_time(:), history(:, :)
    end type room_level_type
@@ -115,7 +132,14 @@ contains
          //'without floor, walls and ceiling', [character(len=8) :: finished_room, 'bare']), &
          real_field('air_density', room%air%density, 'kg/m3', 'density of the air', '[0.5, 2]'), &
          real_field('sound_speed', room%air%sound_speed, 'm/s', 'speed of sound in the air', '[200, 500]'), &
-         get_wall_fields(room%walls), get_ceiling_fields(room%ceiling)]
+         get_wall_fields(room%walls), get_ceiling_fields(room%ceiling), &
+         real_field('corner_x', room%corner_x, 'm', 'position of the room along the length of a larger floor', '[0, 100)'), &
+         real_field('corner_y', room%corner_y, 'm', 'position of the room along the width of a larger floor', '[0, 100)'), &
+         choice_field('radiation', room%radiation, 'radiation factor of the floor, by its modes or by ISO 12354-1', &
+         [character(len=9) :: modal_radiation, 'iso_12354']), &
+         choice_field('positions', room%positions, &
+         'positions of ball and microphone in the modal room: 5 standard ones each, or 16 even ones each', &
+         [character(len=8) :: standard_positions, 'even'])]
    end function get_room_fields
 
    !> Checks the number of reverberation times.
@@ -165,11 +189,13 @@ contains
    !>
    !> The floor takes the energy E = integral 2 |F|**2 Re Y df in each band, with Re Y averaged over positions. The energy
    !> is injected instantaneously: a contact of 20 ms is short compared with the detector's time constant.
-   subroutine get_room_level(plate, conductance, room, bands, force_level, prediction)
+   subroutine get_room_level(plate, conductance, radiation_factor, room, bands, force_level, prediction)
       !> The plate that radiates.
       type(plate_type), intent(in) :: plate
       !> Real part of the mobility of the floor, averaged over positions, m/(N s): [n_band].
       real(wp), intent(in) :: conductance(:)
+      !> Radiation factor of the plate: [n_band].
+      real(wp), intent(in) :: radiation_factor(:)
       type(room_type), intent(in) :: room
       !> Bands from `get_room_bands`: [n_band].
       type(band_type), intent(in) :: bands(:)
@@ -185,7 +211,7 @@ contains
       prediction%conductance = conductance
       prediction%surface_mass = get_surface_mass(plate)
       prediction%energy = 10**(force_level/10)*conductance
-      prediction%radiation_factor = get_plate_radiation(plate, room%air, bands%center)
+      prediction%radiation_factor = radiation_factor
       prediction%loss_factor = get_total_loss(plate, room%air, bands%center)
       prediction%reverberation_time = get_reverberation_times(room, size(bands))
       prediction%floor_modes = get_mode_density(plate)*width
@@ -287,7 +313,8 @@ contains
       at_cavity = at_room + 1
       associate (f => prediction%bands(band)%center, third => prediction%bands(band), air => room%air, &
          ceiling => room%ceiling, area => plate%length*plate%width)
-         radiated = air%density*air%sound_speed/get_surface_mass(plates)*get_plate_radiation(plates, air, f)
+         radiated = air%density*air%sound_speed/get_surface_mass(plates) &
+            *[prediction%radiation_factor(band), get_plate_radiation(plates(2:), air, f)]
          decay = decay_of_60_db/prediction%reverberation_time(band)
          flow = new_energy_flow([get_mode_density(plates), get_room_mode_density(room, f)], &
             [2*pi*f*get_total_loss(plates, air, f), decay], &

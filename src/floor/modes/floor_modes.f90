@@ -33,10 +33,16 @@ module thud_floor_modes
       real(wp) :: limit = 0.0_wp, sum_limit = 0.0_wp
    end type floor_modes_type
 
-   !> Modes of the last floor of each thread, and what they were computed from: a case needs them several times.
-   type(floor_modes_type), save :: last_modes
-   real(wp), allocatable, save :: last_key(:)
-   !$omp threadprivate(last_modes, last_key)
+   !> Modes, and the numbers that determine them.
+   type :: cached_modes_type
+      real(wp), allocatable :: key(:)
+      type(floor_modes_type) :: modes
+   end type cached_modes_type
+
+   !> Modes of the last floors of each thread, because a case needs them several times, and the number of the oldest.
+   type(cached_modes_type), save :: cached(4)
+   integer, save :: oldest = 1
+   !$omp threadprivate(cached, oldest)
 
 contains
 
@@ -57,14 +63,14 @@ contains
       logical :: failed
 
       key = get_key(stack, radiator)
-      if (allocated(last_key)) then
-         if (size(key) == size(last_key)) then
-            if (all(abs(key - last_key) <= 0.0_wp)) then
-               modes = last_modes
-               return
-            end if
+      do i = 1, size(cached)
+         if (.not. allocated(cached(i)%key)) exit
+         if (size(key) /= size(cached(i)%key)) cycle
+         if (all(abs(key - cached(i)%key) <= 0.0_wp)) then
+            modes = cached(i)%modes
+            return
          end if
-      end if
+      end do
       modes%stack = stack
       wanted = mode_limit*resolution
       if (is_uncoupled(stack) .and. .not. has_shear(stack)) wanted = mode_limit*sum_limit_factor
@@ -83,8 +89,9 @@ contains
       frequency = max(modes%omega/(2*pi), 1.0_wp)
       where (share > 0.0_wp) modes%loss_factor = modes%loss_factor + share*(get_total_loss(radiator, air_type(), frequency) &
          - radiator%loss_factor)
-      last_modes = modes
-      call move_alloc(key, last_key)
+      cached(oldest)%modes = modes
+      call move_alloc(key, cached(oldest)%key)
+      oldest = 1 + mod(oldest, size(cached))
    end subroutine get_floor_modes
 
    !> Whether a plate yields in shear: its waves are short, and many functions gain little.
