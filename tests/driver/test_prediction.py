@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pytest
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from conftest import CaseFile, Run
+    from numpy.typing import NDArray
 
 FLOORS = REPOSITORY / "inputs" / "floors"
 PLATE = "&plate\n thickness = 0.2\n/\n"
@@ -211,7 +212,7 @@ def test_walls_ceiling_octaves_and_history_are_written(
     assert room.wall_lengths == (5, 4)
     found = thud.predict_level(shell, thud.Plate(thickness=0.2), room)
     bare = thud.predict_level(shell, thud.Plate(thickness=0.2), thud.Room(volume=40.0))
-    assert (found.level[6:] < bare.level[6:] - 10).all()
+    assert (found.level[6:] < bare.level[6:] - 8).all()
     assert f"{found.spread[0]:.1f} to" in found.warnings[0]
 
 
@@ -292,7 +293,9 @@ def test_floor_radiates_no_more_than_it_loses(shell: thud.Impact) -> None:
 def test_share_that_is_radiated_is_that_of_one_side() -> None:
     """It is rho c sigma/(m'' omega eta), with two sides and the inner losses where eta is less."""
     impact, room = thud.solve(), thud.Room(air_density=1.19, sound_speed=340.0)
-    light = thud.Plate(thickness=0.1, density=45, wave_speed=4600, loss_factor=0.02)
+    light = thud.Plate(
+        thickness=0.1, density=45, wave_speed=4600, loss_factor=0.02, edges="laboratory"
+    )
     least = []
     for floor in (thud.Plate(thickness=0.2), light):
         found = thud.predict_level(impact, floor, room)
@@ -422,3 +425,20 @@ def test_unusual_height_of_the_room_is_named(
     prediction = thud.predict_level(shell, thud.Plate(), thud.Room(volume=volume))
     found = [warning for warning in prediction.warnings if "m high" in warning]
     assert [f"{height} m high" in warning for warning in found] == [True] * bool(height)
+
+
+def test_walls_take_their_power_from_the_losses_of_the_edges(shell: thud.Impact) -> None:
+    """Nothing is lost twice: walls behind soft junctions change nothing, stiff ones take all.
+
+    The contact force depends a little on the losses at the edges: 0.003 dB.
+    """
+
+    def level(edges: Literal["building", "absorption"], **walls: object) -> NDArray[np.float64]:
+        room = thud.Room(**walls)  # type: ignore[arg-type]
+        return thud.predict_level(shell, thud.Plate(edges=edges), room).level
+
+    walls: dict[str, object] = {"wall_lengths": (5, 4, 5, 4), "wall_junction": "index"}
+    soft, stiff = ({**walls, "junction_index": index} for index in (80, -5))
+    assert level("building", **soft) == pytest.approx(level("building"), abs=5e-3)
+    assert level("building", **stiff) == pytest.approx(level("absorption", **stiff), abs=5e-3)
+    assert (level("absorption") > level("building") + 1).all()

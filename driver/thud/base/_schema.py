@@ -73,8 +73,8 @@ FloorName = Literal[
     "joist_floor",
     "measured_mobility",
 ]
-PlateEdges = Literal["laboratory", "absorption"]
-FloatingFloorEdges = Literal["laboratory", "absorption"]
+PlateEdges = Literal["building", "laboratory", "absorption"]
+FloatingFloorEdges = Literal["building", "laboratory", "absorption"]
 JoistFloorSourceOn = Literal["sheathing", "joist"]
 RoomReverberationOf = Literal["finished", "bare"]
 RoomWallJunction = Literal["cross", "t", "index"]
@@ -619,7 +619,7 @@ class Plate(Group):
     loss_factor : float
         Internal loss factor of the floor; 0 <= loss_factor <= 1.
     edges : str
-        Losses at the edges of the floor; "laboratory", "absorption".
+        Losses at the edges of the floor; "building", "laboratory", "absorption".
     edge_absorption : float
         Sum of edge lengths times absorption coefficients, for absorption, m; 0 <= edge_absorption
         <= 1000.
@@ -642,7 +642,7 @@ class Plate(Group):
     stiffness_ratio: float = 1.0
     torsion_ratio: float = 1.0
     loss_factor: float = 0.005
-    edges: PlateEdges = "laboratory"
+    edges: PlateEdges = "building"
     edge_absorption: float = 0.0
     source_x: float = 0.5
     source_y: float = 0.5
@@ -675,7 +675,7 @@ class FloatingFloor(Group):
     loss_factor : float
         Internal loss factor of the floor; 0 <= loss_factor <= 1.
     edges : str
-        Losses at the edges of the floor; "laboratory", "absorption".
+        Losses at the edges of the floor; "building", "laboratory", "absorption".
     edge_absorption : float
         Sum of edge lengths times absorption coefficients, for absorption, m; 0 <= edge_absorption
         <= 1000.
@@ -711,7 +711,7 @@ class FloatingFloor(Group):
     stiffness_ratio: float = 1.0
     torsion_ratio: float = 1.0
     loss_factor: float = 0.005
-    edges: FloatingFloorEdges = "laboratory"
+    edges: FloatingFloorEdges = "building"
     edge_absorption: float = 0.0
     screed_thickness: float = 0.05
     screed_density: float = 2000.0
@@ -1110,7 +1110,7 @@ KEYS = (
     Key("plate", "plate", "stiffness_ratio", "real", "", "ratio of the bending stiffness along the width to that along the length", (), 0.0001, 10000.0),
     Key("plate", "plate", "torsion_ratio", "real", "", "ratio of the twisting stiffness to the geometric mean of both bending stiffnesses", (), 0.0, 1.0),
     Key("plate", "plate", "loss_factor", "real", "", "internal loss factor of the floor", (), 0.0, 1.0),
-    Key("plate", "plate", "edges", "choice", "", "losses at the edges of the floor", ('laboratory', 'absorption')),
+    Key("plate", "plate", "edges", "choice", "", "losses at the edges of the floor", ('building', 'laboratory', 'absorption')),
     Key("plate", "plate", "edge_absorption", "real", "m", "sum of edge lengths times absorption coefficients, for absorption", (), 0.0, 1000.0),
     Key("plate", "plate", "source_x", "real", "", "relative source position along the length; levels in the room are means", (), 0.0, 1.0),
     Key("plate", "plate", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
@@ -1124,7 +1124,7 @@ KEYS = (
     Key("floating_floor", "floating_floor", "stiffness_ratio", "real", "", "ratio of the bending stiffness along the width to that along the length", (), 0.0001, 10000.0),
     Key("floating_floor", "floating_floor", "torsion_ratio", "real", "", "ratio of the twisting stiffness to the geometric mean of both bending stiffnesses", (), 0.0, 1.0),
     Key("floating_floor", "floating_floor", "loss_factor", "real", "", "internal loss factor of the floor", (), 0.0, 1.0),
-    Key("floating_floor", "floating_floor", "edges", "choice", "", "losses at the edges of the floor", ('laboratory', 'absorption')),
+    Key("floating_floor", "floating_floor", "edges", "choice", "", "losses at the edges of the floor", ('building', 'laboratory', 'absorption')),
     Key("floating_floor", "floating_floor", "edge_absorption", "real", "m", "sum of edge lengths times absorption coefficients, for absorption", (), 0.0, 1000.0),
     Key("floating_floor", "floating_floor", "screed_thickness", "real", "m", "thickness of the floating plate", (), 0.003, 0.5),
     Key("floating_floor", "floating_floor", "screed_density", "real", "kg/m3", "density of the floating plate", (), 10.0, 20000.0),
