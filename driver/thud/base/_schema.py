@@ -843,6 +843,9 @@ MODELS: dict[str, type[ModelOptions]] = {
     TwoMass.name: TwoMass,
 }
 
+# Source of a case with a room that names no model.
+ROOM_SOURCE = ModalBall(damping_law="rising", loss_factor=0.3)
+
 # Floors by name, the default first.
 FLOORS: dict[str, type[FloorOptions]] = {
     Rigid.name: Rigid,
@@ -1037,7 +1040,7 @@ KEYS = (
     Key("compression", "compression", "gas", "choice", "", "gas in the ball: leaves through the hole (vented), or is sealed in", ('vented', 'isothermal', 'adiabatic')),
     Key("", "drop", "height", "real", "m", "height of the ball's lowest point above the floor", (), 1e-12, 1000000.0),
     Key("", "drop", "gravity", "real", "m/s2", "acceleration of free fall", (), 1e-12, 1000.0),
-    Key("", "model", "name", "choice", "", "source model", ('hollow_sphere', 'modal_ball', 'finite_element', 'measured_modes', 'hunt_crossley', 'two_mass')),
+    Key("", "model", "name", "choice", "", "source model (default with &room: a modal ball that conforms)", ('hollow_sphere', 'modal_ball', 'finite_element', 'measured_modes', 'hunt_crossley', 'two_mass')),
     Key("hollow_sphere", "hollow_sphere", "momentum_flux", "choice", "", "term for the momentum of wall that enters or leaves the flat cap", ('momentum_balance', 'retarding', 'conservative', 'none')),
     Key("modal_ball", "modal_ball", "highest_frequency", "real", "Hz", "highest frequency of oscillating modes; faster ones follow without inertia; 0: automatic", (), 0.0, 20000.0),
     Key("modal_ball", "modal_ball", "rings", "whole", "", "number of rings on the surface, from the lowest point to 60 degrees; 0: automatic", (), 0.0, 400.0, True),
