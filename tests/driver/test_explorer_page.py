@@ -13,6 +13,7 @@ from conftest import REPOSITORY
 from explorer_server import Served, serve
 
 import thud
+from thud.base._schema import ROOM_SOURCE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -231,6 +232,10 @@ def test_floor_and_room_are_shown(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
     page.locator("#has_room").check()
     sync_api.expect(page.locator("#room_text")).to_contain_text("standardized")
+    # The source of a room whose case names none.
+    sync_api.expect(page.locator("#model")).to_have_value(ROOM_SOURCE.name)
+    sync_api.expect(page.locator("[id='modal_ball.loss_factor']")).to_have_value("0.3")
+    page.locator("#model").select_option("hollow_sphere")
     page.locator("#floor").select_option("joist_floor")
     sync_api.expect(page.locator("#floor_title")).to_contain_text("joist floor")
     sync_api.expect(page.locator("#floor_text")).to_contain_text("energy into the floor 2.7")

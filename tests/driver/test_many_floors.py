@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,9 +30,9 @@ def many() -> thud.Ensemble:
     return thud.solve_many(parameters, CASE, threads=2)
 
 
-@pytest.mark.parametrize("model", ["hollow_sphere", "modal_ball"])
-def test_each_floor_has_the_numbers_of_a_single_prediction(model: thud.ModelName) -> None:
-    many = thud.solve_many({"plate.thickness": THICKNESSES}, CASE, model=model)
+@pytest.mark.parametrize("model", [thud.HollowSphere(), thud.ModalBall()])
+def test_each_floor_has_the_numbers_of_a_single_prediction(model: thud.ModelOptions) -> None:
+    many = thud.solve_many({"plate.thickness": THICKNESSES}, replace(CASE, model=model))
     blocked = thud.solve(model=model)
     for i, thickness in enumerate(THICKNESSES):
         floor = thud.Plate(thickness=thickness)

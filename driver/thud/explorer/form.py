@@ -7,7 +7,7 @@ import re
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
-from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS
+from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS, ROOM_SOURCE
 from thud.base.units import display_unit, power_of, scaled
 from thud.case.case import OPTIONAL_GROUPS
 from thud.case.keys import humanize
@@ -46,6 +46,17 @@ def form() -> list[dict[str, Any]]:
     floors = [_options("floor", name, kind) for name, kind in FLOORS.items()]
     room = _options("room", "room", OPTIONAL_GROUPS["room"])
     return [*groups, *models, *floors, room]
+
+
+def room_source() -> dict[str, dict[str, object]]:
+    """Return name and options of the model of a room whose case names none, by group."""
+    defaults = type(ROOM_SOURCE)()
+    options = {
+        option.name: getattr(ROOM_SOURCE, option.name)
+        for option in fields(ROOM_SOURCE)
+        if getattr(ROOM_SOURCE, option.name) != getattr(defaults, option.name)
+    }
+    return {"model": {"name": ROOM_SOURCE.name}, ROOM_SOURCE.name: options}
 
 
 def _options(part: str, name: str, kind: type[Group]) -> dict[str, Any]:

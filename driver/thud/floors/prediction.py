@@ -13,6 +13,7 @@ from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
 from thud.case.case import Case, case_text
 from thud.floors.survey import RoomLevels
+from thud.impact.compute import compute
 from thud.impact.floor_impact import FloorImpact, new_floor_impact
 from thud.impact.room_level import RoomLevel, new_room_level
 from thud.level.impact_result import ImpactResult
@@ -156,7 +157,9 @@ class RoomPrediction(RoomLevel, Displayed):
 
 
 def predict_level(
-    source: ImpactResult, floor: FloorOptions | None = None, room: Room | None = None
+    source: ImpactResult | None = None,
+    floor: FloorOptions | None = None,
+    room: Room | None = None,
 ) -> RoomPrediction:
     """Predict the level that an impact causes in the room below.
 
@@ -169,7 +172,8 @@ def predict_level(
     Parameters
     ----------
     source
-        Impact of any model, or a recording.
+        Impact of any model, or a recording; by default that of `Case(floor=floor, room=room)`,
+        whose source conforms to the standards.
     floor, room
         Floor and room; by default those of the impact's case.
 
@@ -178,10 +182,12 @@ def predict_level(
     InputError
         If the floor or the room is missing or out of range.
     """
-    require_kind("source", source, ImpactResult)
-    case = source.case
+    require_kind("source", source, ImpactResult | None)
+    if source is None and floor is not None and room is not None:
+        source = compute(Case(floor=floor, room=room))
+    case = Case() if source is None else source.case
     floor, room = floor or case.floor, room or case.room
-    if floor is None or room is None:
+    if source is None or floor is None or room is None:
         refuse(
             f"{'floor' if floor is None else 'room'} is missing", "a floor, such as Plate, and Room"
         )

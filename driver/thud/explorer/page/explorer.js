@@ -1,5 +1,5 @@
 // Main module of the page: sends the values of the form to the server and shows the latest answer.
-import { build, buildRecording, caseValues, describeChanges, isCase, markField, startWith, state, titleOf } from "./form.js";
+import { addRoom, build, buildRecording, caseValues, describeChanges, isCase, markField, startWith, state, titleOf } from "./form.js";
 import { byId, element } from "./page.js";
 import { listenToBall } from "./ball.js";
 import { ConnectionError, ServerError, ask, follow, linkedCase, storeToken } from "./request.js";
@@ -166,8 +166,8 @@ function listen() {
     rebuild();
   });
   byId("has_room").addEventListener("change", (event) => {
-    state.room = event.target.checked;
-    if (state.room) state.floor ||= "plate";
+    if (event.target.checked) addRoom();
+    else state.room = false;
     rebuild();
   });
   byId("pin").addEventListener("click", pin);
@@ -196,6 +196,7 @@ async function begin() {
     about = await (await ask("about")).json();
   } catch (error) { return showMessage(error.message); }
   state.form = about.form;
+  state.roomSource = about.room_source;
   buildRecording(about.recording);
   let start = about.start;
   try { start = JSON.parse(linkedCase()) ?? start; } catch { start = null; }
