@@ -12,13 +12,13 @@ module thud_room_prediction
    use thud_modal_room, only: box_type, get_modal_room, get_standard_positions, modal_room_type
    use thud_plate, only: get_plate_radiation, plate_type
    use thud_rating, only: get_a_weighted_level
-   use thud_room, only: check_below, get_completed_room, get_room_bands, get_room_level, modal_radiation, &
-      room_level_type, room_type, standard_positions
+   use thud_room, only: check_below, get_completed_room, get_reverberation_times, get_room_bands, get_room_level, &
+      modal_radiation, room_level_type, room_type, standard_positions
    use thud_source_limits, only: get_source_limits, source_limits_type
    implicit none (type, external)
    private
 
-   public :: contribution_names, get_box, predict_room
+   public :: contribution_names, get_box, get_positions, predict_room
 
    !> Contributions to the interval of a rating.
    character(len=*), parameter :: contribution_names(*) = [character(len=18) :: 'source', 'edges', 'reverberation_time', &
@@ -87,16 +87,16 @@ contains
    end function get_area
 
    !> The room as a box.
-   pure function get_box(room, plate, prediction) result(box)
+   pure function get_box(room, plate, bands) result(box)
       type(room_type), intent(in) :: room
       type(plate_type), intent(in) :: plate
-      !> Prediction with bands and reverberation times.
-      type(room_level_type), intent(in) :: prediction
+      !> Bands of a prediction: [n_band].
+      type(band_type), intent(in) :: bands(:)
       type(box_type) :: box
 
       associate (completed => get_completed_room(room, plate))
          box = box_type(sides=[completed%length, completed%width, completed%height], corner=[room%corner_x, room%corner_y], &
-            air=room%air, bands=prediction%bands, reverberation_time=prediction%reverberation_time)
+            air=room%air, bands=bands, reverberation_time=get_reverberation_times(room, size(bands)))
       end associate
    end function get_box
 
@@ -119,7 +119,7 @@ contains
       type(box_type) :: box
       integer :: i
 
-      box = get_box(room, plate, prediction)
+      box = get_box(room, plate, prediction%bands)
       call get_positions(room, box, ball, microphone)
       call get_modal_room(modes, box, force, sample_rate, ball, microphone, .false., modal)
       prediction%n_modal = modal%n_band
@@ -200,6 +200,9 @@ contains
          positions = coverage*get_weighted_spread(prediction)/sqrt(n_position)*[-1, 1]
          model = abs(modal - prediction%a_weighted)/2*[-1, 1]
       end associate
+      prediction%rated = (modal + prediction%a_weighted)/2
+      ! The contributions are independent of each other.
+      prediction%interval = prediction%rated + [-1, 1]*norm2(prediction%contribution, dim=2)
    end subroutine add_contributions
 
    !> A-weighted level of one-third-octave bands, dB.

@@ -102,6 +102,8 @@ module thud_room
       real(wp), allocatable :: edge_level(:, :)
       !> Contributions to the interval of the A-weighted level, differences from it, dB: [2, n_contribution].
       real(wp), allocatable :: contribution(:, :)
+      !> Mean of the A-weighted levels of both predictions, dB, and the ends of its interval, dB: [2].
+      real(wp) :: rated = 0.0_wp, interval(2) = 0.0_wp
       !> Times after the impact, s: [n_time], and level of the Fast detector in each band, dB: [n_time, n_band].
       real(wp), allocatable :: history_time(:), history(:, :)
    end type room_level_type

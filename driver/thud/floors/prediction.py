@@ -64,8 +64,13 @@ class RoomPrediction(RoomLevel, Displayed):
 
     @property
     def rating(self) -> Rating:
-        """Single-number rating of the levels in the room."""
+        """Single-number rating of the statistical levels in the room."""
         return rating(self.level, BANDS)
+
+    @property
+    def modal_rating(self) -> Rating:
+        """Single-number rating of the levels by the modes of floor and room."""
+        return rating(self.modal_level, BANDS)
 
     @property
     def radiated_share(self) -> Array:
@@ -131,11 +136,14 @@ class RoomPrediction(RoomLevel, Displayed):
     def rows(self) -> list[tuple[str, ...]]:
         """Return the header and a row of text for each band."""
         header = (
-            "band, Hz", "L_i,Fmax, dB", "standardized, dB", "spread, dB", "energy, mJ",
-            "floor modes",
+            "band, Hz", "statistical, dB", "modal, dB", "simply supported, dB", "clamped, dB",
+            "standardized, dB", "spread, dB", "energy, mJ", "floor modes",
         )  # fmt: skip
-        columns = (self.level, self.standardized, self.spread, 1e3 * self.energy, self.floor_modes)
-        forms = (".1f", ".1f", ".1f", ".3g", ".1f")
+        columns = (
+            self.level, self.modal_level, self.simple_level, self.clamped_level, self.standardized,
+            self.spread, 1e3 * self.energy, self.floor_modes,
+        )  # fmt: skip
+        forms = (".1f", ".1f", ".1f", ".1f", ".1f", ".1f", ".3g", ".1f")
         cells = [
             [f"{value:{form}}" for value in column]
             for column, form in zip(columns, forms, strict=True)
@@ -150,9 +158,10 @@ class RoomPrediction(RoomLevel, Displayed):
 
     def __repr__(self) -> str:
         """Return the single-number ratings."""
+        low, high = self.interval
         return (
-            f"<RoomPrediction: L_iA,Fmax {self.rating.rounded} dB (ISO 717-2), "
-            f"standardized {self.standardized_rating.rounded} dB (ISO 16283-2)>"
+            f"<RoomPrediction: L_iA,Fmax {self.rated:.0f} dB ({low:.0f} to {high:.0f}; ISO 717-2), "
+            f"statistical {self.rating.rounded} dB, modal {self.modal_rating.rounded} dB>"
         )
 
 
@@ -195,9 +204,11 @@ def predict_level(
     impact = _on_floor(source, floor_case)
     level = source.room_level
     if level is None or (floor, room) != (case.floor, case.room):
-        levels = (impact or source).levels(BANDS, force="floor")
-        rated = np.isin(get_bands(BANDS).nominal, rated_bands(BANDS))
-        level = new_room_level(ask("room_level", case=case_text(floor_case), levels=levels[rated]))
+        force = (impact or source).force("floor")
+        answer = ask(
+            "room_level", case=case_text(floor_case), force=force, sample_rate=source.sample_rate
+        )
+        level = new_room_level(answer)
         assert level is not None  # noqa: S101 - the answer of this question has a room
     if impact:
         blocked = (

@@ -9,6 +9,8 @@ from thud.base.bridge import text
 from thud.base.immutable import Immutable
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -55,6 +57,20 @@ class RoomLevel(Immutable):
         Real part of the mobility: power into the floor per mean square of the force, m/(N s).
     floor_warnings : tuple of str
         Sentences on conditions in which the model of the floor is not valid.
+    modal_level, modal_spread : ndarray, shape (12,)
+        Levels by the modes of floor and room, dB: energy mean and standard deviation of positions.
+        Above the first `n_modal` bands, where three modes of the room overlap, the statistical ones.
+    simple_level, clamped_level : ndarray, shape (12,)
+        The same levels if the floor is simply supported or clamped.
+    n_modal : int
+        Number of bands in which the sound is modal.
+    rated : float
+        Mean of the A-weighted levels of the statistical and the modal prediction, dB.
+    interval : tuple of float
+        Ends of the interval of `rated`, dB: the root sum of squares of `contributions`.
+    contributions : mapping
+        Lower and upper deviation from `rated`, dB, by another conforming source, the support of the
+        edges, a reverberation time 20 % shorter or longer, the positions, and the model.
     """
 
     frequency: Array
@@ -75,6 +91,14 @@ class RoomLevel(Immutable):
     history_time: Array
     history: Array
     floor_warnings: tuple[str, ...]
+    modal_level: Array
+    modal_spread: Array
+    simple_level: Array
+    clamped_level: Array
+    n_modal: int
+    rated: float
+    interval: tuple[float, float]
+    contributions: Mapping[str, tuple[float, float]]
 
 
 def new_room_level(answer: Bundle) -> RoomLevel | None:
@@ -92,4 +116,13 @@ def new_room_level(answer: Bundle) -> RoomLevel | None:
         history_time=answer["room_history"]["time"],
         history=answer["room_history"]["level"],
         floor_warnings=tuple(map(text, answer.get("room_warnings", {}).values())),
+        n_modal=int(answer["room"]["n_modal"]),
+        rated=answer["room"]["rated"],
+        interval=_pair(answer["room_interval"]["ends"]),
+        contributions={name: _pair(ends) for name, ends in answer["room_contributions"].items()},
     )
+
+
+def _pair(ends: Array) -> tuple[float, float]:
+    low, high = ends.tolist()
+    return low, high
