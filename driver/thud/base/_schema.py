@@ -73,7 +73,7 @@ FloorName = Literal[
     "joist_floor",
     "measured_mobility",
 ]
-PlateEdges = Literal["laboratory", "absorption"]
+PlateEdges = Literal["building", "laboratory", "absorption"]
 PlateSupport = Literal["simple", "clamped", "free", "elastic"]
 PlateScreedEdges = Literal["simple", "free", "strip"]
 LaminateFloorSupport = Literal["simple", "clamped", "free", "elastic"]
@@ -83,6 +83,8 @@ JoistFloorSupport = Literal["simple", "clamped", "free", "elastic"]
 JoistFloorScreedEdges = Literal["simple", "free", "strip"]
 RoomReverberationOf = Literal["finished", "bare"]
 RoomWallJunction = Literal["cross", "t", "index"]
+RoomRadiation = Literal["modes", "iso_12354"]
+RoomPositions = Literal["standard", "even"]
 BandSet = Literal["octave", "third"]
 
 
@@ -275,13 +277,17 @@ class Room(Group):
 
     Attributes
     ----------
+    length : float
+        Length of the room; 0: that of the floor, m; 0 <= length <= 100.
+    width : float
+        Width of the room; 0: that of the floor, m; 0 <= width <= 100.
+    height : float
+        Height of the room; 0: from the volume, without it 2.5 m, m; 0 <= height <= 100.
     volume : float
-        Volume of the room, m3; 1 <= volume <= 100000.
-    reverberation_time : float
-        Reverberation time of the room, s; 0.05 <= reverberation_time <= 20.
-    reverberation_times : sequence of float
-        Reverberation time in each one-third-octave band from 50 to 630 Hz, s; 0.05 <=
-        reverberation_times <= 20.
+        Volume of the room; 0: length times width times height, m3; 0 <= volume <= 100000.
+    reverberation_time : float | sequence of float
+        Reverberation time of the room: one, 4 for octaves or 12 for one-third octaves, s; 0.05 <=
+        reverberation_time <= 20.
     reverberation_of : str
         Room of the reverberation time: finished, or bare, without floor, walls and ceiling;
         "finished", "bare".
@@ -314,11 +320,22 @@ class Room(Group):
         Depth of the air cavity above the ceiling, m; 0.01 <= ceiling_depth <= 2.
     ceiling_loss_factor : float
         Loss factor of the ceiling cavity; 0.001 <= ceiling_loss_factor <= 1.
+    corner_x : float
+        Position of the room along the length of a larger floor, m; 0 <= corner_x < 100.
+    corner_y : float
+        Position of the room along the width of a larger floor, m; 0 <= corner_y < 100.
+    radiation : str
+        Radiation factor of the floor, by its modes or by ISO 12354-1; "modes", "iso_12354".
+    positions : str
+        Positions of ball and microphone in the modal room: 5 standard ones each, or 16 even ones
+        each; "standard", "even".
     """
 
-    volume: float = 50.0
-    reverberation_time: float = 0.5
-    reverberation_times: Sequence[float] = ()
+    length: float = 0.0
+    width: float = 0.0
+    height: float = 0.0
+    volume: float = 0.0
+    reverberation_time: float | Sequence[float] = (0.5,)
     reverberation_of: RoomReverberationOf = "finished"
     air_density: float = 1.2
     sound_speed: float = 343.0
@@ -333,6 +350,10 @@ class Room(Group):
     ceiling_mass: float = 0.0
     ceiling_depth: float = 0.1
     ceiling_loss_factor: float = 0.3
+    corner_x: float = 0.0
+    corner_y: float = 0.0
+    radiation: RoomRadiation = "modes"
+    positions: RoomPositions = "standard"
 
 
 @dataclass(frozen=True, eq=False)
@@ -624,7 +645,7 @@ class Plate(Group):
     loss_factor : float
         Internal loss factor of the floor; 0 <= loss_factor <= 1.
     edges : str
-        Losses at the edges of the floor; "laboratory", "absorption".
+        Losses at the edges of the floor; "building", "laboratory", "absorption".
     edge_absorption : float
         Sum of edge lengths times absorption coefficients, for absorption, m; 0 <= edge_absorption
         <= 1000.
@@ -688,7 +709,7 @@ class Plate(Group):
     stiffness_ratio: float = 1.0
     torsion_ratio: float = 1.0
     loss_factor: float = 0.005
-    edges: PlateEdges = "laboratory"
+    edges: PlateEdges = "building"
     edge_absorption: float = 0.0
     source_x: float = 0.5
     source_y: float = 0.5
@@ -1013,6 +1034,9 @@ MODELS: dict[str, type[ModelOptions]] = {
     TwoMass.name: TwoMass,
 }
 
+# Source of a case with a room that names no model.
+ROOM_SOURCE = ModalBall(damping_law="rising", loss_factor=0.3)
+
 # Floors by name, the default first.
 FLOORS: dict[str, type[FloorOptions]] = {
     Rigid.name: Rigid,
@@ -1207,7 +1231,7 @@ KEYS = (
     Key("compression", "compression", "gas", "choice", "", "gas in the ball: leaves through the hole (vented), or is sealed in", ('vented', 'isothermal', 'adiabatic')),
     Key("", "drop", "height", "real", "m", "height of the ball's lowest point above the floor", (), 1e-12, 1000000.0),
     Key("", "drop", "gravity", "real", "m/s2", "acceleration of free fall", (), 1e-12, 1000.0),
-    Key("", "model", "name", "choice", "", "source model", ('hollow_sphere', 'modal_ball', 'finite_element', 'measured_modes', 'hunt_crossley', 'two_mass')),
+    Key("", "model", "name", "choice", "", "source model (default with &room: a modal ball that conforms)", ('hollow_sphere', 'modal_ball', 'finite_element', 'measured_modes', 'hunt_crossley', 'two_mass')),
     Key("hollow_sphere", "hollow_sphere", "momentum_flux", "choice", "", "term for the momentum of wall that enters or leaves the flat cap", ('momentum_balance', 'retarding', 'conservative', 'none')),
     Key("modal_ball", "modal_ball", "highest_frequency", "real", "Hz", "highest frequency of oscillating modes; faster ones follow without inertia; 0: automatic", (), 0.0, 20000.0),
     Key("modal_ball", "modal_ball", "rings", "whole", "", "number of rings on the surface, from the lowest point to 60 degrees; 0: automatic", (), 0.0, 400.0, True),
@@ -1280,7 +1304,7 @@ KEYS = (
     Key("plate", "plate", "stiffness_ratio", "real", "", "ratio of the bending stiffness along the width to that along the length", (), 0.0001, 10000.0),
     Key("plate", "plate", "torsion_ratio", "real", "", "ratio of the twisting stiffness to the geometric mean of both bending stiffnesses", (), 0.0, 1.0),
     Key("plate", "plate", "loss_factor", "real", "", "internal loss factor of the floor", (), 0.0, 1.0),
-    Key("plate", "plate", "edges", "choice", "", "losses at the edges of the floor", ('laboratory', 'absorption')),
+    Key("plate", "plate", "edges", "choice", "", "losses at the edges of the floor", ('building', 'laboratory', 'absorption')),
     Key("plate", "plate", "edge_absorption", "real", "m", "sum of edge lengths times absorption coefficients, for absorption", (), 0.0, 1000.0),
     Key("plate", "plate", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
     Key("plate", "plate", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
@@ -1380,9 +1404,11 @@ KEYS = (
     Key("measured_mobility", "measured_mobility", "residue_imaginary", "list", "m/(N s2)", "imaginary parts of the residues, doubled for a pair of poles", (), -1000000000000.0, 1000000000000.0),
     Key("measured_mobility", "measured_mobility", "lowest_frequency", "real", "Hz", "lowest frequency of the measurement", (), 0.0, "highest_frequency"),
     Key("measured_mobility", "measured_mobility", "highest_frequency", "real", "Hz", "highest frequency of the measurement", (), 0.0, 10000000.0),
-    Key("room", "room", "volume", "real", "m3", "volume of the room", (), 1.0, 100000.0),
-    Key("room", "room", "reverberation_time", "real", "s", "reverberation time of the room", (), 0.05, 20.0),
-    Key("room", "room", "reverberation_times", "list", "s", "reverberation time in each one-third-octave band from 50 to 630 Hz", (), 0.05, 20.0),
+    Key("room", "room", "length", "real", "m", "length of the room; 0: that of the floor", (), 0.0, 100.0),
+    Key("room", "room", "width", "real", "m", "width of the room; 0: that of the floor", (), 0.0, 100.0),
+    Key("room", "room", "height", "real", "m", "height of the room; 0: from the volume, without it 2.5 m", (), 0.0, 100.0),
+    Key("room", "room", "volume", "real", "m3", "volume of the room; 0: length times width times height", (), 0.0, 100000.0),
+    Key("room", "room", "reverberation_time", "list", "s", "reverberation time of the room: one, 4 for octaves or 12 for one-third octaves", (), 0.05, 20.0),
     Key("room", "room", "reverberation_of", "choice", "", "room of the reverberation time: finished, or bare, without floor, walls and ceiling", ('finished', 'bare')),
     Key("room", "room", "air_density", "real", "kg/m3", "density of the air", (), 0.5, 2.0),
     Key("room", "room", "sound_speed", "real", "m/s", "speed of sound in the air", (), 200.0, 500.0),
@@ -1397,4 +1423,8 @@ KEYS = (
     Key("room", "room", "ceiling_mass", "real", "kg/m2", "mass per unit area of a suspended ceiling; 0: none", (), 0.0, 200.0),
     Key("room", "room", "ceiling_depth", "real", "m", "depth of the air cavity above the ceiling", (), 0.01, 2.0),
     Key("room", "room", "ceiling_loss_factor", "real", "", "loss factor of the ceiling cavity", (), 0.001, 1.0),
+    Key("room", "room", "corner_x", "real", "m", "position of the room along the length of a larger floor", (), 0.0, 100.0),
+    Key("room", "room", "corner_y", "real", "m", "position of the room along the width of a larger floor", (), 0.0, 100.0),
+    Key("room", "room", "radiation", "choice", "", "radiation factor of the floor, by its modes or by ISO 12354-1", ('modes', 'iso_12354')),
+    Key("room", "room", "positions", "choice", "", "positions of ball and microphone in the modal room: 5 standard ones each, or 16 even ones each", ('standard', 'even')),
 )
