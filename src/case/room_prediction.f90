@@ -9,7 +9,8 @@ module thud_room_prediction
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_kinds, only: wp
    use thud_modal_radiation, only: get_modal_radiation, get_strike_points, modal_radiation_type
-   use thud_modal_room, only: box_type, get_modal_room, get_standard_positions, modal_room_type
+   use thud_modal_room, only: box_type, get_highest_frequency, get_modal_room, &
+      get_standard_positions, modal_room_type
    use thud_plate, only: get_plate_radiation, plate_type
    use thud_rating, only: get_a_weighted_level
    use thud_room, only: check_below, get_completed_room, get_reverberation_times, get_room_bands, get_room_level, &
@@ -125,12 +126,14 @@ contains
       prediction%n_modal = modal%n_band
       allocate (prediction%modal_level, source=prediction%level)
       allocate (prediction%modal_spread, source=prediction%spread)
+      allocate (prediction%mean_spread, source=prediction%spread/sqrt(real(size(ball, 2), wp)))
+      prediction%mean_spread(:modal%n_band) = modal%mean_spread
       prediction%modal_level(:modal%n_band) = modal%mean
       prediction%modal_spread(:modal%n_band) = modal%spread
       allocate (prediction%edge_level(size(prediction%level), 2), source=spread(prediction%modal_level, 2, 2))
       do i = 1, 2
          if (floor%get_support() == supports(i) .or. modal%n_band == 0) cycle
-         call floor%get_room_modes(supports(i), other_plate, other_modes, error)
+         call floor%get_room_modes(supports(i), other_plate, other_modes, error, get_highest_frequency(box))
          if (allocated(error)) return
          call get_modal_room(other_modes, box, force, sample_rate, ball, microphone, .false., modal)
          prediction%edge_level(:modal%n_band, i) = modal%mean
@@ -172,7 +175,7 @@ contains
       type(error_type), allocatable :: error
       type(room_level_type) :: changed
       type(room_type) :: room
-      real(wp) :: modal, n_position
+      real(wp) :: modal
       integer :: i, octave
 
       allocate (prediction%contribution(2, size(contribution_names)), source=0.0_wp)
@@ -196,8 +199,7 @@ contains
             call get_room_level(plate, conductance, radiation_factor, room, prediction%bands, level, changed)
             time(i) = changed%a_weighted - prediction%a_weighted
          end do
-         n_position = merge(5, n_even, case%room%positions == standard_positions)
-         positions = coverage*get_weighted_spread(prediction)/sqrt(n_position)*[-1, 1]
+         positions = coverage*get_weighted_spread(prediction)*[-1, 1]
          model = abs(modal - prediction%a_weighted)/2*[-1, 1]
       end associate
       prediction%rated = (modal + prediction%a_weighted)/2
@@ -213,8 +215,8 @@ contains
       weighted = get_a_weighted_level('third', level)
    end function get_weighted
 
-   !> Standard deviation of the A-weighted level of one position: that of the bands, weighted by their energies, as if their
-   !> deviations were independent, dB.
+   !> Standard deviation of the A-weighted mean level: that of the bands, weighted by their energies, as if their deviations
+   !> were independent, dB.
    pure function get_weighted_spread(prediction) result(deviation)
       type(room_level_type), intent(in) :: prediction
       real(wp) :: deviation
@@ -226,7 +228,7 @@ contains
             - get_weighted(without_band(prediction%modal_level, i))))
       end do
       share = 1 - 1/share
-      deviation = norm2(share*prediction%modal_spread)
+      deviation = norm2(share*prediction%mean_spread)
    end function get_weighted_spread
 
    !> Levels with one band silent, dB.

@@ -158,7 +158,7 @@ contains
    end function has_modes
 
    !> Modes of the floor, with its own support or another one; floors without modes return an error.
-   subroutine get_room_modes(options, support, plate, modes, error)
+   subroutine get_room_modes(options, support, plate, modes, error, max_frequency)
       class(floor_model_type), intent(in) :: options
       !> Support of the edges.
       character(len=*), intent(in) :: support
@@ -167,6 +167,8 @@ contains
       type(floor_modes_type), intent(out) :: modes
       !> Set if the floor has no modes, or they cannot be computed.
       type(error_type), allocatable, intent(out) :: error
+      !> Frequency up to which modes are wanted, Hz.
+      real(wp), intent(in), optional :: max_frequency
 
       error = input_error('&floor: name: this floor has no modes; allowed: a rectangular floor')
    end subroutine get_room_modes

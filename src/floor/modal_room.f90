@@ -14,7 +14,7 @@ module thud_modal_room
    implicit none (type, external)
    private
 
-   public :: box_type, get_crossover, get_modal_room, get_standard_positions, modal_room_type
+   public :: box_type, get_crossover, get_highest_frequency, get_modal_room, get_standard_positions, modal_room_type
 
    !> Number of overlapping modes of the room above which the sound is statistical.
    real(wp), parameter :: overlap_limit = 3.0_wp
@@ -55,8 +55,8 @@ module thud_modal_room
       integer :: n_band = 0
       !> Maximum Fast levels, dB re 20 uPa: [n_band, n_microphone, n_ball].
       real(wp), allocatable :: level(:, :, :)
-      !> Energy mean over the positions, dB, and standard deviation of the levels, dB: [n_band].
-      real(wp), allocatable :: mean(:), spread(:)
+      !> Energy mean over the positions, dB, standard deviation of the levels, and that of their mean, dB: [n_band].
+      real(wp), allocatable :: mean(:), spread(:), mean_spread(:)
       !> Sound pressure, Pa: [n_sample, n_microphone, n_ball], at this many samples per second.
       real(wp), allocatable :: pressure(:, :, :)
       real(wp) :: sample_rate = 0.0_wp
@@ -77,6 +77,15 @@ contains
       frequency = sqrt(overlap_limit*box%air%sound_speed**3*minval(box%reverberation_time) &
          /(2.2_wp*4*pi*product(box%sides)))
    end function get_crossover
+
+   !> Frequency of the highest modes of a floor that take part, Hz.
+   pure function get_highest_frequency(box) result(frequency)
+      type(box_type), intent(in) :: box
+      real(wp) :: frequency
+
+      ! The upper edge of the band at the crossover lies at most a third of an octave above.
+      frequency = floor_ratio*room_ratio*2**(1.0_wp/3)*get_crossover(box)
+   end function get_highest_frequency
 
    !> Standard positions: center and four points near the corners (KS F 2810-2).
    pure subroutine get_standard_positions(box, ball, microphone)
@@ -127,7 +136,7 @@ contains
          room%n_band = room%n_band - 1
       end do
       allocate (room%level(room%n_band, size(microphone, 2), size(ball, 2)))
-      allocate (room%mean(room%n_band), room%spread(room%n_band))
+      allocate (room%mean(room%n_band), room%spread(room%n_band), room%mean_spread(room%n_band))
       allocate (room%floor_input(size(ball, 2)), room%floor_loss(size(ball, 2)), room%room_input(size(ball, 2)), &
          room%room_loss(size(ball, 2)))
       if (room%n_band == 0) return
@@ -166,11 +175,25 @@ contains
          end do
       end do
       do i = 1, room%n_band
-         room%mean(i) = 10*log10(sum(10**(room%level(i, :, :)/10))/size(room%level(i, :, :)))
-         room%spread(i) = sqrt(max(sum(room%level(i, :, :)**2)/size(room%level(i, :, :)) &
-            - (sum(room%level(i, :, :))/size(room%level(i, :, :)))**2, 0.0_wp))
+         associate (level => room%level(i, :, :))
+            room%mean(i) = 10*log10(sum(10**(level/10))/size(level))
+            room%spread(i) = sqrt(get_variance(reshape(level, [size(level)])))
+            ! Balls and microphones are samples of their own.
+            associate (n_microphone => size(level, 1), n_ball => size(level, 2))
+               room%mean_spread(i) = sqrt(get_variance(sum(level, dim=1)/n_microphone)/n_ball &
+                  + get_variance(sum(level, dim=2)/n_ball)/n_microphone)
+            end associate
+         end associate
       end do
    end subroutine get_modal_room
+
+   !> Mean-square deviation from the mean.
+   pure function get_variance(values) result(variance)
+      real(wp), intent(in) :: values(:)
+      real(wp) :: variance
+
+      variance = sum((values - sum(values)/size(values))**2)/size(values)
+   end function get_variance
 
    !> Number of modes of a room below a frequency, about.
    pure function get_room_mode_count(box, frequency) result(count)

@@ -244,7 +244,7 @@ contains
    end function get_source
 
    !> Modes of the floor.
-   subroutine get_modes(options, group, plate, modes, error, support)
+   subroutine get_modes(options, group, plate, modes, error, support, max_frequency)
       class(rectangular_floor_type), intent(in) :: options
       !> Namelist group of the floor.
       character(len=key_length), intent(out) :: group
@@ -255,6 +255,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> Support of the edges (default: its own).
       character(len=*), intent(in), optional :: support
+      !> Frequency up to which modes are wanted, Hz (default: all that the mobility needs).
+      real(wp), intent(in), optional :: max_frequency
       type(plate_stack_type) :: stack
       type(orthotropic_type) :: base
 
@@ -277,7 +279,7 @@ contains
          allocate (stack%layer(0))
       end if
       stack%radiator = size(stack%plate)
-      call get_floor_modes(trim(group), stack, plate, modes, error)
+      call get_floor_modes(trim(group), stack, plate, modes, error, max_frequency)
    end subroutine get_modes
 
    !> Rectangular floors have modes.
@@ -289,15 +291,16 @@ contains
    end function has_modes
 
    !> Modes of the floor with a support of its edges.
-   subroutine get_room_modes(options, support, plate, modes, error)
+   subroutine get_room_modes(options, support, plate, modes, error, max_frequency)
       class(rectangular_floor_type), intent(in) :: options
       character(len=*), intent(in) :: support
       type(plate_type), intent(out) :: plate
       type(floor_modes_type), intent(out) :: modes
       type(error_type), allocatable, intent(out) :: error
+      real(wp), intent(in), optional :: max_frequency
       character(len=key_length) :: group
 
-      call options%get_modes(group, plate, modes, error, support)
+      call options%get_modes(group, plate, modes, error, support, max_frequency)
    end subroutine get_room_modes
 
    !> Support of the edges.

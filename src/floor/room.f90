@@ -92,8 +92,8 @@ module thud_room
       real(wp), allocatable :: conductance(:)
       !> Mass per unit area of the radiating plate, kg/m2.
       real(wp) :: surface_mass = 0.0_wp
-      !> Volume of the room, m3.
-      real(wp) :: volume = 0.0_wp
+      !> Volume of the room, m3, and its length, width and height, m.
+      real(wp) :: volume = 0.0_wp, sides(3) = 0.0_wp
       !> Energy that the impact injects into the floor, J: [n_band].
       real(wp), allocatable :: energy(:)
       !> Radiation factor and total loss factor of the floor: [n_band].
@@ -115,6 +115,8 @@ module thud_room
       !> modes. From band `n_modal` + 1 on, they are statistical.
       integer :: n_modal = 0
       real(wp), allocatable :: modal_level(:), modal_spread(:)
+      !> Standard deviation of the mean over positions, dB: [n_band].
+      real(wp), allocatable :: mean_spread(:)
       !> The same for simply supported and for clamped edges: [n_band, 2].
       real(wp), allocatable :: edge_level(:, :)
       !> Contributions to the interval of the A-weighted level, differences from it, dB: [2, n_contribution].
@@ -266,6 +268,7 @@ contains
       prediction%conductance = conductance
       prediction%surface_mass = get_surface_mass(plate)
       prediction%volume = room%volume
+      prediction%sides = [room%length, room%width, room%height]
       prediction%energy = 10**(force_level/10)*conductance
       prediction%radiation_factor = radiation_factor
       prediction%loss_factor = get_total_loss(plate, room%air, bands%center)

@@ -165,7 +165,7 @@ def positions_below(
         prediction = predict_level(prediction.source, prediction.floor, bare)
     source = prediction.source
     case = replace(source.case, modes=None, floor=prediction.floor, room=prediction.room)
-    size = prediction.room_size
+    size = prediction.size
     answer = ask(
         "modal_room",
         case=case_text(case),

@@ -66,6 +66,8 @@ class RoomLevel(Immutable):
         The same levels if the floor is simply supported or clamped.
     n_modal : int
         Number of bands in which the sound is modal.
+    size : tuple of float
+        Length, width and height of the room, m.
     rated : float
         Mean of the A-weighted levels of the statistical and the modal prediction, dB.
     interval : tuple of float
@@ -99,6 +101,7 @@ class RoomLevel(Immutable):
     simple_level: Array
     clamped_level: Array
     n_modal: int
+    size: tuple[float, float, float]
     rated: float
     interval: tuple[float, float]
     contributions: Mapping[str, tuple[float, float]]
@@ -121,6 +124,7 @@ def new_room_level(answer: Bundle) -> RoomLevel | None:
         history=answer["room_history"]["level"],
         floor_warnings=tuple(map(text, answer.get("room_warnings", {}).values())),
         n_modal=int(answer["room"]["n_modal"]),
+        size=_sides(answer["room_size"]["sides"]),
         rated=answer["room"]["rated"],
         interval=_pair(answer["room_interval"]["ends"]),
         contributions={name: _pair(ends) for name, ends in answer["room_contributions"].items()},
@@ -130,3 +134,8 @@ def new_room_level(answer: Bundle) -> RoomLevel | None:
 def _pair(ends: Array) -> tuple[float, float]:
     low, high = ends.tolist()
     return low, high
+
+
+def _sides(sides: Array) -> tuple[float, float, float]:
+    length, width, height = sides.tolist()
+    return length, width, height

@@ -48,7 +48,7 @@ contains
 
    !> Modes of a stack of plates. To the losses of its parts those of the radiating plate at its edges and by radiation are
    !> added, in proportion to its part of the energy.
-   subroutine get_floor_modes(group, stack, radiator, modes, error)
+   subroutine get_floor_modes(group, stack, radiator, modes, error, max_frequency)
       !> Namelist group, for messages.
       character(len=*), intent(in) :: group
       type(plate_stack_type), intent(in) :: stack
@@ -57,12 +57,17 @@ contains
       type(floor_modes_type), intent(out) :: modes
       !> Set if the modes cannot be computed.
       type(error_type), allocatable, intent(out) :: error
+      !> Frequency up to which modes are wanted, Hz (default: `mode_limit`, and beyond for the static compliance).
+      real(wp), intent(in), optional :: max_frequency
       real(wp), allocatable :: share(:), frequency(:), key(:)
       real(wp) :: wanted, resolved
       integer :: i
       logical :: failed
 
-      key = get_key(stack, radiator)
+      wanted = mode_limit*resolution
+      if (is_uncoupled(stack) .and. .not. has_shear(stack)) wanted = mode_limit*sum_limit_factor
+      if (present(max_frequency)) wanted = min(wanted, max_frequency*resolution)
+      key = [wanted, get_key(stack, radiator)]
       do i = 1, size(cached)
          if (.not. allocated(cached(i)%key)) exit
          if (size(key) /= size(cached(i)%key)) cycle
@@ -72,8 +77,6 @@ contains
          end if
       end do
       modes%stack = stack
-      wanted = mode_limit*resolution
-      if (is_uncoupled(stack) .and. .not. has_shear(stack)) wanted = mode_limit*sum_limit_factor
       call get_stack_modes(stack, wanted, modes%modes, resolved, failed)
       if (failed) then
          error = input_error('&'//group//': no modes can be computed; allowed: stiffnesses and masses above zero')

@@ -119,6 +119,7 @@ contains
       call bundle%add_array('room_bands.time', n, room%time)
       call bundle%add_array('room_bands.spread', n, room%spread)
       call bundle%add_number('room.rated', room%rated)
+      call bundle%add_array('room_size.sides', [3], room%sides)
       call bundle%add_array('room_interval.ends', [2], room%interval)
       call bundle%add_number('room.n_modal', real(room%n_modal, wp))
       call bundle%add_array('room_bands.modal_level', n, room%modal_level)
