@@ -140,7 +140,9 @@ def python_type(key: Entry) -> str:
     if key["kind"] == "texts":
         return "Sequence[str]"
     if key["kind"] == "list":
-        return f"Sequence[{'int' if key['whole'] else 'float'}]"
+        entry = "int" if key["whole"] else "float"
+        # A list that is not empty by default is often a single number.
+        return f"{entry} | Sequence[{entry}]" if key["default"] else f"Sequence[{entry}]"
     return TYPES[key["kind"]]
 
 

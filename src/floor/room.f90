@@ -18,7 +18,8 @@ module thud_room
    implicit none (type, external)
    private
 
-   public :: check_below, check_room, few_modes, get_room_bands, get_room_fields, get_room_level, room_level_type, room_type
+   public :: check_below, check_room, few_modes, get_completed_room, get_room_bands, get_room_fields, get_room_level
+   public :: room_level_type, room_type
 
    !> A room whose reverberation time contains all its losses, as measured ones do.
    character(len=*), parameter :: finished_room = 'finished'
@@ -41,15 +42,29 @@ module thud_room
    !> Time step of a history, s: 4 % of the detector's time constant.
    real(wp), parameter :: history_step = 5.0e-3_wp
 
+   !> Height of a room of which neither height nor volume is stated, m.
+   real(wp), parameter :: default_height = 2.5_wp
+
+   !> Largest relative difference between a volume and the product of length, width and height.
+   real(wp), parameter :: volume_tolerance = 0.01_wp
+
+   !> Smallest volume, m3.
+   real(wp), parameter :: min_volume = 1.0_wp
+
+   !> Numbers of reverberation times: one for all bands, one for each octave or each one-third-octave band.
+   integer, parameter :: time_counts(3) = [1, 4, 12]
+
    !> The room.
    type :: room_type
-      !> Volume, m3.
-      real(wp) :: volume = 50.0_wp
-      !> Reverberation time, s.
-      real(wp) :: reverberation_time = 0.5_wp
-      !> Reverberation time of each one-third-octave band, s; empty: the same for all bands.
-      type(list_type) :: reverberation_times
-      !> What the reverberation times contain: all losses of the finished room (`finished`), or those of its own without
+      !> Length and width, m; 0: those of the floor.
+      real(wp) :: length = 0.0_wp, width = 0.0_wp
+      !> Height, m; 0: the volume divided by the area, or 2.5 m.
+      real(wp) :: height = 0.0_wp
+      !> Volume, m3; 0: the product of length, width and height.
+      real(wp) :: volume = 0.0_wp
+      !> Reverberation time, s: one, or one for each octave or one-third-octave band.
+      type(list_type) :: reverberation_time = list_type(count=1, values=0.5_wp)
+      !> What the reverberation time contains: all losses of the finished room (`finished`), or those of its own without
       !> the flow into floor, walls and ceiling (`bare`).
       character(len=name_length) :: reverberation_of = finished_room
       !> Air in the room.
@@ -68,6 +83,8 @@ module thud_room
       real(wp), allocatable :: conductance(:)
       !> Mass per unit area of the radiating plate, kg/m2.
       real(wp) :: surface_mass = 0.0_wp
+      !> Volume of the room, m3.
+      real(wp) :: volume = 0.0_wp
       !> Energy that the impact injects into the floor, J: [n_band].
       real(wp), allocatable :: energy(:)
       !> Radiation factor and total loss factor of the floor: [n_band].
@@ -103,14 +120,20 @@ contains
    function get_room_fields(room) result(fields)
       !> The room that the fields read and set.
       type(room_type), intent(in), target :: room
-      !> One field per component: [17].
+      !> One field per component: [19].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('volume', room%volume, 'm3', 'volume of the room', '[1, 100000]'), &
-         real_field('reverberation_time', room%reverberation_time, 's', 'reverberation time of the room', '[0.05, 20]'), &
-         list_field('reverberation_times', room%reverberation_times, 's', &
-         'reverberation time in each one-third-octave band from 50 to 630 Hz', '[0.05, 20]'), &
+         real_field('length', room%length, 'm', 'length of the room; 0: that of the floor', '[0, 100]', &
+         derived_at_zero=.true.), &
+         real_field('width', room%width, 'm', 'width of the room; 0: that of the floor', '[0, 100]', &
+         derived_at_zero=.true.), &
+         real_field('height', room%height, 'm', 'height of the room; 0: from the volume, without it 2.5 m', '[0, 100]', &
+         derived_at_zero=.true.), &
+         real_field('volume', room%volume, 'm3', 'volume of the room; 0: length times width times height', '[0, 100000]', &
+         derived_at_zero=.true.), &
+         list_field('reverberation_time', room%reverberation_time, 's', 'reverberation time of the room: one, ' &
+         //'4 for octaves or 12 for one-third octaves', '[0.05, 20]'), &
          choice_field('reverberation_of', room%reverberation_of, 'room of the reverberation time: finished, or bare, ' &
          //'without floor, walls and ceiling', [character(len=8) :: finished_room, 'bare']), &
          real_field('air_density', room%air%density, 'kg/m3', 'density of the air', '[0.5, 2]'), &
@@ -121,33 +144,61 @@ contains
    !> Checks the number of reverberation times.
    subroutine check_room(room, error)
       type(room_type), intent(in) :: room
-      !> Set if it is neither 0 nor the number of bands.
+      !> Set if it is none of `time_counts`.
       type(error_type), allocatable, intent(out) :: error
-      type(band_type), allocatable :: bands(:)
 
-      call get_room_bands(bands, error)
-      if (any(room%reverberation_times%count == [0, size(bands)])) return
-      error = input_error('&room: reverberation_times has '//to_text(room%reverberation_times%count) &
-         //' values; allowed: '//to_text(size(bands))//', one for each one-third-octave band from 50 to 630 Hz')
+      if (any(room%reverberation_time%count == time_counts)) return
+      error = input_error('&room: reverberation_time has '//to_text(room%reverberation_time%count)//' values; allowed: ' &
+         //'1, one for each of the 4 octaves from 63 to 500 Hz, or for each of the 12 one-third-octave bands from 50 to ' &
+         //'630 Hz')
    end subroutine check_room
 
-   !> Checks that walls and ceiling fit below a floor.
+   !> The room with the dimensions that are not stated.
+   elemental function get_completed_room(room, plate) result(completed)
+      type(room_type), intent(in) :: room
+      !> The plate that radiates.
+      type(plate_type), intent(in) :: plate
+      type(room_type) :: completed
+
+      completed = room
+      if (.not. room%length > 0.0_wp) completed%length = plate%length
+      if (.not. room%width > 0.0_wp) completed%width = plate%width
+      associate (area => completed%length*completed%width)
+         if (.not. room%height > 0.0_wp) then
+            completed%height = default_height
+            if (room%volume > 0.0_wp) completed%height = room%volume/area
+         end if
+         if (.not. room%volume > 0.0_wp) completed%volume = area*completed%height
+      end associate
+   end function get_completed_room
+
+   !> Checks the dimensions of a room, and that walls and ceiling fit below a floor.
    subroutine check_below(plate, room, error)
       !> The plate that radiates.
       type(plate_type), intent(in) :: plate
       type(room_type), intent(in) :: room
-      !> Set if the walls are too long, or the cavity above the ceiling is too deep.
+      !> Set if the dimensions contradict each other, the walls are too long, or the cavity above the ceiling is too deep.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: walls, height
+      type(room_type) :: completed
+      real(wp) :: walls, product
 
       walls = sum(room%walls%lengths%values(:room%walls%lengths%count))
-      height = room%volume/(plate%length*plate%width)
-      if (walls > 2*(plate%length + plate%width)*(1 + 1.0e-9_wp)) then
+      completed = get_completed_room(room, plate)
+      product = completed%length*completed%width*completed%height
+      if (abs(product - completed%volume) > volume_tolerance*completed%volume) then
+         error = input_error('&room: length, width and height, '//to_text(completed%length)//' x ' &
+            //to_text(completed%width)//' x '//to_text(completed%height)//' m (a length or width that is not stated is that ' &
+            //'of the floor), contradict the volume, '//to_text(completed%volume)//' m3; allowed: a volume of ' &
+            //to_text(product)//' m3, or without volume or height')
+      else if (completed%volume < min_volume) then
+         error = input_error('&room: the volume is '//to_text(completed%volume)//' m3; allowed: at least ' &
+            //to_text(min_volume)//' m3')
+      else if (walls > 2*(plate%length + plate%width)*(1 + 1.0e-9_wp)) then
          error = input_error('&room: wall_lengths are '//to_text(walls)//' m together, longer than the edges of the ' &
             //'floor; allowed: up to '//to_text(2*(plate%length + plate%width))//' m')
-      else if (room%ceiling%mass > 0.0_wp .and. room%ceiling%depth > height) then
-         error = input_error('&room: ceiling_depth = '//to_text(room%ceiling%depth)//' m is more than the volume ' &
-            //'divided by the area of the floor; allowed: up to '//to_text(height)//' m')
+      else if (room%ceiling%mass > 0.0_wp .and. room%ceiling%depth > completed%height) then
+         error = input_error('&room: ceiling_depth = '//to_text(room%ceiling%depth)//' m is more than the height of the ' &
+            //'room; allowed: up to '//to_text(completed%height)//' m')
       end if
    end subroutine check_below
 
@@ -165,25 +216,28 @@ contains
    !>
    !> The floor takes the energy E = integral 2 |F|**2 Re Y df in each band, with Re Y averaged over positions. The energy
    !> is injected instantaneously: a contact of 20 ms is short compared with the detector's time constant.
-   subroutine get_room_level(plate, conductance, room, bands, force_level, prediction)
+   subroutine get_room_level(plate, conductance, stated_room, bands, force_level, prediction)
       !> The plate that radiates.
       type(plate_type), intent(in) :: plate
       !> Real part of the mobility of the floor, averaged over positions, m/(N s): [n_band].
       real(wp), intent(in) :: conductance(:)
-      type(room_type), intent(in) :: room
+      type(room_type), intent(in) :: stated_room
       !> Bands from `get_room_bands`: [n_band].
       type(band_type), intent(in) :: bands(:)
       !> Force exposure levels of the force on the floor, dB: [n_band].
       real(wp), intent(in) :: force_level(:)
       type(room_level_type), intent(out) :: prediction
       type(band_energies_type) :: energies(size(bands))
+      type(room_type) :: room
       real(wp), dimension(size(bands)) :: width, maximum, floor_decay
       integer :: i
 
+      room = get_completed_room(stated_room, plate)
       width = bands%upper - bands%lower
       prediction%bands = bands
       prediction%conductance = conductance
       prediction%surface_mass = get_surface_mass(plate)
+      prediction%volume = room%volume
       prediction%energy = 10**(force_level/10)*conductance
       prediction%radiation_factor = get_plate_radiation(plate, room%air, bands%center)
       prediction%loss_factor = get_total_loss(plate, room%air, bands%center)
@@ -332,9 +386,11 @@ contains
       type(room_type), intent(in) :: room
       integer, intent(in) :: n_band
       real(wp) :: times(n_band)
+      integer :: i
 
-      times = room%reverberation_time
-      if (room%reverberation_times%count > 0) times = room%reverberation_times%values(:n_band)
+      associate (stated => room%reverberation_time)
+         times = [(stated%values(1 + (i - 1)*stated%count/n_band), i=1, n_band)]
+      end associate
    end function get_reverberation_times
 
 end module thud_room

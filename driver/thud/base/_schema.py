@@ -270,13 +270,17 @@ class Room(Group):
 
     Attributes
     ----------
+    length : float
+        Length of the room; 0: that of the floor, m; 0 <= length <= 100.
+    width : float
+        Width of the room; 0: that of the floor, m; 0 <= width <= 100.
+    height : float
+        Height of the room; 0: from the volume, without it 2.5 m, m; 0 <= height <= 100.
     volume : float
-        Volume of the room, m3; 1 <= volume <= 100000.
-    reverberation_time : float
-        Reverberation time of the room, s; 0.05 <= reverberation_time <= 20.
-    reverberation_times : sequence of float
-        Reverberation time in each one-third-octave band from 50 to 630 Hz, s; 0.05 <=
-        reverberation_times <= 20.
+        Volume of the room; 0: length times width times height, m3; 0 <= volume <= 100000.
+    reverberation_time : float | sequence of float
+        Reverberation time of the room: one, 4 for octaves or 12 for one-third octaves, s; 0.05 <=
+        reverberation_time <= 20.
     reverberation_of : str
         Room of the reverberation time: finished, or bare, without floor, walls and ceiling;
         "finished", "bare".
@@ -311,9 +315,11 @@ class Room(Group):
         Loss factor of the ceiling cavity; 0.001 <= ceiling_loss_factor <= 1.
     """
 
-    volume: float = 50.0
-    reverberation_time: float = 0.5
-    reverberation_times: Sequence[float] = ()
+    length: float = 0.0
+    width: float = 0.0
+    height: float = 0.0
+    volume: float = 0.0
+    reverberation_time: float | Sequence[float] = (0.5,)
     reverberation_of: RoomReverberationOf = "finished"
     air_density: float = 1.2
     sound_speed: float = 343.0
@@ -1163,9 +1169,11 @@ KEYS = (
     Key("measured_mobility", "measured_mobility", "residue_imaginary", "list", "m/(N s2)", "imaginary parts of the residues, doubled for a pair of poles", (), -1000000000000.0, 1000000000000.0),
     Key("measured_mobility", "measured_mobility", "lowest_frequency", "real", "Hz", "lowest frequency of the measurement", (), 0.0, "highest_frequency"),
     Key("measured_mobility", "measured_mobility", "highest_frequency", "real", "Hz", "highest frequency of the measurement", (), 0.0, 10000000.0),
-    Key("room", "room", "volume", "real", "m3", "volume of the room", (), 1.0, 100000.0),
-    Key("room", "room", "reverberation_time", "real", "s", "reverberation time of the room", (), 0.05, 20.0),
-    Key("room", "room", "reverberation_times", "list", "s", "reverberation time in each one-third-octave band from 50 to 630 Hz", (), 0.05, 20.0),
+    Key("room", "room", "length", "real", "m", "length of the room; 0: that of the floor", (), 0.0, 100.0),
+    Key("room", "room", "width", "real", "m", "width of the room; 0: that of the floor", (), 0.0, 100.0),
+    Key("room", "room", "height", "real", "m", "height of the room; 0: from the volume, without it 2.5 m", (), 0.0, 100.0),
+    Key("room", "room", "volume", "real", "m3", "volume of the room; 0: length times width times height", (), 0.0, 100000.0),
+    Key("room", "room", "reverberation_time", "list", "s", "reverberation time of the room: one, 4 for octaves or 12 for one-third octaves", (), 0.05, 20.0),
     Key("room", "room", "reverberation_of", "choice", "", "room of the reverberation time: finished, or bare, without floor, walls and ceiling", ('finished', 'bare')),
     Key("room", "room", "air_density", "real", "kg/m3", "density of the air", (), 0.5, 2.0),
     Key("room", "room", "sound_speed", "real", "m/s", "speed of sound in the air", (), 200.0, 500.0),

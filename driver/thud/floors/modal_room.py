@@ -208,7 +208,7 @@ def positions_below(
     floor, room = prediction.floor, prediction.room
     require_kind("floor", floor, Plate)
     assert isinstance(floor, Plate)  # noqa: S101 - for the type checker
-    size = (floor.length, floor.width, room.volume / (floor.length * floor.width))
+    size = (floor.length, floor.width, prediction.volume / (floor.length * floor.width))
     require_whole("seed", seed, 0, MAX_SEED)
     generator = np.random.default_rng(seed)
     positions = _positions("balls", balls, size[:2], generator)
@@ -235,7 +235,7 @@ def positions_below(
     plate = _receptance(omega, plate_frequency, losses) * (1j * omega) / mass
     # Mean squares of the mode shapes of the room.
     norms = np.prod(np.where(orders > 0, 0.5, 1.0), axis=1)
-    stiffness = room.air_density * room.sound_speed**2 / (room.volume * norms)
+    stiffness = room.air_density * room.sound_speed**2 / (prediction.volume * norms)
     air = _receptance(omega, room_frequency, decay) * (1j * omega) * stiffness[:, None]
     coupling = _coupling(orders, numbers, size[:2])
     shapes = np.prod(np.cos(np.pi * orders * receivers[:, None] / size), axis=2)

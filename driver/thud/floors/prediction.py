@@ -85,7 +85,7 @@ class RoomPrediction(RoomLevel, Displayed):
     @property
     def standardized(self) -> Array:
         """Standardized levels L'_i,Fmax,V,T, dB, shape (12,) (ISO 16283-2)."""
-        return standardized_level(self.level, self.reverberation_time, self.room.volume)
+        return standardized_level(self.level, self.reverberation_time, self.volume)
 
     @property
     def standardized_rating(self) -> Rating:

@@ -41,6 +41,8 @@ class RoomLevel(Immutable):
         Number of modes below which the statistical prediction of a band is uncertain.
     mass_per_area : float
         Mass per unit area of the radiating plate, kg/m2.
+    volume : float
+        Volume of the room, m3.
     spread : ndarray, shape (12,)
         Expected standard deviation of the level at a single position of source and microphone, dB,
         by the modal overlap (Langley and Cotoni 2004).
@@ -69,6 +71,7 @@ class RoomLevel(Immutable):
     conductance: Array
     few_modes: float
     mass_per_area: float
+    volume: float
     spread: Array
     octave_level: Array
     octave_time: Array
@@ -87,6 +90,7 @@ def new_room_level(answer: Bundle) -> RoomLevel | None:
         **bands,
         few_modes=answer["room"]["few_modes"],
         mass_per_area=answer["room"]["surface_mass"],
+        volume=answer["room"]["volume"],
         octave_level=answer["room_octaves"]["level"],
         octave_time=answer["room_octaves"]["time"],
         history_time=answer["room_history"]["time"],

@@ -104,6 +104,7 @@ contains
 
       n = size(room%bands)
       call bundle%add_number('room.surface_mass', room%surface_mass)
+      call bundle%add_number('room.volume', room%volume)
       call bundle%add_number('room.few_modes', few_modes)
       call bundle%add_array('room_bands.conductance', n, room%conductance)
       call bundle%add_array('room_bands.frequency', n, room%bands%nominal)

@@ -77,9 +77,9 @@ contains
       end do
       call add_ratings(prediction, coupled, text)
       resistance = 1/maxval(prediction%conductance)
-      text = text//'  Room of '//fixed(case%room%volume, 1)//' m3, reverberation time ' &
+      text = text//'  Room of '//fixed(prediction%volume, 1)//' m3, reverberation time ' &
          //fixed(minval(prediction%reverberation_time), 2)
-      if (case%room%reverberation_times%count > 0) text = text//' to '//fixed(maxval(prediction%reverberation_time), 2)
+      if (case%room%reverberation_time%count > 1) text = text//' to '//fixed(maxval(prediction%reverberation_time), 2)
       text = text//' s.'//newline
       text = text//'  Resistance of the floor '//fixed(resistance/1.0e3_wp, 1)//' kN s/m.'
       if (any(min(prediction%floor_modes, prediction%room_modes) < few_modes)) text = text//' *: fewer than ' &
