@@ -12,6 +12,7 @@ module thud_warnings
    use thud_numerical_error, only: finer_quantities, get_resolution_keys
    use thud_plate, only: plate_type
    use thud_registry, only: floor_names, model_names
+   use thud_room, only: get_completed_room, room_type
    use thud_sampling, only: get_rate_limit
    use thud_room, only: get_completed_room, room_type
    use thud_source_limits, only: conforms, criterion_type

@@ -125,7 +125,7 @@ def test_studies_vary_floors_and_rooms(tmp_path: Path, many: thud.Ensemble) -> N
     thud.plot.save(thud.plot.draw_design(found), tmp_path / "map.png")
     assert found.dataset["room_level"].dims[-1] == "room_third"
     draws = {"kind": "random", "size": 4}
-    parameters = {"reverberation_time": {"low": 0.4, "high": 0.6}}
+    parameters = {"reverberation_time(1)": {"low": 0.4, "high": 0.6}}
     spread = thud.uncertainty({"case": str(path), "parameters": parameters, "design": draws})
     assert any(row[0] == "rating, standardized" for row in spread.rows())
     dataset = many.to_xarray()

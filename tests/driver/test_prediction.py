@@ -96,7 +96,7 @@ def test_standardization_takes_room_and_reverberation_out(shell: thud.Impact) ->
     larger = thud.predict_level(shell, thud.Plate(), thud.Room(volume=100.0))
     assert larger.level == pytest.approx(reference.level - 10 * np.log10(2), abs=0.1)
     times = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5)
-    longer = thud.predict_level(shell, thud.Plate(), thud.Room(reverberation_times=times))
+    longer = thud.predict_level(shell, thud.Plate(), thud.Room(reverberation_time=times))
     assert longer.reverberation_time.tolist() == list(times)
     assert (longer.level[2:] > reference.level[2:]).all()
 
@@ -145,7 +145,7 @@ def test_inputs_of_floors_are_cases(name: str) -> None:
     case = thud.read_case(FLOORS / f"{name}.nml")
     assert isinstance(case.floor, thud.Plate)
     assert case.floor.thickness == int(name[-3:]) / 1000
-    assert case.room == thud.Room()
+    assert case.room == thud.Room(volume=50.0)
 
 
 @pytest.mark.parametrize(
@@ -157,7 +157,7 @@ def test_inputs_of_floors_are_cases(name: str) -> None:
         (ROOM_CASE.replace("'plate'", "'plat'"), naming("'plat'", "'plate'")),
         ("&model /\n&plate /\n", naming("&plate", "line 2", "&floor")),
         (ROOM_CASE.replace("0.2", "-0.2"), naming("&plate: thickness", -0.2)),
-        (ROOM_CASE.replace("volume = 40", "volume = 0"), naming("&room: volume", 0.0)),
+        (ROOM_CASE.replace("volume = 40", "volume = -1"), naming("&room: volume", -1.0)),
         (
             ROOM_CASE.replace("volume = 40", "wall_lengths = 9, 9.5"),
             naming("wall_lengths", "18.5 m"),
@@ -168,8 +168,8 @@ def test_inputs_of_floors_are_cases(name: str) -> None:
         ),
         (ROOM_CASE.replace("volume = 40", "wall_junction = 'x'"), naming("wall_junction", "'x'")),
         (
-            ROOM_CASE.replace("volume = 40", "reverberation_times = 1, 2"),
-            naming("reverberation_times", 2, 12),
+            ROOM_CASE.replace("volume = 40", "reverberation_time = 1, 2"),
+            naming("reverberation_time", 2, 4, 12),
         ),
         (ROOM_CASE.replace("thickness", "thicknes"), naming("thicknes", "'thickness'")),
     ],
@@ -490,3 +490,31 @@ def test_named_and_stated_sources_of_a_room_are_kept(case_file: CaseFile) -> Non
         thud.solve(**room, momentum_flux="none")
     with pytest.raises(thud.InputError, match=naming("floor is missing")):
         thud.predict_level()
+
+
+def test_room_has_the_dimensions_that_are_stated(shell: thud.Impact) -> None:
+    floor = thud.Plate(length=6.0, width=3.0)
+
+    def predict(**keys: Any) -> thud.RoomPrediction:  # noqa: ANN401 - of any key
+        return thud.predict_level(shell, floor, thud.Room(**keys))
+
+    assert predict().volume == pytest.approx(45.0)
+    assert predict(height=3.0).volume == pytest.approx(54.0)
+    assert predict(height=3.0).level == pytest.approx(predict(volume=54.0).level, abs=1e-12)
+    assert predict(height=3.0).standardized == pytest.approx(predict(volume=54.0).standardized)
+    small = predict(length=4.0, height=2.5)
+    assert small.volume == pytest.approx(30.0)
+    assert any("12.0 m2" in word and "18.0 m2" in word for word in small.warnings)
+    with pytest.raises(thud.InputError, match=naming("volume", "60.0 m3", "45.0 m3")):
+        predict(height=2.5, volume=60.0)
+
+
+def test_reverberation_time_is_one_number_or_a_list() -> None:
+    room = thud.Room(reverberation_time=0.8)
+    assert room == thud.Room(reverberation_time=(0.8,)) == thud.Room(reverberation_time=[0.8])
+    octaves = thud.predict_level(
+        floor=thud.Plate(), room=thud.Room(reverberation_time=(0.9, 0.6, 0.5, 0.4))
+    )
+    assert octaves.reverberation_time.tolist() == [0.9] * 3 + [0.6] * 3 + [0.5] * 3 + [0.4] * 3
+    with pytest.raises(thud.InputError, match=naming("reverberation_time", "empty")):
+        thud.Room(reverberation_time=())
