@@ -140,7 +140,9 @@ def python_type(key: Entry) -> str:
     if key["kind"] == "texts":
         return "Sequence[str]"
     if key["kind"] == "list":
-        return f"Sequence[{'int' if key['whole'] else 'float'}]"
+        entry = "int" if key["whole"] else "float"
+        # A list that is not empty by default is often a single number.
+        return f"{entry} | Sequence[{entry}]" if key["default"] else f"Sequence[{entry}]"
     return TYPES[key["kind"]]
 
 
@@ -233,6 +235,8 @@ def python_module(schema: Entry) -> str:
         union("FloorOptions", floors),
         table("Source models by name, the default first.", "MODELS: dict[str, type[ModelOptions]]",
               [f"{name}.name: {name}" for name in map(class_name, models)]),
+        "\n# Source of a case with a room that names no model.\n",
+        f"ROOM_SOURCE = {instance(schema['room_source'])}\n",
         table("Floors by name, the default first.", "FLOORS: dict[str, type[FloorOptions]]",
               [f"{name}.name: {name}" for name in map(class_name, floors)]),
         table("Groups that every model uses.", "GROUPS",
@@ -280,7 +284,7 @@ def python_calls(schema: Entry) -> str:
     keys, models = schema["keys"], schema["models"]
     owned = {model: [key for key in keys if key["owner"] == model] for model in models}
     choices = {choice_name(key) for key in keys if key["owner"] in models and key["choices"]}
-    names = sorted({"Ball", "Drop", "FloorOptions", "ModelName", "ModelOptions", *choices})
+    names = sorted({"Ball", "Drop", "FloorOptions", "ModelName", "ModelOptions", "Room", *choices})
     parts = [SOLVE.format(names="".join(f"    {name},\n" for name in names))]
     shared = [key for key in keys if key["group"] == "sampling"]
     for name, base, members in [
@@ -290,7 +294,7 @@ def python_calls(schema: Entry) -> str:
         parts.append(f"\nclass {name}Options({base}, total=False):\n")
         parts += [f"    {key['name']}: {python_type(key)}\n" for key in members]
         if base == "TypedDict":
-            parts.append("    floor: FloorOptions | None\n")
+            parts.append("    floor: FloorOptions | None\n    room: Room | None\n")
     parts.append(OF_CASE)
     for model in models:
         words = {"options": f"{class_name(model)}Options", "by": f" by the model ``{model}``"}
@@ -303,6 +307,16 @@ def python_calls(schema: Entry) -> str:
     parts.append(CALL.format(default=" = ...", star="", model="ModelName | ModelOptions = ...",
                              options="SamplingOptions", by=""))  # fmt: skip
     return "".join(parts)
+
+
+def instance(options: Entry) -> str:
+    """Return the options of a model as Python writes them."""
+    values = (
+        f"{key}={quoted(value)}" if isinstance(value, str) else f"{key}={value!r}"
+        for key, value in options.items()
+        if key != "name"
+    )
+    return f"{class_name(options['name'])}({', '.join(values)})"
 
 
 def table(comment: str, name: str, entries: list[str]) -> str:

@@ -3,24 +3,29 @@ module thud_floor_answers
    use thud_band, only: band_type, find_bands
    use thud_bundle, only: bundle_type
    use thud_case, only: case_type, get_floor_number
-   use thud_compute, only: drop_on_floor, predict_room_level
+   use thud_compute, only: drop_on_floor
+   use thud_constants, only: pi
    use thud_error, only: error_type
+   use thud_floor_modes, only: floor_modes_type
    use thud_floor_result, only: get_point_velocity
    use thud_force_history, only: force_history_type
    use thud_injected_energy, only: get_injected_energies, get_mean_conductances, get_total_energy
    use thud_kinds, only: wp
    use thud_measured_mobility_floor, only: measured_mobility_floor_type
    use thud_mobility_fit, only: fit_mobility
+   use thud_modal_room, only: box_type, get_crossover, get_modal_room, modal_room_type
    use thud_plate, only: get_critical_frequency, get_plate_radiation, get_surface_mass, get_total_loss, plate_type
    use thud_receiver, only: get_mobility, receiver_type
    use thud_request, only: request_type
    use thud_result_bundle, only: add_history, add_room_level
-   use thud_room, only: get_room_bands, room_level_type
+   use thud_ritz_system, only: get_mode_values
+   use thud_room, only: check_below, get_room_bands, room_level_type
+   use thud_room_prediction, only: get_box, get_positions, predict_room
    implicit none (type, external)
    private
 
    public :: answer_floor_energy, answer_floor_impact, answer_mobility, answer_mobility_fit, answer_point_velocity
-   public :: answer_radiator, answer_room_level
+   public :: answer_floor_modes, answer_modal_room, answer_radiator, answer_room_level
 
 contains
 
@@ -105,7 +110,7 @@ contains
       if (allocated(on_floor) .and. .not. allocated(error)) call add_history(bundle, 'on_floor.', on_floor)
    end subroutine answer_floor_impact
 
-   !> Level in the room below, from levels of the force `levels`, dB, in the rated one-third-octave bands.
+   !> Level in the room below, from the record `force`, N, at `sample_rate`, Hz.
    subroutine answer_room_level(case, request, bundle, error)
       type(case_type), intent(in) :: case
       type(request_type), intent(in) :: request
@@ -113,12 +118,122 @@ contains
       !> Set if the floor cannot radiate into the room.
       type(error_type), allocatable, intent(out) :: error
       type(room_level_type) :: prediction
-      type(band_type), allocatable :: bands(:)
 
-      call get_room_bands(bands, error)
-      if (.not. allocated(error)) call predict_room_level(case, bands, request%get_array('levels'), prediction, error)
+      call predict_room(case, request%get_array('force'), request%get_number('sample_rate'), prediction, error)
       if (.not. allocated(error)) call add_room_level(bundle, case, prediction)
    end subroutine answer_room_level
+
+   !> Sound in the modal room below for each of the positions `ball` and `microphone`, m from the corner of the room, from
+   !> the record `force`, N, at `sample_rate`, Hz. With `pressure`, the sound pressure, too.
+   subroutine answer_modal_room(case, request, bundle, error)
+      type(case_type), intent(in) :: case
+      type(request_type), intent(in) :: request
+      type(bundle_type), intent(inout) :: bundle
+      !> Set if the floor has no modes.
+      type(error_type), allocatable, intent(out) :: error
+      type(modal_room_type) :: room
+      type(floor_modes_type) :: modes
+      type(plate_type) :: plate
+      type(box_type) :: box
+      real(wp), allocatable :: ball(:, :), microphone(:, :)
+
+      call get_case_box(case, box, plate, error)
+      if (allocated(error)) return
+      associate (floor => case%floors(get_floor_number(case))%model)
+         call floor%get_room_modes(floor%get_support(), plate, modes, error)
+      end associate
+      if (allocated(error)) return
+      associate (stated_ball => request%get_array('ball'), stated_microphone => request%get_array('microphone'))
+         call get_positions(case%room, box, ball, microphone)
+         if (size(stated_ball) > 0) ball = reshape(stated_ball, [2, size(stated_ball)/2])
+         if (size(stated_microphone) > 0) microphone = reshape(stated_microphone, [3, size(stated_microphone)/3])
+      end associate
+      call get_modal_room(modes, box, request%get_array('force'), request%get_number('sample_rate'), ball, microphone, &
+         request%get_number('pressure') > 0.0_wp, room)
+      call bundle%add_array('sides', [3], box%sides)
+      call bundle%add_array('ball', shape(ball), ball)
+      call bundle%add_array('microphone', shape(microphone), microphone)
+      call bundle%add_array('frequency', [room%n_band], box%bands(:room%n_band)%nominal)
+      call bundle%add_array('level', shape(room%level), room%level)
+      call bundle%add_array('mean', shape(room%mean), room%mean)
+      call bundle%add_array('spread', shape(room%spread), room%spread)
+      call bundle%add_array('floor_energy', [size(ball, 2), 2], [room%floor_input, room%floor_loss])
+      call bundle%add_array('room_energy', [size(ball, 2), 2], [room%room_input, room%room_loss])
+      call bundle%add_number('floor_modes', real(room%floor_modes, wp))
+      call bundle%add_number('room_modes', real(room%room_modes, wp))
+      call bundle%add_number('crossover', get_crossover(box))
+      call bundle%add_number('sample_rate', room%sample_rate)
+      if (allocated(room%pressure)) call bundle%add_array('pressure', shape(room%pressure), room%pressure)
+   end subroutine answer_modal_room
+
+   !> Natural frequencies, Hz, and loss factors of the modes of a case's floor up to `highest`, Hz, and the shapes of its
+   !> radiating plate at the points `x`, `y`, m, 1/sqrt(kg).
+   subroutine answer_floor_modes(case, request, bundle, error)
+      type(case_type), intent(in) :: case
+      type(request_type), intent(in) :: request
+      type(bundle_type), intent(inout) :: bundle
+      !> Set if the floor has no modes.
+      type(error_type), allocatable, intent(out) :: error
+      type(floor_modes_type) :: modes
+      type(plate_type) :: plate
+      real(wp), allocatable :: shapes(:, :)
+      integer, allocatable :: order(:)
+      integer :: i
+
+      associate (floor => case%floors(get_floor_number(case))%model)
+         call floor%get_room_modes(floor%get_support(), plate, modes, error)
+      end associate
+      if (allocated(error)) return
+      order = pack([(i, i=1, size(modes%omega))], modes%omega < min(2*pi*request%get_number('highest'), modes%limit))
+      call sort_by(modes%omega, order)
+      call bundle%add_array('frequency', [size(order)], modes%omega(order)/(2*pi))
+      call bundle%add_array('loss_factor', [size(order)], modes%loss_factor(order))
+      call bundle%add_number('limit', modes%limit/(2*pi))
+      call bundle%add_number('length', modes%stack%length)
+      call bundle%add_number('width', modes%stack%width)
+      associate (x => request%get_array('x'), y => request%get_array('y'))
+         if (size(x) == 0) return
+         call get_mode_values(modes%modes, modes%stack%radiator, x, y, shapes)
+         shapes = shapes(order, :)
+         call bundle%add_array('shape', shape(shapes), shapes)
+      end associate
+   end subroutine answer_floor_modes
+
+   !> Sorts numbers by the values that they stand for, ascending (insertion; blocks of modes are sorted already).
+   pure subroutine sort_by(value, order)
+      real(wp), intent(in) :: value(:)
+      integer, intent(inout) :: order(:)
+      integer :: i, k, number
+
+      do i = 2, size(order)
+         number = order(i)
+         do k = i - 1, 1, -1
+            if (value(order(k)) <= value(number)) exit
+            order(k + 1) = order(k)
+         end do
+         order(k + 1) = number
+      end do
+   end subroutine sort_by
+
+   !> The room of a case as a box, and the plate that radiates into it.
+   subroutine get_case_box(case, box, plate, error)
+      type(case_type), intent(in) :: case
+      type(box_type), intent(out) :: box
+      type(plate_type), intent(out) :: plate
+      !> Set if the floor cannot radiate into the room.
+      type(error_type), allocatable, intent(out) :: error
+      type(band_type), allocatable :: bands(:)
+      real(wp), allocatable :: conductance(:)
+
+      call get_room_bands(bands, error)
+      if (allocated(error)) return
+      allocate (conductance(size(bands)))
+      associate (floor => case%floors(get_floor_number(case))%model)
+         call floor%get_radiator(bands%center, plate, conductance, error)
+      end associate
+      if (.not. allocated(error)) call check_below(plate, case%room, error)
+      if (.not. allocated(error)) box = get_box(case%room, plate, bands)
+   end subroutine get_case_box
 
    !> The plate of a floor that radiates into the room below, at the frequencies `frequency`, Hz.
    subroutine answer_radiator(case, request, bundle, error)

@@ -21,7 +21,7 @@ module thud_case
    private
 
    public :: case_type, check_case, check_name, get_active_fields, get_fields, get_floor_number, get_model_number
-   public :: keep_impact_only, new_case
+   public :: keep_impact_only, new_case, set_room_source
 
    !> Input of one run.
    type :: case_type
@@ -80,6 +80,23 @@ contains
       call new_floors(case%floors)
    end subroutine new_case
 
+   !> Chooses the source of a case with a room that names none: the modal ball, with losses that rise with frequency so that
+   !> the standard ball conforms. Both other fast models, by default, do not.
+   subroutine set_room_source(case)
+      type(case_type), intent(inout), target :: case
+      type(field_type), allocatable :: fields(:)
+      type(error_type), allocatable :: error
+      integer :: i
+
+      case%model = 'modal_ball'
+      allocate (fields, source=get_fields(case))
+      do i = 1, size(fields)
+         if (fields(i)%owner /= case%model) cycle
+         if (fields(i)%key == 'damping_law') call fields(i)%set_from_text("'rising'", error)
+         if (fields(i)%key == 'loss_factor') call fields(i)%set_from_text('0.3', error)
+      end do
+   end subroutine set_room_source
+
    !> Leaves out free modes, compression and unknowns, which an impact does not use.
    pure subroutine keep_impact_only(case)
       type(case_type), intent(inout) :: case
@@ -121,7 +138,8 @@ contains
          owned_by('modes', get_modes_fields(case%modes)), &
          owned_by('compression', in_group('compression', get_compression_fields(case%compression))), &
          in_group('drop', get_drop_fields(case%drop)), &
-         in_group('model', [choice_field('name', case%model, 'source model', model_names)])]
+         in_group('model', [ &
+         choice_field('name', case%model, 'source model (default with &room: a modal ball that conforms)', model_names)])]
       do i = 1, size(case%models)
          fields = [fields, owned_by(model_names(i), in_group(model_names(i), case%models(i)%model%get_fields()))]
       end do

@@ -17,7 +17,8 @@ module thud_compute
    use thud_progress, only: let_first_thread_report
    use thud_receiver, only: is_rigid, receiver_type
    use thud_resolved_drop, only: get_drop_cost, solve_drop
-   use thud_room, only: check_below, get_room_bands, get_room_level, room_level_type
+   use thud_room, only: room_level_type
+   use thud_room_prediction, only: predict_room
    use thud_sampling, only: get_sample_count
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, is_inconclusive, source_limits_type
@@ -27,7 +28,7 @@ module thud_compute
    private
 
    public :: assess_floor, assessment_type, compress_case, compute, compute_impact, drop_on_floor, get_assessed_force
-   public :: get_cost, impact_type, is_conforming, predict_room_level, results_type, scope_type
+   public :: get_cost, impact_type, is_conforming, results_type, scope_type
 
    !> Memory per sample of a record, including transforms and text, bytes; measured.
    real(wp), parameter :: sample_memory = 600.0_wp
@@ -281,48 +282,6 @@ contains
             history%numerical_error%contact_time, history%numerical_error%restitution]
       end associate
    end subroutine assess_force
-
-   !> Level in the room below, from a force history.
-   subroutine predict_room(case, force, sample_rate, prediction, error)
-      !> The case, with floor and room.
-      type(case_type), intent(in) :: case
-      !> Force on the floor, N: [n_sample].
-      real(wp), intent(in) :: force(:)
-      !> Samples per second, Hz.
-      real(wp), intent(in) :: sample_rate
-      type(room_level_type), intent(out) :: prediction
-      !> Set if a level cannot be computed.
-      type(error_type), allocatable, intent(out) :: error
-      type(band_type), allocatable :: bands(:)
-      real(wp), allocatable :: level(:)
-
-      call get_room_bands(bands, error)
-      if (allocated(error)) return
-      allocate (level(size(bands)))
-      call get_force_exposure_levels(force, sample_rate, bands, trim(case%level_method), level, error)
-      if (.not. allocated(error)) call predict_room_level(case, bands, level, prediction, error)
-   end subroutine predict_room
-
-   !> Level in the room below, from force exposure levels.
-   subroutine predict_room_level(case, bands, level, prediction, error)
-      !> The case, with floor and room.
-      type(case_type), intent(in) :: case
-      !> One-third-octave bands of `get_room_bands`: [n_band].
-      type(band_type), intent(in) :: bands(:)
-      !> Levels of the force on the floor, dB: [n_band].
-      real(wp), intent(in) :: level(:)
-      type(room_level_type), intent(out) :: prediction
-      !> Set if the floor cannot radiate into the room.
-      type(error_type), allocatable, intent(out) :: error
-      type(plate_type) :: plate
-      real(wp) :: conductance(size(bands))
-
-      associate (floor => case%floors(get_floor_number(case))%model)
-         call floor%get_radiator(bands%center, plate, conductance, error)
-      end associate
-      if (.not. allocated(error)) call check_below(plate, case%room, error)
-      if (.not. allocated(error)) call get_room_level(plate, conductance, case%room, bands, level, prediction)
-   end subroutine predict_room_level
 
    !> Index of the assessed force.
    pure function get_assessed_force(case) result(index)

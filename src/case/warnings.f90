@@ -12,7 +12,9 @@ module thud_warnings
    use thud_numerical_error, only: finer_quantities, get_resolution_keys
    use thud_plate, only: plate_type
    use thud_registry, only: floor_names, model_names
+   use thud_room, only: get_completed_room, room_type
    use thud_sampling, only: get_rate_limit
+   use thud_room, only: get_completed_room, room_type
    use thud_source_limits, only: conforms, criterion_type
    use thud_text, only: fixed, quoted, to_text
    use thud_validity_limit, only: get_limit_message, is_outside, validity_limit_type
@@ -51,6 +53,9 @@ module thud_warnings
 
    !> Range of usual heights of rooms, m: [2].
    real(wp), parameter :: usual_height(2) = [2.0_wp, 6.0_wp]
+
+   !> Largest relative difference between the areas of a room and of the floor above it.
+   real(wp), parameter :: same_area = 0.01_wp
 
    !> Numerical error of an octave level above which a warning is raised, dB.
    real(wp), parameter :: max_error = 0.2_wp
@@ -213,7 +218,7 @@ contains
          //' from the nominal levels): the level in the room is not that of a standard source')
    end subroutine add_source_warning
 
-   !> Adds a warning on a room of unusual height.
+   !> Adds warnings on a room of unusual height and a room that is not as large as the floor.
    subroutine add_height_warning(case, warnings)
       !> A case with floor and room.
       type(case_type), intent(in) :: case
@@ -222,18 +227,21 @@ contains
       type(band_type) :: bands(octave_count)
       type(plate_type) :: plate
       type(error_type), allocatable :: error
+      type(room_type) :: room
       real(wp) :: conductance(octave_count)
-      real(wp) :: height
 
       bands = get_octaves()
       associate (floor => case%floors(get_floor_number(case))%model)
          call floor%get_radiator(bands%center, plate, conductance, error)
       end associate
       if (allocated(error)) return
-      height = case%room%volume/(plate%length*plate%width)
-      if (height < usual_height(1) .or. height > usual_height(2)) call add(warnings, '&room: volume: below ' &
-         //fixed(plate%length*plate%width, 1)//' m2 of floor the room is '//fixed(height, 2)//' m high; usual are ' &
+      room = get_completed_room(case%room, plate)
+      if (room%height < usual_height(1) .or. room%height > usual_height(2)) call add(warnings, '&room: below ' &
+         //fixed(room%length*room%width, 1)//' m2 of floor the room is '//fixed(room%height, 2)//' m high; usual are ' &
          //fixed(usual_height(1), 1)//' to '//fixed(usual_height(2), 1)//' m')
+      if (abs(room%length*room%width/(plate%length*plate%width) - 1) > same_area) call add(warnings, '&room: a room of ' &
+         //fixed(room%length*room%width, 1)//' m2 below a floor of '//fixed(plate%length*plate%width, 1) &
+         //' m2: the prediction lets the whole floor radiate into the room')
    end subroutine add_height_warning
 
    !> Adds warnings on density, modulus and Poisson's ratio of the ball, for models that use them.

@@ -5,7 +5,8 @@
 !> namelist group `&<name>`. The descriptions of arguments in this file hold for every floor.
 module thud_floor_model
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, list_type
+   use thud_field, only: field_type, list_type, name_length
+   use thud_floor_modes, only: floor_modes_type
    use thud_kinds, only: wp
    use thud_new_field, only: list_field
    use thud_plate, only: plate_type
@@ -32,6 +33,10 @@ module thud_floor_model
       procedure, pass(options) :: get_transfer
       procedure, pass(options) :: get_radiator
       procedure, pass(options) :: get_validity
+      procedure, pass(options) :: has_modes
+      procedure, pass(options) :: get_room_modes
+      procedure, pass(options) :: get_support
+      procedure, pass(options) :: has_modal_conductance
    end type floor_model_type
 
    abstract interface
@@ -143,5 +148,45 @@ contains
       highest = huge(highest)
       reason = ''
    end subroutine get_validity
+
+   !> Whether the floor has modes that radiate; by default it has none.
+   pure function has_modes(options) result(yes)
+      class(floor_model_type), intent(in) :: options
+      logical :: yes
+
+      yes = .false.
+   end function has_modes
+
+   !> Modes of the floor, with its own support or another one; floors without modes return an error.
+   subroutine get_room_modes(options, support, plate, modes, error, max_frequency)
+      class(floor_model_type), intent(in) :: options
+      !> Support of the edges.
+      character(len=*), intent(in) :: support
+      !> The plate that radiates.
+      type(plate_type), intent(out) :: plate
+      type(floor_modes_type), intent(out) :: modes
+      !> Set if the floor has no modes, or they cannot be computed.
+      type(error_type), allocatable, intent(out) :: error
+      !> Frequency up to which modes are wanted, Hz.
+      real(wp), intent(in), optional :: max_frequency
+
+      error = input_error('&floor: name: this floor has no modes; allowed: a rectangular floor')
+   end subroutine get_room_modes
+
+   !> Support of the edges; empty for floors without modes.
+   pure function get_support(options) result(support)
+      class(floor_model_type), intent(in) :: options
+      character(len=name_length) :: support
+
+      support = ''
+   end function get_support
+
+   !> Whether the mean power into the floor follows from its modes, because no homogeneous plate represents it.
+   pure function has_modal_conductance(options) result(yes)
+      class(floor_model_type), intent(in) :: options
+      logical :: yes
+
+      yes = .false.
+   end function has_modal_conductance
 
 end module thud_floor_model

@@ -1,4 +1,4 @@
-!> A timber joist floor: an orthotropic plate of sheathing and smeared joists, and locally the sheathing between two joists.
+!> A timber joist floor: sheathing on joists as ribs; its mean properties are those of an orthotropic plate.
 module thud_joist_floor
    use thud_constants, only: pi
    use thud_error, only: error_type
@@ -7,9 +7,9 @@ module thud_joist_floor
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, real_field
    use thud_plate, only: get_resistance, plate_type
-   use thud_plate_modes, only: new_plate_receiver
-   use thud_receiver, only: receiver_type
+   use thud_plate_stack, only: orthotropic_type, ribs_type
    use thud_rectangular_floor, only: rectangular_floor_type
+   use thud_screed, only: new_orthotropic
    implicit none (type, external)
    private
 
@@ -36,14 +36,15 @@ module thud_joist_floor
       real(wp) :: connection = 0.1_wp
       !> Loss factor including that of the edges, without radiation.
       real(wp) :: loss_factor = 0.05_wp
-      !> Impact location: `sheathing` between two joists, or a `joist`.
+      !> Impact location: midway between the next two joists (`sheathing`), the next `joist`, or exactly the `position`.
       character(len=name_length) :: source_on = 'sheathing'
    contains
       procedure, pass(options) :: get_fields
-      procedure, pass(options) :: get_plates
-      procedure, pass(options) :: get_mobility_at
+      procedure, pass(options) :: get_base
+      procedure, pass(options) :: get_source
       procedure, pass(options) :: get_radiator
       procedure, pass(options) :: get_validity
+      procedure, pass(options) :: has_modal_conductance
    end type joist_floor_type
 
 contains
@@ -72,30 +73,82 @@ contains
          'loss factor of the floor including its edges, without radiation', '(0, 1]'), &
          options%get_source_fields(), &
          choice_field('source_on', options%source_on, &
-         'impact location: sheathing between joists, or a joist', [character(len=9) :: 'sheathing', 'joist']), &
-         options%get_point_fields()]
+         'impact location: midway between the next joists, on the next joist, or exactly the position', &
+         [character(len=9) :: 'sheathing', 'joist', 'position']), &
+         options%get_build_up_fields(), options%get_point_fields()]
    end function get_fields
 
-   !> The smeared plate.
-   pure subroutine get_plates(options, group, plates)
+   !> The smeared plate, and the sheathing with its joists.
+   subroutine get_base(options, group, plate, base)
       class(joist_floor_type), intent(in) :: options
       character(len=key_length), intent(out) :: group
-      type(plate_type), allocatable, intent(out) :: plates(:)
+      type(plate_type), intent(out) :: plate
+      type(orthotropic_type), intent(out) :: base
+      type(ribs_type) :: joists
 
       group = 'joist_floor'
-      plates = [get_smeared(options)]
-   end subroutine get_plates
+      plate = get_smeared(options)
+      base = new_orthotropic(plate_type(length=options%length, width=options%width, &
+         thickness=options%sheathing_thickness, density=options%sheathing_density, &
+         wave_speed=sqrt(options%sheathing_modulus/options%sheathing_density), loss_factor=options%loss_factor))
+      associate (e => options%joist_modulus, b => options%joist_width, h => options%joist_height)
+         joists%position = get_positions(options)
+         joists%bending = get_joist_stiffness(options)
+         ! Shear coefficient of a rectangle: 5/6.
+         joists%shear = 5*shear_ratio*e*b*h/6
+         joists%torsion = shear_ratio*e*get_torsion_constant(b, h)
+         joists%mass = options%joist_density*b*h
+         joists%inertia = joists%mass*(b**2 + h**2)/12
+      end associate
+      joists%loss_factor = options%loss_factor
+      base%ribs = [joists]
+   end subroutine get_base
 
-   !> The orthotropic plate with smeared joists, as thick as the sheathing.
-   !>
-   !> The bending stiffness along the joists is EI of the composite section/spacing (EN 1995-1-1 annex B, equations B.1 to
-   !> B.6), across them B' of the sheathing; H = B' + G J of a joist/(2 spacing) (Timoshenko and Woinowsky-Krieger).
-   pure function get_smeared(options) result(plate)
+   !> Positions of the joists' axes across the width, symmetric about the center, m: [n_joist].
+   pure function get_positions(options) result(position)
       class(joist_floor_type), intent(in) :: options
-      type(plate_type) :: plate
-      real(wp) :: across, along, torsion, sheathing_axial, joist_axial, eccentricity, joist_offset, mass
+      real(wp), allocatable :: position(:)
+      integer :: i, n
 
-      across = get_sheathing_stiffness(options)
+      n = max(1, int(options%width/options%spacing*(1 + epsilon(1.0_wp))))
+      ! A joist at the edge itself would not move.
+      if ((n - 1)*options%spacing > options%width - options%joist_width) n = n - 1
+      position = options%width/2 + options%spacing*[(i - (n + 1)/2.0_wp, i=1, n)]
+   end function get_positions
+
+   !> Relative position of the source.
+   function get_source(options) result(source)
+      class(joist_floor_type), intent(in) :: options
+      real(wp) :: source(2)
+
+      source = [options%source_x, options%source_y]
+      associate (joists => get_positions(options), y => options%source_y*options%width)
+         associate (n => size(joists))
+            select case (options%source_on)
+             case ('joist')
+               source(2) = get_nearest(joists, y)/options%width
+             case ('sheathing')
+               if (n > 1) source(2) = get_nearest((joists(:n - 1) + joists(2:))/2, y)/options%width
+            end select
+         end associate
+      end associate
+   end function get_source
+
+   !> The value next to a given one.
+   pure function get_nearest(values, value) result(nearest)
+      real(wp), intent(in) :: values(:), value
+      real(wp) :: nearest
+
+      nearest = values(minloc(abs(values - value), dim=1))
+   end function get_nearest
+
+   !> Bending stiffness of a joist with the part of the sheathing that acts with it, without the bending of the sheathing
+   !> itself, N m2 (EN 1995-1-1 annex B, equations B.1 to B.6).
+   pure function get_joist_stiffness(options) result(stiffness)
+      class(joist_floor_type), intent(in) :: options
+      real(wp) :: stiffness
+      real(wp) :: sheathing_axial, joist_axial, eccentricity, joist_offset
+
       associate (e => options%joist_modulus, b => options%joist_width, h => options%joist_height, &
          t => options%sheathing_thickness, a => options%spacing)
          ! Axial stiffness, N, of the connected fraction of the sheathing and of a joist; distance of the joist's axis from
@@ -104,7 +157,23 @@ contains
          joist_axial = e*b*h
          eccentricity = (h + t)/2
          joist_offset = sheathing_axial*eccentricity/(sheathing_axial + joist_axial)
-         along = across + (e*b*h**3/12 + sheathing_axial*(eccentricity - joist_offset)**2 + joist_axial*joist_offset**2)/a
+         stiffness = e*b*h**3/12 + sheathing_axial*(eccentricity - joist_offset)**2 + joist_axial*joist_offset**2
+      end associate
+   end function get_joist_stiffness
+
+   !> The orthotropic plate with smeared joists, as thick as the sheathing.
+   !>
+   !> The bending stiffness along the joists is that of sheathing and joists, across them B' of the sheathing; H = B' + G J of
+   !> a joist/(2 spacing) (Timoshenko and Woinowsky-Krieger).
+   pure function get_smeared(options) result(plate)
+      class(joist_floor_type), intent(in) :: options
+      type(plate_type) :: plate
+      real(wp) :: across, along, torsion, mass
+
+      across = get_sheathing_stiffness(options)
+      associate (e => options%joist_modulus, b => options%joist_width, h => options%joist_height, &
+         t => options%sheathing_thickness, a => options%spacing)
+         along = across + get_joist_stiffness(options)/a
          torsion = across + shear_ratio*e*get_torsion_constant(b, h)/(2*a)
          mass = options%sheathing_density*t + options%joist_density*b*h/a
       end associate
@@ -134,15 +203,19 @@ contains
       end associate
    end function get_torsion_constant
 
-   !> Frequency band in which joists can be smeared.
+   !> Frequency band in which the sheathing is thin.
    subroutine get_validity(options, lowest, highest, reason)
       class(joist_floor_type), intent(in) :: options
       real(wp), intent(out) :: lowest, highest
       character(len=reason_length), intent(out) :: reason
+      type(plate_type) :: plate
+      type(orthotropic_type) :: base
+      character(len=key_length) :: group
 
+      call options%get_base(group, plate, base)
       lowest = 0.0_wp
-      highest = get_smeared_limit(options)
-      reason = 'half a bending wave of the sheathing is shorter than the spacing of the joists: the plate is not homogeneous'
+      highest = (2*pi/(6*options%sheathing_thickness))**2*sqrt(base%along/base%mass)/(2*pi)
+      reason = 'bending waves are shorter than six thicknesses of the sheathing, and it is not thin'
    end subroutine get_validity
 
    !> Frequency at which half a bending wavelength in the sheathing equals the distance between joists, Hz.
@@ -153,26 +226,6 @@ contains
       frequency = pi/(2*options%spacing**2) &
          *sqrt(get_sheathing_stiffness(options)/(options%sheathing_density*options%sheathing_thickness))
    end function get_smeared_limit
-
-   !> Transfer mobility from the source to a point: modes of the smeared plate, with at most as many half waves across the
-   !> joists as there are bays. At a source on the sheathing, the residual modes are those of the sheathing between two
-   !> joists, with its static compliance and, at high frequencies, the conductance of the infinite sheathing. Elsewhere they
-   !> are those of the smeared plate.
-   subroutine get_mobility_at(options, source, point, receiver, error)
-      class(joist_floor_type), intent(in) :: options
-      real(wp), intent(in) :: source(2), point(2)
-      type(receiver_type), intent(out) :: receiver
-      type(error_type), allocatable, intent(out) :: error
-
-      associate (plate => get_smeared(options), n_bay => int(options%width/options%spacing))
-         if (options%source_on == 'sheathing' .and. all(abs(source - point) < epsilon(1.0_wp))) then
-            call new_plate_receiver('joist_floor', plate, source, point, receiver, error, n_bay, &
-               [get_local_compliance(options), get_local_corner(options)])
-         else
-            call new_plate_receiver('joist_floor', plate, source, point, receiver, error, n_bay)
-         end if
-      end associate
-   end subroutine get_mobility_at
 
    !> Resistance of the infinite sheathing without joists, N s/m.
    pure function get_sheathing_resistance(options) result(resistance)
@@ -213,5 +266,13 @@ contains
       if (options%source_on == 'sheathing') conductance = conductance + 1/(get_sheathing_resistance(options) &
          *(1 + (get_local_corner(options)/(2*pi*frequency))**4))
    end subroutine get_radiator
+
+   !> No homogeneous plate represents the floor.
+   pure function has_modal_conductance(options) result(yes)
+      class(joist_floor_type), intent(in) :: options
+      logical :: yes
+
+      yes = .true.
+   end function has_modal_conductance
 
 end module thud_joist_floor

@@ -14,6 +14,10 @@ module thud_plate
    !> Number of wave directions of an orthotropic plate; the mean of their radiation factors errs by 2 %.
    integer, parameter :: n_direction = 64
 
+   !> Mean absorption coefficient of the edges of a slab in a building: the one of the worked example of ISO 12354, whose
+   !> floor (220 mm of concrete, 5 m x 4 m) loses as much in each one-third-octave band from 50 to 630 Hz within 0.3 %.
+   real(wp), parameter :: building_absorption = 0.148_wp
+
    !> Air in the rooms.
    type :: air_type
       !> Density, kg/m3.
@@ -22,7 +26,7 @@ module thud_plate
       real(wp) :: sound_speed = 343.0_wp
    end type air_type
 
-   !> A plate; the defaults are a concrete floor in a laboratory.
+   !> A plate; the defaults are a concrete floor in a building.
    type :: plate_type
       !> Length and width, m.
       real(wp) :: length = 5.0_wp, width = 4.0_wp
@@ -39,8 +43,8 @@ module thud_plate
       real(wp) :: torsion_ratio = 1.0_wp
       !> Internal loss factor.
       real(wp) :: loss_factor = 0.005_wp
-      !> Losses at the edges: `laboratory`, or `absorption` for given absorption coefficients.
-      character(len=name_length) :: edges = 'laboratory'
+      !> Losses at the edges: `building`, `laboratory`, or `absorption` for given absorption coefficients.
+      character(len=name_length) :: edges = 'building'
       !> Sum over the edges of length times absorption coefficient, m.
       real(wp) :: edge_absorption = 0.0_wp
    end type plate_type
@@ -66,7 +70,7 @@ contains
          'ratio of the twisting stiffness to the geometric mean of both bending stiffnesses', '[0, 1]'), &
          real_field('loss_factor', plate%loss_factor, '', 'internal loss factor of the floor', '[0, 1]'), &
          choice_field('edges', plate%edges, 'losses at the edges of the floor', &
-         [character(len=10) :: 'laboratory', 'absorption']), &
+         [character(len=10) :: 'building', 'laboratory', 'absorption']), &
          real_field('edge_absorption', plate%edge_absorption, 'm', &
          'sum of edge lengths times absorption coefficients, for absorption', '[0, 1000]')]
    end function get_plate_fields
@@ -221,18 +225,20 @@ contains
       !> Frequency, Hz.
       real(wp), intent(in) :: frequency
       real(wp) :: loss_factor
-      real(wp) :: sigma
+      real(wp) :: sigma, absorption
 
       if (plate%edges == 'laboratory') then
          ! The laboratory loss includes radiation.
          loss_factor = plate%loss_factor + get_surface_mass(plate)/(485*sqrt(frequency))
          return
       end if
+      absorption = plate%edge_absorption
+      if (plate%edges == 'building') absorption = building_absorption*2*(plate%length + plate%width)
       sigma = get_plate_radiation(plate, air, frequency)
       loss_factor = plate%loss_factor &
          + 2*air%density*air%sound_speed*sigma/(2*pi*frequency*get_surface_mass(plate)) &
          + air%sound_speed/(pi**2*plate%length*plate%width*sqrt(frequency*get_critical_frequency(plate, air))) &
-         *plate%edge_absorption
+         *absorption
    end function get_total_loss
 
 end module thud_plate

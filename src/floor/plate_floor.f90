@@ -1,12 +1,13 @@
-!> A homogeneous, simply supported rectangular plate above the room.
+!> A rectangular plate, isotropic or orthotropic, bare or with a floating plate.
 module thud_plate_floor
+   use thud_double_plate, only: double_plate_type, get_lower_conductance
    use thud_error, only: error_type
    use thud_field, only: field_type, key_length
    use thud_kinds, only: wp
    use thud_plate, only: get_plate_fields, get_resistance, plate_type
-   use thud_plate_modes, only: new_plate_receiver
-   use thud_receiver, only: receiver_type
+   use thud_plate_stack, only: orthotropic_type
    use thud_rectangular_floor, only: rectangular_floor_type
+   use thud_screed, only: get_screed_plate, new_orthotropic
    implicit none (type, external)
    private
 
@@ -17,8 +18,7 @@ module thud_plate_floor
       type(plate_type) :: plate
    contains
       procedure, pass(options) :: get_fields
-      procedure, pass(options) :: get_plates
-      procedure, pass(options) :: get_mobility_at
+      procedure, pass(options) :: get_base
       procedure, pass(options) :: get_radiator
    end type plate_floor_type
 
@@ -29,30 +29,24 @@ contains
       class(plate_floor_type), intent(in), target :: options
       type(field_type), allocatable :: fields(:)
 
-      fields = [get_plate_fields(options%plate), options%get_source_fields(), options%get_point_fields()]
+      fields = [get_plate_fields(options%plate), options%get_source_fields(), options%get_build_up_fields(), &
+         options%get_point_fields()]
    end function get_fields
 
    !> The plate.
-   pure subroutine get_plates(options, group, plates)
+   subroutine get_base(options, group, plate, base)
       class(plate_floor_type), intent(in) :: options
       character(len=key_length), intent(out) :: group
-      type(plate_type), allocatable, intent(out) :: plates(:)
+      type(plate_type), intent(out) :: plate
+      type(orthotropic_type), intent(out) :: base
 
       group = 'plate'
-      plates = [options%plate]
-   end subroutine get_plates
+      plate = options%plate
+      base = new_orthotropic(plate)
+   end subroutine get_base
 
-   !> Transfer mobility from the source to a point, as poles and residues.
-   subroutine get_mobility_at(options, source, point, receiver, error)
-      class(plate_floor_type), intent(in) :: options
-      real(wp), intent(in) :: source(2), point(2)
-      type(receiver_type), intent(out) :: receiver
-      type(error_type), allocatable, intent(out) :: error
-
-      call new_plate_receiver('plate', options%plate, source, point, receiver, error)
-   end subroutine get_mobility_at
-
-   !> The plate itself; its conductance, averaged over positions, is that of the infinite plate.
+   !> The plate itself; its conductance, averaged over positions, is that of the infinite plate, or the power through the
+   !> layer of a floating plate with both plates infinite.
    subroutine get_radiator(options, frequency, plate, conductance, error)
       class(plate_floor_type), intent(in) :: options
       real(wp), intent(in) :: frequency(:)
@@ -61,7 +55,14 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       plate = options%plate
-      conductance = 1/get_resistance(plate)
+      if (options%screed%thickness > 0.0_wp) then
+         associate (screed => options%screed)
+            conductance = get_lower_conductance(double_plate_type(get_screed_plate(screed, plate), plate, &
+               screed%layer_stiffness, screed%layer_loss_factor), frequency)
+         end associate
+      else
+         conductance = 1/get_resistance(plate)
+      end if
    end subroutine get_radiator
 
 end module thud_plate_floor

@@ -1,57 +1,70 @@
-!> A floor of rectangular plates with the source on the upper plate: keys, checks and receivers that such floors share.
+!> A floor of rectangular plates with the source on the upper plate: supports, floating plate, covering, modes and mobility.
 module thud_rectangular_floor
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, key_length
+   use thud_field, only: field_type, key_length, list_type, name_length
    use thud_floor_model, only: floor_model_type, reason_length
+   use thud_floor_modes, only: floor_modes_type, get_floor_modes, new_floor_receiver
    use thud_kinds, only: wp
-   use thud_new_field, only: real_field
-   use thud_plate, only: get_thin_limit, plate_type
-   use thud_plate_modes, only: check_mode_count
+   use thud_new_field, only: choice_field, list_field, real_field
+   use thud_plate, only: get_resistance, get_thin_limit, plate_type
+   use thud_plate_stack, only: edge_type, orthotropic_type, plate_stack_type, rigid_support
    use thud_receiver, only: receiver_type
+   use thud_screed, only: get_screed_edge, get_screed_fields, get_screed_layer, get_screed_plate, new_orthotropic, &
+      screed_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
    public :: rectangular_floor_type
 
+   !> Supports of the edges.
+   character(len=*), parameter :: supports(*) = [character(len=7) :: 'simple', 'clamped', 'free', 'elastic']
+
    !> The floor; all plates have the same length and width.
    type, abstract, extends(floor_model_type) :: rectangular_floor_type
       !> Relative position of the source along length and width.
       real(wp) :: source_x = 0.5_wp, source_y = 0.5_wp
+      !> Support of the edges.
+      character(len=name_length) :: support = 'simple'
+      !> Springs along the edges x = 0, x = length, y = 0 and y = width, or one value for all: stiffness against deflection
+      !> per length, N/m2, and against rotation, N.
+      type(list_type) :: support_stiffness, support_rotation
+      !> Positions of further supports along the length (walls or beams across it) and along the width, m.
+      type(list_type) :: line_x, line_y
+      !> Floating plate; no thickness: none.
+      type(screed_type) :: screed
+      !> Stiffness of a covering under the source, N/m (0: none), and its loss factor.
+      real(wp) :: covering_stiffness = 0.0_wp, covering_loss_factor = 0.2_wp
    contains
       procedure, pass(options) :: get_source_fields
+      procedure, pass(options) :: get_build_up_fields
       procedure, pass(options) :: check
+      procedure, pass(options) :: check_build_up
       procedure, pass(options) :: get_receiver
       procedure, pass(options) :: get_transfer
+      procedure, pass(options) :: get_mobility_at
+      procedure, pass(options) :: get_source
+      procedure, pass(options) :: get_modes
       procedure, pass(options) :: get_validity
-      procedure(get_plates), deferred, pass(options) :: get_plates
-      procedure(get_mobility_at), deferred, pass(options) :: get_mobility_at
+      procedure, pass(options) :: has_modes
+      procedure, pass(options) :: get_room_modes
+      procedure, pass(options) :: get_support
+      procedure(get_base), deferred, pass(options) :: get_base
    end type rectangular_floor_type
 
    abstract interface
-      !> The plates, the upper one first.
-      pure subroutine get_plates(options, group, plates)
-         import :: key_length, plate_type, rectangular_floor_type
+      !> The floor without floating plate: the plate that radiates into the room, and its stiffnesses.
+      subroutine get_base(options, group, plate, base)
+         import :: key_length, orthotropic_type, plate_type, rectangular_floor_type
          implicit none (type, external)
          class(rectangular_floor_type), intent(in) :: options
-         !> Namelist group of the plates.
+         !> Namelist group of the floor.
          character(len=key_length), intent(out) :: group
-         !> The plates: [n_plate].
-         type(plate_type), allocatable, intent(out) :: plates(:)
-      end subroutine get_plates
-
-      !> Transfer mobility from a source to a point of the upper plate.
-      subroutine get_mobility_at(options, source, point, receiver, error)
-         import :: error_type, receiver_type, rectangular_floor_type, wp
-         implicit none (type, external)
-         class(rectangular_floor_type), intent(in) :: options
-         !> Positions of source and point, as fractions of length and width: [2].
-         real(wp), intent(in) :: source(2), point(2)
-         !> The transfer mobility, as poles and residues.
-         type(receiver_type), intent(out) :: receiver
-         !> Set if the losses are too high.
-         type(error_type), allocatable, intent(out) :: error
-      end subroutine get_mobility_at
+         !> The plate with homogeneous stiffness.
+         type(plate_type), intent(out) :: plate
+         !> Stiffnesses, masses and ribs, without supports.
+         type(orthotropic_type), intent(out) :: base
+      end subroutine get_base
    end interface
 
 contains
@@ -63,23 +76,85 @@ contains
 
       fields = [ &
          real_field('source_x', options%source_x, '', 'relative source position along the length; ' &
-         //'levels in the room are means', '(0, 1)'), &
+         //'statistical levels in the room are means', '(0, 1)'), &
          real_field('source_y', options%source_y, '', 'relative source position along the width', '(0, 1)')]
    end function get_source_fields
 
-   !> Checks the number of modes of the plates.
+   !> Fields of supports, floating plate and covering.
+   function get_build_up_fields(options) result(fields)
+      class(rectangular_floor_type), intent(in), target :: options
+      type(field_type), allocatable :: fields(:)
+
+      fields = [ &
+         choice_field('support', options%support, 'support of the edges', supports), &
+         list_field('support_stiffness', options%support_stiffness, 'N/m2', 'stiffness of elastic edges against ' &
+         //'deflection per length: 1 value or x = 0, x = length, y = 0, y = width', '[0, 1e14]'), &
+         list_field('support_rotation', options%support_rotation, 'N', &
+         'stiffness of elastic edges against rotation per length: 1 or 4 values', '[0, 1e14]'), &
+         list_field('line_x', options%line_x, 'm', 'positions along the length of walls or beams on which the floor rests', &
+         '(0, 100)'), &
+         list_field('line_y', options%line_y, 'm', 'positions along the width of walls or beams on which the floor rests', &
+         '(0, 100)'), &
+         get_screed_fields(options%screed), &
+         real_field('covering_stiffness', options%covering_stiffness, 'N/m', &
+         'stiffness of a covering under the source; 0: none', '[0, 1e12]'), &
+         real_field('covering_loss_factor', options%covering_loss_factor, '', 'loss factor of the covering at 50 Hz', &
+         '[0.01, 2]')]
+   end function get_build_up_fields
+
+   !> Checks supports and positions.
    subroutine check(options, error)
       class(rectangular_floor_type), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error
-      type(plate_type), allocatable :: plates(:)
-      character(len=key_length) :: group
-      integer :: i
 
-      call options%get_plates(group, plates)
-      do i = 1, size(plates)
-         if (.not. allocated(error)) call check_mode_count(trim(group), plates(i), error)
-      end do
+      call options%check_build_up(error)
    end subroutine check
+
+   !> Checks what all rectangular floors have: supports and positions.
+   subroutine check_build_up(options, error)
+      class(rectangular_floor_type), intent(in) :: options
+      type(error_type), allocatable, intent(out) :: error
+      type(plate_type) :: plate
+      type(orthotropic_type) :: base
+      character(len=key_length) :: group
+
+      call options%get_base(group, plate, base)
+      call check_edges(options%support_stiffness, 'support_stiffness')
+      call check_edges(options%support_rotation, 'support_rotation')
+      call check_positions(options%line_x, 'line_x', plate%length)
+      call check_positions(options%line_y, 'line_y', plate%width)
+      call check_positions(options%screed%bridge_x, 'bridge_x', plate%length)
+      call check_positions(options%screed%bridge_y, 'bridge_y', plate%width)
+      if (allocated(error)) return
+      if (options%support == 'free' .and. options%line_x%count + options%line_y%count == 0) then
+         error = input_error('&'//trim(group)//': support = free needs supports at line_x or line_y; allowed: at least one')
+      else if (options%screed%bridge_x%count /= options%screed%bridge_y%count) then
+         error = input_error('&'//trim(group)//': bridge_x has '//to_text(options%screed%bridge_x%count) &
+            //' values and bridge_y '//to_text(options%screed%bridge_y%count)//'; allowed: the same number of both')
+      end if
+   contains
+
+      !> Checks the number of values of an elastic edge.
+      subroutine check_edges(list, key)
+         type(list_type), intent(in) :: list
+         character(len=*), intent(in) :: key
+
+         if (allocated(error) .or. any(list%count == [0, 1, 4])) return
+         error = input_error('&'//trim(group)//': '//key//' has '//to_text(list%count)//' values; allowed: 1 or 4')
+      end subroutine check_edges
+
+      !> Checks that positions lie between two edges.
+      subroutine check_positions(list, key, side)
+         type(list_type), intent(in) :: list
+         character(len=*), intent(in) :: key
+         !> Distance of the edges, m.
+         real(wp), intent(in) :: side
+
+         if (allocated(error) .or. all(list%values(:list%count) < side)) return
+         error = input_error('&'//trim(group)//': '//key//' = '//to_text(maxval(list%values(:list%count))) &
+            //' m lies outside the floor; allowed: below '//to_text(side)//' m')
+      end subroutine check_positions
+   end subroutine check_build_up
 
    !> Mobility at the source.
    subroutine get_receiver(options, receiver, error)
@@ -87,10 +162,24 @@ contains
       type(receiver_type), intent(out) :: receiver
       type(error_type), allocatable, intent(out) :: error
 
-      associate (source => [options%source_x, options%source_y])
+      associate (source => options%get_source())
          call options%get_mobility_at(source, source, receiver, error)
       end associate
+      if (.not. allocated(error) .and. options%covering_stiffness > 0.0_wp) call add_covering(options, receiver)
    end subroutine get_receiver
+
+   !> Adds the mobility s/(k + c s) of a covering in series; its dashpot c has the loss factor at 50 Hz.
+   subroutine add_covering(options, receiver)
+      class(rectangular_floor_type), intent(in) :: options
+      type(receiver_type), intent(inout) :: receiver
+      real(wp), parameter :: omega = 100*acos(-1.0_wp)
+
+      associate (k => options%covering_stiffness, c => options%covering_stiffness*options%covering_loss_factor/omega)
+         receiver%direct = receiver%direct + 1/c
+         receiver%pole = [receiver%pole, cmplx(-k/c, 0.0_wp, wp)]
+         receiver%residue = [receiver%residue, cmplx(-k/c**2, 0.0_wp, wp)]
+      end associate
+   end subroutine add_covering
 
    !> Transfer mobility to another point; a point outside the floor is an error.
    subroutine get_transfer(options, x, y, transfer, error)
@@ -98,13 +187,14 @@ contains
       real(wp), intent(in) :: x, y
       type(receiver_type), intent(out) :: transfer
       type(error_type), allocatable, intent(out) :: error
-      type(plate_type), allocatable :: plates(:)
+      type(plate_type) :: plate
+      type(orthotropic_type) :: base
       character(len=key_length) :: group
 
-      call options%get_plates(group, plates)
-      associate (length => plates(1)%length, width => plates(1)%width)
+      call options%get_base(group, plate, base)
+      associate (length => plate%length, width => plate%width)
          if (x >= 0.0_wp .and. x <= length .and. y >= 0.0_wp .and. y <= width) then
-            call options%get_mobility_at([options%source_x, options%source_y], [x/length, y/width], transfer, error)
+            call options%get_mobility_at(options%get_source(), [x/length, y/width], transfer, error)
          else
             error = input_error('&'//trim(group)//': the point ('//to_text(x)//', '//to_text(y) &
                //') m lies outside; allowed: 0 to '//to_text(length)//' m and 0 to '//to_text(width)//' m')
@@ -112,17 +202,161 @@ contains
       end associate
    end subroutine get_transfer
 
+   !> Transfer mobility from a source to a point of the upper plate, without covering.
+   subroutine get_mobility_at(options, source, point, receiver, error)
+      class(rectangular_floor_type), intent(in) :: options
+      !> Positions of source and point, as fractions of length and width: [2].
+      real(wp), intent(in) :: source(2), point(2)
+      !> The transfer mobility, as poles and residues.
+      type(receiver_type), intent(out) :: receiver
+      !> Set if the losses are too high.
+      type(error_type), allocatable, intent(out) :: error
+      type(floor_modes_type) :: modes
+      type(plate_type) :: plate
+      character(len=key_length) :: group
+
+      call options%get_modes(group, plate, modes, error)
+      if (allocated(error)) return
+      if (options%screed%thickness > 0.0_wp) plate = get_screed_plate(options%screed, plate)
+      associate (upper => modes%stack%plate(1))
+         call new_floor_receiver(trim(group), modes, get_resistance(plate)*get_rib_factor(upper, plate), source, point, &
+            receiver, error)
+      end associate
+   end subroutine get_mobility_at
+
+   !> Ratio of the resistance of the plate between ribs to that of the plate with smeared ribs.
+   pure function get_rib_factor(upper, plate) result(factor)
+      type(orthotropic_type), intent(in) :: upper
+      !> The plate with smeared ribs.
+      type(plate_type), intent(in) :: plate
+      real(wp) :: factor
+
+      factor = 1.0_wp
+      if (allocated(upper%ribs)) factor = 8*sqrt(sqrt(upper%along*upper%across)*upper%mass)/get_resistance(plate)
+   end function get_rib_factor
+
+   !> Relative position of the source.
+   function get_source(options) result(source)
+      class(rectangular_floor_type), intent(in) :: options
+      real(wp) :: source(2)
+
+      source = [options%source_x, options%source_y]
+   end function get_source
+
+   !> Modes of the floor.
+   subroutine get_modes(options, group, plate, modes, error, support, max_frequency)
+      class(rectangular_floor_type), intent(in) :: options
+      !> Namelist group of the floor.
+      character(len=key_length), intent(out) :: group
+      !> The plate that radiates.
+      type(plate_type), intent(out) :: plate
+      type(floor_modes_type), intent(out) :: modes
+      !> Set if they cannot be computed.
+      type(error_type), allocatable, intent(out) :: error
+      !> Support of the edges (default: its own).
+      character(len=*), intent(in), optional :: support
+      !> Frequency up to which modes are wanted, Hz (default: all that the mobility needs).
+      real(wp), intent(in), optional :: max_frequency
+      type(plate_stack_type) :: stack
+      type(orthotropic_type) :: base
+
+      call options%get_base(group, plate, base)
+      if (present(support)) then
+         base%edge = get_edges(options, support)
+      else
+         base%edge = get_edges(options, options%support)
+      end if
+      base%line_x = options%line_x%values(:options%line_x%count)
+      base%line_y = options%line_y%values(:options%line_y%count)
+      stack%length = plate%length
+      stack%width = plate%width
+      if (options%screed%thickness > 0.0_wp) then
+         stack%plate = [new_orthotropic(get_screed_plate(options%screed, plate)), base]
+         stack%plate(1)%edge = get_screed_edge(options%screed)
+         stack%layer = [get_screed_layer(options%screed)]
+      else
+         stack%plate = [base]
+         allocate (stack%layer(0))
+      end if
+      stack%radiator = size(stack%plate)
+      call get_floor_modes(trim(group), stack, plate, modes, error, max_frequency)
+   end subroutine get_modes
+
+   !> Rectangular floors have modes.
+   pure function has_modes(options) result(yes)
+      class(rectangular_floor_type), intent(in) :: options
+      logical :: yes
+
+      yes = .true.
+   end function has_modes
+
+   !> Modes of the floor with a support of its edges.
+   subroutine get_room_modes(options, support, plate, modes, error, max_frequency)
+      class(rectangular_floor_type), intent(in) :: options
+      character(len=*), intent(in) :: support
+      type(plate_type), intent(out) :: plate
+      type(floor_modes_type), intent(out) :: modes
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), intent(in), optional :: max_frequency
+      character(len=key_length) :: group
+
+      call options%get_modes(group, plate, modes, error, support, max_frequency)
+   end subroutine get_room_modes
+
+   !> Support of the edges.
+   pure function get_support(options) result(support)
+      class(rectangular_floor_type), intent(in) :: options
+      character(len=name_length) :: support
+
+      support = options%support
+   end function get_support
+
+   !> Supports of the edges: [4].
+   pure function get_edges(options, support) result(edge)
+      class(rectangular_floor_type), intent(in) :: options
+      !> One of `supports`.
+      character(len=*), intent(in) :: support
+      type(edge_type) :: edge(4)
+
+      select case (support)
+       case ('simple')
+         edge = edge_type(rigid_support, 0.0_wp)
+       case ('clamped')
+         edge = edge_type(rigid_support, rigid_support)
+       case ('free')
+         edge = edge_type(0.0_wp, 0.0_wp)
+       case default
+         edge%deflection = get_four(options%support_stiffness, rigid_support)
+         edge%rotation = get_four(options%support_rotation, 0.0_wp)
+      end select
+   end function get_edges
+
+   !> Values of four edges.
+   pure function get_four(list, default) result(values)
+      !> No, one or four values.
+      type(list_type), intent(in) :: list
+      !> Value of all edges if the list is empty.
+      real(wp), intent(in) :: default
+      real(wp) :: values(4)
+
+      values = default
+      if (list%count == 1) values = list%values(1)
+      if (list%count == 4) values = list%values(:4)
+   end function get_four
+
    !> Frequency band in which all plates are thin.
    subroutine get_validity(options, lowest, highest, reason)
       class(rectangular_floor_type), intent(in) :: options
       real(wp), intent(out) :: lowest, highest
       character(len=reason_length), intent(out) :: reason
-      type(plate_type), allocatable :: plates(:)
+      type(plate_type) :: plate
+      type(orthotropic_type) :: base
       character(len=key_length) :: group
 
-      call options%get_plates(group, plates)
+      call options%get_base(group, plate, base)
       lowest = 0.0_wp
-      highest = minval(get_thin_limit(plates))
+      highest = get_thin_limit(plate)
+      if (options%screed%thickness > 0.0_wp) highest = min(highest, get_thin_limit(get_screed_plate(options%screed, plate)))
       reason = 'bending waves are shorter than six thicknesses, and a plate is not thin'
    end subroutine get_validity
 

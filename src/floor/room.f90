@@ -18,10 +18,14 @@ module thud_room
    implicit none (type, external)
    private
 
-   public :: check_below, check_room, few_modes, get_room_bands, get_room_fields, get_room_level, room_level_type, room_type
+   public :: check_below, check_room, few_modes, get_completed_room, get_reverberation_times, get_room_bands
+   public :: get_room_fields, get_room_level, modal_radiation, room_level_type, room_type, standard_positions
 
    !> A room whose reverberation time contains all its losses, as measured ones do.
    character(len=*), parameter :: finished_room = 'finished'
+
+   !> Radiation factor by the modes of the floor; positions of the standards.
+   character(len=*), parameter :: modal_radiation = 'modes', standard_positions = 'standard'
 
    !> Band sets of a prediction.
    character(len=*), parameter :: third_set = 'third', octave_set = 'octave'
@@ -41,15 +45,29 @@ module thud_room
    !> Time step of a history, s: 4 % of the detector's time constant.
    real(wp), parameter :: history_step = 5.0e-3_wp
 
+   !> Height of a room of which neither height nor volume is stated, m.
+   real(wp), parameter :: default_height = 2.5_wp
+
+   !> Largest relative difference between a volume and the product of length, width and height.
+   real(wp), parameter :: volume_tolerance = 0.01_wp
+
+   !> Smallest volume, m3.
+   real(wp), parameter :: min_volume = 1.0_wp
+
+   !> Numbers of reverberation times: one for all bands, one for each octave or each one-third-octave band.
+   integer, parameter :: time_counts(3) = [1, 4, 12]
+
    !> The room.
    type :: room_type
-      !> Volume, m3.
-      real(wp) :: volume = 50.0_wp
-      !> Reverberation time, s.
-      real(wp) :: reverberation_time = 0.5_wp
-      !> Reverberation time of each one-third-octave band, s; empty: the same for all bands.
-      type(list_type) :: reverberation_times
-      !> What the reverberation times contain: all losses of the finished room (`finished`), or those of its own without
+      !> Length and width, m; 0: those of the floor.
+      real(wp) :: length = 0.0_wp, width = 0.0_wp
+      !> Height, m; 0: the volume divided by the area, or 2.5 m.
+      real(wp) :: height = 0.0_wp
+      !> Volume, m3; 0: the product of length, width and height.
+      real(wp) :: volume = 0.0_wp
+      !> Reverberation time, s: one, or one for each octave or one-third-octave band.
+      type(list_type) :: reverberation_time = list_type(count=1, values=0.5_wp)
+      !> What the reverberation time contains: all losses of the finished room (`finished`), or those of its own without
       !> the flow into floor, walls and ceiling (`bare`).
       character(len=name_length) :: reverberation_of = finished_room
       !> Air in the room.
@@ -58,6 +76,12 @@ module thud_room
       type(walls_type) :: walls
       !> Suspended ceiling.
       type(ceiling_type) :: ceiling
+      !> Position of the corner of the room below the floor, m.
+      real(wp) :: corner_x = 0.0_wp, corner_y = 0.0_wp
+      !> Radiation factor of the floor: by its `modes`, or by `iso_12354`.
+      character(len=name_length) :: radiation = modal_radiation
+      !> Positions of ball and microphone: `standard` or `even` ones.
+      character(len=name_length) :: positions = standard_positions
    end type room_type
 
    !> A prediction in one-third-octave bands.
@@ -68,6 +92,8 @@ module thud_room
       real(wp), allocatable :: conductance(:)
       !> Mass per unit area of the radiating plate, kg/m2.
       real(wp) :: surface_mass = 0.0_wp
+      !> Volume of the room, m3, and its length, width and height, m.
+      real(wp) :: volume = 0.0_wp, sides(3) = 0.0_wp
       !> Energy that the impact injects into the floor, J: [n_band].
       real(wp), allocatable :: energy(:)
       !> Radiation factor and total loss factor of the floor: [n_band].
@@ -85,6 +111,18 @@ module thud_room
       !> Octave bands, their levels and times, as above: [n_octave].
       type(band_type), allocatable :: octaves(:)
       real(wp), allocatable :: octave_level(:), octave_time(:)
+      !> Levels by the modes of floor and room, dB, and spread of positions, dB: [n_band]; not allocated for floors without
+      !> modes. From band `n_modal` + 1 on, they are statistical.
+      integer :: n_modal = 0
+      real(wp), allocatable :: modal_level(:), modal_spread(:)
+      !> Standard deviation of the mean over positions, dB: [n_band].
+      real(wp), allocatable :: mean_spread(:)
+      !> The same for simply supported and for clamped edges: [n_band, 2].
+      real(wp), allocatable :: edge_level(:, :)
+      !> Contributions to the interval of the A-weighted level, differences from it, dB: [2, n_contribution].
+      real(wp), allocatable :: contribution(:, :)
+      !> Mean of the A-weighted levels of both predictions, dB, and the ends of its interval, dB: [2].
+      real(wp) :: rated = 0.0_wp, interval(2) = 0.0_wp
       !> Times after the impact, s: [n_time], and level of the Fast detector in each band, dB: [n_time, n_band].
       real(wp), allocatable :: history_time(:), history(:, :)
    end type room_level_type
@@ -103,51 +141,92 @@ contains
    function get_room_fields(room) result(fields)
       !> The room that the fields read and set.
       type(room_type), intent(in), target :: room
-      !> One field per component: [17].
+      !> One field per component: [19].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('volume', room%volume, 'm3', 'volume of the room', '[1, 100000]'), &
-         real_field('reverberation_time', room%reverberation_time, 's', 'reverberation time of the room', '[0.05, 20]'), &
-         list_field('reverberation_times', room%reverberation_times, 's', &
-         'reverberation time in each one-third-octave band from 50 to 630 Hz', '[0.05, 20]'), &
+         real_field('length', room%length, 'm', 'length of the room; 0: that of the floor', '[0, 100]', &
+         derived_at_zero=.true.), &
+         real_field('width', room%width, 'm', 'width of the room; 0: that of the floor', '[0, 100]', &
+         derived_at_zero=.true.), &
+         real_field('height', room%height, 'm', 'height of the room; 0: from the volume, without it 2.5 m', '[0, 100]', &
+         derived_at_zero=.true.), &
+         real_field('volume', room%volume, 'm3', 'volume of the room; 0: length times width times height', '[0, 100000]', &
+         derived_at_zero=.true.), &
+         list_field('reverberation_time', room%reverberation_time, 's', 'reverberation time of the room: one, ' &
+         //'4 for octaves or 12 for one-third octaves', '[0.05, 20]'), &
          choice_field('reverberation_of', room%reverberation_of, 'room of the reverberation time: finished, or bare, ' &
          //'without floor, walls and ceiling', [character(len=8) :: finished_room, 'bare']), &
          real_field('air_density', room%air%density, 'kg/m3', 'density of the air', '[0.5, 2]'), &
          real_field('sound_speed', room%air%sound_speed, 'm/s', 'speed of sound in the air', '[200, 500]'), &
-         get_wall_fields(room%walls), get_ceiling_fields(room%ceiling)]
+         get_wall_fields(room%walls), get_ceiling_fields(room%ceiling), &
+         real_field('corner_x', room%corner_x, 'm', 'position of the room along the length of a larger floor', '[0, 100)'), &
+         real_field('corner_y', room%corner_y, 'm', 'position of the room along the width of a larger floor', '[0, 100)'), &
+         choice_field('radiation', room%radiation, 'radiation factor of the floor, by its modes or by ISO 12354-1', &
+         [character(len=9) :: modal_radiation, 'iso_12354']), &
+         choice_field('positions', room%positions, &
+         'positions of ball and microphone in the modal room: 5 standard ones each, or 16 even ones each', &
+         [character(len=8) :: standard_positions, 'even'])]
    end function get_room_fields
 
    !> Checks the number of reverberation times.
    subroutine check_room(room, error)
       type(room_type), intent(in) :: room
-      !> Set if it is neither 0 nor the number of bands.
+      !> Set if it is none of `time_counts`.
       type(error_type), allocatable, intent(out) :: error
-      type(band_type), allocatable :: bands(:)
 
-      call get_room_bands(bands, error)
-      if (any(room%reverberation_times%count == [0, size(bands)])) return
-      error = input_error('&room: reverberation_times has '//to_text(room%reverberation_times%count) &
-         //' values; allowed: '//to_text(size(bands))//', one for each one-third-octave band from 50 to 630 Hz')
+      if (any(room%reverberation_time%count == time_counts)) return
+      error = input_error('&room: reverberation_time has '//to_text(room%reverberation_time%count)//' values; allowed: ' &
+         //'1, one for each of the 4 octaves from 63 to 500 Hz, or for each of the 12 one-third-octave bands from 50 to ' &
+         //'630 Hz')
    end subroutine check_room
 
-   !> Checks that walls and ceiling fit below a floor.
+   !> The room with the dimensions that are not stated.
+   elemental function get_completed_room(room, plate) result(completed)
+      type(room_type), intent(in) :: room
+      !> The plate that radiates.
+      type(plate_type), intent(in) :: plate
+      type(room_type) :: completed
+
+      completed = room
+      if (.not. room%length > 0.0_wp) completed%length = plate%length
+      if (.not. room%width > 0.0_wp) completed%width = plate%width
+      associate (area => completed%length*completed%width)
+         if (.not. room%height > 0.0_wp) then
+            completed%height = default_height
+            if (room%volume > 0.0_wp) completed%height = room%volume/area
+         end if
+         if (.not. room%volume > 0.0_wp) completed%volume = area*completed%height
+      end associate
+   end function get_completed_room
+
+   !> Checks the dimensions of a room, and that walls and ceiling fit below a floor.
    subroutine check_below(plate, room, error)
       !> The plate that radiates.
       type(plate_type), intent(in) :: plate
       type(room_type), intent(in) :: room
-      !> Set if the walls are too long, or the cavity above the ceiling is too deep.
+      !> Set if the dimensions contradict each other, the walls are too long, or the cavity above the ceiling is too deep.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: walls, height
+      type(room_type) :: completed
+      real(wp) :: walls, product
 
       walls = sum(room%walls%lengths%values(:room%walls%lengths%count))
-      height = room%volume/(plate%length*plate%width)
-      if (walls > 2*(plate%length + plate%width)*(1 + 1.0e-9_wp)) then
+      completed = get_completed_room(room, plate)
+      product = completed%length*completed%width*completed%height
+      if (abs(product - completed%volume) > volume_tolerance*completed%volume) then
+         error = input_error('&room: length, width and height, '//to_text(completed%length)//' x ' &
+            //to_text(completed%width)//' x '//to_text(completed%height)//' m (a length or width that is not stated is that ' &
+            //'of the floor), contradict the volume, '//to_text(completed%volume)//' m3; allowed: a volume of ' &
+            //to_text(product)//' m3, or without volume or height')
+      else if (completed%volume < min_volume) then
+         error = input_error('&room: the volume is '//to_text(completed%volume)//' m3; allowed: at least ' &
+            //to_text(min_volume)//' m3')
+      else if (walls > 2*(plate%length + plate%width)*(1 + 1.0e-9_wp)) then
          error = input_error('&room: wall_lengths are '//to_text(walls)//' m together, longer than the edges of the ' &
             //'floor; allowed: up to '//to_text(2*(plate%length + plate%width))//' m')
-      else if (room%ceiling%mass > 0.0_wp .and. room%ceiling%depth > height) then
-         error = input_error('&room: ceiling_depth = '//to_text(room%ceiling%depth)//' m is more than the volume ' &
-            //'divided by the area of the floor; allowed: up to '//to_text(height)//' m')
+      else if (room%ceiling%mass > 0.0_wp .and. room%ceiling%depth > completed%height) then
+         error = input_error('&room: ceiling_depth = '//to_text(room%ceiling%depth)//' m is more than the height of the ' &
+            //'room; allowed: up to '//to_text(completed%height)//' m')
       end if
    end subroutine check_below
 
@@ -165,27 +244,33 @@ contains
    !>
    !> The floor takes the energy E = integral 2 |F|**2 Re Y df in each band, with Re Y averaged over positions. The energy
    !> is injected instantaneously: a contact of 20 ms is short compared with the detector's time constant.
-   subroutine get_room_level(plate, conductance, room, bands, force_level, prediction)
+   subroutine get_room_level(plate, conductance, radiation_factor, stated_room, bands, force_level, prediction)
       !> The plate that radiates.
       type(plate_type), intent(in) :: plate
       !> Real part of the mobility of the floor, averaged over positions, m/(N s): [n_band].
       real(wp), intent(in) :: conductance(:)
-      type(room_type), intent(in) :: room
+      !> Radiation factor of the plate: [n_band].
+      real(wp), intent(in) :: radiation_factor(:)
+      type(room_type), intent(in) :: stated_room
       !> Bands from `get_room_bands`: [n_band].
       type(band_type), intent(in) :: bands(:)
       !> Force exposure levels of the force on the floor, dB: [n_band].
       real(wp), intent(in) :: force_level(:)
       type(room_level_type), intent(out) :: prediction
       type(band_energies_type) :: energies(size(bands))
+      type(room_type) :: room
       real(wp), dimension(size(bands)) :: width, maximum, floor_decay
       integer :: i
 
+      room = get_completed_room(stated_room, plate)
       width = bands%upper - bands%lower
       prediction%bands = bands
       prediction%conductance = conductance
       prediction%surface_mass = get_surface_mass(plate)
+      prediction%volume = room%volume
+      prediction%sides = [room%length, room%width, room%height]
       prediction%energy = 10**(force_level/10)*conductance
-      prediction%radiation_factor = get_plate_radiation(plate, room%air, bands%center)
+      prediction%radiation_factor = radiation_factor
       prediction%loss_factor = get_total_loss(plate, room%air, bands%center)
       prediction%reverberation_time = get_reverberation_times(room, size(bands))
       prediction%floor_modes = get_mode_density(plate)*width
@@ -287,7 +372,8 @@ contains
       at_cavity = at_room + 1
       associate (f => prediction%bands(band)%center, third => prediction%bands(band), air => room%air, &
          ceiling => room%ceiling, area => plate%length*plate%width)
-         radiated = air%density*air%sound_speed/get_surface_mass(plates)*get_plate_radiation(plates, air, f)
+         radiated = air%density*air%sound_speed/get_surface_mass(plates) &
+            *[prediction%radiation_factor(band), get_plate_radiation(plates(2:), air, f)]
          decay = decay_of_60_db/prediction%reverberation_time(band)
          flow = new_energy_flow([get_mode_density(plates), get_room_mode_density(room, f)], &
             [2*pi*f*get_total_loss(plates, air, f), decay], &
@@ -332,9 +418,11 @@ contains
       type(room_type), intent(in) :: room
       integer, intent(in) :: n_band
       real(wp) :: times(n_band)
+      integer :: i
 
-      times = room%reverberation_time
-      if (room%reverberation_times%count > 0) times = room%reverberation_times%values(:n_band)
+      associate (stated => room%reverberation_time)
+         times = [(stated%values(1 + (i - 1)*stated%count/n_band), i=1, n_band)]
+      end associate
    end function get_reverberation_times
 
 end module thud_room

@@ -5,7 +5,7 @@ module thud_lapack
    private
 
    public :: dgbsv, dgeev, dgels, dgemm, dgemv, dgetf2, dgetrs, dpbtrf, dpbtrs, dposv, dpotf2, dpotrf, dsbmv, dstevr
-   public :: dsygv, dsygvx, dsyrk, dtrsm, dtrsv
+   public :: dsygv, dsygvd, dsygvx, dsyrk, dtrsm, dtrsv
 
    interface
       !> Eigenvalues of a general matrix.
@@ -29,6 +29,18 @@ module thud_lapack
          real(wp), intent(out) :: w(*), work(*)
          integer, intent(out) :: info
       end subroutine dsygv
+
+      !> Generalized symmetric eigenproblem, by divide and conquer.
+      pure subroutine dsygvd(itype, jobz, uplo, n, a, lda, b, ldb, w, work, lwork, iwork, liwork, info)
+         import :: wp
+         implicit none (type, external)
+         integer, intent(in) :: itype, n, lda, ldb, lwork, liwork
+         character(len=1), intent(in) :: jobz, uplo
+         real(wp), intent(inout) :: a(lda, *), b(ldb, *)
+         real(wp), intent(out) :: w(*), work(*)
+         integer, intent(out) :: iwork(*)
+         integer, intent(out) :: info
+      end subroutine dsygvd
 
       !> Eigenvalues in a range and their vectors, of the generalized symmetric eigenproblem.
       pure subroutine dsygvx(itype, jobz, range, uplo, n, a, lda, b, ldb, vl, vu, il, iu, abstol, m, w, z, ldz, work, &

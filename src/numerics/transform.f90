@@ -7,7 +7,7 @@ module thud_transform
    implicit none (type)
    private
 
-   public :: get_autocorrelation, get_low_pass, get_power_spectrum
+   public :: get_autocorrelation, get_low_pass, get_power_spectrum, get_signal
 
    include 'fftw3.f03'
 
@@ -96,6 +96,25 @@ contains
       call release(plans)
       power = real(spectrum)**2 + aimag(spectrum)**2
    end subroutine get_power_spectrum
+
+   !> Real signal of a spectrum: the sum of c_k exp(2 pi i k n/length) over all k, negative ones included, over the length.
+   subroutine get_signal(spectrum, signal)
+      !> c_0, c_1, ...: [at most length/2 + 1]; the others are 0.
+      complex(wp), intent(in) :: spectrum(:)
+      !> The signal; its length is even: [length].
+      real(wp), intent(out) :: signal(:)
+      real(wp), allocatable :: buffer(:)
+      complex(wp), allocatable :: half(:)
+      type(plans_type) :: plans
+
+      ! The plans fit allocated arrays only.
+      allocate (buffer(size(signal)), half(size(signal)/2 + 1))
+      call take_plans(buffer, half, plans)
+      half = 0.0_wp
+      half(:size(spectrum)) = spectrum
+      call transform_back(half, buffer, plans)
+      signal = buffer/size(signal)
+   end subroutine get_signal
 
    !> Transform of a zero-padded record.
    subroutine transform_padded(record, length, signal, spectrum, plans)

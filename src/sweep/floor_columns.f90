@@ -78,7 +78,7 @@ contains
          values(:n_band) = impact%assessment%level(impact%assessment%first_band:, 2)
       end if
       if (case%has_room) values(n_band + 2:) = [room%level, room%a_weighted, get_a_weighted_level(room%bands(1)%set, &
-         room%level + get_standardization(room%reverberation_time, case%room%volume))]
+         room%level + get_standardization(room%reverberation_time, room%volume))]
    end subroutine get_floor_values
 
 end module thud_floor_columns

@@ -45,7 +45,7 @@ ceiling_mass = { value = 12, source = "data sheet" }
 
 def level_below(name: str) -> float:
     """Return the rating below a construction, by the fastest model of the ball."""
-    case = replace(thud.construction(name).case(), model=thud.HollowSphere(), ball=thud.Ball())
+    case = replace(thud.construction(name).case(), model=thud.HollowSphere())
     return thud.predict_level(thud.solve(case)).rating.a_weighted
 
 
@@ -66,7 +66,8 @@ def test_file_is_a_floor_whose_values_have_sources(path: Path) -> None:
     assert set(entry.sources) == set(stated)
     for key, cell in stated.items():
         assert SOURCE.search(cell["source"]), key
-        assert getattr(entry.floor, key, entry.room.get(key)) == cell["value"]
+        value = getattr(entry.floor, key, entry.room.get(key))
+        assert (list(value) if isinstance(value, tuple) else value) == cell["value"]
     cited = re.findall(r"\b(?:EN|ISO|DIN|ETA) \d[\d-]*", path.read_text(encoding="utf-8"))
     assert set(cited) <= CITED
     assert np.isfinite(thud.mobility(entry.floor, [31.5, 500.0])).all()
@@ -78,14 +79,15 @@ def test_mass_of_the_layers_is_that_of_the_keys(entry: thud.Construction) -> Non
     if isinstance(floor, thud.JoistFloor):
         joists = floor.joist_density * floor.joist_width * floor.joist_height / floor.spacing
         mass = floor.sheathing_thickness * floor.sheathing_density + joists
+    elif isinstance(floor, thud.LaminateFloor):
+        mass = sum(floor.layer_thickness) * floor.density + floor.added_mass
     else:
-        assert isinstance(floor, thud.Plate | thud.FloatingFloor)
+        assert isinstance(floor, thud.Plate)
         mass = floor.thickness * floor.density
-    if isinstance(floor, thud.FloatingFloor):
-        mass += floor.screed_thickness * floor.screed_density
+    mass += floor.screed_thickness * floor.screed_density
     mass += entry.room.get("ceiling_mass", 0.0)
     # Neither the resilient layer nor the air is in the keys.
-    light = ("mineral wool", "polystyrene", "cavity")
+    light = ("mineral wool", "polystyrene", "wood fiber", "cavity")
     layers = sum(
         layer.thickness * layer.density
         for layer in entry.layers
@@ -100,7 +102,6 @@ def test_mass_of_the_layers_is_that_of_the_keys(entry: thud.Construction) -> Non
         ("concrete 140", "concrete_140"),
         ("concrete 180, ceiling", "concrete_180_ceiling"),
         ("concrete 220", "concrete_220"),
-        ("CLT 200", "clt_200"),
         ("joists, 1 board", "joists"),
     ],
 )
@@ -116,11 +117,11 @@ def test_construction_agrees_with_the_case_of_this_floor(name: str, case: str) -
             other = getattr(known.floor, key)
             is_number = isinstance(value, float)
             assert value == (pytest.approx(other, rel=0.005) if is_number else other), key
-    assert (ours.ball, ours.drop, ours.model) == (known.ball, known.drop, known.model)
     assert ours.room is not None
     assert known.room is not None
-    for key in ("volume", "ceiling_mass", "ceiling_depth", "ceiling_loss_factor"):
-        if key == "volume" or known.room.ceiling_mass:
+    assert ours.room.ceiling_mass == known.room.ceiling_mass
+    if known.room.ceiling_mass:
+        for key in ("ceiling_depth", "ceiling_loss_factor"):
             assert getattr(ours.room, key) == getattr(known.room, key)
 
 
@@ -132,15 +133,25 @@ def test_construction_agrees_with_the_case_of_this_floor(name: str, case: str) -
         ["concrete 200", *(f"concrete 200, screed on {s} MN/m3" for s in (20, 15, 10, 6))],
         ["concrete 200, screed on 10 MN/m3", "concrete 200, screed 70 on 10 MN/m3"],
         [f"hollow core {h}" for h in (200, 265, 320)],
-        [f"CLT {h}" for h in (140, 160, 200, 240)],
-        ["CLT 160", "CLT 160, gravel", "CLT 160, gravel, screed on 10 MN/m3"],
-        [f"joists, {n}" for n in ("1 board", "2 boards", "3 boards")],
-        [
-            "joists, 3 boards",
-            "joists, 3 boards, rigid subceiling",
-            "joists, 3 boards, resilient subceiling",
-            "joists, 3 boards, double resilient subceiling",
-        ],
+        *(
+            pytest.param(names, marks=pytest.mark.slow)
+            for names in (
+                [f"CLT {h}" for h in (140, 160, 200, 240)],
+                ["CLT 160", "CLT 160, gravel", "CLT 160, gravel, screed on 10 MN/m3"],
+                [
+                    f"joists, 1 board{top}"
+                    for top in ("", ", dry screed on 30 MN/m3", ", screed on 10 MN/m3")
+                ],
+                ["joists, 1 board", "joists, 2 boards", "joists, 3 boards"],
+                [
+                    f"joists, 3 boards{below}"
+                    for below in (
+                        *("", ", rigid subceiling", ", resilient subceiling"),
+                        ", double resilient subceiling",
+                    )
+                ],
+            )
+        ),
     ],
     ids=lambda names: names[0],
 )
@@ -203,7 +214,7 @@ def test_rows_state_value_unit_and_source() -> None:
     rows = {row[0]: row[1:] for row in thud.construction("concrete 180, ceiling").rows()}
     assert rows["thickness"] == ("0.18", "m", "nominal")
     assert rows["ceiling_mass"] == ("9", "kg/m2", "estimate: 12.5 mm of gypsum board")
-    assert rows["edges"][0] == "laboratory"
+    assert rows["edges"][0] == "building"
 
 
 def test_section_has_a_bar_and_a_label_for_each_layer() -> None:
@@ -283,7 +294,7 @@ def test_file_of_the_page_is_a_construction(tmp_path: Path) -> None:
     (tmp_path / "my_floor.toml").write_text(block)
     entry = thud.construction(tmp_path / "my_floor.toml")
     assert entry.name == "concrete 200, my mat"
-    assert entry.floor == thud.FloatingFloor(
+    assert entry.floor == thud.Plate(
         thickness=0.2, screed_thickness=0.06, layer_stiffness=1.2e7, layer_loss_factor=0.15
     )
 

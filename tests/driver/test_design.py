@@ -186,15 +186,17 @@ def test_what_is_no_map_is_reported(parameters: dict[str, Any]) -> None:
 def room_design(tmp_path_factory: pytest.TempPathFactory) -> thud.Design:
     """Return a map of floors by the shell model, in a room with two reverberation times."""
     path = tmp_path_factory.mktemp("room") / "deck.nml"
-    room = thud.Room(volume=60.0, reverberation_times=(*6 * (0.5,), *6 * (0.6,)))
-    case = thud.construction("concrete 180, screed on 10 MN/m3").case(thud.Case(room=room))
+    room = thud.Room(volume=60.0, reverberation_time=(*6 * (0.5,), *6 * (0.6,)))
+    case = thud.construction("concrete 180, screed on 10 MN/m3").case(
+        thud.Case(model=thud.HollowSphere(), room=room)
+    )
     thud.write_case(case, path)
     return thud.design(
         {
             "case": str(path),
             "parameters": {
                 "thickness": {"values": [160, 240, 300], "unit": "mm"},
-                "floating_floor.layer_stiffness": {"values": [4, 8, 30], "unit": "MN/m3"},
+                "plate.layer_stiffness": {"values": [4, 8, 30], "unit": "MN/m3"},
             },
         }
     )
@@ -205,7 +207,7 @@ def test_octave_rating_is_that_of_single_predictions(room_design: thud.Design) -
     assert found is not None
     assert found.dims == room_design.axes
     case = thud.read_case(Path(str(room_design.dataset.attrs["study"]).split('"')[3]))
-    assert isinstance(case.floor, thud.FloatingFloor)
+    assert isinstance(case.floor, thud.Plate)
     for i, thickness in enumerate(room_design.dataset["thickness"].values):
         for j, stiffness in enumerate(room_design.dataset[room_design.axes[1]].values):
             floor = replace(case.floor, thickness=thickness, layer_stiffness=stiffness)

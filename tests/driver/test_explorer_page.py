@@ -13,6 +13,7 @@ from conftest import REPOSITORY
 from explorer_server import Served, serve
 
 import thud
+from thud.base._schema import ROOM_SOURCE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -231,6 +232,10 @@ def test_floor_and_room_are_shown(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
     page.locator("#has_room").check()
     sync_api.expect(page.locator("#room_text")).to_contain_text("standardized")
+    # The source of a room whose case names none.
+    sync_api.expect(page.locator("#model")).to_have_value(ROOM_SOURCE.name)
+    sync_api.expect(page.locator("[id='modal_ball.loss_factor']")).to_have_value("0.3")
+    page.locator("#model").select_option("hollow_sphere")
     page.locator("#floor").select_option("joist_floor")
     sync_api.expect(page.locator("#floor_title")).to_contain_text("joist floor")
     sync_api.expect(page.locator("#floor_text")).to_contain_text("energy into the floor 2.7")
@@ -254,24 +259,24 @@ def test_construction_fills_floor_and_ceiling(browser: Browser, server: Served) 
     name = "concrete 180, screed on 15 MN/m3, ceiling"
     sync_api.expect(text).to_be_hidden()
     chosen.select_option(name)
-    sync_api.expect(page.locator("#floor")).to_have_value("floating_floor")
+    sync_api.expect(page.locator("#floor")).to_have_value("plate")
     sync_api.expect(page.locator("#has_room")).to_be_checked()
     for key, value in {
-        "floating_floor.thickness": "180", "floating_floor.layer_stiffness": "15",
-        "floating_floor.source_x": "0.4", "room.ceiling_mass": "9",
+        "plate.thickness": "180", "plate.layer_stiffness": "15",
+        "plate.source_x": "0.4", "room.ceiling_mass": "9",
     }.items():  # fmt: skip
         sync_api.expect(page.locator(f"[id='{key}']")).to_have_value(value)
     sync_api.expect(text).to_contain_text("20 mm mineral wool, 180 mm concrete")
-    help_text = page.locator("[id='floating_floor.layer_stiffness.help']")
+    help_text = page.locator("[id='plate.layer_stiffness.help']")
     sync_api.expect(help_text).to_contain_text("EN 29052-1")
     sync_api.expect(page.locator("#room_text")).to_contain_text("standardized")
     page.locator("#pin").click()
     # Another value is none of the library, and has no source.
-    fill(page, "floating_floor.layer_stiffness", "14")
+    fill(page, "plate.layer_stiffness", "14")
     sync_api.expect(chosen).to_have_value("")
     sync_api.expect(text).to_be_hidden()
     sync_api.expect(help_text).not_to_contain_text("EN 29052-1")
-    fill(page, "floating_floor.layer_stiffness", "15")
+    fill(page, "plate.layer_stiffness", "15")
     sync_api.expect(chosen).to_have_value(name)
     # A floor without ceiling takes it away; of two equal floors the chosen one is shown.
     chosen.select_option("filigree slab 200")
@@ -280,8 +285,8 @@ def test_construction_fills_floor_and_ceiling(browser: Browser, server: Served) 
     sync_api.expect(chosen).to_have_value("filigree slab 200")
     sync_api.expect(page.locator("#variants li")).to_have_text(
         [
-            re.compile("Hollow sphere Floor: filigree slab 200, Room below"),
-            re.compile(f"A: Hollow sphere Floor: {name}, Room below"),
+            re.compile("Modal ball.*Floor: filigree slab 200, Room below"),
+            re.compile(f"A: Modal ball.*Floor: {name}, Room below"),
         ]
     )
     page.locator("#reset").click()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,9 +30,9 @@ def many() -> thud.Ensemble:
     return thud.solve_many(parameters, CASE, threads=2)
 
 
-@pytest.mark.parametrize("model", ["hollow_sphere", "modal_ball"])
-def test_each_floor_has_the_numbers_of_a_single_prediction(model: thud.ModelName) -> None:
-    many = thud.solve_many({"plate.thickness": THICKNESSES}, CASE, model=model)
+@pytest.mark.parametrize("model", [thud.HollowSphere(), thud.ModalBall()])
+def test_each_floor_has_the_numbers_of_a_single_prediction(model: thud.ModelOptions) -> None:
+    many = thud.solve_many({"plate.thickness": THICKNESSES}, replace(CASE, model=model))
     blocked = thud.solve(model=model)
     for i, thickness in enumerate(THICKNESSES):
         floor = thud.Plate(thickness=thickness)
@@ -124,7 +125,7 @@ def test_studies_vary_floors_and_rooms(tmp_path: Path, many: thud.Ensemble) -> N
     thud.plot.save(thud.plot.draw_design(found), tmp_path / "map.png")
     assert found.dataset["room_level"].dims[-1] == "room_third"
     draws = {"kind": "random", "size": 4}
-    parameters = {"reverberation_time": {"low": 0.4, "high": 0.6}}
+    parameters = {"reverberation_time(1)": {"low": 0.4, "high": 0.6}}
     spread = thud.uncertainty({"case": str(path), "parameters": parameters, "design": draws})
     assert any(row[0] == "rating, standardized" for row in spread.rows())
     dataset = many.to_xarray()

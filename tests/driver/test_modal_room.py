@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-FLOOR = thud.Plate(length=4.5, width=3.7, thickness=0.16)
+FLOOR = thud.Plate(length=4.5, width=3.7, thickness=0.16, edges="laboratory")
 ROOM = thud.Room(volume=40.0, reverberation_time=0.4)
 SIZE = np.array([4.5, 3.7, 40 / (4.5 * 3.7)])
 BALL = np.array([1.1, 2.3])

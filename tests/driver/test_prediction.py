@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pytest
@@ -13,8 +13,9 @@ from conftest import REPOSITORY, naming, recorded
 
 import thud
 from thud import plot
-from thud.base import bridge
+from thud.base import _schema, bridge
 from thud.base.errors import ReportWarning
+from thud.case.case import tables_case
 from thud.cli import main
 from thud.floors.prediction import _force_change
 from thud.level.assessment import octave_limits
@@ -23,10 +24,11 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from conftest import CaseFile, Run
+    from numpy.typing import NDArray
 
 FLOORS = REPOSITORY / "inputs" / "floors"
 PLATE = "&plate\n thickness = 0.2\n/\n"
-FLOOR_CASE = f"&ball /\n&drop /\n&model /\n&floor name = 'plate' /\n{PLATE}"
+FLOOR_CASE = f"&ball /\n&drop /\n&model name = 'hollow_sphere' /\n&floor name = 'plate' /\n{PLATE}"
 ROOM_CASE = f"{FLOOR_CASE}&room\n volume = 40\n/\n"
 # Exact mid frequencies of the one-third-octave bands from 50 to 630 Hz, Hz.
 BAND_CENTERS = 1000 * 10 ** (np.arange(-13, -1) / 10)
@@ -61,7 +63,7 @@ def test_executable_tells_of_a_floor_that_gives_way(
     text = ROOM_CASE.replace("0.2", f"{thickness}")
     modes = "frequency = 24, 89\n damping_ratio = 0.05, 0.1\n effective_mass = 2.4, 0.1"
     model = f"&model name = 'measured_modes' /\n&measured_modes {modes} /"
-    blocked = text.replace("&model /", model)
+    blocked = text.replace("&model name = 'hollow_sphere' /", model)
     done = run(case_file(blocked), "-o", "out")
     assert done.returncode == 0, done.stderr
     assert ("rigid floor" in done.stdout) == told
@@ -94,7 +96,7 @@ def test_standardization_takes_room_and_reverberation_out(shell: thud.Impact) ->
     larger = thud.predict_level(shell, thud.Plate(), thud.Room(volume=100.0))
     assert larger.level == pytest.approx(reference.level - 10 * np.log10(2), abs=0.1)
     times = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5)
-    longer = thud.predict_level(shell, thud.Plate(), thud.Room(reverberation_times=times))
+    longer = thud.predict_level(shell, thud.Plate(), thud.Room(reverberation_time=times))
     assert longer.reverberation_time.tolist() == list(times)
     assert (longer.level[2:] > reference.level[2:]).all()
 
@@ -143,7 +145,7 @@ def test_inputs_of_floors_are_cases(name: str) -> None:
     case = thud.read_case(FLOORS / f"{name}.nml")
     assert isinstance(case.floor, thud.Plate)
     assert case.floor.thickness == int(name[-3:]) / 1000
-    assert case.room == thud.Room()
+    assert case.room == thud.Room(volume=50.0)
 
 
 @pytest.mark.parametrize(
@@ -155,7 +157,7 @@ def test_inputs_of_floors_are_cases(name: str) -> None:
         (ROOM_CASE.replace("'plate'", "'plat'"), naming("'plat'", "'plate'")),
         ("&model /\n&plate /\n", naming("&plate", "line 2", "&floor")),
         (ROOM_CASE.replace("0.2", "-0.2"), naming("&plate: thickness", -0.2)),
-        (ROOM_CASE.replace("volume = 40", "volume = 0"), naming("&room: volume", 0.0)),
+        (ROOM_CASE.replace("volume = 40", "volume = -1"), naming("&room: volume", -1.0)),
         (
             ROOM_CASE.replace("volume = 40", "wall_lengths = 9, 9.5"),
             naming("wall_lengths", "18.5 m"),
@@ -166,8 +168,8 @@ def test_inputs_of_floors_are_cases(name: str) -> None:
         ),
         (ROOM_CASE.replace("volume = 40", "wall_junction = 'x'"), naming("wall_junction", "'x'")),
         (
-            ROOM_CASE.replace("volume = 40", "reverberation_times = 1, 2"),
-            naming("reverberation_times", 2, 12),
+            ROOM_CASE.replace("volume = 40", "reverberation_time = 1, 2"),
+            naming("reverberation_time", 2, 4, 12),
         ),
         (ROOM_CASE.replace("thickness", "thicknes"), naming("thicknes", "'thickness'")),
     ],
@@ -211,7 +213,7 @@ def test_walls_ceiling_octaves_and_history_are_written(
     assert room.wall_lengths == (5, 4)
     found = thud.predict_level(shell, thud.Plate(thickness=0.2), room)
     bare = thud.predict_level(shell, thud.Plate(thickness=0.2), thud.Room(volume=40.0))
-    assert (found.level[6:] < bare.level[6:] - 10).all()
+    assert (found.level[6:] < bare.level[6:] - 8).all()
     assert f"{found.spread[0]:.1f} to" in found.warnings[0]
 
 
@@ -292,7 +294,9 @@ def test_floor_radiates_no_more_than_it_loses(shell: thud.Impact) -> None:
 def test_share_that_is_radiated_is_that_of_one_side() -> None:
     """It is rho c sigma/(m'' omega eta), with two sides and the inner losses where eta is less."""
     impact, room = thud.solve(), thud.Room(air_density=1.19, sound_speed=340.0)
-    light = thud.Plate(thickness=0.1, density=45, wave_speed=4600, loss_factor=0.02)
+    light = thud.Plate(
+        thickness=0.1, density=45, wave_speed=4600, loss_factor=0.02, edges="laboratory"
+    )
     least = []
     for floor in (thud.Plate(thickness=0.2), light):
         found = thud.predict_level(impact, floor, room)
@@ -422,3 +426,95 @@ def test_unusual_height_of_the_room_is_named(
     prediction = thud.predict_level(shell, thud.Plate(), thud.Room(volume=volume))
     found = [warning for warning in prediction.warnings if "m high" in warning]
     assert [f"{height} m high" in warning for warning in found] == [True] * bool(height)
+
+
+def test_walls_take_their_power_from_the_losses_of_the_edges(shell: thud.Impact) -> None:
+    """Nothing is lost twice: walls behind soft junctions change nothing, stiff ones take all.
+
+    The contact force depends a little on the losses at the edges: 0.003 dB.
+    """
+
+    def level(edges: Literal["building", "absorption"], **walls: object) -> NDArray[np.float64]:
+        room = thud.Room(**walls)  # type: ignore[arg-type]
+        return thud.predict_level(shell, thud.Plate(edges=edges), room).level
+
+    walls: dict[str, object] = {"wall_lengths": (5, 4, 5, 4), "wall_junction": "index"}
+    soft, stiff = ({**walls, "junction_index": index} for index in (80, -5))
+    assert level("building", **soft) == pytest.approx(level("building"), abs=5e-3)
+    assert level("building", **stiff) == pytest.approx(level("absorption", **stiff), abs=5e-3)
+    assert (level("absorption") > level("building") + 1).all()
+
+
+def test_source_of_a_room_that_names_none_conforms(run: Run, case_file: CaseFile) -> None:
+    """One rule for files, Python, tables of studies and samples."""
+    room: dict[str, Any] = {"floor": thud.Plate(), "room": thud.Room()}
+    impact = thud.solve(**room)
+    assert impact.assess().conforms
+    assert impact.on_floor is not None
+    assert impact.on_floor.assess().conforms
+    assert impact.case.model == thud.Case(**room).model == _schema.ROOM_SOURCE
+    found = thud.predict_level(**room)
+    assert not found.source_warnings
+    assert impact.room_level is not None
+    assert found.level == pytest.approx(impact.room_level.level, abs=1e-12)
+    tables = {"floor": {"name": "plate"}, "room": {}}
+    assert tables_case(tables).model == _schema.ROOM_SOURCE
+    assert thud.solve_many({}, tables_case(tables)).room_rating == pytest.approx(
+        [found.rating.a_weighted], abs=1e-9
+    )
+    for text in (
+        "&floor name = 'plate' /\n&room /\n",
+        "&model /\n&floor name = 'plate' /\n&room /\n",
+    ):
+        file = case_file(text)
+        assert thud.read_case(file).model == _schema.ROOM_SOURCE
+        assert thud.Case.from_text(text).model == _schema.ROOM_SOURCE
+    done = run(file, "-o", "out")
+    assert f"L_iA,Fmax {found.rating.rounded} dB ({found.rating.a_weighted:.2f})" in done.stdout
+    assert "does not conform" not in done.stderr
+
+
+def test_named_and_stated_sources_of_a_room_are_kept(case_file: CaseFile) -> None:
+    room: dict[str, Any] = {"floor": thud.Plate(), "room": thud.Room()}
+    assert thud.Case(**room, model=thud.HollowSphere()).model == thud.HollowSphere()
+    assert replace(thud.Case(), **room).model == thud.HollowSphere()
+    assert thud.solve(**room, model="modal_ball").case.model == thud.ModalBall()
+    assert thud.Case(**room, model=None).model is None
+    # Options without a name are those of the modal ball.
+    expected = replace(_schema.ROOM_SOURCE, loss_factor=0.2)
+    assert thud.solve(**room, loss_factor=0.2).case.model == expected
+    text = "&modal_ball loss_factor = 0.2 /\n&floor name = 'plate' /\n&room /\n"
+    assert thud.read_case(case_file(text)).model == expected
+    assert thud.Case.from_text(text).model == expected
+    with pytest.raises(thud.InputError, match=naming("momentum_flux", "HollowSphere")):
+        thud.solve(**room, momentum_flux="none")
+    with pytest.raises(thud.InputError, match=naming("floor is missing")):
+        thud.predict_level()
+
+
+def test_room_has_the_dimensions_that_are_stated(shell: thud.Impact) -> None:
+    floor = thud.Plate(length=6.0, width=3.0)
+
+    def predict(**keys: Any) -> thud.RoomPrediction:  # noqa: ANN401 - of any key
+        return thud.predict_level(shell, floor, thud.Room(**keys))
+
+    assert predict().volume == pytest.approx(45.0)
+    assert predict(height=3.0).volume == pytest.approx(54.0)
+    assert predict(height=3.0).level == pytest.approx(predict(volume=54.0).level, abs=1e-12)
+    assert predict(height=3.0).standardized == pytest.approx(predict(volume=54.0).standardized)
+    small = predict(length=4.0, height=2.5)
+    assert small.volume == pytest.approx(30.0)
+    assert any("12.0 m2" in word and "18.0 m2" in word for word in small.warnings)
+    with pytest.raises(thud.InputError, match=naming("volume", "60.0 m3", "45.0 m3")):
+        predict(height=2.5, volume=60.0)
+
+
+def test_reverberation_time_is_one_number_or_a_list() -> None:
+    room = thud.Room(reverberation_time=0.8)
+    assert room == thud.Room(reverberation_time=(0.8,)) == thud.Room(reverberation_time=[0.8])
+    octaves = thud.predict_level(
+        floor=thud.Plate(), room=thud.Room(reverberation_time=(0.9, 0.6, 0.5, 0.4))
+    )
+    assert octaves.reverberation_time.tolist() == [0.9] * 3 + [0.6] * 3 + [0.5] * 3 + [0.4] * 3
+    with pytest.raises(thud.InputError, match=naming("reverberation_time", "empty")):
+        thud.Room(reverberation_time=())

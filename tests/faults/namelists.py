@@ -282,7 +282,7 @@ def _usual() -> dict[tuple[str, str, str], float]:
         ("plate", "point_x"): 1.0, ("plate", "point_y"): 1.0,
         ("floating_floor", "point_x"): 1.0, ("floating_floor", "point_y"): 1.0,
         ("joist_floor", "point_x"): 1.0, ("joist_floor", "point_y"): 1.0,
-        ("room", "reverberation_times"): 0.5, ("room", "wall_lengths"): 4.0,
+        ("room", "reverberation_time"): 0.5, ("room", "wall_lengths"): 4.0,
         ("modal_ball", "static_families"): 12.0,
     }  # fmt: skip
     found |= {(owner, owner, name): value for (owner, name), value in lists.items()}

@@ -33,7 +33,7 @@ def draw_differences(
     found, expected = [], []
     for _ in range(count):
         length, width, thickness, height = (draw.uniform(*ends) for ends in ranges)
-        floor = thud.Plate(length=length, width=width, thickness=thickness)
+        floor = thud.Plate(length=length, width=width, thickness=thickness, edges="laboratory")
         room = thud.Room(volume=length * width * height)
         size = np.array([length, width, height])
         balls, microphones = (

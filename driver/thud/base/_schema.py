@@ -21,13 +21,13 @@ __all__ = [
     "Compression",
     "Drop",
     "FiniteElement",
-    "FloatingFloor",
     "FloorName",
     "FloorOptions",
     "HollowSphere",
     "HuntCrossley",
     "InfinitePlate",
     "JoistFloor",
+    "LaminateFloor",
     "Levels",
     "Limits",
     "MeasuredMobility",
@@ -69,15 +69,22 @@ FloorName = Literal[
     "infinite_plate",
     "oscillator",
     "plate",
-    "floating_floor",
+    "laminate_floor",
     "joist_floor",
     "measured_mobility",
 ]
-PlateEdges = Literal["laboratory", "absorption"]
-FloatingFloorEdges = Literal["laboratory", "absorption"]
-JoistFloorSourceOn = Literal["sheathing", "joist"]
+PlateEdges = Literal["building", "laboratory", "absorption"]
+PlateSupport = Literal["simple", "clamped", "free", "elastic"]
+PlateScreedEdges = Literal["simple", "free", "strip"]
+LaminateFloorSupport = Literal["simple", "clamped", "free", "elastic"]
+LaminateFloorScreedEdges = Literal["simple", "free", "strip"]
+JoistFloorSourceOn = Literal["sheathing", "joist", "position"]
+JoistFloorSupport = Literal["simple", "clamped", "free", "elastic"]
+JoistFloorScreedEdges = Literal["simple", "free", "strip"]
 RoomReverberationOf = Literal["finished", "bare"]
 RoomWallJunction = Literal["cross", "t", "index"]
+RoomRadiation = Literal["modes", "iso_12354"]
+RoomPositions = Literal["standard", "even"]
 BandSet = Literal["octave", "third"]
 
 
@@ -270,13 +277,17 @@ class Room(Group):
 
     Attributes
     ----------
+    length : float
+        Length of the room; 0: that of the floor, m; 0 <= length <= 100.
+    width : float
+        Width of the room; 0: that of the floor, m; 0 <= width <= 100.
+    height : float
+        Height of the room; 0: from the volume, without it 2.5 m, m; 0 <= height <= 100.
     volume : float
-        Volume of the room, m3; 1 <= volume <= 100000.
-    reverberation_time : float
-        Reverberation time of the room, s; 0.05 <= reverberation_time <= 20.
-    reverberation_times : sequence of float
-        Reverberation time in each one-third-octave band from 50 to 630 Hz, s; 0.05 <=
-        reverberation_times <= 20.
+        Volume of the room; 0: length times width times height, m3; 0 <= volume <= 100000.
+    reverberation_time : float | sequence of float
+        Reverberation time of the room: one, 4 for octaves or 12 for one-third octaves, s; 0.05 <=
+        reverberation_time <= 20.
     reverberation_of : str
         Room of the reverberation time: finished, or bare, without floor, walls and ceiling;
         "finished", "bare".
@@ -309,11 +320,22 @@ class Room(Group):
         Depth of the air cavity above the ceiling, m; 0.01 <= ceiling_depth <= 2.
     ceiling_loss_factor : float
         Loss factor of the ceiling cavity; 0.001 <= ceiling_loss_factor <= 1.
+    corner_x : float
+        Position of the room along the length of a larger floor, m; 0 <= corner_x < 100.
+    corner_y : float
+        Position of the room along the width of a larger floor, m; 0 <= corner_y < 100.
+    radiation : str
+        Radiation factor of the floor, by its modes or by ISO 12354-1; "modes", "iso_12354".
+    positions : str
+        Positions of ball and microphone in the modal room: 5 standard ones each, or 16 even ones
+        each; "standard", "even".
     """
 
-    volume: float = 50.0
-    reverberation_time: float = 0.5
-    reverberation_times: Sequence[float] = ()
+    length: float = 0.0
+    width: float = 0.0
+    height: float = 0.0
+    volume: float = 0.0
+    reverberation_time: float | Sequence[float] = (0.5,)
     reverberation_of: RoomReverberationOf = "finished"
     air_density: float = 1.2
     sound_speed: float = 343.0
@@ -328,6 +350,10 @@ class Room(Group):
     ceiling_mass: float = 0.0
     ceiling_depth: float = 0.1
     ceiling_loss_factor: float = 0.3
+    corner_x: float = 0.0
+    corner_y: float = 0.0
+    radiation: RoomRadiation = "modes"
+    positions: RoomPositions = "standard"
 
 
 @dataclass(frozen=True, eq=False)
@@ -619,14 +645,55 @@ class Plate(Group):
     loss_factor : float
         Internal loss factor of the floor; 0 <= loss_factor <= 1.
     edges : str
-        Losses at the edges of the floor; "laboratory", "absorption".
+        Losses at the edges of the floor; "building", "laboratory", "absorption".
     edge_absorption : float
         Sum of edge lengths times absorption coefficients, for absorption, m; 0 <= edge_absorption
         <= 1000.
     source_x : float
-        Relative source position along the length; levels in the room are means; 0 < source_x < 1.
+        Relative source position along the length; statistical levels in the room are means; 0 <
+        source_x < 1.
     source_y : float
         Relative source position along the width; 0 < source_y < 1.
+    support : str
+        Support of the edges; "simple", "clamped", "free", "elastic".
+    support_stiffness : sequence of float
+        Stiffness of elastic edges against deflection per length: 1 value or x = 0, x = length, y =
+        0, y, N/m2; 0 <= support_stiffness <= 1e+14.
+    support_rotation : sequence of float
+        Stiffness of elastic edges against rotation per length: 1 or 4 values, N; 0 <=
+        support_rotation <= 1e+14.
+    line_x : sequence of float
+        Positions along the length of walls or beams on which the floor rests, m; 0 < line_x < 100.
+    line_y : sequence of float
+        Positions along the width of walls or beams on which the floor rests, m; 0 < line_y < 100.
+    screed_thickness : float
+        Thickness of a floating plate; 0: none, m; 0 <= screed_thickness <= 0.5.
+    screed_density : float
+        Density of the floating plate, kg/m3; 10 <= screed_density <= 20000.
+    screed_wave_speed : float
+        Speed of longitudinal waves in the floating plate, m/s; 100 <= screed_wave_speed <= 10000.
+    screed_loss_factor : float
+        Loss factor of the floating plate; 0 <= screed_loss_factor <= 1.
+    layer_stiffness : float
+        Dynamic stiffness of the resilient layer per unit area (ISO 9052-1), N/m3; 10000 <=
+        layer_stiffness <= 1e+12.
+    layer_loss_factor : float
+        Loss factor of the resilient layer; 0 <= layer_loss_factor <= 1.
+    screed_edges : str
+        Edges of the floating plate; "simple", "free", "strip".
+    strip_stiffness : float
+        Stiffness of edge strips against vertical motion per length, for strip, N/m2; 0 <=
+        strip_stiffness <= 1e+12.
+    bridge_x : sequence of float
+        Positions along the length of bridges through the layer, m; 0 < bridge_x < 100.
+    bridge_y : sequence of float
+        Positions along the width of these bridges, m; 0 < bridge_y < 100.
+    bridge_stiffness : float
+        Stiffness of one bridge, N/m; 1000 <= bridge_stiffness <= 1e+12.
+    covering_stiffness : float
+        Stiffness of a covering under the source; 0: none, N/m; 0 <= covering_stiffness <= 1e+12.
+    covering_loss_factor : float
+        Loss factor of the covering at 50 Hz; 0.01 <= covering_loss_factor <= 2.
     point_x : sequence of float
         Positions along the length of points whose velocity is computed, m; 0 <= point_x <= 1000.
     point_y : sequence of float
@@ -642,45 +709,84 @@ class Plate(Group):
     stiffness_ratio: float = 1.0
     torsion_ratio: float = 1.0
     loss_factor: float = 0.005
-    edges: PlateEdges = "laboratory"
+    edges: PlateEdges = "building"
     edge_absorption: float = 0.0
     source_x: float = 0.5
     source_y: float = 0.5
+    support: PlateSupport = "simple"
+    support_stiffness: Sequence[float] = ()
+    support_rotation: Sequence[float] = ()
+    line_x: Sequence[float] = ()
+    line_y: Sequence[float] = ()
+    screed_thickness: float = 0.0
+    screed_density: float = 2000.0
+    screed_wave_speed: float = 3500.0
+    screed_loss_factor: float = 0.03
+    layer_stiffness: float = 10000000.0
+    layer_loss_factor: float = 0.1
+    screed_edges: PlateScreedEdges = "simple"
+    strip_stiffness: float = 1000000.0
+    bridge_x: Sequence[float] = ()
+    bridge_y: Sequence[float] = ()
+    bridge_stiffness: float = 100000000.0
+    covering_stiffness: float = 0.0
+    covering_loss_factor: float = 0.2
     point_x: Sequence[float] = ()
     point_y: Sequence[float] = ()
 
 
 @dataclass(frozen=True, eq=False)
-class FloatingFloor(Group):
-    """Floor ``floating_floor``.
+class LaminateFloor(Group):
+    """Floor ``laminate_floor``.
 
     Attributes
     ----------
     length : float
-        Length of the floor, m; 0.5 <= length <= 100.
+        Length of the floor, along layers of 0 degrees, m; 0.5 <= length <= 100.
     width : float
         Width of the floor, m; 0.5 <= width <= 100.
-    thickness : float
-        Thickness of the floor, m; 0.001 <= thickness <= 2.
+    layer_thickness : sequence of float
+        Thicknesses of the layers from the top (default: 40, 20, 40, 20, 40 mm), m; 0.003 <=
+        layer_thickness <= 0.5.
+    layer_angle : sequence of float
+        Directions of the layers, 0 (along the length) or 90 (default: alternating, beginning with
+        0), deg; 0 <= layer_angle <= 90.
+    youngs_modulus : float
+        Modulus of elasticity along the grain, Pa; 1e+08 <= youngs_modulus <= 1e+12.
+    cross_modulus : float
+        Modulus of elasticity across the grain, Pa; 0 <= cross_modulus <= 1e+12.
+    shear_modulus : float
+        Shear modulus along the grain, Pa; 1e+06 <= shear_modulus <= 1e+12.
+    rolling_shear_modulus : float
+        Modulus of rolling shear, Pa; 1e+06 <= rolling_shear_modulus <= 1e+12.
+    torsion_factor : float
+        Fraction of the torsional stiffness that joints between boards leave; 0 <= torsion_factor
+        <= 1.
     density : float
-        Density of the floor, kg/m3; 10 <= density <= 20000.
-    wave_speed : float
-        Speed of longitudinal waves in the floor, m/s; 100 <= wave_speed <= 10000.
-    stiffness_ratio : float
-        Ratio of the bending stiffness along the width to that along the length; 0.0001 <=
-        stiffness_ratio <= 10000.
-    torsion_ratio : float
-        Ratio of the twisting stiffness to the geometric mean of both bending stiffnesses; 0 <=
-        torsion_ratio <= 1.
+        Density of the layers, kg/m3; 10 <= density <= 20000.
+    added_mass : float
+        Mass without stiffness on the plate, as gravel, kg/m2; 0 <= added_mass <= 1000.
     loss_factor : float
-        Internal loss factor of the floor; 0 <= loss_factor <= 1.
-    edges : str
-        Losses at the edges of the floor; "laboratory", "absorption".
-    edge_absorption : float
-        Sum of edge lengths times absorption coefficients, for absorption, m; 0 <= edge_absorption
-        <= 1000.
+        Loss factor of the floor including its edges, without radiation; 0 < loss_factor <= 1.
+    source_x : float
+        Relative source position along the length; statistical levels in the room are means; 0 <
+        source_x < 1.
+    source_y : float
+        Relative source position along the width; 0 < source_y < 1.
+    support : str
+        Support of the edges; "simple", "clamped", "free", "elastic".
+    support_stiffness : sequence of float
+        Stiffness of elastic edges against deflection per length: 1 value or x = 0, x = length, y =
+        0, y, N/m2; 0 <= support_stiffness <= 1e+14.
+    support_rotation : sequence of float
+        Stiffness of elastic edges against rotation per length: 1 or 4 values, N; 0 <=
+        support_rotation <= 1e+14.
+    line_x : sequence of float
+        Positions along the length of walls or beams on which the floor rests, m; 0 < line_x < 100.
+    line_y : sequence of float
+        Positions along the width of walls or beams on which the floor rests, m; 0 < line_y < 100.
     screed_thickness : float
-        Thickness of the floating plate, m; 0.003 <= screed_thickness <= 0.5.
+        Thickness of a floating plate; 0: none, m; 0 <= screed_thickness <= 0.5.
     screed_density : float
         Density of the floating plate, kg/m3; 10 <= screed_density <= 20000.
     screed_wave_speed : float
@@ -692,35 +798,60 @@ class FloatingFloor(Group):
         layer_stiffness <= 1e+12.
     layer_loss_factor : float
         Loss factor of the resilient layer; 0 <= layer_loss_factor <= 1.
-    source_x : float
-        Relative source position along the length; levels in the room are means; 0 < source_x < 1.
-    source_y : float
-        Relative source position along the width; 0 < source_y < 1.
+    screed_edges : str
+        Edges of the floating plate; "simple", "free", "strip".
+    strip_stiffness : float
+        Stiffness of edge strips against vertical motion per length, for strip, N/m2; 0 <=
+        strip_stiffness <= 1e+12.
+    bridge_x : sequence of float
+        Positions along the length of bridges through the layer, m; 0 < bridge_x < 100.
+    bridge_y : sequence of float
+        Positions along the width of these bridges, m; 0 < bridge_y < 100.
+    bridge_stiffness : float
+        Stiffness of one bridge, N/m; 1000 <= bridge_stiffness <= 1e+12.
+    covering_stiffness : float
+        Stiffness of a covering under the source; 0: none, N/m; 0 <= covering_stiffness <= 1e+12.
+    covering_loss_factor : float
+        Loss factor of the covering at 50 Hz; 0.01 <= covering_loss_factor <= 2.
     point_x : sequence of float
         Positions along the length of points whose velocity is computed, m; 0 <= point_x <= 1000.
     point_y : sequence of float
         Positions of these points along the width, m; 0 <= point_y <= 1000.
     """
 
-    name: ClassVar[FloorName] = "floating_floor"
+    name: ClassVar[FloorName] = "laminate_floor"
     length: float = 5.0
     width: float = 4.0
-    thickness: float = 0.18
-    density: float = 2300.0
-    wave_speed: float = 3500.0
-    stiffness_ratio: float = 1.0
-    torsion_ratio: float = 1.0
-    loss_factor: float = 0.005
-    edges: FloatingFloorEdges = "laboratory"
-    edge_absorption: float = 0.0
-    screed_thickness: float = 0.05
+    layer_thickness: Sequence[float] = ()
+    layer_angle: Sequence[float] = ()
+    youngs_modulus: float = 11000000000.0
+    cross_modulus: float = 370000000.0
+    shear_modulus: float = 690000000.0
+    rolling_shear_modulus: float = 50000000.0
+    torsion_factor: float = 0.65
+    density: float = 470.0
+    added_mass: float = 0.0
+    loss_factor: float = 0.03
+    source_x: float = 0.5
+    source_y: float = 0.5
+    support: LaminateFloorSupport = "simple"
+    support_stiffness: Sequence[float] = ()
+    support_rotation: Sequence[float] = ()
+    line_x: Sequence[float] = ()
+    line_y: Sequence[float] = ()
+    screed_thickness: float = 0.0
     screed_density: float = 2000.0
     screed_wave_speed: float = 3500.0
     screed_loss_factor: float = 0.03
     layer_stiffness: float = 10000000.0
     layer_loss_factor: float = 0.1
-    source_x: float = 0.5
-    source_y: float = 0.5
+    screed_edges: LaminateFloorScreedEdges = "simple"
+    strip_stiffness: float = 1000000.0
+    bridge_x: Sequence[float] = ()
+    bridge_y: Sequence[float] = ()
+    bridge_stiffness: float = 100000000.0
+    covering_stiffness: float = 0.0
+    covering_loss_factor: float = 0.2
     point_x: Sequence[float] = ()
     point_y: Sequence[float] = ()
 
@@ -757,11 +888,53 @@ class JoistFloor(Group):
     loss_factor : float
         Loss factor of the floor including its edges, without radiation; 0 < loss_factor <= 1.
     source_x : float
-        Relative source position along the length; levels in the room are means; 0 < source_x < 1.
+        Relative source position along the length; statistical levels in the room are means; 0 <
+        source_x < 1.
     source_y : float
         Relative source position along the width; 0 < source_y < 1.
     source_on : str
-        Impact location: sheathing between joists, or a joist; "sheathing", "joist".
+        Impact location: midway between the next joists, on the next joist, or exactly the
+        position; "sheathing", "joist", "position".
+    support : str
+        Support of the edges; "simple", "clamped", "free", "elastic".
+    support_stiffness : sequence of float
+        Stiffness of elastic edges against deflection per length: 1 value or x = 0, x = length, y =
+        0, y, N/m2; 0 <= support_stiffness <= 1e+14.
+    support_rotation : sequence of float
+        Stiffness of elastic edges against rotation per length: 1 or 4 values, N; 0 <=
+        support_rotation <= 1e+14.
+    line_x : sequence of float
+        Positions along the length of walls or beams on which the floor rests, m; 0 < line_x < 100.
+    line_y : sequence of float
+        Positions along the width of walls or beams on which the floor rests, m; 0 < line_y < 100.
+    screed_thickness : float
+        Thickness of a floating plate; 0: none, m; 0 <= screed_thickness <= 0.5.
+    screed_density : float
+        Density of the floating plate, kg/m3; 10 <= screed_density <= 20000.
+    screed_wave_speed : float
+        Speed of longitudinal waves in the floating plate, m/s; 100 <= screed_wave_speed <= 10000.
+    screed_loss_factor : float
+        Loss factor of the floating plate; 0 <= screed_loss_factor <= 1.
+    layer_stiffness : float
+        Dynamic stiffness of the resilient layer per unit area (ISO 9052-1), N/m3; 10000 <=
+        layer_stiffness <= 1e+12.
+    layer_loss_factor : float
+        Loss factor of the resilient layer; 0 <= layer_loss_factor <= 1.
+    screed_edges : str
+        Edges of the floating plate; "simple", "free", "strip".
+    strip_stiffness : float
+        Stiffness of edge strips against vertical motion per length, for strip, N/m2; 0 <=
+        strip_stiffness <= 1e+12.
+    bridge_x : sequence of float
+        Positions along the length of bridges through the layer, m; 0 < bridge_x < 100.
+    bridge_y : sequence of float
+        Positions along the width of these bridges, m; 0 < bridge_y < 100.
+    bridge_stiffness : float
+        Stiffness of one bridge, N/m; 1000 <= bridge_stiffness <= 1e+12.
+    covering_stiffness : float
+        Stiffness of a covering under the source; 0: none, N/m; 0 <= covering_stiffness <= 1e+12.
+    covering_loss_factor : float
+        Loss factor of the covering at 50 Hz; 0.01 <= covering_loss_factor <= 2.
     point_x : sequence of float
         Positions along the length of points whose velocity is computed, m; 0 <= point_x <= 1000.
     point_y : sequence of float
@@ -784,6 +957,24 @@ class JoistFloor(Group):
     source_x: float = 0.5
     source_y: float = 0.5
     source_on: JoistFloorSourceOn = "sheathing"
+    support: JoistFloorSupport = "simple"
+    support_stiffness: Sequence[float] = ()
+    support_rotation: Sequence[float] = ()
+    line_x: Sequence[float] = ()
+    line_y: Sequence[float] = ()
+    screed_thickness: float = 0.0
+    screed_density: float = 2000.0
+    screed_wave_speed: float = 3500.0
+    screed_loss_factor: float = 0.03
+    layer_stiffness: float = 10000000.0
+    layer_loss_factor: float = 0.1
+    screed_edges: JoistFloorScreedEdges = "simple"
+    strip_stiffness: float = 1000000.0
+    bridge_x: Sequence[float] = ()
+    bridge_y: Sequence[float] = ()
+    bridge_stiffness: float = 100000000.0
+    covering_stiffness: float = 0.0
+    covering_loss_factor: float = 0.2
     point_x: Sequence[float] = ()
     point_y: Sequence[float] = ()
 
@@ -828,7 +1019,7 @@ FloorOptions = (
     | InfinitePlate
     | Oscillator
     | Plate
-    | FloatingFloor
+    | LaminateFloor
     | JoistFloor
     | MeasuredMobility
 )
@@ -843,13 +1034,16 @@ MODELS: dict[str, type[ModelOptions]] = {
     TwoMass.name: TwoMass,
 }
 
+# Source of a case with a room that names no model.
+ROOM_SOURCE = ModalBall(damping_law="rising", loss_factor=0.3)
+
 # Floors by name, the default first.
 FLOORS: dict[str, type[FloorOptions]] = {
     Rigid.name: Rigid,
     InfinitePlate.name: InfinitePlate,
     Oscillator.name: Oscillator,
     Plate.name: Plate,
-    FloatingFloor.name: FloatingFloor,
+    LaminateFloor.name: LaminateFloor,
     JoistFloor.name: JoistFloor,
     MeasuredMobility.name: MeasuredMobility,
 }
@@ -1037,7 +1231,7 @@ KEYS = (
     Key("compression", "compression", "gas", "choice", "", "gas in the ball: leaves through the hole (vented), or is sealed in", ('vented', 'isothermal', 'adiabatic')),
     Key("", "drop", "height", "real", "m", "height of the ball's lowest point above the floor", (), 1e-12, 1000000.0),
     Key("", "drop", "gravity", "real", "m/s2", "acceleration of free fall", (), 1e-12, 1000.0),
-    Key("", "model", "name", "choice", "", "source model", ('hollow_sphere', 'modal_ball', 'finite_element', 'measured_modes', 'hunt_crossley', 'two_mass')),
+    Key("", "model", "name", "choice", "", "source model (default with &room: a modal ball that conforms)", ('hollow_sphere', 'modal_ball', 'finite_element', 'measured_modes', 'hunt_crossley', 'two_mass')),
     Key("hollow_sphere", "hollow_sphere", "momentum_flux", "choice", "", "term for the momentum of wall that enters or leaves the flat cap", ('momentum_balance', 'retarding', 'conservative', 'none')),
     Key("modal_ball", "modal_ball", "highest_frequency", "real", "Hz", "highest frequency of oscillating modes; faster ones follow without inertia; 0: automatic", (), 0.0, 20000.0),
     Key("modal_ball", "modal_ball", "rings", "whole", "", "number of rings on the surface, from the lowest point to 60 degrees; 0: automatic", (), 0.0, 400.0, True),
@@ -1097,7 +1291,7 @@ KEYS = (
     Key("unknowns", "unknowns", "high", "list", "", "their maxima", (), -1e+30, 1e+30),
     Key("unknowns", "unknowns", "standard_deviation", "list", "", "standard deviations around the values of the case, truncated by low and high; 0: uniform", (), 0.0, 1e+30),
     Key("unknowns", "unknowns", "reason", "texts", "", "reasons of the ranges, with their sources"),
-    Key("floor", "floor", "name", "choice", "", "floor under the source", ('rigid', 'infinite_plate', 'oscillator', 'plate', 'floating_floor', 'joist_floor', 'measured_mobility')),
+    Key("floor", "floor", "name", "choice", "", "floor under the source", ('rigid', 'infinite_plate', 'oscillator', 'plate', 'laminate_floor', 'joist_floor', 'measured_mobility')),
     Key("infinite_plate", "infinite_plate", "resistance", "real", "N s/m", "driving-point resistance: force divided by velocity", (), 1.0, 1000000000000000.0),
     Key("oscillator", "oscillator", "mass", "real", "kg", "moving mass under the source", (), 0.001, 1000000000000.0),
     Key("oscillator", "oscillator", "stiffness", "real", "N/m", "stiffness of the support", (), 0.0, 1000000000000000.0),
@@ -1110,32 +1304,64 @@ KEYS = (
     Key("plate", "plate", "stiffness_ratio", "real", "", "ratio of the bending stiffness along the width to that along the length", (), 0.0001, 10000.0),
     Key("plate", "plate", "torsion_ratio", "real", "", "ratio of the twisting stiffness to the geometric mean of both bending stiffnesses", (), 0.0, 1.0),
     Key("plate", "plate", "loss_factor", "real", "", "internal loss factor of the floor", (), 0.0, 1.0),
-    Key("plate", "plate", "edges", "choice", "", "losses at the edges of the floor", ('laboratory', 'absorption')),
+    Key("plate", "plate", "edges", "choice", "", "losses at the edges of the floor", ('building', 'laboratory', 'absorption')),
     Key("plate", "plate", "edge_absorption", "real", "m", "sum of edge lengths times absorption coefficients, for absorption", (), 0.0, 1000.0),
-    Key("plate", "plate", "source_x", "real", "", "relative source position along the length; levels in the room are means", (), 0.0, 1.0),
+    Key("plate", "plate", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
     Key("plate", "plate", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
+    Key("plate", "plate", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic')),
+    Key("plate", "plate", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value or x = 0, x = length, y = 0, y", (), 0.0, 100000000000000.0),
+    Key("plate", "plate", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
+    Key("plate", "plate", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
+    Key("plate", "plate", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0),
+    Key("plate", "plate", "screed_thickness", "real", "m", "thickness of a floating plate; 0: none", (), 0.0, 0.5),
+    Key("plate", "plate", "screed_density", "real", "kg/m3", "density of the floating plate", (), 10.0, 20000.0),
+    Key("plate", "plate", "screed_wave_speed", "real", "m/s", "speed of longitudinal waves in the floating plate", (), 100.0, 10000.0),
+    Key("plate", "plate", "screed_loss_factor", "real", "", "loss factor of the floating plate", (), 0.0, 1.0),
+    Key("plate", "plate", "layer_stiffness", "real", "N/m3", "dynamic stiffness of the resilient layer per unit area (ISO 9052-1)", (), 10000.0, 1000000000000.0),
+    Key("plate", "plate", "layer_loss_factor", "real", "", "loss factor of the resilient layer", (), 0.0, 1.0),
+    Key("plate", "plate", "screed_edges", "choice", "", "edges of the floating plate", ('simple', 'free', 'strip')),
+    Key("plate", "plate", "strip_stiffness", "real", "N/m2", "stiffness of edge strips against vertical motion per length, for strip", (), 0.0, 1000000000000.0),
+    Key("plate", "plate", "bridge_x", "list", "m", "positions along the length of bridges through the layer", (), 0.0, 100.0),
+    Key("plate", "plate", "bridge_y", "list", "m", "positions along the width of these bridges", (), 0.0, 100.0),
+    Key("plate", "plate", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
+    Key("plate", "plate", "covering_stiffness", "real", "N/m", "stiffness of a covering under the source; 0: none", (), 0.0, 1000000000000.0),
+    Key("plate", "plate", "covering_loss_factor", "real", "", "loss factor of the covering at 50 Hz", (), 0.01, 2.0),
     Key("plate", "plate", "point_x", "list", "m", "positions along the length of points whose velocity is computed", (), 0.0, 1000.0),
     Key("plate", "plate", "point_y", "list", "m", "positions of these points along the width", (), 0.0, 1000.0),
-    Key("floating_floor", "floating_floor", "length", "real", "m", "length of the floor", (), 0.5, 100.0),
-    Key("floating_floor", "floating_floor", "width", "real", "m", "width of the floor", (), 0.5, 100.0),
-    Key("floating_floor", "floating_floor", "thickness", "real", "m", "thickness of the floor", (), 0.001, 2.0),
-    Key("floating_floor", "floating_floor", "density", "real", "kg/m3", "density of the floor", (), 10.0, 20000.0),
-    Key("floating_floor", "floating_floor", "wave_speed", "real", "m/s", "speed of longitudinal waves in the floor", (), 100.0, 10000.0),
-    Key("floating_floor", "floating_floor", "stiffness_ratio", "real", "", "ratio of the bending stiffness along the width to that along the length", (), 0.0001, 10000.0),
-    Key("floating_floor", "floating_floor", "torsion_ratio", "real", "", "ratio of the twisting stiffness to the geometric mean of both bending stiffnesses", (), 0.0, 1.0),
-    Key("floating_floor", "floating_floor", "loss_factor", "real", "", "internal loss factor of the floor", (), 0.0, 1.0),
-    Key("floating_floor", "floating_floor", "edges", "choice", "", "losses at the edges of the floor", ('laboratory', 'absorption')),
-    Key("floating_floor", "floating_floor", "edge_absorption", "real", "m", "sum of edge lengths times absorption coefficients, for absorption", (), 0.0, 1000.0),
-    Key("floating_floor", "floating_floor", "screed_thickness", "real", "m", "thickness of the floating plate", (), 0.003, 0.5),
-    Key("floating_floor", "floating_floor", "screed_density", "real", "kg/m3", "density of the floating plate", (), 10.0, 20000.0),
-    Key("floating_floor", "floating_floor", "screed_wave_speed", "real", "m/s", "speed of longitudinal waves in the floating plate", (), 100.0, 10000.0),
-    Key("floating_floor", "floating_floor", "screed_loss_factor", "real", "", "loss factor of the floating plate", (), 0.0, 1.0),
-    Key("floating_floor", "floating_floor", "layer_stiffness", "real", "N/m3", "dynamic stiffness of the resilient layer per unit area (ISO 9052-1)", (), 10000.0, 1000000000000.0),
-    Key("floating_floor", "floating_floor", "layer_loss_factor", "real", "", "loss factor of the resilient layer", (), 0.0, 1.0),
-    Key("floating_floor", "floating_floor", "source_x", "real", "", "relative source position along the length; levels in the room are means", (), 0.0, 1.0),
-    Key("floating_floor", "floating_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
-    Key("floating_floor", "floating_floor", "point_x", "list", "m", "positions along the length of points whose velocity is computed", (), 0.0, 1000.0),
-    Key("floating_floor", "floating_floor", "point_y", "list", "m", "positions of these points along the width", (), 0.0, 1000.0),
+    Key("laminate_floor", "laminate_floor", "length", "real", "m", "length of the floor, along layers of 0 degrees", (), 0.5, 100.0),
+    Key("laminate_floor", "laminate_floor", "width", "real", "m", "width of the floor", (), 0.5, 100.0),
+    Key("laminate_floor", "laminate_floor", "layer_thickness", "list", "m", "thicknesses of the layers from the top (default: 40, 20, 40, 20, 40 mm)", (), 0.003, 0.5),
+    Key("laminate_floor", "laminate_floor", "layer_angle", "list", "deg", "directions of the layers, 0 (along the length) or 90 (default: alternating, beginning with 0)", (), 0.0, 90.0),
+    Key("laminate_floor", "laminate_floor", "youngs_modulus", "real", "Pa", "modulus of elasticity along the grain", (), 100000000.0, 1000000000000.0),
+    Key("laminate_floor", "laminate_floor", "cross_modulus", "real", "Pa", "modulus of elasticity across the grain", (), 0.0, 1000000000000.0),
+    Key("laminate_floor", "laminate_floor", "shear_modulus", "real", "Pa", "shear modulus along the grain", (), 1000000.0, 1000000000000.0),
+    Key("laminate_floor", "laminate_floor", "rolling_shear_modulus", "real", "Pa", "modulus of rolling shear", (), 1000000.0, 1000000000000.0),
+    Key("laminate_floor", "laminate_floor", "torsion_factor", "real", "", "fraction of the torsional stiffness that joints between boards leave", (), 0.0, 1.0),
+    Key("laminate_floor", "laminate_floor", "density", "real", "kg/m3", "density of the layers", (), 10.0, 20000.0),
+    Key("laminate_floor", "laminate_floor", "added_mass", "real", "kg/m2", "mass without stiffness on the plate, as gravel", (), 0.0, 1000.0),
+    Key("laminate_floor", "laminate_floor", "loss_factor", "real", "", "loss factor of the floor including its edges, without radiation", (), 0.0, 1.0),
+    Key("laminate_floor", "laminate_floor", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
+    Key("laminate_floor", "laminate_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
+    Key("laminate_floor", "laminate_floor", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic')),
+    Key("laminate_floor", "laminate_floor", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value or x = 0, x = length, y = 0, y", (), 0.0, 100000000000000.0),
+    Key("laminate_floor", "laminate_floor", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
+    Key("laminate_floor", "laminate_floor", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
+    Key("laminate_floor", "laminate_floor", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0),
+    Key("laminate_floor", "laminate_floor", "screed_thickness", "real", "m", "thickness of a floating plate; 0: none", (), 0.0, 0.5),
+    Key("laminate_floor", "laminate_floor", "screed_density", "real", "kg/m3", "density of the floating plate", (), 10.0, 20000.0),
+    Key("laminate_floor", "laminate_floor", "screed_wave_speed", "real", "m/s", "speed of longitudinal waves in the floating plate", (), 100.0, 10000.0),
+    Key("laminate_floor", "laminate_floor", "screed_loss_factor", "real", "", "loss factor of the floating plate", (), 0.0, 1.0),
+    Key("laminate_floor", "laminate_floor", "layer_stiffness", "real", "N/m3", "dynamic stiffness of the resilient layer per unit area (ISO 9052-1)", (), 10000.0, 1000000000000.0),
+    Key("laminate_floor", "laminate_floor", "layer_loss_factor", "real", "", "loss factor of the resilient layer", (), 0.0, 1.0),
+    Key("laminate_floor", "laminate_floor", "screed_edges", "choice", "", "edges of the floating plate", ('simple', 'free', 'strip')),
+    Key("laminate_floor", "laminate_floor", "strip_stiffness", "real", "N/m2", "stiffness of edge strips against vertical motion per length, for strip", (), 0.0, 1000000000000.0),
+    Key("laminate_floor", "laminate_floor", "bridge_x", "list", "m", "positions along the length of bridges through the layer", (), 0.0, 100.0),
+    Key("laminate_floor", "laminate_floor", "bridge_y", "list", "m", "positions along the width of these bridges", (), 0.0, 100.0),
+    Key("laminate_floor", "laminate_floor", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
+    Key("laminate_floor", "laminate_floor", "covering_stiffness", "real", "N/m", "stiffness of a covering under the source; 0: none", (), 0.0, 1000000000000.0),
+    Key("laminate_floor", "laminate_floor", "covering_loss_factor", "real", "", "loss factor of the covering at 50 Hz", (), 0.01, 2.0),
+    Key("laminate_floor", "laminate_floor", "point_x", "list", "m", "positions along the length of points whose velocity is computed", (), 0.0, 1000.0),
+    Key("laminate_floor", "laminate_floor", "point_y", "list", "m", "positions of these points along the width", (), 0.0, 1000.0),
     Key("joist_floor", "joist_floor", "length", "real", "m", "span of the joists", (), 0.5, 100.0),
     Key("joist_floor", "joist_floor", "width", "real", "m", "width of the floor across the joists", (), 0.5, 100.0),
     Key("joist_floor", "joist_floor", "sheathing_thickness", "real", "m", "thickness of the sheathing", (), 0.003, 0.3),
@@ -1148,9 +1374,27 @@ KEYS = (
     Key("joist_floor", "joist_floor", "joist_modulus", "real", "Pa", "modulus of elasticity of the joists", (), 10000000.0, 1000000000000.0),
     Key("joist_floor", "joist_floor", "connection", "real", "", "composite action of sheathing and joists, 0 (loose) to 1 (glued), EN 1995-1-1 annex B", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "loss_factor", "real", "", "loss factor of the floor including its edges, without radiation", (), 0.0, 1.0),
-    Key("joist_floor", "joist_floor", "source_x", "real", "", "relative source position along the length; levels in the room are means", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
-    Key("joist_floor", "joist_floor", "source_on", "choice", "", "impact location: sheathing between joists, or a joist", ('sheathing', 'joist')),
+    Key("joist_floor", "joist_floor", "source_on", "choice", "", "impact location: midway between the next joists, on the next joist, or exactly the position", ('sheathing', 'joist', 'position')),
+    Key("joist_floor", "joist_floor", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic')),
+    Key("joist_floor", "joist_floor", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value or x = 0, x = length, y = 0, y", (), 0.0, 100000000000000.0),
+    Key("joist_floor", "joist_floor", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
+    Key("joist_floor", "joist_floor", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
+    Key("joist_floor", "joist_floor", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0),
+    Key("joist_floor", "joist_floor", "screed_thickness", "real", "m", "thickness of a floating plate; 0: none", (), 0.0, 0.5),
+    Key("joist_floor", "joist_floor", "screed_density", "real", "kg/m3", "density of the floating plate", (), 10.0, 20000.0),
+    Key("joist_floor", "joist_floor", "screed_wave_speed", "real", "m/s", "speed of longitudinal waves in the floating plate", (), 100.0, 10000.0),
+    Key("joist_floor", "joist_floor", "screed_loss_factor", "real", "", "loss factor of the floating plate", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "layer_stiffness", "real", "N/m3", "dynamic stiffness of the resilient layer per unit area (ISO 9052-1)", (), 10000.0, 1000000000000.0),
+    Key("joist_floor", "joist_floor", "layer_loss_factor", "real", "", "loss factor of the resilient layer", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "screed_edges", "choice", "", "edges of the floating plate", ('simple', 'free', 'strip')),
+    Key("joist_floor", "joist_floor", "strip_stiffness", "real", "N/m2", "stiffness of edge strips against vertical motion per length, for strip", (), 0.0, 1000000000000.0),
+    Key("joist_floor", "joist_floor", "bridge_x", "list", "m", "positions along the length of bridges through the layer", (), 0.0, 100.0),
+    Key("joist_floor", "joist_floor", "bridge_y", "list", "m", "positions along the width of these bridges", (), 0.0, 100.0),
+    Key("joist_floor", "joist_floor", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
+    Key("joist_floor", "joist_floor", "covering_stiffness", "real", "N/m", "stiffness of a covering under the source; 0: none", (), 0.0, 1000000000000.0),
+    Key("joist_floor", "joist_floor", "covering_loss_factor", "real", "", "loss factor of the covering at 50 Hz", (), 0.01, 2.0),
     Key("joist_floor", "joist_floor", "point_x", "list", "m", "positions along the length of points whose velocity is computed", (), 0.0, 1000.0),
     Key("joist_floor", "joist_floor", "point_y", "list", "m", "positions of these points along the width", (), 0.0, 1000.0),
     Key("measured_mobility", "measured_mobility", "direct", "real", "m/(N s)", "limit of the mobility at high frequencies", (), 0.0, 1000.0),
@@ -1160,9 +1404,11 @@ KEYS = (
     Key("measured_mobility", "measured_mobility", "residue_imaginary", "list", "m/(N s2)", "imaginary parts of the residues, doubled for a pair of poles", (), -1000000000000.0, 1000000000000.0),
     Key("measured_mobility", "measured_mobility", "lowest_frequency", "real", "Hz", "lowest frequency of the measurement", (), 0.0, "highest_frequency"),
     Key("measured_mobility", "measured_mobility", "highest_frequency", "real", "Hz", "highest frequency of the measurement", (), 0.0, 10000000.0),
-    Key("room", "room", "volume", "real", "m3", "volume of the room", (), 1.0, 100000.0),
-    Key("room", "room", "reverberation_time", "real", "s", "reverberation time of the room", (), 0.05, 20.0),
-    Key("room", "room", "reverberation_times", "list", "s", "reverberation time in each one-third-octave band from 50 to 630 Hz", (), 0.05, 20.0),
+    Key("room", "room", "length", "real", "m", "length of the room; 0: that of the floor", (), 0.0, 100.0),
+    Key("room", "room", "width", "real", "m", "width of the room; 0: that of the floor", (), 0.0, 100.0),
+    Key("room", "room", "height", "real", "m", "height of the room; 0: from the volume, without it 2.5 m", (), 0.0, 100.0),
+    Key("room", "room", "volume", "real", "m3", "volume of the room; 0: length times width times height", (), 0.0, 100000.0),
+    Key("room", "room", "reverberation_time", "list", "s", "reverberation time of the room: one, 4 for octaves or 12 for one-third octaves", (), 0.05, 20.0),
     Key("room", "room", "reverberation_of", "choice", "", "room of the reverberation time: finished, or bare, without floor, walls and ceiling", ('finished', 'bare')),
     Key("room", "room", "air_density", "real", "kg/m3", "density of the air", (), 0.5, 2.0),
     Key("room", "room", "sound_speed", "real", "m/s", "speed of sound in the air", (), 200.0, 500.0),
@@ -1177,4 +1423,8 @@ KEYS = (
     Key("room", "room", "ceiling_mass", "real", "kg/m2", "mass per unit area of a suspended ceiling; 0: none", (), 0.0, 200.0),
     Key("room", "room", "ceiling_depth", "real", "m", "depth of the air cavity above the ceiling", (), 0.01, 2.0),
     Key("room", "room", "ceiling_loss_factor", "real", "", "loss factor of the ceiling cavity", (), 0.001, 1.0),
+    Key("room", "room", "corner_x", "real", "m", "position of the room along the length of a larger floor", (), 0.0, 100.0),
+    Key("room", "room", "corner_y", "real", "m", "position of the room along the width of a larger floor", (), 0.0, 100.0),
+    Key("room", "room", "radiation", "choice", "", "radiation factor of the floor, by its modes or by ISO 12354-1", ('modes', 'iso_12354')),
+    Key("room", "room", "positions", "choice", "", "positions of ball and microphone in the modal room: 5 standard ones each, or 16 even ones each", ('standard', 'even')),
 )

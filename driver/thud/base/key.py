@@ -67,6 +67,21 @@ class Group(Plain):
         require_keywords(f"{cls.__name__}()", keywords, _names(cls))
         return super().__new__(cls)
 
+    def __post_init__(self) -> None:
+        """Make a number a list of one where a list is needed.
+
+        Raise InputError if a list that has a default is empty.
+        """
+        super().__post_init__()
+        for option in fields(self):  # type: ignore[arg-type]
+            value = getattr(self, option.name)
+            if not isinstance(option.default, tuple):
+                continue
+            if isinstance(value, int | float):
+                object.__setattr__(self, option.name, (value,))
+            elif option.default and isinstance(value, tuple | list) and not value:
+                refuse(f"{type(self).__name__}: {option.name} is empty", "one number or more")
+
 
 def _names(group: type[Group]) -> list[str]:
     return [option.name for option in fields(group)]  # type: ignore[arg-type]

@@ -15,6 +15,7 @@ from thud.base._schema import (
     GROUPS,
     KEYS,
     MODELS,
+    ROOM_SOURCE,
     Ball,
     Compression,
     Drop,
@@ -67,8 +68,22 @@ def group_of(model: str, option: Field[Any]) -> str:
     return group
 
 
-def new_model(model: str | ModelOptions, options: Mapping[str, object]) -> ModelOptions:
-    """Return the options of a model by its name; raise InputError if a name is not known."""
+def default_model(room: Room | None) -> ModelOptions:
+    """Return the model of a case that names none: below a room, a source that conforms."""
+    return HollowSphere() if room is None else ROOM_SOURCE
+
+
+def new_model(
+    model: str | ModelOptions | None, options: Mapping[str, object], room: Room | None = None
+) -> ModelOptions:
+    """Return the options of a model by its name, or of that of a case that names none.
+
+    Raise InputError if a name is not known.
+    """
+    if model is None:
+        unnamed = default_model(room)
+        require_keywords(f"&{unnamed.name}", options, [key.name for key in fields(unnamed)])
+        return replace(unnamed, **options)  # type: ignore[arg-type]
     if isinstance(model, ModelOptions):
         if options:
             problem = f"model is an object of {type(model).__name__}, with {', '.join(options)}"
@@ -77,6 +92,10 @@ def new_model(model: str | ModelOptions, options: Mapping[str, object]) -> Model
     require_choice("&model: name", model, MODELS)
     require_keywords(f"&{model}", options, [option.name for option in fields(MODELS[model])])
     return MODELS[model](**options)  # type: ignore[arg-type]
+
+
+# The model of a case whose model is not stated.
+_UNNAMED = HollowSphere()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -88,7 +107,8 @@ class Case(Group, Displayed):
     name : str
         Name of the case, also of its output directory.
     model : HollowSphere, ModalBall, FiniteElement, MeasuredModes, HuntCrossley, TwoMass or None
-        Options of the source model; None: no impact.
+        Options of the source model; by default `HollowSphere()`, with a room a `ModalBall` that
+        conforms to the standards; None: no impact.
     modes : Modes or None
         Options of the free modes; None: no free modes.
     floor : FloorOptions or None
@@ -107,7 +127,7 @@ class Case(Group, Displayed):
     name: str = "python"
     ball: Ball = field(default_factory=Ball)
     drop: Drop = field(default_factory=Drop)
-    model: ModelOptions | None = field(default_factory=HollowSphere)
+    model: ModelOptions | None = _UNNAMED
     sampling: Sampling = field(default_factory=Sampling)
     levels: Levels = field(default_factory=Levels)
     limits: Limits = field(default_factory=Limits)
@@ -116,6 +136,12 @@ class Case(Group, Displayed):
     room: Room | None = None
     compression: Compression | None = None
     unknowns: Unknowns | None = None
+
+    def __post_init__(self) -> None:
+        """Choose the model if none is stated."""
+        if self.model is _UNNAMED:
+            object.__setattr__(self, "model", default_model(self.room))
+        super().__post_init__()
 
     def __repr__(self) -> str:
         """Return what is computed."""
@@ -194,26 +220,28 @@ class Case(Group, Displayed):
         groups = {
             group: kind(**content[group]) for group, kind in GROUPS.items() if group in content
         }
-        model = modes = None
-        if "modes" in content:
-            modes = Modes(**content["modes"], **content.get("mesh", {}))
-        if "model" in content or not modes:
-            name = content.get("model", {}).get("name", next(iter(MODELS)))
-            options = {}
-            for option in fields(MODELS[name]):
-                entries = content.get(group_of(name, option), {})
-                if option.name in entries:
-                    options[option.name] = entries[option.name]
-            model = MODELS[name](**_with_lists(options))
-        floor = None
-        if "floor" in content:
-            name = content["floor"].get("name", next(iter(FLOORS)))
-            floor = FLOORS[name](**_with_lists(content.get(name, {})))
         optional: dict[str, Any] = {
             group: kind(**_with_lists(content[group]))
             for group, kind in IMPACT_GROUPS.items()
             if group in content
         }
+        room = optional.get("room")
+        model = modes = None
+        if "modes" in content:
+            modes = Modes(**content["modes"], **content.get("mesh", {}))
+        if "model" in content or not modes:
+            name = content.get("model", {}).get("name")
+            kind = type(default_model(room)) if name is None else MODELS[name]
+            options = {}
+            for option in fields(kind):
+                entries = content.get(group_of(kind.name, option), {})
+                if option.name in entries:
+                    options[option.name] = entries[option.name]
+            model = new_model(name, _with_lists(options), room)
+        floor = None
+        if "floor" in content:
+            name = content["floor"].get("name", next(iter(FLOORS)))
+            floor = FLOORS[name](**_with_lists(content.get(name, {})))
         name = content.get("case", {}).get("name", cls.name)
         return cls(name=name, model=model, floor=floor, modes=modes, **groups, **optional)
 

@@ -90,7 +90,7 @@ FLOOR = Command(
             default=[],
             metavar="NAME|FILE.toml",
             help="also a construction of the library or of a file, with ball, drop, model and room "
-            "of the first case (default: the standard ball by finite elements); may be repeated",
+            "of the first case (default: a ball that conforms); may be repeated",
         ),
         argument(
             "--list",

@@ -7,7 +7,7 @@ import re
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
-from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS
+from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS, ROOM_SOURCE
 from thud.base.units import display_unit, power_of, scaled
 from thud.case.case import OPTIONAL_GROUPS
 from thud.case.keys import humanize
@@ -61,12 +61,27 @@ def construction_form() -> list[dict[str, Any]]:
             "kind": _capitalize(entry.kind),
             "text": f"{', '.join(map(str, entry.layers))}. {entry.note}".rstrip(),
             "floor": entry.floor.name,
-            "keys": {k: v for k, v in vars(entry.floor).items() if k in entry.sources},
+            "keys": {
+                key: list(value) if isinstance(value, tuple) else value
+                for key, value in vars(entry.floor).items()
+                if key in entry.sources
+            },
             "room": entry.room,
             "sources": entry.sources,
         }
         for entry in constructions()
     ]
+
+
+def room_source() -> dict[str, dict[str, object]]:
+    """Return name and options of the model of a room whose case names none, by group."""
+    defaults = type(ROOM_SOURCE)()
+    options = {
+        option.name: getattr(ROOM_SOURCE, option.name)
+        for option in fields(ROOM_SOURCE)
+        if getattr(ROOM_SOURCE, option.name) != getattr(defaults, option.name)
+    }
+    return {"model": {"name": ROOM_SOURCE.name}, ROOM_SOURCE.name: options}
 
 
 def _options(part: str, name: str, kind: type[Group]) -> dict[str, Any]:

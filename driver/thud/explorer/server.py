@@ -23,7 +23,7 @@ from thud.base.bridge import version
 from thud.base.checks import refuse
 from thud.case.case import read_case
 from thud.explorer.downloads import DOWNLOADS
-from thud.explorer.form import construction_form, form
+from thud.explorer.form import construction_form, form, room_source
 from thud.explorer.jobs import INPUT_ERRORS, Jobs
 from thud.explorer.recording_fields import recording_form, recording_table
 
@@ -114,6 +114,7 @@ def new_application(
         "recording": recording_form(),
         "version": version(),
         "start": start,
+        "room_source": room_source(),
         "max_recording": MAX_RECORDING,
     }
     application.state.token = token

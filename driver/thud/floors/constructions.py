@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from thud.base._schema import FLOORS, KEYS, Ball, FiniteElement, FloorOptions, Room
+from thud.base._schema import FLOORS, KEYS, FloorOptions, Room
 from thud.base.checks import (
     refuse,
     refuse_unknown,
@@ -91,8 +91,8 @@ class Construction(Displayed):
         Parameters
         ----------
         source
-            Case whose ball, drop, model and room are used; by default the standard rubber ball by
-            finite elements, and the room of ISO 16283-2.
+            Case whose ball, drop, model and room are used; by default that of a room below which no
+            source is named: a rubber ball that conforms, and a room of 50 m3 with 0.5 s.
 
         Raises
         ------
@@ -101,7 +101,7 @@ class Construction(Displayed):
         """
         require_kind("source", source, Case | None)
         if source is None:
-            source = Case(ball=Ball.standard(), model=FiniteElement())
+            source = Case(room=Room())
         # The ceiling of the source is not part of this construction.
         ceiling = {key: getattr(Room(), key) for key in CEILING_KEYS} | self.room
         return replace(
@@ -117,7 +117,8 @@ class Construction(Displayed):
         rows: list[tuple[str, ...]] = [("key", "value", "unit", "source")]
         for key, source in self.sources.items():
             owner, value = ("room", self.room[key]) if key in self.room else self._of_floor(key)
-            text = f"{value:g}" if isinstance(value, float) else str(value)
+            values = value if isinstance(value, tuple) else (value,)
+            text = ", ".join(f"{v:g}" if isinstance(v, float) else str(v) for v in values)
             rows.append((key, text, _UNITS[owner, key], source))
         return rows
 

@@ -13,6 +13,7 @@ from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
 from thud.case.case import Case, case_text
 from thud.floors.survey import RoomLevels
+from thud.impact.compute import compute
 from thud.impact.floor_impact import FloorImpact, new_floor_impact
 from thud.impact.room_level import RoomLevel, new_room_level
 from thud.level.impact_result import ImpactResult
@@ -63,8 +64,13 @@ class RoomPrediction(RoomLevel, Displayed):
 
     @property
     def rating(self) -> Rating:
-        """Single-number rating of the levels in the room."""
+        """Single-number rating of the statistical levels in the room."""
         return rating(self.level, BANDS)
+
+    @property
+    def modal_rating(self) -> Rating:
+        """Single-number rating of the levels by the modes of floor and room."""
+        return rating(self.modal_level, BANDS)
 
     @property
     def radiated_share(self) -> Array:
@@ -84,7 +90,7 @@ class RoomPrediction(RoomLevel, Displayed):
     @property
     def standardized(self) -> Array:
         """Standardized levels L'_i,Fmax,V,T, dB, shape (12,) (ISO 16283-2)."""
-        return standardized_level(self.level, self.reverberation_time, self.room.volume)
+        return standardized_level(self.level, self.reverberation_time, self.volume)
 
     @property
     def standardized_rating(self) -> Rating:
@@ -130,11 +136,14 @@ class RoomPrediction(RoomLevel, Displayed):
     def rows(self) -> list[tuple[str, ...]]:
         """Return the header and a row of text for each band."""
         header = (
-            "band, Hz", "L_i,Fmax, dB", "standardized, dB", "spread, dB", "energy, mJ",
-            "floor modes",
+            "band, Hz", "statistical, dB", "modal, dB", "simply supported, dB", "clamped, dB",
+            "standardized, dB", "spread, dB", "energy, mJ", "floor modes",
         )  # fmt: skip
-        columns = (self.level, self.standardized, self.spread, 1e3 * self.energy, self.floor_modes)
-        forms = (".1f", ".1f", ".1f", ".3g", ".1f")
+        columns = (
+            self.level, self.modal_level, self.simple_level, self.clamped_level, self.standardized,
+            self.spread, 1e3 * self.energy, self.floor_modes,
+        )  # fmt: skip
+        forms = (".1f", ".1f", ".1f", ".1f", ".1f", ".1f", ".3g", ".1f")
         cells = [
             [f"{value:{form}}" for value in column]
             for column, form in zip(columns, forms, strict=True)
@@ -149,14 +158,17 @@ class RoomPrediction(RoomLevel, Displayed):
 
     def __repr__(self) -> str:
         """Return the single-number ratings."""
+        low, high = self.interval
         return (
-            f"<RoomPrediction: L_iA,Fmax {self.rating.rounded} dB (ISO 717-2), "
-            f"standardized {self.standardized_rating.rounded} dB (ISO 16283-2)>"
+            f"<RoomPrediction: L_iA,Fmax {self.rated:.0f} dB ({low:.0f} to {high:.0f}; ISO 717-2), "
+            f"statistical {self.rating.rounded} dB, modal {self.modal_rating.rounded} dB>"
         )
 
 
 def predict_level(
-    source: ImpactResult, floor: FloorOptions | None = None, room: Room | None = None
+    source: ImpactResult | None = None,
+    floor: FloorOptions | None = None,
+    room: Room | None = None,
 ) -> RoomPrediction:
     """Predict the level that an impact causes in the room below.
 
@@ -169,7 +181,8 @@ def predict_level(
     Parameters
     ----------
     source
-        Impact of any model, or a recording.
+        Impact of any model, or a recording; by default that of `Case(floor=floor, room=room)`,
+        whose source conforms to the standards.
     floor, room
         Floor and room; by default those of the impact's case.
 
@@ -178,10 +191,12 @@ def predict_level(
     InputError
         If the floor or the room is missing or out of range.
     """
-    require_kind("source", source, ImpactResult)
-    case = source.case
+    require_kind("source", source, ImpactResult | None)
+    if source is None and floor is not None and room is not None:
+        source = compute(Case(floor=floor, room=room))
+    case = Case() if source is None else source.case
     floor, room = floor or case.floor, room or case.room
-    if floor is None or room is None:
+    if source is None or floor is None or room is None:
         refuse(
             f"{'floor' if floor is None else 'room'} is missing", "a floor, such as Plate, and Room"
         )
@@ -189,9 +204,11 @@ def predict_level(
     impact = _on_floor(source, floor_case)
     level = source.room_level
     if level is None or (floor, room) != (case.floor, case.room):
-        levels = (impact or source).levels(BANDS, force="floor")
-        rated = np.isin(get_bands(BANDS).nominal, rated_bands(BANDS))
-        level = new_room_level(ask("room_level", case=case_text(floor_case), levels=levels[rated]))
+        force = (impact or source).force("floor")
+        answer = ask(
+            "room_level", case=case_text(floor_case), force=force, sample_rate=source.sample_rate
+        )
+        level = new_room_level(answer)
         assert level is not None  # noqa: S101 - the answer of this question has a room
     if impact:
         blocked = (

@@ -106,7 +106,7 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
     --------
     >>> import thud
     >>> thud.tapping_level(thud.Plate(thickness=0.2))
-    <TappingLevel: L_n,w 71 dB, C_I -11 dB>
+    <TappingLevel: L_n,w 73 dB, C_I -11 dB>
     """
     require_kind("floor", floor, Plate)
     if not _is_like_concrete(floor):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import KEYS, SAMPLE_QUANTITIES, HollowSphere, Limits
+from thud.base._schema import KEYS, SAMPLE_QUANTITIES, Limits
 from thud.base.bridge import ask, text
 from thud.base.checks import (
     refuse,
@@ -130,7 +130,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         limits=Limits(source) if source is not None else base.limits,
     )
     if base.model is None or (model is not None and model != base.model.name):
-        base = replace(base, model=new_model(HollowSphere.name if model is None else model, {}))
+        base = replace(base, model=new_model(model, {}, base.room))
     content = case_text(base)
     if not hasattr(parameters, "keys"):
         refuse_value("parameters", parameters, "arrays by their keys")

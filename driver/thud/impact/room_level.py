@@ -9,6 +9,8 @@ from thud.base.bridge import text
 from thud.base.immutable import Immutable
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -41,6 +43,8 @@ class RoomLevel(Immutable):
         Number of modes below which the statistical prediction of a band is uncertain.
     mass_per_area : float
         Mass per unit area of the radiating plate, kg/m2.
+    volume : float
+        Volume of the room, m3.
     spread : ndarray, shape (12,)
         Expected standard deviation of the level at a single position of source and microphone, dB,
         by the modal overlap (Langley and Cotoni 2004).
@@ -55,6 +59,22 @@ class RoomLevel(Immutable):
         Real part of the mobility: power into the floor per mean square of the force, m/(N s).
     floor_warnings : tuple of str
         Sentences on conditions in which the model of the floor is not valid.
+    modal_level, modal_spread : ndarray, shape (12,)
+        Levels by the modes of floor and room, dB: energy mean and standard deviation of positions.
+        Above the first `n_modal` bands, where three modes of the room overlap, the statistical ones.
+    simple_level, clamped_level : ndarray, shape (12,)
+        The same levels if the floor is simply supported or clamped.
+    n_modal : int
+        Number of bands in which the sound is modal.
+    size : tuple of float
+        Length, width and height of the room, m.
+    rated : float
+        Mean of the A-weighted levels of the statistical and the modal prediction, dB.
+    interval : tuple of float
+        Ends of the interval of `rated`, dB: the root sum of squares of `contributions`.
+    contributions : mapping
+        Lower and upper deviation from `rated`, dB, by another conforming source, the support of the
+        edges, a reverberation time 20 % shorter or longer, the positions, and the model.
     """
 
     frequency: Array
@@ -69,12 +89,22 @@ class RoomLevel(Immutable):
     conductance: Array
     few_modes: float
     mass_per_area: float
+    volume: float
     spread: Array
     octave_level: Array
     octave_time: Array
     history_time: Array
     history: Array
     floor_warnings: tuple[str, ...]
+    modal_level: Array
+    modal_spread: Array
+    simple_level: Array
+    clamped_level: Array
+    n_modal: int
+    size: tuple[float, float, float]
+    rated: float
+    interval: tuple[float, float]
+    contributions: Mapping[str, tuple[float, float]]
 
 
 def new_room_level(answer: Bundle) -> RoomLevel | None:
@@ -87,9 +117,25 @@ def new_room_level(answer: Bundle) -> RoomLevel | None:
         **bands,
         few_modes=answer["room"]["few_modes"],
         mass_per_area=answer["room"]["surface_mass"],
+        volume=answer["room"]["volume"],
         octave_level=answer["room_octaves"]["level"],
         octave_time=answer["room_octaves"]["time"],
         history_time=answer["room_history"]["time"],
         history=answer["room_history"]["level"],
         floor_warnings=tuple(map(text, answer.get("room_warnings", {}).values())),
+        n_modal=int(answer["room"]["n_modal"]),
+        size=_sides(answer["room_size"]["sides"]),
+        rated=answer["room"]["rated"],
+        interval=_pair(answer["room_interval"]["ends"]),
+        contributions={name: _pair(ends) for name, ends in answer["room_contributions"].items()},
     )
+
+
+def _pair(ends: Array) -> tuple[float, float]:
+    low, high = ends.tolist()
+    return low, high
+
+
+def _sides(sides: Array) -> tuple[float, float, float]:
+    length, width, height = sides.tolist()
+    return length, width, height

@@ -17,6 +17,7 @@ from thud.base._schema import (
     ModalBallFloorFriction,
     ModelName,
     ModelOptions,
+    Room,
 )
 from thud.case.case import Case
 from thud.impact.impact import Impact
@@ -27,6 +28,7 @@ class SamplingOptions(TypedDict, total=False):
     substeps: int
     verify: bool
     floor: FloorOptions | None
+    room: Room | None
 
 class HollowSphereOptions(SamplingOptions, total=False):
     momentum_flux: HollowSphereMomentumFlux

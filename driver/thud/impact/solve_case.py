@@ -13,7 +13,7 @@ from thud.case.case import Case, new_model
 from thud.impact.compute import compute
 
 if TYPE_CHECKING:
-    from thud.base._schema import FloorOptions, ModelName, ModelOptions
+    from thud.base._schema import FloorOptions, ModelName, ModelOptions, Room
     from thud.impact.impact import Impact
 
 
@@ -26,6 +26,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     duration: float | None = None,
     substeps: int | None = None,
     floor: FloorOptions | None = None,
+    room: Room | None = None,
     verify: bool = False,
     **options: object,
 ) -> Impact:
@@ -38,8 +39,9 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
         `Case`, without any other argument but `verify`.
     model
         ``"hollow_sphere"`` (the analytical model of the paper, the default), ``"modal_ball"`` (the
-        improved model), ``"finite_element"``, ``"measured_modes"``, ``"hunt_crossley"`` or
-        ``"two_mass"``; or an object of the classes below, which holds the options.
+        improved model; with a room the default, with options with which it conforms),
+        ``"finite_element"``, ``"measured_modes"``, ``"hunt_crossley"`` or ``"two_mass"``; or an
+        object of the classes below, which holds the options.
     sample_rate
         Samples per second, Hz.
     duration
@@ -50,6 +52,8 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
         Floor on which the ball is dropped in addition to a rigid floor, on which the standards
         assess the force. An object of `Rigid`, `InfinitePlate`, `Oscillator`, `Plate`,
         `FloatingFloor`, `JoistFloor` or `MeasuredMobility`.
+    room
+        Room below the floor, for `Impact.room_level`.
     verify
         Compute again at a finer resolution, for `Impact.finer`; also with a case.
     **options
@@ -76,7 +80,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     sampling = {"sample_rate": sample_rate, "duration": duration, "substeps": substeps}
     settings = {name: value for name, value in sampling.items() if value is not None}
     if isinstance(ball, Case):
-        if settings or options or any(value is not None for value in (drop, model, floor)):
+        if settings or options or any(value is not None for value in (drop, model, floor, room)):
             refuse("solve() has other arguments in addition to a case", "solve(case)")
         case = ball
         if verify:
@@ -85,9 +89,10 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
         case = Case(
             ball=Ball() if ball is None else ball,
             drop=Drop() if drop is None else drop,
-            model=new_model("hollow_sphere" if model is None else model, options),
+            model=new_model(model, options, room),
             sampling=Sampling(**settings, verify=verify),  # type: ignore[arg-type]
             floor=floor,
+            room=room,
         )
     impact = compute(case)
     for warning in impact.warnings:

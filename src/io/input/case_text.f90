@@ -1,6 +1,6 @@
 !> Cases as namelist files: reading, writing, and the description of all keys.
 module thud_case_text
-   use thud_case, only: case_type, check_case, check_name, get_active_fields, get_fields, new_case
+   use thud_case, only: case_type, check_case, check_name, get_active_fields, get_fields, new_case, set_room_source
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type, name_length
    use thud_namelist_text, only: group_type, parse_groups
@@ -45,6 +45,7 @@ contains
       call check_groups(groups, fields, error)
       if (case%has_room .and. .not. (case%has_floor .or. allocated(error))) error = input_error( &
          '&room is given without &floor; allowed: both, for the level in the room below')
+      if (case%has_impact .and. case%has_room .and. .not. names_model(groups)) call set_room_source(case)
       do i = 1, merge(size(main_groups), 1, case%has_impact)
          if (any([(groups(j)%name == main_groups(i), j=1, size(groups))])) cycle
          case%left_out = trim(case%left_out)//' &'//main_groups(i)
@@ -63,6 +64,17 @@ contains
       end if
       if (.not. allocated(error)) call check_case(case, error)
    end subroutine read_case
+
+   !> Whether a file names the source model.
+   pure function names_model(groups) result(named)
+      !> Groups of the file: [n_group].
+      type(group_type), intent(in) :: groups(:)
+      logical :: named
+      integer :: i, j
+
+      named = any([((groups(i)%name == 'model' .and. groups(i)%assignments(j)%key == 'name', &
+         j=1, size(groups(i)%assignments)), i=1, size(groups))])
+   end function names_model
 
    !> Returns an error if the case does not use a group.
    subroutine check_use(groups, case, error)

@@ -2,7 +2,7 @@
 !> from it.
 module thud_schema
    use thud_band, only: band_set_names, band_type, get_bands, octave_count
-   use thud_case, only: case_type, get_fields, new_case
+   use thud_case, only: case_type, get_active_fields, get_fields, new_case, set_room_source
    use thud_constants, only: version
    use thud_error, only: error_type
    use thud_field, only: field_type
@@ -29,14 +29,15 @@ contains
       type(field_type), allocatable :: fields(:)
       type(band_type), allocatable :: bands(:)
       type(error_type), allocatable :: error
-      character(len=:), allocatable :: entry
+      character(len=:), allocatable :: entry, room_source
       integer :: i
 
+      call describe_room_source(room_source)
       call new_case(case)
       allocate (fields, source=get_fields(case))
       text = '{"version": '//text_value(version)//','//newline//'"models": '//list_of(model_names)//','//newline &
          //'"floors": '//list_of(floor_names)//','//newline//'"sources": '//list_of(source_names)//','//newline &
-         //'"band_sets": {'
+         //'"room_source": '//room_source//','//newline//'"band_sets": {'
       do i = 1, size(band_set_names)
          bands = get_bands(band_set_names(i))
          text = text//newline//text_value(band_set_names(i))//': {"nominal": ['//join(bands%nominal)//'], "center": [' &
@@ -67,6 +68,30 @@ contains
       end do
       text = text//']}'
    end subroutine get_schema
+
+   !> Describes the source of a room by the options of its model that differ from their defaults.
+   subroutine describe_room_source(text)
+      !> A JSON object.
+      character(len=:), allocatable, intent(out) :: text
+      type(case_type), target :: case, default
+      type(field_type), allocatable :: fields(:), defaults(:)
+      character(len=:), allocatable :: value
+      integer :: i
+
+      call new_case(case)
+      call set_room_source(case)
+      call new_case(default)
+      default%model = case%model
+      allocate (fields, source=get_active_fields(case))
+      allocate (defaults, source=get_active_fields(default))
+      text = '{"name": '//text_value(case%model)
+      do i = 1, size(fields)
+         if (fields(i)%owner /= case%model) cycle
+         value = json_value(fields(i))
+         if (value /= json_value(defaults(i))) text = text//', '//text_value(fields(i)%key)//': '//value
+      end do
+      text = text//'}'
+   end subroutine describe_room_source
 
    !> Describes the criteria of a source.
    subroutine describe_limits(source, text)
@@ -106,8 +131,28 @@ contains
       type(field_type), intent(in) :: field
       !> A JSON object.
       character(len=:), allocatable, intent(out) :: text
-      character(len=:), allocatable :: value
       type(interval_type) :: interval
+
+      text = '{"owner": '//text_value(field%owner)//', "group": '//text_value(field%group)//', "name": ' &
+         //text_value(field%key)//', "kind": '//text_value(field%get_kind())//', "unit": '//text_value(field%unit) &
+         //', "default": '//json_value(field)//', "choices": '//list_of(field%choices(:field%n_choice))//', "meaning": ' &
+         //text_value(field%meaning)
+      if (field%range /= '') then
+         interval = new_interval(field%range)
+         text = text//', "lower": '//end_value(interval%lower, interval%lower_expression)//', "upper": ' &
+            //end_value(interval%upper, interval%upper_expression)//', "lower_open": ' &
+            //trim(merge('true ', 'false', interval%lower_open))//', "upper_open": ' &
+            //trim(merge('true ', 'false', interval%upper_open))//', "whole": ' &
+            //trim(merge('true ', 'false', field%whole_entries .or. field%get_kind() == 'whole'))
+      end if
+      text = text//'}'
+   end subroutine describe
+
+   !> The value of a key.
+   function json_value(field) result(value)
+      type(field_type), intent(in) :: field
+      !> A JSON value.
+      character(len=:), allocatable :: value
 
       call field%get_text(value)
       select case (field%get_kind())
@@ -122,20 +167,7 @@ contains
       case default
          continue
       end select
-      text = '{"owner": '//text_value(field%owner)//', "group": '//text_value(field%group)//', "name": ' &
-         //text_value(field%key)//', "kind": '//text_value(field%get_kind())//', "unit": '//text_value(field%unit) &
-         //', "default": '//value//', "choices": '//list_of(field%choices(:field%n_choice))//', "meaning": ' &
-         //text_value(field%meaning)
-      if (field%range /= '') then
-         interval = new_interval(field%range)
-         text = text//', "lower": '//end_value(interval%lower, interval%lower_expression)//', "upper": ' &
-            //end_value(interval%upper, interval%upper_expression)//', "lower_open": ' &
-            //trim(merge('true ', 'false', interval%lower_open))//', "upper_open": ' &
-            //trim(merge('true ', 'false', interval%upper_open))//', "whole": ' &
-            //trim(merge('true ', 'false', field%whole_entries .or. field%get_kind() == 'whole'))
-      end if
-      text = text//'}'
-   end subroutine describe
+   end function json_value
 
    !> One end of a range: a number, or an expression in quotes.
    function end_value(number, expression) result(value)

@@ -9,6 +9,7 @@ module thud_result_bundle
    use thud_kinds, only: wp
    use thud_quantities, only: get_quantities, history_quantity_count, quantities
    use thud_room, only: few_modes, room_level_type
+   use thud_room_prediction, only: contribution_names
    use thud_text, only: to_text
    use thud_warnings, only: add_floor_warning, add_height_warning, warning_length
    implicit none (type, external)
@@ -100,10 +101,11 @@ contains
       type(case_type), intent(in) :: case
       type(room_level_type), intent(in) :: room
       character(len=warning_length), allocatable :: warnings(:)
-      integer :: n(1)
+      integer :: n(1), i
 
       n = size(room%bands)
       call bundle%add_number('room.surface_mass', room%surface_mass)
+      call bundle%add_number('room.volume', room%volume)
       call bundle%add_number('room.few_modes', few_modes)
       call bundle%add_array('room_bands.conductance', n, room%conductance)
       call bundle%add_array('room_bands.frequency', n, room%bands%nominal)
@@ -116,6 +118,17 @@ contains
       call bundle%add_array('room_bands.level', n, room%level)
       call bundle%add_array('room_bands.time', n, room%time)
       call bundle%add_array('room_bands.spread', n, room%spread)
+      call bundle%add_number('room.rated', room%rated)
+      call bundle%add_array('room_size.sides', [3], room%sides)
+      call bundle%add_array('room_interval.ends', [2], room%interval)
+      call bundle%add_number('room.n_modal', real(room%n_modal, wp))
+      call bundle%add_array('room_bands.modal_level', n, room%modal_level)
+      call bundle%add_array('room_bands.modal_spread', n, room%modal_spread)
+      call bundle%add_array('room_bands.simple_level', n, room%edge_level(:, 1))
+      call bundle%add_array('room_bands.clamped_level', n, room%edge_level(:, 2))
+      do i = 1, size(contribution_names)
+         call bundle%add_array('room_contributions.'//trim(contribution_names(i)), [2], room%contribution(:, i))
+      end do
       n = size(room%octaves)
       call bundle%add_array('room_octaves.frequency', n, room%octaves%nominal)
       call bundle%add_array('room_octaves.level', n, room%octave_level)

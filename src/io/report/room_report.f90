@@ -7,7 +7,8 @@ module thud_room_report
    use thud_kinds, only: wp
    use thud_rating, only: get_a_weighted_level, get_class, get_rounded
    use thud_room, only: few_modes, room_level_type
-   use thud_text, only: fixed, newline, to_text
+   use thud_room_prediction, only: contribution_names
+   use thud_text, only: fixed, newline, replaced, to_text
    implicit none (type, external)
    private
 
@@ -36,9 +37,11 @@ contains
 
       files%name = room_file_names
       files(1)%content = get_table_csv('nominal_Hz,level_dB,time_of_maximum_s,spread_dB,energy_J,radiation_factor,' &
-         //'loss_factor,reverberation_time_s,floor_modes,room_modes', reshape([prediction%bands%nominal, prediction%level, &
+         //'loss_factor,reverberation_time_s,floor_modes,room_modes,modal_level_dB,modal_spread_dB,' &
+         //'simply_supported_level_dB,clamped_level_dB', reshape([prediction%bands%nominal, prediction%level, &
          prediction%time, prediction%spread, prediction%energy, prediction%radiation_factor, prediction%loss_factor, &
-         prediction%reverberation_time, prediction%floor_modes, prediction%room_modes], [size(prediction%level), 10]))
+         prediction%reverberation_time, prediction%floor_modes, prediction%room_modes, prediction%modal_level, &
+         prediction%modal_spread, prediction%edge_level], [size(prediction%level), 14]))
       files(2)%content = get_table_csv('nominal_Hz,level_dB,time_of_maximum_s', reshape([prediction%octaves%nominal, &
          prediction%octave_level, prediction%octave_time], [size(prediction%octave_level), 3]))
       header = 'time_s'
@@ -63,13 +66,19 @@ contains
       real(wp) :: resistance
       integer :: i
 
-      text = '  '//padded('room below')//padded('L_i,Fmax')//padded('spread')//padded('floor modes') &
-         //'room modes'//newline
+      text = '  '//padded('room below')//padded('statistical')//padded('modal')//padded('simple edges')//padded('clamped') &
+         //'spread'//newline
       do i = 1, size(prediction%bands)
          mark = merge('*', ' ', min(prediction%floor_modes(i), prediction%room_modes(i)) < few_modes)
          text = text//'  '//padded(get_band_name(prediction%bands(i))//' Hz') &
-            //padded(fixed(prediction%level(i), 1)//' dB '//mark)//padded(fixed(prediction%spread(i), 1)//' dB') &
-            //padded(fixed(prediction%floor_modes(i), 1))//fixed(prediction%room_modes(i), 1)//newline
+            //padded(fixed(prediction%level(i), 1)//' dB '//mark)
+         if (i <= prediction%n_modal) then
+            text = text//padded(fixed(prediction%modal_level(i), 1)//' dB') &
+               //padded(fixed(prediction%edge_level(i, 1), 1)//' dB')//padded(fixed(prediction%edge_level(i, 2), 1)//' dB')
+         else
+            text = text//padded('-')//padded('-')//padded('-')
+         end if
+         text = text//fixed(prediction%spread(i), 1)//' dB'//newline
       end do
       text = text//newline//'  Octaves:'
       do i = 1, size(prediction%octaves)
@@ -77,9 +86,9 @@ contains
       end do
       call add_ratings(prediction, coupled, text)
       resistance = 1/maxval(prediction%conductance)
-      text = text//'  Room of '//fixed(case%room%volume, 1)//' m3, reverberation time ' &
+      text = text//'  Room of '//fixed(prediction%volume, 1)//' m3, reverberation time ' &
          //fixed(minval(prediction%reverberation_time), 2)
-      if (case%room%reverberation_times%count > 0) text = text//' to '//fixed(maxval(prediction%reverberation_time), 2)
+      if (case%room%reverberation_time%count > 1) text = text//' to '//fixed(maxval(prediction%reverberation_time), 2)
       text = text//' s.'//newline
       text = text//'  Resistance of the floor '//fixed(resistance/1.0e3_wp, 1)//' kN s/m.'
       if (any(min(prediction%floor_modes, prediction%room_modes) < few_modes)) text = text//' *: fewer than ' &
@@ -97,10 +106,18 @@ contains
       !> The table so far.
       character(len=:), allocatable, intent(inout) :: text
       real(wp) :: level
-      integer :: korean_class
+      integer :: korean_class, i
 
-      text = text//newline//'  ISO 717-2, of one-third octaves: L_iA,Fmax ' &
-         //to_text(get_rounded(prediction%a_weighted))//' dB ('//fixed(prediction%a_weighted, 2)//')'//newline
+      text = text//newline//'  ISO 717-2, of one-third octaves: L_iA,Fmax '//to_text(get_rounded(prediction%rated))//' dB (' &
+         //fixed(prediction%interval(1), 0)//' to '//fixed(prediction%interval(2), 0)//'), statistical ' &
+         //fixed(prediction%a_weighted, 1)//' dB, modal ' &
+         //fixed(get_a_weighted_level(prediction%bands(1)%set, prediction%modal_level), 1)//' dB'//newline
+      text = text//'  Contributions:'
+      do i = 1, size(contribution_names)
+         text = text//merge(',', ' ', i > 1)//' '//trim(replaced(trim(contribution_names(i)), '_', ' '))//' ' &
+            //fixed(prediction%contribution(1, i), 1)//' to '//fixed(prediction%contribution(2, i), 1)
+      end do
+      text = text//' dB'//newline
       level = get_a_weighted_level(prediction%octaves(1)%set, prediction%octave_level)
       korean_class = get_class(level)
       text = text//'  KS F 2863-2, of octaves: L_iA,Fmax '//fixed(level, 2)//' dB, '
@@ -109,7 +126,7 @@ contains
       else
          text = text//'no class'
       end if
-      text = text//newline//'  Statistical means over positions, by the ' &
+      text = text//' (statistical)'//newline//'  Means over positions, by the ' &
          //trim(merge('contact force', 'blocked force', coupled))//'.'//newline
    end subroutine add_ratings
 

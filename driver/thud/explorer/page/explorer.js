@@ -1,5 +1,5 @@
 // Main module of the page: sends the values of the form to the server and shows the latest answer.
-import { build, buildRecording, caseValues, describeChanges, fillConstruction, isCase, markField, startWith, state, titleOf } from "./form.js";
+import { addRoom, build, buildRecording, caseValues, describeChanges, fillConstruction, isCase, markField, startWith, state, titleOf } from "./form.js";
 import { byId, element } from "./page.js";
 import { listenToBall } from "./ball.js";
 import { ConnectionError, ServerError, ask, follow, linkedCase, storeToken } from "./request.js";
@@ -167,8 +167,8 @@ function listen() {
   });
   byId("construction").addEventListener("change", (event) => { fillConstruction(event.target.value); rebuild(); });
   byId("has_room").addEventListener("change", (event) => {
-    state.room = event.target.checked;
-    if (state.room) state.floor ||= "plate";
+    if (event.target.checked) addRoom();
+    else state.room = false;
     rebuild();
   });
   byId("pin").addEventListener("click", pin);
@@ -198,6 +198,7 @@ async function begin() {
   } catch (error) { return showMessage(error.message); }
   state.form = about.form;
   state.constructions = about.constructions;
+  state.roomSource = about.room_source;
   buildRecording(about.recording);
   let start = about.start;
   try { start = JSON.parse(linkedCase()) ?? start; } catch { start = null; }

@@ -2,7 +2,7 @@
 import { byId, capitalize, element, scaled } from "./page.js";
 
 /** State of the case: values that differ from their defaults, chosen construction, ranges of moved sliders, and what is not known, by model. */
-export const state = { form: [], constructions: [], values: {}, model: "", floor: "", chosen: "", room: false, moved: {}, unknowns: {} };
+export const state = { form: [], constructions: [], roomSource: {}, values: {}, model: "", floor: "", chosen: "", room: false, moved: {}, unknowns: {} };
 
 const groupsOf = (part) => state.form.filter((group) => group.part === part);
 const commonGroups = () => state.form.filter((group) => group.part === group.name && group.part !== "room");
@@ -51,7 +51,7 @@ export function fillConstruction(name) {
   if (!construction) return;
   state.chosen = name;
   state.floor = construction.floor;
-  state.room ||= Object.keys(construction.room).length > 0;
+  if (Object.keys(construction.room).length && !state.room) addRoom();
   for (const field of floorFields(construction)) setValue(field, construction.keys[field.name] ?? field.default);
   if (state.room) for (const field of ceilingFields()) setValue(field, construction.room[field.name] ?? field.default);
 }
@@ -92,7 +92,7 @@ export function isCase(values) {
 
 /** Fill the form with the values of a case. */
 export function startWith(values, onChange) {
-  const { model, floor, ...rest } = values;
+  const { model, floor, ...rest } = values.room && !values.model ? { ...values, ...state.roomSource } : values;
   Object.assign(state, { model: model?.name ?? groupsOf("model")[0].name, floor: floor?.name ?? "", room: Boolean(rest.room), values: {}, moved: {} });
   state.unknowns = rest.unknowns ? { [state.model]: rest.unknowns } : {};
   for (const { fields } of usedGroups()) {
@@ -104,6 +104,16 @@ export function startWith(values, onChange) {
     }
   }
   build(onChange);
+}
+
+/** Add the room; a model that was left at its default becomes the source of a room whose case names none. */
+export function addRoom() {
+  state.room = true;
+  state.floor ||= "plate";
+  const { model, ...options } = state.roomSource;
+  if (state.model !== groupsOf("model")[0].name || state.values[state.model]) return;
+  state.model = model.name;
+  for (const [group, values] of Object.entries(options)) state.values[group] ??= { ...values };
 }
 
 function getValue(field) {

@@ -44,6 +44,12 @@ contains
       n = size(gain)
       allocate (receiver%pole(n + 1), receiver%residue(n + 1))
       do i = 1, n
+         if (.not. omega(i) > 0.0_wp) then
+            ! A rigid body that nothing holds.
+            receiver%pole(i) = 0.0_wp
+            receiver%residue(i) = gain(i)
+            cycle
+         end if
          pole = omega(i)*cmplx(-loss_factor(i)/2, sqrt(1 - (loss_factor(i)/2)**2), wp)
          receiver%pole(i) = pole
          receiver%residue(i) = gain(i)*cmplx(1.0_wp, -pole%re/pole%im, wp)

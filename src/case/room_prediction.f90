@@ -1,0 +1,244 @@
+!> Predictions of the level in the room below a floor: a statistical one and one by the modes of floor and room, and an
+!> interval of the rating.
+module thud_room_prediction
+   use thud_band, only: band_type, octave_count
+   use thud_case, only: case_type, get_floor_number
+   use thud_error, only: error_type
+   use thud_floor_model, only: floor_model_type
+   use thud_floor_modes, only: floor_modes_type
+   use thud_force_exposure, only: get_force_exposure_levels
+   use thud_kinds, only: wp
+   use thud_modal_radiation, only: get_modal_radiation, get_strike_points, modal_radiation_type
+   use thud_modal_room, only: box_type, get_highest_frequency, get_modal_room, &
+      get_standard_positions, modal_room_type
+   use thud_plate, only: get_plate_radiation, plate_type
+   use thud_rating, only: get_a_weighted_level
+   use thud_room, only: check_below, get_completed_room, get_reverberation_times, get_room_bands, get_room_level, &
+      modal_radiation, room_level_type, room_type, standard_positions
+   use thud_source_limits, only: get_source_limits, source_limits_type
+   implicit none (type, external)
+   private
+
+   public :: contribution_names, get_box, get_positions, predict_room
+
+   !> Contributions to the interval of a rating.
+   character(len=*), parameter :: contribution_names(*) = [character(len=18) :: 'source', 'edges', 'reverberation_time', &
+      'positions', 'model']
+
+   !> Uncertainty of a reverberation time, as a ratio; an estimate for times that are not measured.
+   real(wp), parameter :: time_ratio = 1.2_wp
+
+   !> Number of even positions of ball and of microphone, and their distance from the walls, m (ISO 16283-2).
+   integer, parameter :: n_even = 16
+   real(wp), parameter :: even_distance = 0.5_wp
+
+   !> Coverage factor of the scatter of positions.
+   real(wp), parameter :: coverage = 2.0_wp
+
+contains
+
+   !> Level in the room below, from a force history.
+   subroutine predict_room(case, force, sample_rate, prediction, error)
+      !> The case, with floor and room.
+      type(case_type), intent(in) :: case
+      !> Force on the floor, N: [n_sample].
+      real(wp), intent(in) :: force(:)
+      !> Samples per second, Hz.
+      real(wp), intent(in) :: sample_rate
+      type(room_level_type), intent(out) :: prediction
+      !> Set if a level cannot be computed, or the floor cannot radiate into the room.
+      type(error_type), allocatable, intent(out) :: error
+      type(band_type), allocatable :: bands(:)
+      type(floor_modes_type) :: modes
+      type(modal_radiation_type) :: radiation
+      type(plate_type) :: plate
+      real(wp), allocatable :: level(:), conductance(:), radiation_factor(:)
+
+      call get_room_bands(bands, error)
+      if (allocated(error)) return
+      allocate (level(size(bands)), conductance(size(bands)))
+      call get_force_exposure_levels(force, sample_rate, bands, trim(case%level_method), level, error)
+      if (allocated(error)) return
+      associate (floor => case%floors(get_floor_number(case))%model)
+         call floor%get_radiator(bands%center, plate, conductance, error)
+         if (.not. allocated(error)) call check_below(plate, case%room, error)
+         if (.not. allocated(error)) call floor%get_room_modes(floor%get_support(), plate, modes, error)
+         if (allocated(error)) return
+         radiation_factor = get_plate_radiation(plate, case%room%air, bands%center)
+         if (case%room%radiation == modal_radiation .or. floor%has_modal_conductance()) then
+            call get_modal_radiation(modes, plate, case%room%air, bands, get_area(case%room, plate), radiation)
+            if (case%room%radiation == modal_radiation) radiation_factor = radiation%radiation_factor
+            if (floor%has_modal_conductance()) conductance = radiation%conductance
+         end if
+         call get_room_level(plate, conductance, radiation_factor, case%room, bands, level, prediction)
+         call add_modal_levels(case%room, floor, plate, modes, force, sample_rate, prediction, error)
+         if (.not. allocated(error)) call add_contributions(case, plate, conductance, radiation_factor, level, prediction)
+      end associate
+   end subroutine predict_room
+
+   !> Part of a floor above a room: its ends along length and width, m.
+   pure function get_area(room, plate) result(area)
+      type(room_type), intent(in) :: room
+      type(plate_type), intent(in) :: plate
+      real(wp) :: area(4)
+
+      associate (completed => get_completed_room(room, plate))
+         area = [room%corner_x, room%corner_x + completed%length, room%corner_y, room%corner_y + completed%width]
+      end associate
+   end function get_area
+
+   !> The room as a box.
+   pure function get_box(room, plate, bands) result(box)
+      type(room_type), intent(in) :: room
+      type(plate_type), intent(in) :: plate
+      !> Bands of a prediction: [n_band].
+      type(band_type), intent(in) :: bands(:)
+      type(box_type) :: box
+
+      associate (completed => get_completed_room(room, plate))
+         box = box_type(sides=[completed%length, completed%width, completed%height], corner=[room%corner_x, room%corner_y], &
+            air=room%air, bands=bands, reverberation_time=get_reverberation_times(room, size(bands)))
+      end associate
+   end function get_box
+
+   !> Levels by the modes of floor and room: as the floor is supported, simply supported and clamped.
+   subroutine add_modal_levels(room, floor, plate, modes, force, sample_rate, prediction, error)
+      type(room_type), intent(in) :: room
+      class(floor_model_type), intent(in) :: floor
+      type(plate_type), intent(in) :: plate
+      !> Modes of the floor as it is supported.
+      type(floor_modes_type), intent(in) :: modes
+      real(wp), intent(in) :: force(:), sample_rate
+      type(room_level_type), intent(inout) :: prediction
+      !> Set if the modes cannot be computed.
+      type(error_type), allocatable, intent(out) :: error
+      character(len=*), parameter :: supports(2) = [character(len=7) :: 'simple', 'clamped']
+      real(wp), allocatable :: ball(:, :), microphone(:, :)
+      type(floor_modes_type) :: other_modes
+      type(plate_type) :: other_plate
+      type(modal_room_type) :: modal
+      type(box_type) :: box
+      integer :: i
+
+      box = get_box(room, plate, prediction%bands)
+      call get_positions(room, box, ball, microphone)
+      call get_modal_room(modes, box, force, sample_rate, ball, microphone, .false., modal)
+      prediction%n_modal = modal%n_band
+      allocate (prediction%modal_level, source=prediction%level)
+      allocate (prediction%modal_spread, source=prediction%spread)
+      allocate (prediction%mean_spread, source=prediction%spread/sqrt(real(size(ball, 2), wp)))
+      prediction%mean_spread(:modal%n_band) = modal%mean_spread
+      prediction%modal_level(:modal%n_band) = modal%mean
+      prediction%modal_spread(:modal%n_band) = modal%spread
+      allocate (prediction%edge_level(size(prediction%level), 2), source=spread(prediction%modal_level, 2, 2))
+      do i = 1, 2
+         if (floor%get_support() == supports(i) .or. modal%n_band == 0) cycle
+         call floor%get_room_modes(supports(i), other_plate, other_modes, error, get_highest_frequency(box))
+         if (allocated(error)) return
+         call get_modal_room(other_modes, box, force, sample_rate, ball, microphone, .false., modal)
+         prediction%edge_level(:modal%n_band, i) = modal%mean
+      end do
+   end subroutine add_modal_levels
+
+   !> Positions of ball and microphone, from the corner of the room, m.
+   subroutine get_positions(room, box, ball, microphone)
+      type(room_type), intent(in) :: room
+      type(box_type), intent(in) :: box
+      !> Positions: [2, n_ball], [3, n_microphone].
+      real(wp), allocatable, intent(out) :: ball(:, :), microphone(:, :)
+      real(wp), allocatable :: even(:, :)
+      real(wp) :: distance(3)
+      integer :: i
+
+      if (room%positions == standard_positions) then
+         allocate (ball(2, 5), microphone(3, 5))
+         call get_standard_positions(box, ball, microphone)
+         return
+      end if
+      call get_strike_points(2*n_even, even)
+      distance = min(even_distance, box%sides/4)
+      ! Every other point is one of the ball; heights are in another order than the other coordinates.
+      ball = spread(distance(:2), 2, n_even) + spread(box%sides(:2) - 2*distance(:2), 2, n_even)*even(:, 1::2)
+      microphone = reshape([(distance(:2) + (box%sides(:2) - 2*distance(:2))*even(:, 2*i), &
+         distance(3) + (box%sides(3) - 2*distance(3))*modulo(0.5_wp + 7*(i - 0.5_wp)/n_even, 1.0_wp), i=1, n_even)], &
+         [3, n_even])
+   end subroutine get_positions
+
+   !> Contributions to the interval of the A-weighted level, as differences from the mean of both predictions.
+   subroutine add_contributions(case, plate, conductance, radiation_factor, level, prediction)
+      type(case_type), intent(in) :: case
+      type(plate_type), intent(in) :: plate
+      !> Conductance, m/(N s), radiation factor, and levels of the force, dB: [n_band].
+      real(wp), intent(in) :: conductance(:), radiation_factor(:), level(:)
+      type(room_level_type), intent(inout) :: prediction
+      type(source_limits_type) :: limits
+      type(error_type), allocatable :: error
+      type(room_level_type) :: changed
+      type(room_type) :: room
+      real(wp) :: modal
+      integer :: i, octave
+
+      allocate (prediction%contribution(2, size(contribution_names)), source=0.0_wp)
+      modal = get_weighted(prediction%modal_level)
+      associate (source => prediction%contribution(:, 1), edges => prediction%contribution(:, 2), &
+         time => prediction%contribution(:, 3), positions => prediction%contribution(:, 4), &
+         model => prediction%contribution(:, 5))
+         ! Another source that conforms: half the range of its octave, the octave of 31.5 Hz being the first.
+         call get_source_limits(case%source, limits, error)
+         changed%level = prediction%level
+         do i = 1, size(level)
+            octave = min(2 + (i - 1)/3, octave_count)
+            changed%level(i) = prediction%level(i) + (limits%upper_level(octave) - limits%lower_level(octave))/2
+         end do
+         source = (get_weighted(changed%level) - prediction%a_weighted)*[-1, 1]
+         edges = [(get_weighted(prediction%edge_level(:, i)) - modal, i=1, 2)]
+         edges = [min(minval(edges), 0.0_wp), max(maxval(edges), 0.0_wp)]
+         do i = 1, 2
+            room = case%room
+            room%reverberation_time%values = room%reverberation_time%values*time_ratio**(2*i - 3)
+            call get_room_level(plate, conductance, radiation_factor, room, prediction%bands, level, changed)
+            time(i) = changed%a_weighted - prediction%a_weighted
+         end do
+         positions = coverage*get_weighted_spread(prediction)*[-1, 1]
+         model = abs(modal - prediction%a_weighted)/2*[-1, 1]
+      end associate
+      prediction%rated = (modal + prediction%a_weighted)/2
+      ! The contributions are independent of each other.
+      prediction%interval = prediction%rated + [-1, 1]*norm2(prediction%contribution, dim=2)
+   end subroutine add_contributions
+
+   !> A-weighted level of one-third-octave bands, dB.
+   pure function get_weighted(level) result(weighted)
+      real(wp), intent(in) :: level(:)
+      real(wp) :: weighted
+
+      weighted = get_a_weighted_level('third', level)
+   end function get_weighted
+
+   !> Standard deviation of the A-weighted mean level: that of the bands, weighted by their energies, as if their deviations
+   !> were independent, dB.
+   pure function get_weighted_spread(prediction) result(deviation)
+      type(room_level_type), intent(in) :: prediction
+      real(wp) :: deviation
+      real(wp) :: share(size(prediction%modal_level))
+      integer :: i
+
+      do i = 1, size(share)
+         share(i) = 10**(0.1_wp*(get_weighted(prediction%modal_level) &
+            - get_weighted(without_band(prediction%modal_level, i))))
+      end do
+      share = 1 - 1/share
+      deviation = norm2(share*prediction%mean_spread)
+   end function get_weighted_spread
+
+   !> Levels with one band silent, dB.
+   pure function without_band(level, band) result(others)
+      real(wp), intent(in) :: level(:)
+      integer, intent(in) :: band
+      real(wp) :: others(size(level))
+
+      others = level
+      others(band) = -1000.0_wp
+   end function without_band
+
+end module thud_room_prediction

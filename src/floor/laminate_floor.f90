@@ -1,0 +1,202 @@
+!> A plate of crossed layers that yield in shear, as cross-laminated timber.
+module thud_laminate_floor
+   use thud_error, only: error_type, input_error
+   use thud_field, only: field_type, key_length, list_type
+   use thud_floor_model, only: reason_length
+   use thud_kinds, only: wp
+   use thud_legendre, only: get_gauss_legendre
+   use thud_new_field, only: list_field, real_field
+   use thud_plate, only: get_resistance, plate_type
+   use thud_plate_stack, only: orthotropic_type
+   use thud_rectangular_floor, only: rectangular_floor_type
+   use thud_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: laminate_floor_type
+
+   !> Thicknesses, m, and directions of the default layers, degrees.
+   real(wp), parameter :: default_thickness(*) = [0.04_wp, 0.02_wp, 0.04_wp, 0.02_wp, 0.04_wp]
+   real(wp), parameter :: default_angle(*) = [0.0_wp, 90.0_wp, 0.0_wp, 90.0_wp, 0.0_wp]
+
+   !> The floor; the defaults are five layers of spruce (strength class C24).
+   type, extends(rectangular_floor_type) :: laminate_floor_type
+      !> Length, along layers of 0 degrees, and width, m.
+      real(wp) :: length = 5.0_wp, width = 4.0_wp
+      !> Thicknesses of the layers from the top, m, and their directions, 0 or 90 degrees: empty lists are the default.
+      type(list_type) :: layer_thickness, layer_angle
+      !> Modulus of elasticity along and across the grain, Pa.
+      real(wp) :: youngs_modulus = 1.1e10_wp, cross_modulus = 3.7e8_wp
+      !> Shear modulus along the grain, and that of rolling shear, Pa.
+      real(wp) :: shear_modulus = 6.9e8_wp, rolling_shear_modulus = 5.0e7_wp
+      !> Fraction of the torsional stiffness that joints between the boards of a layer leave.
+      real(wp) :: torsion_factor = 0.65_wp
+      !> Density, kg/m3; mass per area of what lies on the plate without stiffness, as gravel, kg/m2.
+      real(wp) :: density = 470.0_wp, added_mass = 0.0_wp
+      !> Loss factor including that of the edges, without radiation.
+      real(wp) :: loss_factor = 0.03_wp
+   contains
+      procedure, pass(options) :: get_fields
+      procedure, pass(options) :: check
+      procedure, pass(options) :: get_base
+      procedure, pass(options) :: get_radiator
+      procedure, pass(options) :: get_validity
+      procedure, pass(options) :: has_modal_conductance
+   end type laminate_floor_type
+
+contains
+
+   !> Keys and allowed ranges of the group `&laminate_floor`.
+   function get_fields(options) result(fields)
+      class(laminate_floor_type), intent(in), target :: options
+      type(field_type), allocatable :: fields(:)
+
+      fields = [ &
+         real_field('length', options%length, 'm', 'length of the floor, along layers of 0 degrees', '[0.5, 100]'), &
+         real_field('width', options%width, 'm', 'width of the floor', '[0.5, 100]'), &
+         list_field('layer_thickness', options%layer_thickness, 'm', &
+         'thicknesses of the layers from the top (default: 40, 20, 40, 20, 40 mm)', '[0.003, 0.5]'), &
+         list_field('layer_angle', options%layer_angle, 'deg', &
+         'directions of the layers, 0 (along the length) or 90 (default: alternating, beginning with 0)', '[0, 90]'), &
+         real_field('youngs_modulus', options%youngs_modulus, 'Pa', 'modulus of elasticity along the grain', '[1e8, 1e12]'), &
+         real_field('cross_modulus', options%cross_modulus, 'Pa', 'modulus of elasticity across the grain', '[0, 1e12]'), &
+         real_field('shear_modulus', options%shear_modulus, 'Pa', 'shear modulus along the grain', '[1e6, 1e12]'), &
+         real_field('rolling_shear_modulus', options%rolling_shear_modulus, 'Pa', 'modulus of rolling shear', '[1e6, 1e12]'), &
+         real_field('torsion_factor', options%torsion_factor, '', &
+         'fraction of the torsional stiffness that joints between boards leave', '[0, 1]'), &
+         real_field('density', options%density, 'kg/m3', 'density of the layers', '[10, 20000]'), &
+         real_field('added_mass', options%added_mass, 'kg/m2', 'mass without stiffness on the plate, as gravel', '[0, 1000]'), &
+         real_field('loss_factor', options%loss_factor, '', &
+         'loss factor of the floor including its edges, without radiation', '(0, 1]'), &
+         options%get_source_fields(), options%get_build_up_fields(), options%get_point_fields()]
+   end function get_fields
+
+   !> Checks the layers, then what all rectangular floors have.
+   subroutine check(options, error)
+      class(laminate_floor_type), intent(in) :: options
+      type(error_type), allocatable, intent(out) :: error
+
+      associate (thickness => options%layer_thickness, angle => options%layer_angle)
+         if (angle%count > 0 .and. angle%count /= max(thickness%count, merge(size(default_thickness), 0, &
+            thickness%count == 0))) then
+            error = input_error('&laminate_floor: layer_angle has '//to_text(angle%count)//' values and layer_thickness ' &
+               //to_text(thickness%count)//'; allowed: the same number of both')
+         else if (any(angle%values(:angle%count) > 0.0_wp .and. angle%values(:angle%count) < 90.0_wp)) then
+            error = input_error('&laminate_floor: layer_angle = '//to_text(minval(angle%values(:angle%count), &
+               angle%values(:angle%count) > 0.0_wp))//' degrees; allowed: 0 or 90')
+         end if
+      end associate
+      if (.not. allocated(error)) call options%check_build_up(error)
+   end subroutine check
+
+   !> Thicknesses, m, and whether the grain runs along the length: [n_layer].
+   pure subroutine get_layers(options, thickness, is_along)
+      class(laminate_floor_type), intent(in) :: options
+      real(wp), allocatable, intent(out) :: thickness(:)
+      logical, allocatable, intent(out) :: is_along(:)
+      integer :: i
+
+      thickness = default_thickness
+      if (options%layer_thickness%count > 0) thickness = options%layer_thickness%values(:options%layer_thickness%count)
+      is_along = [(mod(i, 2) == 1, i=1, size(thickness))]
+      if (options%layer_angle%count == size(thickness)) is_along = options%layer_angle%values(:size(thickness)) < 45.0_wp
+   end subroutine get_layers
+
+   !> Bending and shear stiffness per width in one direction.
+   !>
+   !> The shear stress at a height z is V Q(z)/B with the shear force V and Q the first moment of the moduli of elasticity
+   !> above z; its energy V**2/(2 S) gives 1/S = integral of Q**2/(G B**2) (Timoshenko beam of layers).
+   pure subroutine get_section(thickness, modulus, shear_modulus, bending, shear)
+      !> Thicknesses of the layers from the top, m: [n_layer].
+      real(wp), intent(in) :: thickness(:)
+      !> Moduli of elasticity and shear moduli in this direction, Pa: [n_layer].
+      real(wp), intent(in) :: modulus(:), shear_modulus(:)
+      !> Bending stiffness, N m, and shear stiffness, N/m.
+      real(wp), intent(out) :: bending, shear
+      real(wp) :: node(3), weight(3), top(size(thickness)), center(size(thickness))
+      real(wp) :: axis, moment, compliance
+      integer :: i
+
+      top = [(sum(thickness(:i - 1)), i=1, size(thickness))]
+      center = top + thickness/2
+      axis = sum(modulus*thickness*center)/sum(modulus*thickness)
+      bending = sum(modulus*thickness*(thickness**2/12 + (center - axis)**2))
+      ! Q**2 is a polynomial of degree 4 in each layer, which three points integrate exactly.
+      call get_gauss_legendre(node, weight)
+      moment = 0.0_wp
+      compliance = 0.0_wp
+      do i = 1, size(thickness)
+         associate (z => top(i) + thickness(i)*(node + 1)/2)
+            compliance = compliance + sum(weight*(moment + modulus(i)*(z - top(i))*((z + top(i))/2 - axis))**2) &
+               *thickness(i)/2/shear_modulus(i)
+         end associate
+         moment = moment + modulus(i)*thickness(i)*(center(i) - axis)
+      end do
+      shear = bending**2/compliance
+   end subroutine get_section
+
+   !> The equivalent homogeneous plate, and the stiffnesses of the layers.
+   subroutine get_base(options, group, plate, base)
+      class(laminate_floor_type), intent(in) :: options
+      character(len=key_length), intent(out) :: group
+      type(plate_type), intent(out) :: plate
+      type(orthotropic_type), intent(out) :: base
+      real(wp), allocatable :: thickness(:)
+      logical, allocatable :: is_along(:)
+      real(wp) :: mean
+
+      group = 'laminate_floor'
+      call get_layers(options, thickness, is_along)
+      associate (e => options%youngs_modulus, e_cross => options%cross_modulus, g => options%shear_modulus, &
+         g_rolling => options%rolling_shear_modulus, total => sum(thickness))
+         call get_section(thickness, merge(e, e_cross, is_along), merge(g, g_rolling, is_along), base%along, base%shear(1))
+         call get_section(thickness, merge(e_cross, e, is_along), merge(g_rolling, g, is_along), base%across, base%shear(2))
+         base%torsion = options%torsion_factor*g*total**3/12
+         base%mass = options%density*total + options%added_mass
+         base%inertia = options%density*total**3/12
+         base%loss_factor = options%loss_factor
+         mean = sqrt(base%along*base%across)
+         plate = plate_type(length=options%length, width=options%width, thickness=total, density=base%mass/total, &
+            wave_speed=sqrt(12*mean/base%mass)/total, stiffness_ratio=base%across/base%along, &
+            torsion_ratio=min(2*base%torsion/mean, 1.0_wp), loss_factor=options%loss_factor, edges='absorption')
+      end associate
+   end subroutine get_base
+
+   !> The equivalent plate, and its conductance if it were infinite and rigid in shear.
+   subroutine get_radiator(options, frequency, plate, conductance, error)
+      class(laminate_floor_type), intent(in) :: options
+      real(wp), intent(in) :: frequency(:)
+      type(plate_type), intent(out) :: plate
+      real(wp), intent(out) :: conductance(:)
+      type(error_type), allocatable, intent(out) :: error
+      type(orthotropic_type) :: base
+      character(len=key_length) :: group
+
+      call options%get_base(group, plate, base)
+      conductance = 1/get_resistance(plate)
+   end subroutine get_radiator
+
+   !> Frequency band in which shear waves are longer than two thicknesses.
+   subroutine get_validity(options, lowest, highest, reason)
+      class(laminate_floor_type), intent(in) :: options
+      real(wp), intent(out) :: lowest, highest
+      character(len=reason_length), intent(out) :: reason
+      type(plate_type) :: plate
+      type(orthotropic_type) :: base
+      character(len=key_length) :: group
+
+      call options%get_base(group, plate, base)
+      lowest = 0.0_wp
+      highest = sqrt(minval(base%shear)/base%mass)/(2*plate%thickness)
+      reason = 'shear waves are shorter than two thicknesses, and layers deform by themselves'
+   end subroutine get_validity
+
+   !> No homogeneous plate represents the floor.
+   pure function has_modal_conductance(options) result(yes)
+      class(laminate_floor_type), intent(in) :: options
+      logical :: yes
+
+      yes = .true.
+   end function has_modal_conductance
+
+end module thud_laminate_floor

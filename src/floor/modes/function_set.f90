@@ -1,0 +1,189 @@
+!> Orthonormal functions of one coordinate, whose products are the shapes in which a plate moves.
+module thud_function_set
+   use thud_constants, only: pi
+   use thud_kinds, only: wp
+   use thud_legendre, only: get_gauss_legendre, get_legendre
+   implicit none (type, external)
+   private
+
+   public :: function_set_type, get_functions, get_overlap, get_quadrature, new_cosines, new_polynomials, new_sines
+
+   !> Kinds of functions.
+   integer, parameter :: sines = 1, cosines = 2, polynomials = 3
+
+   !> Functions that are orthonormal on [0, length].
+   type :: function_set_type
+      !> Kind of the functions.
+      integer :: kind = sines
+      !> Length of the interval, m.
+      real(wp) :: length = 1.0_wp
+      !> Number of functions.
+      integer :: count = 0
+      !> Polynomials as sums of orthonormal Legendre polynomials: [0:degree, count].
+      real(wp), allocatable :: coefficient(:, :)
+   end type function_set_type
+
+contains
+
+   !> sqrt(2/length) sin(i pi x/length), i = 1 to count: deflections of simply supported plates.
+   pure function new_sines(length, count) result(set)
+      !> Length, m.
+      real(wp), intent(in) :: length
+      !> Number of functions.
+      integer, intent(in) :: count
+      type(function_set_type) :: set
+
+      set = function_set_type(sines, length, count)
+   end function new_sines
+
+   !> sqrt(2/length) cos(i pi x/length), i = 1 to count: rotations of simply supported plates.
+   pure function new_cosines(length, count) result(set)
+      !> Length, m.
+      real(wp), intent(in) :: length
+      !> Number of functions.
+      integer, intent(in) :: count
+      type(function_set_type) :: set
+
+      set = function_set_type(cosines, length, count)
+   end function new_cosines
+
+   !> Polynomials up to a degree that fulfill constraints: at each position, the derivative of the given order is 0.
+   !>
+   !> A Householder reflection per constraint maps it to one function, which is removed. Constraints at mirrored positions
+   !> are replaced by their sum and difference, so that the functions remain even or odd.
+   pure function new_polynomials(length, degree, position, order) result(set)
+      !> Length, m.
+      real(wp), intent(in) :: length
+      !> Degree of the polynomials.
+      integer, intent(in) :: degree
+      !> Positions of the constraints, m, and orders of derivatives (0 or 1): [n_constraint].
+      real(wp), intent(in) :: position(:)
+      integer, intent(in) :: order(:)
+      type(function_set_type) :: set
+      real(wp), allocatable :: constraint(:, :), row(:), reflection(:)
+      integer :: i, j, pivot
+
+      set = function_set_type(polynomials, length, degree + 1)
+      allocate (set%coefficient(0:degree, degree + 1), source=0.0_wp)
+      do i = 0, degree
+         set%coefficient(i, i + 1) = 1.0_wp
+      end do
+      constraint = get_constraints(set, position, order)
+      do i = 1, size(constraint, 1)
+         row = matmul(constraint(i, :), set%coefficient)
+         do pivot = 1, set%count
+            if (abs(row(pivot)) > 1.0e-9_wp*maxval(abs(row))) exit
+         end do
+         reflection = row
+         reflection(pivot) = row(pivot) + sign(norm2(row), row(pivot))
+         set%coefficient = set%coefficient - spread(matmul(set%coefficient, reflection), 2, set%count) &
+            *spread(reflection, 1, degree + 1)*2/dot_product(reflection, reflection)
+         set%count = set%count - 1
+         set%coefficient = set%coefficient(:, [(j, j=1, pivot - 1), (j, j=pivot + 1, set%count + 1)])
+      end do
+   end function new_polynomials
+
+   !> Constraints as rows over the functions: [n_constraint, count].
+   pure function get_constraints(set, position, order) result(row)
+      !> The functions without constraints.
+      type(function_set_type), intent(in) :: set
+      !> Positions, m, and orders of derivatives: [n_constraint].
+      real(wp), intent(in) :: position(:)
+      integer, intent(in) :: order(:)
+      real(wp), allocatable :: row(:, :)
+      logical :: mirrored(size(position))
+      integer :: i, j
+
+      allocate (row(size(position), set%count))
+      do i = 1, size(position)
+         row(i, :) = reshape(get_functions(set, position(i:i), order(i)), [set%count])
+      end do
+      mirrored = .false.
+      do i = 1, size(position)
+         do j = i + 1, size(position)
+            if (order(i) /= order(j) .or. mirrored(i) .or. mirrored(j)) cycle
+            if (abs(position(i) + position(j) - set%length) > 1.0e-9_wp*set%length) cycle
+            row([i, j], :) = reshape([row(i, :) + row(j, :), row(i, :) - row(j, :)], [2, set%count], order=[2, 1])
+            mirrored([i, j]) = .true.
+         end do
+      end do
+      ! Rounding would mix even and odd functions.
+      where (abs(row) < 1.0e-12_wp*spread(maxval(abs(row), dim=2), 2, set%count)) row = 0.0_wp
+   end function get_constraints
+
+   !> The functions or their derivatives at positions: [n_position, count].
+   pure function get_functions(set, position, order) result(value)
+      type(function_set_type), intent(in) :: set
+      !> Positions, m: [n_position].
+      real(wp), intent(in) :: position(:)
+      !> Order of the derivative: 0 to 2.
+      integer, intent(in) :: order
+      !> Values, 1/m**(order + 1/2).
+      real(wp) :: value(size(position), set%count)
+      real(wp) :: legendre(0:size(set%coefficient, 1) - 1, 0:2)
+      integer :: i, j
+
+      if (set%kind == polynomials) then
+         do i = 1, size(position)
+            call get_legendre(2*position(i)/set%length - 1, legendre(:, 0), legendre(:, 1), legendre(:, 2))
+            do j = 0, ubound(legendre, 1)
+               legendre(j, order) = legendre(j, order)*sqrt((2*j + 1)/set%length)
+            end do
+            value(i, :) = (2/set%length)**order*matmul(legendre(:, order), set%coefficient)
+         end do
+         return
+      end if
+      do j = 1, set%count
+         associate (k => j*pi/set%length)
+            ! A derivative of a sine or cosine advances its phase by a quarter of a turn.
+            value(:, j) = sqrt(2/set%length)*k**order*sin(k*position + merge(order, order + 1, set%kind == sines)*pi/2)
+         end associate
+      end do
+   end function get_functions
+
+   !> Points and weights of a quadrature on an interval that integrates products of two functions.
+   pure subroutine get_quadrature(count, from, to, point, weight)
+      !> Number of points; the number of the functions plus 20 integrates their products to rounding.
+      integer, intent(in) :: count
+      !> Ends of the interval, m.
+      real(wp), intent(in) :: from, to
+      !> Points and weights, m: [count].
+      real(wp), allocatable, intent(out) :: point(:), weight(:)
+
+      allocate (point(count), weight(count))
+      call get_gauss_legendre(point, weight)
+      point = from + (to - from)*(point + 1)/2
+      weight = weight*(to - from)/2
+   end subroutine get_quadrature
+
+   !> Integrals of products of derivatives of two sets over an interval: [first%count, second%count].
+   pure function get_overlap(first, first_order, second, second_order, from, to) result(overlap)
+      type(function_set_type), intent(in) :: first, second
+      !> Orders of the derivatives.
+      integer, intent(in) :: first_order, second_order
+      !> Ends of the interval, m (default: the whole).
+      real(wp), intent(in), optional :: from, to
+      !> The integrals, 1/m**(first_order + second_order).
+      real(wp) :: overlap(first%count, second%count)
+      real(wp), allocatable :: point(:), weight(:)
+      real(wp) :: ends(2)
+      integer :: i, phase
+
+      phase = first_order - second_order + merge(0, 1, first%kind == sines) - merge(0, 1, second%kind == sines)
+      if (all([first%kind, second%kind] /= polynomials) .and. mod(phase, 2) == 0 .and. .not. present(from)) then
+         overlap = 0.0_wp
+         do i = 1, min(first%count, second%count)
+            overlap(i, i) = merge(1, -1, mod(phase, 4) == 0)*(i*pi/first%length)**(first_order + second_order)
+         end do
+         return
+      end if
+      ends = [0.0_wp, first%length]
+      if (present(from)) ends(1) = from
+      if (present(to)) ends(2) = to
+      call get_quadrature(first%count + second%count + 20, ends(1), ends(2), point, weight)
+      associate (left => get_functions(first, point, first_order), right => get_functions(second, point, second_order))
+         overlap = matmul(transpose(left*spread(weight, 2, first%count)), right)
+      end associate
+   end function get_overlap
+
+end module thud_function_set

@@ -1,0 +1,508 @@
+!> Plates above each other, with ribs and resilient layers, as a Ritz system.
+!>
+!> Each plate is orthotropic, with bending stiffnesses and, if it is not rigid in shear, with the rotations of Mindlin's
+!> theory as static displacements. Its edges are held by springs against deflection and rotation, which may be rigid.
+module thud_plate_stack
+   use thud_constants, only: pi
+   use thud_function_set, only: function_set_type, get_functions, get_overlap, new_cosines, new_polynomials, new_sines
+   use thud_kinds, only: wp
+   use thud_lapack, only: dposv
+   use thud_ritz_system, only: add_displacement, add_mass, add_stiffness, modes_type, product_type, ritz_system_type, &
+      solve_ritz_system
+   implicit none (type, external)
+   private
+
+   public :: edge_type, get_resolved_frequency, get_stack_modes, is_uncoupled, layer_type, orthotropic_type
+   public :: plate_stack_type, point_spring_type, ribs_type, rigid_support
+
+   !> A spring of this stiffness or more is a rigid support.
+   real(wp), parameter :: rigid_support = 1.0e15_wp
+
+   !> Maximum number of functions of a stack, if all are coupled, if those of equal symmetry in one or in both directions
+   !> are, if only those along the width are, and if none is. The first four take about as long.
+   integer, parameter :: max_coupled(0:2) = [700, 1100, 1700], max_half_coupled = 6000, max_uncoupled = 40000
+
+   !> Springs along an edge of a plate.
+   type :: edge_type
+      !> Stiffness against deflection, N/m2, and against rotation, N, per length.
+      real(wp) :: deflection = rigid_support, rotation = 0.0_wp
+   end type edge_type
+
+   !> Equal beams below a plate, all along its length or all along its width.
+   type :: ribs_type
+      !> Positions across the ribs, m: [n_rib].
+      real(wp), allocatable :: position(:)
+      !> Along the width instead of the length.
+      logical :: along_width = .false.
+      !> Stiffness of one rib in bending, N m2, in shear, N (0: rigid), and in torsion, N m2.
+      real(wp) :: bending = 0.0_wp, shear = 0.0_wp, torsion = 0.0_wp
+      !> Mass per length, kg/m, and its moment of inertia about the axis, kg m.
+      real(wp) :: mass = 0.0_wp, inertia = 0.0_wp
+      real(wp) :: loss_factor = 0.0_wp
+   end type ribs_type
+
+   !> A plate.
+   type :: orthotropic_type
+      !> Bending stiffness per width along length and width, coupling of both curvatures, and torsion, N m; the energy per
+      !> area is (B_x w_xx**2 + 2 B_xy w_xx w_yy + B_y w_yy**2 + 4 B_t w_xy**2)/2.
+      real(wp) :: along = 0.0_wp, across = 0.0_wp, coupling = 0.0_wp, torsion = 0.0_wp
+      !> Shear stiffness per width of both directions, N/m; 0: rigid.
+      real(wp) :: shear(2) = 0.0_wp
+      !> Mass per area, kg/m2, and its moment of inertia, kg.
+      real(wp) :: mass = 0.0_wp, inertia = 0.0_wp
+      real(wp) :: loss_factor = 0.0_wp
+      !> Edges at x = 0, x = length, y = 0 and y = width.
+      type(edge_type) :: edge(4)
+      !> Lines on which the plate rests, m: x = constant and y = constant.
+      real(wp), allocatable :: line_x(:), line_y(:)
+      type(ribs_type), allocatable :: ribs(:)
+   end type orthotropic_type
+
+   !> A spring between two plates.
+   type :: point_spring_type
+      !> Position, m; stiffness, N/m; loss factor.
+      real(wp) :: x = 0.0_wp, y = 0.0_wp, stiffness = 0.0_wp, loss_factor = 0.0_wp
+   end type point_spring_type
+
+   !> The connection of two plates.
+   type :: layer_type
+      !> Stiffness per area, N/m3, and its loss factor.
+      real(wp) :: stiffness = 0.0_wp, loss_factor = 0.0_wp
+      !> Springs along lines y = constant: positions, m, stiffness per length, N/m2, and loss factor.
+      real(wp), allocatable :: line_y(:)
+      real(wp) :: line_stiffness = 0.0_wp, line_loss_factor = 0.0_wp
+      !> Springs at points.
+      type(point_spring_type), allocatable :: point(:)
+   end type layer_type
+
+   !> Plates of equal sides, the upper one first.
+   type :: plate_stack_type
+      !> Length and width, m.
+      real(wp) :: length = 1.0_wp, width = 1.0_wp
+      type(orthotropic_type), allocatable :: plate(:)
+      !> The layers between them: [n_plate - 1].
+      type(layer_type), allocatable :: layer(:)
+      !> Number of the plate that radiates into the room.
+      integer :: radiator = 1
+   end type plate_stack_type
+
+   !> Displacement and rotations of a plate, and numbers of these in the system; 0: no rotations.
+   type :: plate_motion_type
+      type(product_type) :: deflection, rotation_x, rotation_y
+      integer :: w = 0, a = 0, b = 0
+   end type plate_motion_type
+
+contains
+
+   !> Modes of a stack. The displacements of the plates are the first ones of the modes, in the same order.
+   subroutine get_stack_modes(stack, max_frequency, modes, resolved, failed)
+      type(plate_stack_type), intent(in) :: stack
+      !> Frequency up to which the modes are wanted, Hz.
+      real(wp), intent(in) :: max_frequency
+      type(modes_type), intent(out) :: modes
+      !> Frequency up to which the functions resolve the waves, Hz: less than the wanted one for large or soft plates.
+      real(wp), intent(out) :: resolved
+      !> The system has no solution.
+      logical, intent(out) :: failed
+      type(ritz_system_type) :: system
+      type(plate_motion_type) :: motion(size(stack%plate))
+      integer :: i
+
+      resolved = get_resolved_frequency(stack, max_frequency)
+      do i = 1, size(stack%plate)
+         motion(i) = new_motion(stack, stack%plate(i), resolved)
+         call add_displacement(system, motion(i)%deflection, motion(i)%w)
+      end do
+      do i = 1, size(stack%plate)
+         system%is_radiator = i == stack%radiator
+         if (maxval(stack%plate(i)%shear) > 0.0_wp) then
+            call add_displacement(system, motion(i)%rotation_x, motion(i)%a)
+            call add_displacement(system, motion(i)%rotation_y, motion(i)%b)
+            call add_shear_plate(system, stack%plate(i), motion(i))
+         else
+            call add_thin_plate(system, stack%plate(i), motion(i))
+         end if
+         call add_edges(system, stack%plate(i), motion(i))
+         call add_ribs(system, stack%plate(i), motion(i))
+      end do
+      system%is_radiator = .false.
+      do i = 1, size(stack%plate) - 1
+         call add_layer(system, stack%layer(i), motion(i), motion(i + 1))
+      end do
+      call solve_ritz_system(system, modes, failed)
+   end subroutine get_stack_modes
+
+   !> Frequency up to which the functions of a stack resolve its waves, Hz.
+   pure function get_resolved_frequency(stack, max_frequency) result(frequency)
+      type(plate_stack_type), intent(in) :: stack
+      !> Frequency up to which the modes are wanted, Hz.
+      real(wp), intent(in) :: max_frequency
+      real(wp) :: frequency
+      integer :: i, limit
+
+      limit = max_coupled(count([is_symmetric(stack, 1), is_symmetric(stack, 2)]))
+      if (is_uncoupled_along(stack, 1)) limit = max_half_coupled
+      if (is_uncoupled(stack)) limit = max_uncoupled
+      ! Rotations take about as long as two plates.
+      if (any([(maxval(stack%plate(i)%shear) > 0.0_wp, i=1, size(stack%plate))])) limit = limit/2
+      frequency = max_frequency
+      do while (sum([(product(get_counts(stack, stack%plate(i), frequency)), i=1, size(stack%plate))]) > limit)
+         frequency = 0.95_wp*frequency
+      end do
+   end function get_resolved_frequency
+
+   !> Whether each mode of a stack has one number of half waves along the length and one along the width.
+   pure function is_uncoupled(stack) result(yes)
+      type(plate_stack_type), intent(in) :: stack
+      logical :: yes
+
+      yes = is_uncoupled_along(stack, 1) .and. is_uncoupled_along(stack, 2)
+   end function is_uncoupled
+
+   !> Whether each mode of a stack has one number of half waves in a direction: simply supported plates with ribs along it.
+   pure function is_uncoupled_along(stack, direction) result(yes)
+      type(plate_stack_type), intent(in) :: stack
+      !> 1: along the length, 2: along the width.
+      integer, intent(in) :: direction
+      logical :: yes
+      integer :: i
+
+      yes = .true.
+      do i = 1, size(stack%plate)
+         yes = yes .and. has_sines(stack%plate(i), direction)
+         if (allocated(stack%plate(i)%ribs)) yes = yes .and. all(stack%plate(i)%ribs%along_width .eqv. direction == 2)
+      end do
+      do i = 1, size(stack%plate) - 1
+         yes = yes .and. .not. allocated(stack%layer(i)%point)
+         if (direction == 2) yes = yes .and. .not. allocated(stack%layer(i)%line_y)
+      end do
+   end function is_uncoupled_along
+
+   !> Whether the supports and connections of a stack are symmetric in a direction.
+   pure function is_symmetric(stack, direction) result(yes)
+      type(plate_stack_type), intent(in) :: stack
+      !> 1: along the length, 2: along the width.
+      integer, intent(in) :: direction
+      logical :: yes
+      integer :: i
+
+      yes = .true.
+      do i = 1, size(stack%plate)
+         associate (edges => stack%plate(i)%edge(2*direction - 1:2*direction))
+            yes = yes .and. abs(edges(1)%deflection - edges(2)%deflection) <= 0.0_wp &
+               .and. abs(edges(1)%rotation - edges(2)%rotation) <= 0.0_wp
+         end associate
+         if (direction == 1 .and. allocated(stack%plate(i)%line_x)) yes = yes .and. size(stack%plate(i)%line_x) == 0
+         if (direction == 2 .and. allocated(stack%plate(i)%line_y)) yes = yes .and. size(stack%plate(i)%line_y) == 0
+      end do
+      do i = 1, size(stack%plate) - 1
+         yes = yes .and. .not. allocated(stack%layer(i)%point)
+      end do
+   end function is_symmetric
+
+   !> Number of functions of x and of y that resolve the waves of a plate up to a frequency: [2].
+   pure function get_counts(stack, plate, frequency) result(n)
+      type(plate_stack_type), intent(in) :: stack
+      type(orthotropic_type), intent(in) :: plate
+      !> Frequency, Hz.
+      real(wp), intent(in) :: frequency
+      integer :: n(2)
+      real(wp) :: sides(2), half, stiffness(2), inertia
+      integer :: i
+
+      sides = [stack%length, stack%width]
+      stiffness = [plate%along, plate%across]
+      inertia = plate%mass*(2*pi*frequency)**2
+      do i = 1, 2
+         associate (b => stiffness(i), s => plate%shear(i))
+            if (s > 0.0_wp) then
+               half = sides(i)/2*sqrt((inertia*b + sqrt((inertia*b)**2 + 4*b*s**2*inertia))/(2*b*s))
+            else
+               half = sides(i)/2*(inertia/b)**0.25_wp
+            end if
+         end associate
+         if (has_sines(plate, i)) then
+            n(i) = 4 + int(2*half/pi)
+         else
+            ! A wave of half the length `half` in radians has Legendre coefficients up to this degree.
+            n(i) = 8 + int(half + 4*half**(1.0_wp/3))
+         end if
+      end do
+   end function get_counts
+
+   !> Whether both ends of a plate in one direction are simply supported, without further supports.
+   pure function has_sines(plate, direction) result(yes)
+      type(orthotropic_type), intent(in) :: plate
+      !> 1: along the length, 2: along the width.
+      integer, intent(in) :: direction
+      logical :: yes
+
+      associate (edges => plate%edge(2*direction - 1:2*direction))
+         yes = all(edges%deflection >= rigid_support .and. edges%rotation <= 0.0_wp)
+      end associate
+      if (direction == 1 .and. allocated(plate%line_x)) yes = yes .and. size(plate%line_x) == 0
+      if (direction == 2 .and. allocated(plate%line_y)) yes = yes .and. size(plate%line_y) == 0
+   end function has_sines
+
+   !> Functions of the deflection and the rotations of a plate.
+   pure function new_motion(stack, plate, frequency) result(motion)
+      type(plate_stack_type), intent(in) :: stack
+      type(orthotropic_type), intent(in) :: plate
+      !> Frequency up to which waves are resolved, Hz.
+      real(wp), intent(in) :: frequency
+      type(plate_motion_type) :: motion
+      type(function_set_type) :: deflection(2), rotation(2)
+      real(wp), allocatable :: lines(:)
+      real(wp) :: sides(2)
+      integer :: n(2), i
+
+      n = get_counts(stack, plate, frequency)
+      sides = [stack%length, stack%width]
+      do i = 1, 2
+         if (has_sines(plate, i)) then
+            deflection(i) = new_sines(sides(i), n(i))
+            rotation(i) = new_cosines(sides(i), n(i))
+            cycle
+         end if
+         lines = [real(wp) ::]
+         if (i == 1 .and. allocated(plate%line_x)) lines = plate%line_x
+         if (i == 2 .and. allocated(plate%line_y)) lines = plate%line_y
+         associate (edge => plate%edge(2*i - 1:2*i), ends => [0.0_wp, sides(i)])
+            associate (fixed => [pack(ends, edge%deflection >= rigid_support), lines], &
+               clamped => pack(ends, edge%rotation >= rigid_support))
+               deflection(i) = new_polynomials(sides(i), n(i) + size(fixed) + size(clamped), [fixed, clamped], &
+                  [spread(0, 1, size(fixed)), spread(1, 1, size(clamped))])
+               rotation(i) = new_polynomials(sides(i), n(i) + size(clamped), clamped, spread(0, 1, size(clamped)))
+            end associate
+         end associate
+      end do
+      motion%deflection = product_type(deflection(1), deflection(2))
+      motion%rotation_x = product_type(rotation(1), deflection(2), is_static=.true.)
+      motion%rotation_y = product_type(deflection(1), rotation(2), is_static=.true.)
+   end function new_motion
+
+   !> Stiffness and mass of a plate that is rigid in shear (Kirchhoff).
+   subroutine add_thin_plate(system, plate, motion)
+      type(ritz_system_type), intent(inout) :: system
+      type(orthotropic_type), intent(in) :: plate
+      type(plate_motion_type), intent(in) :: motion
+
+      associate (x => motion%deflection%x, y => motion%deflection%y, w => motion%w, eta => plate%loss_factor)
+         call add_stiffness(system, w, w, plate%along, get_overlap(x, 2, x, 2), get_overlap(y, 0, y, 0), eta)
+         call add_stiffness(system, w, w, plate%across, get_overlap(x, 0, x, 0), get_overlap(y, 2, y, 2), eta)
+         call add_stiffness(system, w, w, plate%coupling, get_overlap(x, 0, x, 2), get_overlap(y, 2, y, 0), eta)
+         call add_stiffness(system, w, w, plate%coupling, get_overlap(x, 2, x, 0), get_overlap(y, 0, y, 2), eta)
+         call add_stiffness(system, w, w, 4*plate%torsion, get_overlap(x, 1, x, 1), get_overlap(y, 1, y, 1), eta)
+         call add_mass(system, w, w, plate%mass, get_overlap(x, 0, x, 0), get_overlap(y, 0, y, 0))
+         call add_mass(system, w, w, plate%inertia, get_overlap(x, 1, x, 1), get_overlap(y, 0, y, 0))
+         call add_mass(system, w, w, plate%inertia, get_overlap(x, 0, x, 0), get_overlap(y, 1, y, 1))
+      end associate
+   end subroutine add_thin_plate
+
+   !> Stiffness and mass of a plate with shear (Mindlin): the energy of bending is that of the rotations, the energy of
+   !> shear that of slope minus rotation.
+   subroutine add_shear_plate(system, plate, motion)
+      type(ritz_system_type), intent(inout) :: system
+      type(orthotropic_type), intent(in) :: plate
+      type(plate_motion_type), intent(in) :: motion
+
+      associate (x => motion%deflection%x, y => motion%deflection%y, turn_x => motion%rotation_x%x, &
+         turn_y => motion%rotation_y%y, w => motion%w, a => motion%a, b => motion%b, eta => plate%loss_factor)
+         call add_stiffness(system, a, a, plate%along, get_overlap(turn_x, 1, turn_x, 1), get_overlap(y, 0, y, 0), eta)
+         call add_stiffness(system, b, b, plate%across, get_overlap(x, 0, x, 0), get_overlap(turn_y, 1, turn_y, 1), eta)
+         call add_stiffness(system, a, b, plate%coupling, get_overlap(turn_x, 1, x, 0), get_overlap(y, 0, turn_y, 1), eta)
+         call add_stiffness(system, a, a, plate%torsion, get_overlap(turn_x, 0, turn_x, 0), get_overlap(y, 1, y, 1), eta)
+         call add_stiffness(system, b, b, plate%torsion, get_overlap(x, 1, x, 1), get_overlap(turn_y, 0, turn_y, 0), eta)
+         call add_stiffness(system, a, b, plate%torsion, get_overlap(turn_x, 0, x, 1), get_overlap(y, 1, turn_y, 0), eta)
+         associate (s => plate%shear)
+            call add_stiffness(system, w, w, s(1), get_overlap(x, 1, x, 1), get_overlap(y, 0, y, 0), eta)
+            call add_stiffness(system, a, a, s(1), get_overlap(turn_x, 0, turn_x, 0), get_overlap(y, 0, y, 0), eta)
+            call add_stiffness(system, w, a, -s(1), get_overlap(x, 1, turn_x, 0), get_overlap(y, 0, y, 0), eta)
+            call add_stiffness(system, w, w, s(2), get_overlap(x, 0, x, 0), get_overlap(y, 1, y, 1), eta)
+            call add_stiffness(system, b, b, s(2), get_overlap(x, 0, x, 0), get_overlap(turn_y, 0, turn_y, 0), eta)
+            call add_stiffness(system, w, b, -s(2), get_overlap(x, 0, x, 0), get_overlap(y, 1, turn_y, 0), eta)
+         end associate
+         call add_mass(system, w, w, plate%mass, get_overlap(x, 0, x, 0), get_overlap(y, 0, y, 0))
+         call add_mass(system, a, a, plate%inertia, get_overlap(turn_x, 0, turn_x, 0), get_overlap(y, 0, y, 0))
+         call add_mass(system, b, b, plate%inertia, get_overlap(x, 0, x, 0), get_overlap(turn_y, 0, turn_y, 0))
+      end associate
+   end subroutine add_shear_plate
+
+   !> Springs along the edges of a plate that are not rigid. Equal edges are one term, which keeps the symmetry.
+   subroutine add_edges(system, plate, motion)
+      type(ritz_system_type), intent(inout) :: system
+      type(orthotropic_type), intent(in) :: plate
+      type(plate_motion_type), intent(in) :: motion
+      integer :: i
+
+      do i = 1, 2
+         call add_ends(system, i, motion%w, motion%deflection, 0, plate%edge(2*i - 1:2*i)%deflection)
+         associate (rotation => plate%edge(2*i - 1:2*i)%rotation)
+            if (motion%a == 0) then
+               call add_ends(system, i, motion%w, motion%deflection, 1, rotation)
+            else if (i == 1) then
+               call add_ends(system, i, motion%a, motion%rotation_x, 0, rotation)
+            else
+               call add_ends(system, i, motion%b, motion%rotation_y, 0, rotation)
+            end if
+         end associate
+      end do
+   end subroutine add_edges
+
+   !> Springs along both edges across one direction.
+   subroutine add_ends(system, direction, number, shape, order, spring)
+      type(ritz_system_type), intent(inout) :: system
+      !> 1: edges x = constant, 2: edges y = constant.
+      integer, intent(in) :: direction
+      !> Number of the displacement and its functions.
+      integer, intent(in) :: number
+      type(product_type), intent(in) :: shape
+      !> Order of the derivative that the springs resist.
+      integer, intent(in) :: order
+      !> Stiffness per length.
+      real(wp), intent(in) :: spring(2)
+      real(wp) :: ends(2)
+      integer :: i, n
+
+      ends = [0.0_wp, merge(shape%x%length, shape%y%length, direction == 1)]
+      n = merge(2, 1, abs(spring(1) - spring(2)) <= 0.0_wp)
+      do i = 1, 3 - n
+         if (.not. spring(i) < rigid_support) cycle
+         associate (at => ends(i:i + n - 1))
+            if (direction == 1) then
+               call add_stiffness(system, number, number, spring(i), get_point_matrix(shape%x, at, order), &
+                  get_overlap(shape%y, 0, shape%y, 0), 0.0_wp)
+            else
+               call add_stiffness(system, number, number, spring(i), get_overlap(shape%x, 0, shape%x, 0), &
+                  get_point_matrix(shape%y, at, order), 0.0_wp)
+            end if
+         end associate
+      end do
+   end subroutine add_ends
+
+   !> Sum over positions of products of derivatives of functions: [count, count].
+   pure function get_point_matrix(set, position, order) result(matrix)
+      type(function_set_type), intent(in) :: set
+      !> Positions, m: [n_position].
+      real(wp), intent(in) :: position(:)
+      !> Order of the derivatives.
+      integer, intent(in) :: order
+      real(wp) :: matrix(set%count, set%count)
+
+      associate (value => get_functions(set, position, order))
+         matrix = matmul(transpose(value), value)
+      end associate
+   end function get_point_matrix
+
+   !> Stiffness and mass of the ribs of a plate; their torsion follows the slope of its deflection.
+   subroutine add_ribs(system, plate, motion)
+      type(ritz_system_type), intent(inout) :: system
+      type(orthotropic_type), intent(in) :: plate
+      type(plate_motion_type), intent(in) :: motion
+      integer :: i
+
+      if (.not. allocated(plate%ribs)) return
+      do i = 1, size(plate%ribs)
+         associate (ribs => plate%ribs(i), w => motion%w, x => motion%deflection%x, y => motion%deflection%y)
+            if (ribs%along_width) then
+               associate (at_ribs => get_point_matrix(x, ribs%position, 0), slope => get_point_matrix(x, ribs%position, 1))
+                  call add_stiffness(system, w, w, 1.0_wp, at_ribs, get_beam_stiffness(ribs, y, motion%rotation_y%y), &
+                     ribs%loss_factor)
+                  call add_stiffness(system, w, w, ribs%torsion, slope, get_overlap(y, 1, y, 1), ribs%loss_factor)
+                  call add_mass(system, w, w, ribs%mass, at_ribs, get_overlap(y, 0, y, 0))
+                  call add_mass(system, w, w, ribs%inertia, slope, get_overlap(y, 0, y, 0))
+               end associate
+            else
+               associate (at_ribs => get_point_matrix(y, ribs%position, 0), slope => get_point_matrix(y, ribs%position, 1))
+                  call add_stiffness(system, w, w, 1.0_wp, get_beam_stiffness(ribs, x, motion%rotation_x%x), at_ribs, &
+                     ribs%loss_factor)
+                  call add_stiffness(system, w, w, ribs%torsion, get_overlap(x, 1, x, 1), slope, ribs%loss_factor)
+                  call add_mass(system, w, w, ribs%mass, get_overlap(x, 0, x, 0), at_ribs)
+                  call add_mass(system, w, w, ribs%inertia, get_overlap(x, 0, x, 0), slope)
+               end associate
+            end if
+         end associate
+      end do
+   end subroutine add_ribs
+
+   !> Stiffness of a rib over the functions of its deflection. With shear (Timoshenko), its rotation takes the values of
+   !> least energy.
+   function get_beam_stiffness(ribs, deflection, rotation) result(stiffness)
+      type(ribs_type), intent(in) :: ribs
+      type(function_set_type), intent(in) :: deflection, rotation
+      !> The stiffness, N/m times m: [deflection%count, deflection%count].
+      real(wp) :: stiffness(deflection%count, deflection%count)
+      real(wp) :: rotated(rotation%count, rotation%count)
+      real(wp), dimension(rotation%count, deflection%count) :: coupling, followed
+      integer :: info
+
+      if (.not. ribs%shear > 0.0_wp) then
+         stiffness = ribs%bending*get_overlap(deflection, 2, deflection, 2)
+         return
+      end if
+      rotated = ribs%bending*get_overlap(rotation, 1, rotation, 1) + ribs%shear*get_overlap(rotation, 0, rotation, 0)
+      coupling = ribs%shear*get_overlap(rotation, 0, deflection, 1)
+      followed = coupling
+      call dposv('U', rotation%count, deflection%count, rotated, rotation%count, followed, rotation%count, info)
+      stiffness = ribs%shear*get_overlap(deflection, 1, deflection, 1) - matmul(transpose(coupling), followed)
+   end function get_beam_stiffness
+
+   !> Springs between two plates.
+   subroutine add_layer(system, layer, upper, lower)
+      type(ritz_system_type), intent(inout) :: system
+      type(layer_type), intent(in) :: layer
+      type(plate_motion_type), intent(in) :: upper, lower
+      integer :: i
+
+      if (layer%stiffness > 0.0_wp) then
+         call add_between(layer%stiffness, layer%loss_factor)
+      end if
+      if (allocated(layer%line_y)) call add_between(layer%line_stiffness, layer%line_loss_factor, y=layer%line_y)
+      if (.not. allocated(layer%point)) return
+      do i = 1, size(layer%point)
+         associate (point => layer%point(i))
+            call add_between(point%stiffness, point%loss_factor, x=[point%x], y=[point%y])
+         end associate
+      end do
+   contains
+
+      !> Adds springs at all positions, at lines y, or at a point.
+      subroutine add_between(stiffness, loss_factor, x, y)
+         real(wp), intent(in) :: stiffness, loss_factor
+         real(wp), intent(in), optional :: x(:), y(:)
+
+         call add_pair(system, upper, upper, stiffness, loss_factor, x, y)
+         call add_pair(system, lower, lower, stiffness, loss_factor, x, y)
+         call add_pair(system, upper, lower, -stiffness, loss_factor, x, y)
+      end subroutine add_between
+   end subroutine add_layer
+
+   !> Stiffness of springs between the deflections of two plates, or of one plate with itself.
+   subroutine add_pair(system, first, second, stiffness, loss_factor, x, y)
+      type(ritz_system_type), intent(inout) :: system
+      type(plate_motion_type), intent(in) :: first, second
+      !> Stiffness per area, per length or of a point, and loss factor.
+      real(wp), intent(in) :: stiffness, loss_factor
+      !> Positions of the springs, m (default: everywhere).
+      real(wp), intent(in), optional :: x(:), y(:)
+
+      call add_stiffness(system, first%w, second%w, stiffness, &
+         get_product(first%deflection%x, second%deflection%x, x), &
+         get_product(first%deflection%y, second%deflection%y, y), loss_factor)
+   end subroutine add_pair
+
+   !> Products of two sets, summed over positions or, without these, integrated: [first%count, second%count].
+   pure function get_product(first, second, position) result(matrix)
+      type(function_set_type), intent(in) :: first, second
+      !> Positions, m.
+      real(wp), intent(in), optional :: position(:)
+      real(wp) :: matrix(first%count, second%count)
+
+      if (present(position)) then
+         matrix = matmul(transpose(get_functions(first, position, 0)), get_functions(second, position, 0))
+      else
+         matrix = get_overlap(first, 0, second, 0)
+      end if
+   end function get_product
+
+end module thud_plate_stack

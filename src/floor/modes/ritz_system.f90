@@ -1,0 +1,428 @@
+!> Modes by the Ritz method: displacements are sums of products of functions of x and of y, energies are sums of products
+!> of matrices in x and in y.
+!>
+!> The matrices couple only some functions (of the same number for simply supported plates, of the same symmetry for
+!> symmetric ones). The system falls into blocks of functions that are coupled, which are solved one by one.
+module thud_ritz_system
+   use thud_function_set, only: function_set_type, get_functions
+   use thud_kinds, only: wp
+   use thud_lapack, only: dposv, dsygvd
+   implicit none (type, external)
+   private
+
+   public :: add_displacement, add_mass, add_stiffness, get_mode_values, mode_block_type, modes_type, product_type
+   public :: ritz_system_type, solve_ritz_system
+
+   !> A matrix entry below this fraction of the largest one in its row or column is rounding.
+   real(wp), parameter :: rounding = 1.0e-11_wp
+
+   !> Functions of x and y whose products make up a displacement or a rotation.
+   type :: product_type
+      type(function_set_type) :: x, y
+      !> The displacement has no mass; it follows the others statically.
+      logical :: is_static = .false.
+   end type product_type
+
+   !> A part of the energy: half the double sum of coefficients times x times y.
+   type :: term_type
+      !> Numbers of the displacements.
+      integer :: row = 0, column = 0
+      !> Matrices over their functions of x and y: [n_row, n_column].
+      real(wp), allocatable :: x(:, :), y(:, :)
+      !> Loss factor, of stiffnesses.
+      real(wp) :: loss_factor = 0.0_wp
+      !> The energy belongs to the radiating plate.
+      logical :: in_radiator = .false.
+   end type term_type
+
+   !> Displacements and their energies.
+   type :: ritz_system_type
+      type(product_type), allocatable :: displacement(:)
+      type(term_type), allocatable :: stiffness(:), mass(:)
+      !> The stiffnesses that are added now belong to the radiating plate.
+      logical :: is_radiator = .false.
+   end type ritz_system_type
+
+   !> One displacement in the modes of a block.
+   type :: shape_type
+      !> Numbers of the functions of x and y: [n_x], [n_y].
+      integer, allocatable :: x(:), y(:)
+      !> Coefficients of their products, x first: [n_x*n_y, n_mode].
+      real(wp), allocatable :: coefficient(:, :)
+   end type shape_type
+
+   !> Modes of a block, normalized to a modal mass of 1 kg.
+   type :: mode_block_type
+      !> Angular frequencies, ascending, rad/s, loss factors, and fractions of the energy in the radiating plate: [n_mode].
+      real(wp), allocatable :: omega(:), loss_factor(:), radiator_share(:)
+      !> Shapes of the displacements; not allocated for static ones: [n_displacement].
+      type(shape_type), allocatable :: shape(:)
+   end type mode_block_type
+
+   !> Modes of a system, block after block.
+   type :: modes_type
+      type(product_type), allocatable :: displacement(:)
+      type(mode_block_type), allocatable :: block(:)
+   end type modes_type
+
+contains
+
+   !> Adds a displacement and returns its number.
+   subroutine add_displacement(system, displacement, number)
+      type(ritz_system_type), intent(inout) :: system
+      type(product_type), intent(in) :: displacement
+      integer, intent(out) :: number
+
+      if (.not. allocated(system%displacement)) allocate (system%displacement(0))
+      system%displacement = [system%displacement, displacement]
+      number = size(system%displacement)
+   end subroutine add_displacement
+
+   !> Adds a stiffness: an energy of half the double sum over the coefficients of two displacements. Between different
+   !> displacements, the transposed stiffness is included.
+   subroutine add_stiffness(system, row, column, stiffness, x, y, loss_factor)
+      type(ritz_system_type), intent(inout) :: system
+      integer, intent(in) :: row, column
+      !> Factor of the matrices: the energy is in J.
+      real(wp), intent(in) :: stiffness
+      real(wp), intent(in) :: x(:, :), y(:, :)
+      real(wp), intent(in) :: loss_factor
+
+      if (.not. allocated(system%stiffness)) allocate (system%stiffness(0))
+      if (.not. abs(stiffness) > 0.0_wp) return
+      system%stiffness = [system%stiffness, term_type(row, column, stiffness*x, y, loss_factor, system%is_radiator)]
+   end subroutine add_stiffness
+
+   !> Adds a mass; as `add_stiffness`.
+   subroutine add_mass(system, row, column, mass, x, y)
+      type(ritz_system_type), intent(inout) :: system
+      integer, intent(in) :: row, column
+      real(wp), intent(in) :: mass
+      real(wp), intent(in) :: x(:, :), y(:, :)
+
+      if (.not. allocated(system%mass)) allocate (system%mass(0))
+      if (.not. abs(mass) > 0.0_wp) return
+      system%mass = [system%mass, term_type(row, column, mass*x, y)]
+   end subroutine add_mass
+
+   !> Solves a system for all its modes.
+   subroutine solve_ritz_system(system, modes, failed)
+      type(ritz_system_type), intent(in) :: system
+      type(modes_type), intent(out) :: modes
+      !> A mass or the stiffness of a static displacement is not positive.
+      logical, intent(out) :: failed
+      integer, allocatable :: group_x(:), group_y(:)
+      integer :: i, j, n
+
+      failed = .false.
+      call find_groups(system, .true., group_x)
+      call find_groups(system, .false., group_y)
+      allocate (modes%displacement, source=system%displacement)
+      allocate (modes%block(maxval(group_x)*maxval(group_y)))
+      n = 0
+      do i = 1, maxval(group_x)
+         do j = 1, maxval(group_y)
+            call solve_block(system, group_x == i, group_y == j, modes%block(n + 1), failed)
+            if (failed) return
+            if (size(modes%block(n + 1)%omega) > 0) n = n + 1
+         end do
+      end do
+      if (n < size(modes%block)) modes%block = modes%block(:n)
+   end subroutine solve_ritz_system
+
+   !> Number of the group of each function of one coordinate; functions of different groups are not coupled.
+   subroutine find_groups(system, along_x, group)
+      type(ritz_system_type), intent(in) :: system
+      !> Functions of x, otherwise of y.
+      logical, intent(in) :: along_x
+      !> Numbers from 1, in the order of displacements and their functions.
+      integer, allocatable, intent(out) :: group(:)
+      integer, allocatable :: first(:), root(:)
+      integer :: i, n
+
+      associate (displacement => system%displacement)
+         if (along_x) then
+            first = get_first(displacement%x%count)
+         else
+            first = get_first(displacement%y%count)
+         end if
+      end associate
+      n = first(size(first)) - 1
+      root = [(i, i=1, n)]
+      do i = 1, size(system%stiffness)
+         call merge_terms(system%stiffness(i))
+      end do
+      do i = 1, size(system%mass)
+         call merge_terms(system%mass(i))
+      end do
+      allocate (group(n), source=0)
+      n = 0
+      do i = 1, size(group)
+         if (root(i) == i) then
+            n = n + 1
+            group(i) = n
+         end if
+      end do
+      do i = 1, size(group)
+         group(i) = group(get_root(i))
+      end do
+   contains
+
+      !> Merges the groups of functions that a term couples.
+      subroutine merge_terms(term)
+         type(term_type), intent(in) :: term
+         real(wp), allocatable :: matrix(:, :), row_scale(:), column_scale(:)
+         integer :: k, l
+
+         if (along_x) then
+            allocate (matrix, source=abs(term%x))
+         else
+            allocate (matrix, source=abs(term%y))
+         end if
+         row_scale = maxval(matrix, dim=2)
+         column_scale = maxval(matrix, dim=1)
+         do l = 1, size(matrix, 2)
+            do k = 1, size(matrix, 1)
+               if (matrix(k, l) > rounding*max(row_scale(k), column_scale(l))) call merge_functions(first(term%row) + k - 1, &
+                  first(term%column) + l - 1)
+            end do
+         end do
+      end subroutine merge_terms
+
+      !> Merges the groups of two functions.
+      subroutine merge_functions(one, other)
+         integer, intent(in) :: one, other
+         integer :: roots(2)
+
+         roots = [get_root(one), get_root(other)]
+         root(maxval(roots)) = minval(roots)
+      end subroutine merge_functions
+
+      !> First function of the group of a function.
+      function get_root(number) result(found)
+         integer, intent(in) :: number
+         integer :: found
+
+         found = number
+         do while (root(found) /= found)
+            root(found) = root(root(found))
+            found = root(found)
+         end do
+      end function get_root
+   end subroutine find_groups
+
+   !> First of the numbers of each part, and the one after the last: [size(count) + 1].
+   pure function get_first(count) result(first)
+      !> Sizes of the parts.
+      integer, intent(in) :: count(:)
+      integer :: first(size(count) + 1)
+      integer :: i
+
+      first(1) = 1
+      do i = 1, size(count)
+         first(i + 1) = first(i) + count(i)
+      end do
+   end function get_first
+
+   !> Modes of the functions of one group in x and one in y.
+   subroutine solve_block(system, in_x, in_y, block, failed)
+      type(ritz_system_type), intent(in) :: system
+      !> Functions of x and of y in the block.
+      logical, intent(in) :: in_x(:), in_y(:)
+      type(mode_block_type), intent(out) :: block
+      logical, intent(out) :: failed
+      real(wp), allocatable :: stiffness(:, :), loss(:, :), radiator(:, :), mass(:, :), omega(:)
+      integer, allocatable :: first(:), first_x(:), first_y(:), dynamic(:), static(:)
+      integer :: i, p, n
+
+      failed = .false.
+      associate (displacement => system%displacement)
+         n = size(displacement)
+         first_x = get_first(displacement%x%count)
+         first_y = get_first(displacement%y%count)
+         allocate (block%shape(n))
+         do p = 1, n
+            block%shape(p)%x = pack([(i, i=1, displacement(p)%x%count)], in_x(first_x(p):first_x(p + 1) - 1))
+            block%shape(p)%y = pack([(i, i=1, displacement(p)%y%count)], in_y(first_y(p):first_y(p + 1) - 1))
+         end do
+         first = get_first([(size(block%shape(p)%x)*size(block%shape(p)%y), p=1, n)])
+         dynamic = [integer ::]
+         static = [integer ::]
+         do p = 1, n
+            if (displacement(p)%is_static) then
+               static = [static, (i, i=first(p), first(p + 1) - 1)]
+            else
+               dynamic = [dynamic, (i, i=first(p), first(p + 1) - 1)]
+            end if
+         end do
+      end associate
+      if (size(dynamic) == 0) then
+         allocate (block%omega(0), block%loss_factor(0), block%radiator_share(0))
+         return
+      end if
+      associate (terms => system%stiffness)
+         call assemble(terms, spread(1.0_wp, 1, size(terms)), block, first, stiffness)
+         call assemble(terms, terms%loss_factor, block, first, loss)
+         call assemble(terms, merge(1.0_wp, 0.0_wp, terms%in_radiator), block, first, radiator)
+      end associate
+      call assemble(system%mass, spread(1.0_wp, 1, size(system%mass)), block, first, mass)
+      if (size(static) > 0) call condense(dynamic, static, stiffness, loss, radiator, mass, failed)
+      if (failed) return
+      call get_eigenmodes(stiffness, mass, omega, failed)
+      if (failed) return
+      ! `stiffness` contains the shapes now. Without stiffness and losses, a mode moves as a rigid body.
+      block%omega = omega
+      block%loss_factor = get_share(loss)
+      block%radiator_share = get_share(radiator)
+      i = 0
+      do p = 1, n
+         if (system%displacement(p)%is_static) cycle
+         associate (count => first(p + 1) - first(p))
+            block%shape(p)%coefficient = stiffness(i + 1:i + count, :)
+            i = i + count
+         end associate
+      end do
+   contains
+
+      !> Energy of the modes by a matrix over their elastic energy: [n_mode].
+      function get_share(matrix) result(share)
+         real(wp), intent(in) :: matrix(:, :)
+         real(wp) :: share(size(omega))
+
+         share = sum(stiffness*matmul(matrix, stiffness), dim=1)/max(omega**2, tiny(omega))
+         where (omega <= 0.0_wp) share = 0.0_wp
+      end function get_share
+   end subroutine solve_block
+
+   !> Matrix of a block.
+   subroutine assemble(terms, weight, block, first, matrix)
+      type(term_type), intent(in) :: terms(:)
+      !> Factors of the terms.
+      real(wp), intent(in) :: weight(:)
+      type(mode_block_type), intent(in) :: block
+      !> First coefficient of each displacement, and the one after the last.
+      integer, intent(in) :: first(:)
+      !> The matrix: [n, n].
+      real(wp), allocatable, intent(out) :: matrix(:, :)
+      integer :: i, k, l, p, q, at_row, at_column
+
+      allocate (matrix(first(size(first)) - 1, first(size(first)) - 1), source=0.0_wp)
+      do i = 1, size(terms)
+         p = terms(i)%row
+         q = terms(i)%column
+         if (.not. abs(weight(i)) > 0.0_wp) cycle
+         associate (row => block%shape(p), column => block%shape(q))
+            associate (x => weight(i)*terms(i)%x(row%x, column%x), n_row => size(row%x), n_column => size(column%x))
+               do l = 1, size(column%y)
+                  at_column = first(q) + (l - 1)*n_column
+                  do k = 1, size(row%y)
+                     at_row = first(p) + (k - 1)*n_row
+                     associate (part => matrix(at_row:at_row + n_row - 1, at_column:at_column + n_column - 1))
+                        part = part + x*terms(i)%y(row%y(k), column%y(l))
+                     end associate
+                     if (p == q) cycle
+                     associate (part => matrix(at_column:at_column + n_column - 1, at_row:at_row + n_row - 1))
+                        part = part + transpose(x)*terms(i)%y(row%y(k), column%y(l))
+                     end associate
+                  end do
+               end do
+            end associate
+         end associate
+      end do
+   end subroutine assemble
+
+   !> Eliminates the static coefficients: they take the values of least energy.
+   subroutine condense(dynamic, static, stiffness, loss, radiator, mass, failed)
+      !> Numbers of the coefficients.
+      integer, intent(in) :: dynamic(:), static(:)
+      !> Matrices of all coefficients, then of the dynamic ones: [n, n].
+      real(wp), allocatable, intent(inout) :: stiffness(:, :), loss(:, :), radiator(:, :), mass(:, :)
+      !> The stiffness of the static coefficients is not positive.
+      logical, intent(out) :: failed
+      real(wp), allocatable :: followed(:, :), static_stiffness(:, :), transformation(:, :)
+      integer, allocatable :: stiff(:)
+      integer :: i, info
+
+      stiff = pack(static, [(stiffness(static(i), static(i)) > 0.0_wp, i=1, size(static))])
+      static_stiffness = stiffness(stiff, stiff)
+      followed = -stiffness(stiff, dynamic)
+      call dposv('U', size(stiff), size(dynamic), static_stiffness, max(1, size(stiff)), followed, max(1, size(stiff)), info)
+      failed = info /= 0
+      if (failed) return
+      allocate (transformation(size(stiffness, 1), size(dynamic)), source=0.0_wp)
+      do i = 1, size(dynamic)
+         transformation(dynamic(i), i) = 1.0_wp
+      end do
+      transformation(stiff, :) = followed
+      call transform(stiffness)
+      call transform(loss)
+      call transform(radiator)
+      call transform(mass)
+   contains
+
+      !> The matrix of the dynamic coefficients.
+      subroutine transform(matrix)
+         real(wp), allocatable, intent(inout) :: matrix(:, :)
+
+         matrix = matmul(transpose(transformation), matmul(matrix, transformation))
+      end subroutine transform
+   end subroutine condense
+
+   !> Angular frequencies and shapes; the shapes replace the stiffness.
+   subroutine get_eigenmodes(stiffness, mass, omega, failed)
+      !> Stiffness, then shapes, one per column: [n, n].
+      real(wp), intent(inout) :: stiffness(:, :)
+      real(wp), intent(inout) :: mass(:, :)
+      !> Angular frequencies, ascending, rad/s: [n].
+      real(wp), allocatable, intent(out) :: omega(:)
+      !> The mass is not positive.
+      logical, intent(out) :: failed
+      real(wp), allocatable :: work(:)
+      integer, allocatable :: whole_work(:)
+      integer :: n, info
+
+      n = size(mass, 1)
+      allocate (omega(n))
+      if (n == 1) then
+         failed = .not. mass(1, 1) > 0.0_wp
+         if (failed) return
+         omega = sqrt(max(stiffness(1, 1)/mass(1, 1), 0.0_wp))
+         stiffness = 1/sqrt(mass)
+         return
+      end if
+      allocate (work(1 + 6*n + 2*n**2), whole_work(3 + 5*n))
+      call dsygvd(1, 'V', 'U', n, stiffness, n, mass, n, omega, work, size(work), whole_work, size(whole_work), info)
+      failed = info /= 0
+      omega = sqrt(max(omega, 0.0_wp))
+   end subroutine get_eigenmodes
+
+   !> Values of a displacement of all modes at points, block after block: [n_mode, n_point].
+   subroutine get_mode_values(modes, displacement, x, y, value)
+      type(modes_type), intent(in) :: modes
+      !> Number of the displacement.
+      integer, intent(in) :: displacement
+      !> Coordinates of the points, m: [n_point].
+      real(wp), intent(in) :: x(:), y(:)
+      !> Values, 1/sqrt(kg).
+      real(wp), allocatable, intent(out) :: value(:, :)
+      real(wp), allocatable :: at_x(:, :), at_y(:, :), product(:)
+      integer :: i, j, k, n
+
+      associate (set => modes%displacement(displacement))
+         allocate (at_x, source=get_functions(set%x, x, 0))
+         allocate (at_y, source=get_functions(set%y, y, 0))
+      end associate
+      allocate (value(sum([(size(modes%block(i)%omega), i=1, size(modes%block))]), size(x)))
+      n = 0
+      do i = 1, size(modes%block)
+         associate (shape => modes%block(i)%shape(displacement), n_mode => size(modes%block(i)%omega))
+            do j = 1, size(x)
+               product = [(at_x(j, shape%x)*at_y(j, shape%y(k)), k=1, size(shape%y))]
+               value(n + 1:n + n_mode, j) = matmul(product, shape%coefficient)
+            end do
+            n = n + n_mode
+         end associate
+      end do
+   end subroutine get_mode_values
+
+end module thud_ritz_system
