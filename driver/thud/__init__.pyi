@@ -21,6 +21,12 @@ from .export.force_files import (
     BlockedForce as BlockedForce,
     blocked_force as blocked_force,
 )
+from .floors.constructions import (
+    Construction as Construction,
+    Constructions as Constructions,
+    construction as construction,
+    constructions as constructions,
+)
 from .floors.floor_comparison import (
     FloorComparison as FloorComparison,
     compare_floors as compare_floors,

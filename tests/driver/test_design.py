@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -178,3 +180,56 @@ def test_places_without_results_stay_empty() -> None:
 def test_what_is_no_map_is_reported(parameters: dict[str, Any]) -> None:
     with pytest.raises(thud.InputError, match=naming("[parameters]")):
         thud.design({"parameters": parameters})
+
+
+@pytest.fixture(scope="module")
+def room_design(tmp_path_factory: pytest.TempPathFactory) -> thud.Design:
+    """Return a map of floors by the shell model, in a room with two reverberation times."""
+    path = tmp_path_factory.mktemp("room") / "deck.nml"
+    room = thud.Room(volume=60.0, reverberation_time=(*6 * (0.5,), *6 * (0.6,)))
+    case = thud.construction("concrete 180, screed on 10 MN/m3").case(
+        thud.Case(model=thud.HollowSphere(), room=room)
+    )
+    thud.write_case(case, path)
+    return thud.design(
+        {
+            "case": str(path),
+            "parameters": {
+                "thickness": {"values": [160, 240, 300], "unit": "mm"},
+                "plate.layer_stiffness": {"values": [4, 8, 30], "unit": "MN/m3"},
+            },
+        }
+    )
+
+
+def test_octave_rating_is_that_of_single_predictions(room_design: thud.Design) -> None:
+    found = room_design.octave_rating
+    assert found is not None
+    assert found.dims == room_design.axes
+    case = thud.read_case(Path(str(room_design.dataset.attrs["study"]).split('"')[3]))
+    assert isinstance(case.floor, thud.Plate)
+    for i, thickness in enumerate(room_design.dataset["thickness"].values):
+        for j, stiffness in enumerate(room_design.dataset[room_design.axes[1]].values):
+            floor = replace(case.floor, thickness=thickness, layer_stiffness=stiffness)
+            expected = thud.predict_level(thud.solve(replace(case, floor=floor))).octave_rating
+            # An upper bound: bands of an octave have their maxima at almost the same time.
+            assert 0 <= found.values[i, j] - expected.a_weighted < 0.02
+
+
+def test_map_of_a_room_has_the_limits_of_the_korean_classes(room_design: thud.Design) -> None:
+    found = room_design.octave_rating
+    assert found is not None
+    rows = dict(room_design.rows())
+    assert rows["class 4 or better (KS F 2863-2)"] == str(int((found <= 49).sum()))
+    assert 0 < int((found <= 49).sum()) < found.size
+    figure = room_design.plot()
+    drawn = {f"class {i}, {x} dB": x for i, x in enumerate((37, 41, 45, 49), 1)}
+    inside = [name for name, x in drawn.items() if found.min() < x < found.max()]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == inside
+    assert "octaves" in figure.legends[0].get_title().get_text()
+
+
+def test_map_without_a_room_has_no_classes() -> None:
+    result = thud.design(MODAL)
+    assert result.octave_rating is None
+    assert not any("KS F" in row[0] for row in result.rows())

@@ -30,7 +30,7 @@ from thud.base._schema import FLOORS, MODELS
 from thud.case.case import check_case
 from thud.explorer import server
 from thud.explorer.answer import new_case
-from thud.explorer.form import form
+from thud.explorer.form import construction_form, form
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Awaitable, Callable, Iterator
@@ -85,6 +85,22 @@ def test_fields_are_those_of_the_schema() -> None:
         field for field in groups["model", "finite_element"]["fields"] if field["name"] == "law"
     )
     assert list(law["choices"].values()) == ["neo-Hookean", "Mooney–Rivlin"]
+
+
+def test_constructions_of_the_page_are_floors_of_the_library() -> None:
+    known = {group["name"]: group for group in form()}
+    entries = construction_form()
+    assert [entry["name"] for entry in entries] == list(thud.constructions().names)
+    for entry in entries:
+        values = SHELL | {"floor": {"name": entry["floor"]}, entry["floor"]: entry["keys"]}
+        case = new_case(values | {"room": entry["room"]})
+        expected = thud.construction(entry["name"])
+        assert (case.floor, case.room) == (expected.floor, expected.case().room)
+        # The page fills fields by their names.
+        fields = {
+            field["name"] for name in (entry["floor"], "room") for field in known[name]["fields"]
+        }
+        assert {*entry["keys"], *entry["room"]} == set(entry["sources"]) <= fields
 
 
 def test_ends_of_sliders_are_allowed() -> None:

@@ -253,6 +253,46 @@ def test_floor_and_room_are_shown(browser: Browser, server: Served) -> None:
     sync_api.expect(page.locator("#floor_section")).to_be_hidden()
 
 
+def test_construction_fills_floor_and_ceiling(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    chosen, text = page.locator("#construction"), page.locator("#construction_text")
+    name = "concrete 180, screed on 15 MN/m3, ceiling"
+    sync_api.expect(text).to_be_hidden()
+    chosen.select_option(name)
+    sync_api.expect(page.locator("#floor")).to_have_value("plate")
+    sync_api.expect(page.locator("#has_room")).to_be_checked()
+    for key, value in {
+        "plate.thickness": "180", "plate.layer_stiffness": "15",
+        "plate.source_x": "0.4", "room.ceiling_mass": "9",
+    }.items():  # fmt: skip
+        sync_api.expect(page.locator(f"[id='{key}']")).to_have_value(value)
+    sync_api.expect(text).to_contain_text("20 mm mineral wool, 180 mm concrete")
+    help_text = page.locator("[id='plate.layer_stiffness.help']")
+    sync_api.expect(help_text).to_contain_text("EN 29052-1")
+    sync_api.expect(page.locator("#room_text")).to_contain_text("standardized")
+    page.locator("#pin").click()
+    # Another value is none of the library, and has no source.
+    fill(page, "plate.layer_stiffness", "14")
+    sync_api.expect(chosen).to_have_value("")
+    sync_api.expect(text).to_be_hidden()
+    sync_api.expect(help_text).not_to_contain_text("EN 29052-1")
+    fill(page, "plate.layer_stiffness", "15")
+    sync_api.expect(chosen).to_have_value(name)
+    # A floor without ceiling takes it away; of two equal floors the chosen one is shown.
+    chosen.select_option("filigree slab 200")
+    sync_api.expect(page.locator("[id='plate.thickness']")).to_have_value("200")
+    sync_api.expect(page.locator("[id='room.ceiling_mass']")).to_have_value("0")
+    sync_api.expect(chosen).to_have_value("filigree slab 200")
+    sync_api.expect(page.locator("#variants li")).to_have_text(
+        [
+            re.compile("Modal ball.*Floor: filigree slab 200, Room below"),
+            re.compile(f"A: Modal ball.*Floor: {name}, Room below"),
+        ]
+    )
+    page.locator("#reset").click()
+    sync_api.expect(chosen).to_have_value("")
+
+
 def test_files_are_downloaded(browser: Browser, server: Served, tmp_path: Path) -> None:
     page = new_page(browser, server[0])
     page.locator("button", has_text="Study").click()
@@ -335,6 +375,7 @@ def test_page_is_accessible(
     page = new_page(browser, server[0], width, scheme)
     page.locator("#pin").click()
     page.locator("#has_room").check()
+    page.locator("#construction").select_option("CLT 160, gravel")
     sync_api.expect(page.locator("#room_text")).to_contain_text("standardized")
     page.locator("summary", has_text="Recording").click()
     page.locator("summary", has_text="Standard uncertainties").click()

@@ -13,13 +13,14 @@ import signal
 import stat
 import threading
 import time
+import tomllib
 import warnings
 import zlib
 from abc import ABC, abstractmethod
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, NamedTuple, NoReturn
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, NoReturn
 
 from thud.base.checks import refuse
 from thud.base.errors import InputError, LockWarning
@@ -250,6 +251,36 @@ def read_input(path: Path) -> bytes:
     """Return the content of an input file; raise OSError if it is not a regular file."""
     _require_regular(path.stat(), path)
     return path.read_bytes()
+
+
+def read_toml(path: Path) -> tuple[dict[str, Any], str]:
+    """Return the tables and the text of a TOML file.
+
+    Raise InputError with the path if the file cannot be read or is not TOML.
+    """
+    try:
+        text = read_input(path).decode("utf-8")
+    except OSError as error:
+        refuse(f"{path}: {error.strerror}", "a file that exists and can be read", error)
+    except UnicodeDecodeError as error:
+        refuse(f"{path}: byte {error.start + 1} is not UTF-8", "TOML, which is UTF-8", error)
+    try:
+        return tomllib.loads(text), text
+    except (ValueError, RecursionError) as error:  # no TOML, or thousands of digits or brackets
+        refuse(f"{path}: {error}", "TOML", error)
+
+
+def inputs_folder() -> Path:
+    """Return the folder of the inputs: those of the installed package, or of the clone.
+
+    Raise InputError if there is none.
+    """
+    package = Path(__file__).parents[1]
+    folders = (package / "inputs", package.parents[1] / "inputs")
+    folder = next(filter(Path.is_dir, folders), None)
+    if folder is None:
+        refuse("this package has no inputs", "an installed package, or a clone")
+    return folder
 
 
 def _require_unlinked(status: os.stat_result, part: Path) -> None:

@@ -6,7 +6,6 @@ import os
 import shutil
 import sys
 import warnings
-from importlib import resources
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -17,7 +16,7 @@ from thud.base.bridge import ask, text
 from thud.base.checks import refuse
 from thud.base.display import draw_all, warn_if_not_drawn
 from thud.base.errors import InputError, PlausibilityWarning, ThudError
-from thud.base.files import Results, unique_path
+from thud.base.files import Results, inputs_folder, unique_path
 from thud.base.tables import format_rows
 from thud.case.case import Case, read_case
 from thud.cli.command import (
@@ -292,26 +291,24 @@ def copy_examples(options: argparse.Namespace) -> int:
     target = Path(options.directory)
     if target.exists() or target.is_symlink():
         refuse(f"{target} exists", "a new directory")
-    with resources.as_file(resources.files("thud") / "inputs") as source:
-        if not source.is_dir():
-            refuse("this package has no inputs", "an installed one; in a clone they are in inputs/")
-        target.parent.mkdir(parents=True, exist_ok=True)
-        partial = unique_path(target.with_name(f".{target.name}.part"))
-        try:
-            # Installers compile Python scripts.
-            shutil.copytree(source, partial, ignore=shutil.ignore_patterns("__pycache__"))
-            partial.rename(target)
-        except shutil.Error as error:
-            refuse(f"{target} cannot be written", "a writable directory with free space", error)
-        finally:
-            shutil.rmtree(partial, ignore_errors=True)
+    source = inputs_folder()
+    target.parent.mkdir(parents=True, exist_ok=True)
+    partial = unique_path(target.with_name(f".{target.name}.part"))
+    try:
+        # Installers compile Python scripts.
+        shutil.copytree(source, partial, ignore=shutil.ignore_patterns("__pycache__"))
+        partial.rename(target)
+    except shutil.Error as error:
+        refuse(f"{target} cannot be written", "a writable directory with free space", error)
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
     if not options.quiet:
         print(f"Inputs: {target}")
     return 0
 
 
 EXAMPLES = Command(
-    "copy the inputs of the documentation: cases, studies, recordings, floors",
+    "copy the inputs of the documentation: cases, studies, recordings, floors, constructions",
     (
         argument(
             "directory",

@@ -6,7 +6,8 @@ import sys
 import warnings
 from typing import TYPE_CHECKING
 
-from thud.base.errors import InputError, PlausibilityWarning
+from thud.base.checks import refuse
+from thud.base.errors import PlausibilityWarning
 from thud.base.tables import format_rows
 from thud.case.case import read_case
 from thud.cli.command import (
@@ -23,23 +24,26 @@ from thud.cli.command import (
 
 if TYPE_CHECKING:
     import argparse
+    from collections.abc import Iterable
 
     from thud.case.case import Case
 
 
 def compare_floor_cases(options: argparse.Namespace) -> int:
-    """Compare the floors of cases, print the table and save the page; return the exit code."""
+    """Compare floors, print the table and save the page; return the exit code.
+
+    With ``--list`` print the constructions of the library instead.
+    """
+    from thud.floors.constructions import constructions
     from thud.floors.floor_comparison import compare_floors
 
-    results = results_of(options, "floors", options.cases)
+    if options.list is not None:
+        print(format_rows(constructions(options.list).rows()))
+        return 0
+    files = [name for name in options.construction if name.endswith(".toml")]
+    results = results_of(options, "floors", [*options.cases, *files])
     results.require(f"floors{ending}" for ending in PAGE)
-    cases: dict[str, Case] = {}
-    for path in options.cases:
-        case = read_case(path)
-        if case.name in cases:
-            message = f"{path}: {case.name!r} also names another case; allowed: different names"
-            raise InputError(message)
-        cases[case.name] = case
+    cases = _floor_cases(options.cases, options.construction)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PlausibilityWarning)
         comparison = compare_floors(cases, progress=not options.quiet and sys.stderr.isatty())
@@ -51,10 +55,50 @@ def compare_floor_cases(options: argparse.Namespace) -> int:
     return 0
 
 
+def _floor_cases(paths: Iterable[str], names: Iterable[str]) -> dict[str, Case]:
+    """Return the cases of files, and of constructions with the source and room of the first."""
+    from thud.floors.constructions import construction
+
+    cases: dict[str, Case] = {}
+
+    def add(name: str, origin: str, case: Case) -> None:
+        if name in cases:
+            refuse(f"{origin}: {name!r} also names another floor", "different names")
+        cases[name] = case
+
+    for path in paths:
+        case = read_case(path)
+        add(case.name, path, case)
+    first = next(iter(cases.values()), None)
+    for name in names:
+        chosen = construction(name)
+        add(chosen.name, f"--construction {name}", chosen.case(first))
+        if chosen.note:
+            print_notes([f"{chosen.name}: {chosen.note}"])
+    if not cases:
+        refuse("no floor is stated", "case files, --construction NAME, or --list")
+    return cases
+
+
 FLOOR = Command(
-    "compare floors and rooms of several cases on one page",
+    "compare floors and rooms of several cases and constructions on one page",
     (
-        argument("cases", nargs="+", metavar="CASE.nml", help="namelist files with floor and room"),
+        argument("cases", nargs="*", metavar="CASE.nml", help="namelist files with floor and room"),
+        argument(
+            "--construction",
+            action="append",
+            default=[],
+            metavar="NAME|FILE.toml",
+            help="also a construction of the library or of a file, with ball, drop, model and room "
+            "of the first case (default: a ball that conforms); may be repeated",
+        ),
+        argument(
+            "--list",
+            nargs="?",
+            const="",
+            metavar="WORDS",
+            help="only list the constructions of the library, all or those that contain the words",
+        ),
         *output("the page (default: outputs/floors)"),
         QUIET,
     ),

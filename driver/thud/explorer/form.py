@@ -1,4 +1,4 @@
-"""Form fields of the page, from the declarations of the keys."""
+"""Form fields of the page, from the declarations of the keys, and constructions that fill them."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS, ROOM_SOURCE
 from thud.base.units import display_unit, power_of, scaled
 from thud.case.case import OPTIONAL_GROUPS
 from thud.case.keys import humanize
+from thud.floors.constructions import constructions
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -46,6 +47,30 @@ def form() -> list[dict[str, Any]]:
     floors = [_options("floor", name, kind) for name, kind in FLOORS.items()]
     room = _options("room", "room", OPTIONAL_GROUPS["room"])
     return [*groups, *models, *floors, room]
+
+
+def construction_form() -> list[dict[str, Any]]:
+    """Return the constructions of the library, which fill the fields of floor and ceiling.
+
+    A construction has name, kind, text (its layers and note), floor, and for the stated keys of
+    floor and room their values (``"keys"``, ``"room"``) and sources.
+    """
+    return [
+        {
+            "name": entry.name,
+            "kind": _capitalize(entry.kind),
+            "text": f"{', '.join(map(str, entry.layers))}. {entry.note}".rstrip(),
+            "floor": entry.floor.name,
+            "keys": {
+                key: list(value) if isinstance(value, tuple) else value
+                for key, value in vars(entry.floor).items()
+                if key in entry.sources
+            },
+            "room": entry.room,
+            "sources": entry.sources,
+        }
+        for entry in constructions()
+    ]
 
 
 def room_source() -> dict[str, dict[str, object]]:

@@ -23,7 +23,7 @@ from thud.base.bridge import version
 from thud.base.checks import refuse
 from thud.case.case import read_case
 from thud.explorer.downloads import DOWNLOADS
-from thud.explorer.form import form, room_source
+from thud.explorer.form import construction_form, form, room_source
 from thud.explorer.jobs import INPUT_ERRORS, Jobs
 from thud.explorer.recording_fields import recording_form, recording_table
 
@@ -110,6 +110,7 @@ def new_application(
     )
     application.state.about = {
         "form": form(),
+        "constructions": construction_form(),
         "recording": recording_form(),
         "version": version(),
         "start": start,

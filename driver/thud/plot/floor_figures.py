@@ -19,6 +19,7 @@ from thud.plot.style import (
     add_curves,
     band_axis,
     empty_axes,
+    escape_label,
     legend_above,
     line_style,
     marker_style,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from thud.floors.constructions import Construction
     from thud.floors.impedance import BallImpedance
     from thud.floors.mobility_fit import MobilityFit
     from thud.impact.floor_impact import FloorImpact
@@ -45,6 +47,31 @@ _SHOWN = 1.5
 MAX_SHAPES, POINTS = 30, 60
 # Frequencies per octave in plots of a mobility: peaks of lightly damped floors are narrow.
 _DENSITY = 400
+
+
+@own_style()
+def draw_construction(construction: Construction) -> Figure:
+    """Draw the section of a floor, with the thicknesses of its layers to scale."""
+    layers = construction.layers
+    total = sum(layer.thickness for layer in layers)
+    figure, axes = empty_axes(max(1.2, 0.2 * len(layers), 4 * total))
+    materials = list(dict.fromkeys(layer.material for layer in layers))
+    top = 0.0
+    for i, layer in enumerate(layers):
+        color = COLORS[materials.index(layer.material) % len(COLORS)]
+        axes.bar(
+            0.5, layer.thickness, 1.0, top, color=color, alpha=0.5, edgecolor="black",
+            linewidth=0.6,
+        )  # fmt: skip
+        # Labels at equal distances do not overlap.
+        label = (i + 0.5) / len(layers) * total
+        axes.plot([1.0, 1.15], [top + layer.thickness / 2, label], color="black", linewidth=0.4)
+        axes.text(1.2, label, escape_label(str(layer)), va="center", fontsize="small")
+        top += layer.thickness
+    axes.set(xlim=(-0.01, 3.2), ylim=(1.01 * top, -0.01 * top))
+    axes.set_title(escape_label(construction.name), loc="left")
+    axes.set_axis_off()
+    return figure
 
 
 @own_style()

@@ -14,14 +14,17 @@ from matplotlib.ticker import (
     StrMethodFormatter,
 )
 
+from thud.base._schema import CLASS_LIMITS
 from thud.base.units import display_unit
 from thud.case.keys import humanize
 from thud.impact.quantities import RATING
 from thud.level.assessment import octave_limits
 from thud.level.levels import FORCES, get_bands
+from thud.level.rating import CLASSES
 from thud.plot.style import (
     COLORS,
     FORCE_NAMES,
+    LINES,
     empty_axes,
     legend_above,
     line_style,
@@ -284,7 +287,8 @@ def draw_design(result: Design) -> Figure:
     """Draw the margin of a design map, dB, its zero as a line, and the samples that conform.
 
     The margin is positive if all octave levels lie within their limits. For a case with a room the
-    figure shows the rating of its standardized levels instead.
+    figure shows the rating of its standardized levels instead, and the limits of the classes of
+    KS F 2863-2 by the rating of its octaves.
     """
     dataset = result.dataset
     figure, axes = empty_axes(2.9)
@@ -297,6 +301,10 @@ def draw_design(result: Design) -> Figure:
     if RATING in dataset:
         rating = np.ma.masked_invalid(dataset[RATING].transpose(*result.axes).values.T)
         _draw_rating(figure, axes, (x, y), rating)
+        octave_rating = result.octave_rating
+        if octave_rating is not None:
+            classes = octave_rating.transpose(*result.axes).values.T
+            _draw_classes(axes, (x, y), np.ma.masked_invalid(classes))
         axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
         axes.grid(visible=False)
         return figure
@@ -344,6 +352,23 @@ def _draw_rating(
         lines = axes.contour(*position, rating, inside, colors="black", linewidths=0.5)
         axes.clabel(lines, fontsize="x-small", fmt=StrMethodFormatter("{x:g}"))
     figure.colorbar(filled, ax=axes, ticks=steps, label="Standardized L_iA,Fmax, dB re 20 µPa")
+
+
+def _draw_classes(
+    axes: Axes, position: tuple[Values, Values], rating: np.ma.MaskedArray[Any, Any]
+) -> None:
+    """Draw the limits of the Korean classes as lines, with a legend if there is one."""
+    for i, (number, limit) in enumerate(zip(CLASSES[1:], CLASS_LIMITS, strict=True)):
+        if rating.count() and rating.min() < limit < rating.max():
+            axes.contour(
+                *position, rating, [limit], colors=COLORS[1], linewidths=1.4, linestyles=[LINES[i]]
+            )
+            axes.plot(
+                [], [], color=COLORS[1], linewidth=1.4, linestyle=LINES[i],
+                label=f"class {number}, {limit:g} dB",
+            )  # fmt: skip
+    if axes.get_legend_handles_labels()[0]:
+        legend_above(axes, title="Limits of KS F 2863-2 (octaves, not standardized)")
 
 
 def _draw_margin(

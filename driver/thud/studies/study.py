@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import tomllib
 from collections.abc import Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
@@ -19,7 +18,7 @@ from thud.base._schema import MODELS
 from thud.base.bridge import version
 from thud.base.checks import refuse, refuse_unknown, refuse_value, require_kind, shown
 from thud.base.errors import InputError
-from thud.base.files import read_input
+from thud.base.files import read_toml
 from thud.case.case import Case, check_case, impact_only, new_model, read_case, tables_case
 from thud.case.keys import DENSITY, TEMPERATURE, find_key, key_owners, with_values
 from thud.studies.parameter import Parameter, read_quantity, read_value
@@ -115,14 +114,12 @@ def read_tables(
         return
     require_kind("study", source, str | Path)
     path = Path(source)
+    content, text = read_toml(path)
     try:
-        text = _content(path)
-        yield {"name": path.stem, **tomllib.loads(text)}, path.parent, text
+        yield {"name": path.stem, **content}, path.parent, text
     except InputError as error:
         message = f"{path}: {error}"
         raise InputError(message) from error
-    except (ValueError, RecursionError) as error:  # no TOML, or thousands of digits or brackets
-        refuse(f"{path}: {error}", "TOML", error)
 
 
 def named_files(value: object, folder: Path) -> Iterator[Path]:
@@ -134,15 +131,6 @@ def named_files(value: object, folder: Path) -> Iterator[Path]:
     elif isinstance(value, Mapping | list):
         for entry in value.values() if isinstance(value, Mapping) else value:
             yield from named_files(entry, folder)
-
-
-def _content(path: Path) -> str:
-    try:
-        return read_input(path).decode("utf-8")
-    except OSError as error:
-        refuse(f"{error.strerror}", "a file that exists and can be read", error)
-    except UnicodeDecodeError as error:
-        refuse(f"byte {error.start + 1} is not UTF-8", "TOML, which is UTF-8", error)
 
 
 def _text(source: Mapping[str, object]) -> str:

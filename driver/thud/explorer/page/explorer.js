@@ -1,5 +1,5 @@
 // Main module of the page: sends the values of the form to the server and shows the latest answer.
-import { addRoom, build, buildRecording, caseValues, describeChanges, isCase, markField, startWith, state, titleOf } from "./form.js";
+import { addRoom, build, buildRecording, caseValues, describeChanges, fillConstruction, isCase, markField, startWith, state, titleOf } from "./form.js";
 import { byId, element } from "./page.js";
 import { listenToBall } from "./ball.js";
 import { ConnectionError, ServerError, ask, follow, linkedCase, storeToken } from "./request.js";
@@ -165,6 +165,7 @@ function listen() {
     state.room &&= Boolean(state.floor);
     rebuild();
   });
+  byId("construction").addEventListener("change", (event) => { fillConstruction(event.target.value); rebuild(); });
   byId("has_room").addEventListener("change", (event) => {
     if (event.target.checked) addRoom();
     else state.room = false;
@@ -196,6 +197,7 @@ async function begin() {
     about = await (await ask("about")).json();
   } catch (error) { return showMessage(error.message); }
   state.form = about.form;
+  state.constructions = about.constructions;
   state.roomSource = about.room_source;
   buildRecording(about.recording);
   let start = about.start;

@@ -1,8 +1,8 @@
 // Form of the case, with fields from the declarations of the keys.
 import { byId, capitalize, element, scaled } from "./page.js";
 
-/** State of the case: values that differ from their defaults, ranges of moved sliders, and what is not known, by model. */
-export const state = { form: [], roomSource: {}, values: {}, model: "", floor: "", room: false, moved: {}, unknowns: {} };
+/** State of the case: values that differ from their defaults, chosen construction, ranges of moved sliders, and what is not known, by model. */
+export const state = { form: [], constructions: [], roomSource: {}, values: {}, model: "", floor: "", chosen: "", room: false, moved: {}, unknowns: {} };
 
 const groupsOf = (part) => state.form.filter((group) => group.part === part);
 const commonGroups = () => state.form.filter((group) => group.part === group.name && group.part !== "room");
@@ -33,13 +33,47 @@ export function caseValues() {
   return structuredClone(values);
 }
 
+/** Return the fields that a construction fills: those of its floor, and of the ceiling of the room. */
+const floorFields = (construction) => findGroup("floor", construction.floor).fields;
+const ceilingFields = () => findGroup("room", "room").fields.filter((field) => field.name.startsWith("ceiling_"));
+
+/** Return the construction whose values the form has, if there is one; of several, the chosen one. */
+function findConstruction() {
+  const hasValues = (fields, values) => fields.every((field) => JSON.stringify(getValue(field)) === JSON.stringify(values[field.name] ?? field.default));
+  const found = state.constructions.filter((construction) => construction.floor === state.floor && hasValues(floorFields(construction), construction.keys)
+    && (state.room ? hasValues(ceilingFields(), construction.room) : !Object.keys(construction.room).length));
+  return found.find(({ name }) => name === state.chosen) ?? found[0];
+}
+
+/** Fill the fields of floor and ceiling with the values of a construction; a ceiling needs the room below. */
+export function fillConstruction(name) {
+  const construction = state.constructions.find((entry) => entry.name === name);
+  if (!construction) return;
+  state.chosen = name;
+  state.floor = construction.floor;
+  if (Object.keys(construction.room).length && !state.room) addRoom();
+  for (const field of floorFields(construction)) setValue(field, construction.keys[field.name] ?? field.default);
+  if (state.room) for (const field of ceilingFields()) setValue(field, construction.room[field.name] ?? field.default);
+}
+
+/** Show which construction the form has. */
+function showConstruction() {
+  const construction = findConstruction();
+  byId("construction").value = construction?.name ?? "";
+  byId("construction_text").textContent = construction?.text ?? "";
+  byId("construction_text").hidden = !construction;
+}
+
 /** Return a text of floor, room and the values that differ from their defaults. */
 export function describeChanges() {
   const changes = [];
-  if (state.floor) changes.push(`Floor: ${titleOf("floor", state.floor)}`);
+  const construction = findConstruction();
+  const filled = construction ? [...floorFields(construction), ...ceilingFields()] : [];
+  if (state.floor) changes.push(`Floor: ${construction?.name ?? titleOf("floor", state.floor)}`);
   if (state.room) changes.push("Room below");
   for (const { fields } of usedGroups()) {
     for (const field of fields) {
+      if (filled.includes(field)) continue;
       const value = state.values[field.group]?.[field.name];
       if (value === undefined) continue;
       const shown = field.choices[value] ?? (typeof value === "number" ? scaled(value, -field.power) : String(value));
@@ -95,8 +129,9 @@ function setValue(field, value) {
 
 /** Build the form for the current model, floor and room; `onChange` is called after each change. */
 export function build(onChange) {
+  const sources = findConstruction()?.sources ?? {};
   const named = (names) => commonGroups().filter((group) => names.includes(group.name));
-  const elements = (groups, isOpen) => groups.filter((group) => group?.fields.length).map((group) => groupElement(group, isOpen, onChange));
+  const elements = (groups, isOpen) => groups.filter((group) => group?.fields.length).map((group) => groupElement(group, isOpen, onChange, ["floor", "room"].includes(group.part) ? sources : {}));
   byId("groups").replaceChildren(...elements([...named(["ball", "drop"]), findGroup("model", state.model)], true));
   byId("floor_groups").replaceChildren(...elements([findGroup("floor", state.floor)], true));
   byId("room_groups").replaceChildren(...elements(state.room ? groupsOf("room") : [], true));
@@ -104,23 +139,33 @@ export function build(onChange) {
   const options = (name) => groupsOf(name).map((group) => element("option", { value: group.name }, group.title));
   byId("model").replaceChildren(...options("model"));
   byId("floor").replaceChildren(element("option", { value: "" }, "Rigid test floor"), ...options("floor").filter((option) => option.value !== "rigid"));
+  const kinds = [...new Set(state.constructions.map(({ kind }) => kind))];
+  const ofKind = (kind) => state.constructions.filter((construction) => construction.kind === kind).map(({ name }) => element("option", { value: name }, name));
+  byId("construction").replaceChildren(element("option", { value: "" }, "None of the library"), ...kinds.map((kind) => element("optgroup", { label: kind }, ...ofKind(kind))));
+  showConstruction();
   byId("model").value = state.model;
   byId("floor").value = state.floor;
   byId("has_room").checked = state.room;
 }
 
-function groupElement(group, open, onChange) {
-  return element("details", { open }, element("summary", {}, group.title), ...group.fields.map((field) => fieldElement(field, onChange)));
+/** Return the element of a group; `sources` are those of the values of a construction. */
+function groupElement(group, open, onChange, sources) {
+  return element("details", { open }, element("summary", {}, group.title), ...group.fields.map((field) => fieldElement(field, onChange, sources[field.name])));
 }
 
-function fieldElement(field, onChange) {
+function fieldElement(field, onChange, source) {
   const id = `${field.group}.${field.name}`;
   const label = element("label", { for: id, title: field.help }, field.unit ? `${field.label}, ${field.unit}` : field.label);
-  const onInput = (value) => { setValue(field, value); onChange(); };
+  const help = element("p", { class: "help", id: `${id}.help` }, source ? `${field.help}. Source of the value: ${source}.` : `${field.help}.`);
+  const onInput = (value) => {
+    setValue(field, value);
+    help.textContent = `${field.help}.`;
+    showConstruction();
+    onChange();
+  };
   const newInputs = { choice: choiceInput, flag: flagInput, list: listInput }[field.kind] ?? numberInput;
   const inputs = newInputs(field, id, onInput);
   for (const input of inputs) input.setAttribute("aria-describedby", `${id}.help`);
-  const help = element("p", { class: "help", id: `${id}.help` }, `${field.help}.`);
   return element("div", { class: "field" }, label, ...inputs, help);
 }
 

@@ -1,0 +1,347 @@
+"""The library of floor constructions, and files of users."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from conftest import REPOSITORY, names_in, naming
+
+import thud
+from thud import cli
+from thud.base import files
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conftest import ErrorsOf
+
+FILES = sorted((REPOSITORY / "inputs/constructions").glob("*.toml"))
+# What a source must name, unless the value is nominal or says that it is an estimate.
+SOURCE = re.compile(r"\b(EN|ISO|DIN|ETA) \d|\bestimate\b|^nominal|manufacturer|technical approvals")
+# Standards that the library may cite.
+CITED = {
+    "EN 312", "EN 338", "EN 1168", "EN 13747", "EN 1991-1-1", "EN 1995-1-1", "EN 29052-1",
+    "ISO 12354", "ISO 12354-1", "DIN 18560-2",
+}  # fmt: skip
+MINE = """\
+name = "mine"
+kind = "concrete"
+floor = "plate"
+layers = [{ material = "concrete", thickness = 0.2, density = 2400 }]
+
+[keys]
+thickness = { value = 0.2, source = "drawing" }
+density = { value = 2400, source = "estimate" }
+
+[room]
+ceiling_mass = { value = 12, source = "data sheet" }
+"""
+
+
+def level_below(name: str) -> float:
+    """Return the rating below a construction, by the fastest model of the ball."""
+    case = replace(thud.construction(name).case(), model=thud.HollowSphere())
+    return thud.predict_level(thud.solve(case)).rating.a_weighted
+
+
+def test_library_holds_every_file_under_a_name_of_its_own() -> None:
+    library = thud.constructions()
+    assert len(library) == len(FILES) > 30
+    assert len(set(library.names)) == len(library)
+    names = {tomllib.loads(path.read_text(encoding="utf-8"))["name"] for path in FILES}
+    assert names == set(library.names)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_file_is_a_floor_whose_values_have_sources(path: Path) -> None:
+    content = tomllib.loads(path.read_text(encoding="utf-8"))
+    entry = thud.construction(path)
+    assert entry == thud.construction(content["name"])
+    stated = content["keys"] | content.get("room", {})
+    assert set(entry.sources) == set(stated)
+    for key, cell in stated.items():
+        assert SOURCE.search(cell["source"]), key
+        value = getattr(entry.floor, key, entry.room.get(key))
+        assert (list(value) if isinstance(value, tuple) else value) == cell["value"]
+    cited = re.findall(r"\b(?:EN|ISO|DIN|ETA) \d[\d-]*", path.read_text(encoding="utf-8"))
+    assert set(cited) <= CITED
+    assert np.isfinite(thud.mobility(entry.floor, [31.5, 500.0])).all()
+
+
+@pytest.mark.parametrize("entry", list(thud.constructions()), ids=lambda entry: entry.name)
+def test_mass_of_the_layers_is_that_of_the_keys(entry: thud.Construction) -> None:
+    floor = entry.floor
+    if isinstance(floor, thud.JoistFloor):
+        joists = floor.joist_density * floor.joist_width * floor.joist_height / floor.spacing
+        mass = floor.sheathing_thickness * floor.sheathing_density + joists
+    elif isinstance(floor, thud.LaminateFloor):
+        mass = sum(floor.layer_thickness) * floor.density + floor.added_mass
+    else:
+        assert isinstance(floor, thud.Plate)
+        mass = floor.thickness * floor.density
+    mass += floor.screed_thickness * floor.screed_density
+    mass += entry.room.get("ceiling_mass", 0.0)
+    # Neither the resilient layer nor the air is in the keys.
+    light = ("mineral wool", "polystyrene", "wood fiber", "cavity")
+    layers = sum(
+        layer.thickness * layer.density
+        for layer in entry.layers
+        if not any(word in layer.material for word in light)
+    )
+    assert mass == pytest.approx(layers, rel=0.005)
+
+
+@pytest.mark.parametrize(
+    ("name", "case"),
+    [
+        ("concrete 140", "concrete_140"),
+        ("concrete 180, ceiling", "concrete_180_ceiling"),
+        ("concrete 220", "concrete_220"),
+        ("joists, 1 board", "joists"),
+    ],
+)
+def test_construction_agrees_with_the_case_of_this_floor(name: str, case: str) -> None:
+    ours, known = (
+        thud.construction(name).case(),
+        thud.read_case(REPOSITORY / f"inputs/floors/{case}.nml"),
+    )
+    assert type(ours.floor) is type(known.floor)
+    # Some of these cases have the source in the middle, and rounded keys.
+    for key, value in vars(ours.floor).items():
+        if key not in {"source_x", "source_y"}:
+            other = getattr(known.floor, key)
+            is_number = isinstance(value, float)
+            assert value == (pytest.approx(other, rel=0.005) if is_number else other), key
+    assert ours.room is not None
+    assert known.room is not None
+    assert ours.room.ceiling_mass == known.room.ceiling_mass
+    if known.room.ceiling_mass:
+        for key in ("ceiling_depth", "ceiling_loss_factor"):
+            assert getattr(ours.room, key) == getattr(known.room, key)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        [f"concrete {h}" for h in (140, 160, 180, 200, 210, 220, 240, 250, 280, 300)],
+        [f"concrete {h}, screed on 10 MN/m3" for h in (160, 180, 240)],
+        ["concrete 200", *(f"concrete 200, screed on {s} MN/m3" for s in (20, 15, 10, 6))],
+        ["concrete 200, screed on 10 MN/m3", "concrete 200, screed 70 on 10 MN/m3"],
+        [f"hollow core {h}" for h in (200, 265, 320)],
+        *(
+            pytest.param(names, marks=pytest.mark.slow)
+            for names in (
+                [f"CLT {h}" for h in (140, 160, 200, 240)],
+                ["CLT 160", "CLT 160, gravel", "CLT 160, gravel, screed on 10 MN/m3"],
+                [
+                    f"joists, 1 board{top}"
+                    for top in ("", ", dry screed on 30 MN/m3", ", screed on 10 MN/m3")
+                ],
+                ["joists, 1 board", "joists, 2 boards", "joists, 3 boards"],
+                [
+                    f"joists, 3 boards{below}"
+                    for below in (
+                        *("", ", rigid subceiling", ", resilient subceiling"),
+                        ", double resilient subceiling",
+                    )
+                ],
+            )
+        ),
+    ],
+    ids=lambda names: names[0],
+)
+def test_heavier_and_softer_floors_are_quieter(names: list[str]) -> None:
+    levels = list(map(level_below, names))
+    assert levels == sorted(levels, reverse=True)
+    assert levels[0] > levels[-1] + 1
+
+
+def test_solid_slab_is_quieter_than_hollow_cores_of_its_depth() -> None:
+    assert level_below("concrete 200") < level_below("hollow core 200") - 3
+    assert level_below("filigree slab 200") == level_below("concrete 200")
+
+
+def test_case_has_source_and_room_of_another_but_not_its_ceiling() -> None:
+    room = thud.Room(volume=30.0, ceiling_mass=15.0, ceiling_depth=0.3)
+    other = thud.Case(ball=thud.Ball(mass=2.4), drop=thud.Drop(0.5), modes=thud.Modes(), room=room)
+    bare, with_ceiling = (
+        thud.construction(name).case(other) for name in ("concrete 180", "concrete 180, ceiling")
+    )
+    assert (bare.ball, bare.drop, bare.modes) == (other.ball, other.drop, None)
+    assert bare.name == "concrete_180"
+    assert bare.room == thud.Room(volume=30.0)
+    assert with_ceiling.room == replace(
+        thud.Room(volume=30.0), ceiling_mass=9.0, ceiling_depth=0.2, ceiling_loss_factor=0.3
+    )
+    with pytest.raises(thud.InputError, match="Case"):
+        thud.construction("concrete 180").case("concrete_180.nml")  # type: ignore[arg-type]
+
+
+def test_library_is_filtered_by_words() -> None:
+    found = thud.constructions("Mineral concrete 180")
+    assert found.names == (
+        "concrete 180, screed on 6 MN/m3",
+        "concrete 180, screed on 10 MN/m3",
+        "concrete 180, screed on 15 MN/m3",
+        "concrete 180, screed on 15 MN/m3, ceiling",
+    )
+    assert [entry.name for entry in found] == list(found.names)
+    assert found.filter("ceiling")[found.names[-1]] == thud.construction(found.names[-1])
+    (header, row) = found.filter("ceiling").rows()
+    assert header[0] == "construction"
+    assert (row[0], row[2]) == (found.names[-1], "526")
+    assert row[1].split(", ") == [
+        "50 mm cement screed", "20 mm mineral wool", "180 mm concrete",
+        "200 mm cavity with absorber", "12.5 mm gypsum board",
+    ]  # fmt: skip
+    with pytest.raises(thud.InputError, match=naming("marble", "timber joists")):
+        thud.constructions("marble")
+
+
+def test_misspelled_name_is_suggested() -> None:
+    with pytest.raises(thud.InputError, match=naming("conrete 180", "concrete 180", "TOML")):
+        thud.construction("conrete 180")
+    with pytest.raises(thud.InputError, match=naming("3")):
+        thud.construction(3)  # type: ignore[arg-type]
+
+
+def test_rows_state_value_unit_and_source() -> None:
+    rows = {row[0]: row[1:] for row in thud.construction("concrete 180, ceiling").rows()}
+    assert rows["thickness"] == ("0.18", "m", "nominal")
+    assert rows["ceiling_mass"] == ("9", "kg/m2", "estimate: 12.5 mm of gypsum board")
+    assert rows["edges"][0] == "building"
+
+
+def test_section_has_a_bar_and_a_label_for_each_layer() -> None:
+    entry = thud.construction("joists, 3 boards, resilient subceiling")
+    (axes,) = entry.plot().axes
+    heights = [bar.get_height() for bar in axes.patches]  # type: ignore[attr-defined]
+    assert heights == pytest.approx([layer.thickness for layer in entry.layers])
+    assert [text.get_text() for text in axes.texts] == list(map(str, entry.layers))
+
+
+def test_file_of_a_user_is_a_construction(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(MINE)
+    for source in (path, str(path)):
+        entry = thud.construction(source)
+        assert entry.floor == thud.Plate(thickness=0.2, density=2400)
+        assert entry.room == {"ceiling_mass": 12.0}
+        assert entry.sources["thickness"] == "drawing"
+        assert entry.note == ""
+    assert "mine" not in thud.constructions().names
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "parts"),
+    [
+        ('name = "mine"\n', "", ("name", "missing")),
+        ('kind = "concrete"', 'kind = ""', ("kind", "text")),
+        ('floor = "plate"', 'floor = "plat"', ("floor", "plat", "plate")),
+        ('floor = "plate"', 'flor = "plate"', ("flor", "floor")),
+        ("thickness = { value", "thicknes = { value", ("thicknes", "thickness")),
+        ("value = 0.2,", "value = 9,", ("plate", "thickness", "9.0", "2 m")),
+        ("value = 0.2,", "value = 'thick',", ("thickness", "thick")),
+        (', source = "drawing"', "", ("thickness", "source")),
+        ('"drawing"', '" "', ("thickness", "source", "text")),
+        ("ceiling_mass", "volume", ("room", "volume", "ceiling_mass")),
+        ("value = 12,", "value = -12,", ("room", "ceiling_mass", "-12.0")),
+        ("[room]\n", "[rooms]\n", ("rooms", "room")),
+        ("density = 2400 }]", "density = 0 }]", ("layer", 1, "density", 0)),
+        (", density = 2400 }]", "}]", ("layer", 1, "density")),
+        ("[keys]\n", "[keys\n", ("TOML",)),
+    ],
+    ids=lambda value: str(value)[:20],
+)
+def test_bad_file_is_refused_in_one_sentence(
+    old: str, new: str, parts: tuple[object, ...], tmp_path: Path
+) -> None:
+    path = tmp_path / "mine.toml"
+    assert old in MINE
+    path.write_text(MINE.replace(old, new))
+    with pytest.raises(thud.InputError, match=naming(path, "allowed", *parts)) as caught:
+        thud.construction(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
+    for name, content in (("missing.toml", None), ("latin.toml", 'name = "für"'.encode("latin-1"))):
+        if content is not None:
+            (tmp_path / name).write_bytes(content)
+        with pytest.raises(thud.InputError, match=naming(tmp_path / name, "allowed")):
+            thud.construction(tmp_path / name)
+
+
+def test_page_lists_the_library() -> None:
+    page = (REPOSITORY / "docs/constructions.md").read_text(encoding="utf-8")
+    table = page.partition("<!-- table -->\n")[2].partition("<!-- end -->")[0].splitlines()[2:]
+    listed = [tuple(line.strip("| ").split(" | ")) for line in table]
+    library = thud.constructions()
+    _, *rows = library.rows()
+    assert listed == [
+        (*row, f"`{entry.floor.name}`") for entry, row in zip(library, rows, strict=True)
+    ]
+
+
+def test_file_of_the_page_is_a_construction(tmp_path: Path) -> None:
+    page = (REPOSITORY / "docs/constructions.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"^```\n(name = .*?)^```", page, re.DOTALL | re.MULTILINE)
+    (tmp_path / "my_floor.toml").write_text(block)
+    entry = thud.construction(tmp_path / "my_floor.toml")
+    assert entry.name == "concrete 200, my mat"
+    assert entry.floor == thud.Plate(
+        thickness=0.2, screed_thickness=0.06, layer_stiffness=1.2e7, layer_loss_factor=0.15
+    )
+
+
+def test_command_compares_constructions_beside_cases(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = thud.Case(name="first", floor=thud.Plate(thickness=0.2), room=thud.Room(volume=30.0))
+    thud.write_case(case, tmp_path / "first.nml")
+    (tmp_path / "mine.toml").write_text(f'note = "for tests"\n{MINE}')
+    options = ["--construction", "concrete 200", "--construction", str(tmp_path / "mine.toml")]
+    out = tmp_path / "out"
+    assert cli.main(["floor", str(tmp_path / "first.nml"), *options, "-o", str(out)]) == 0
+    assert {"floors.html", "floors.svg"} <= set(names_in(out))
+    printed = capsys.readouterr()
+    assert "mine: for tests" in printed.err
+    (names,) = [line.split() for line in printed.out.splitlines() if "first" in line]
+    assert names == ["first", "concrete", "200", "mine"]
+    levels = next(line for line in printed.out.splitlines() if line.startswith("500 Hz octave"))
+    first, library, mine = map(float, levels.split()[4:])
+    # The same ball, drop and room; only the ceiling differs.
+    assert first == pytest.approx(library, abs=0.1)
+    assert mine < library
+
+
+def test_command_lists_constructions(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["floor", "--list"]) == 0
+    printed = capsys.readouterr().out
+    assert all(name in printed for name in thud.constructions().names)
+    assert cli.main(["floor", "--list", "CLT 240"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 2
+
+
+def test_command_refuses_what_is_no_floor(errors_of: ErrorsOf) -> None:
+    assert "--construction" in errors_of("floor")
+    assert "'concrete 180'" in errors_of("floor", "--construction", "conrete 180")
+    twice = ("--construction", "concrete 180") * 2
+    assert "also names another floor" in errors_of("floor", *twice)
+    assert "marble" in errors_of("floor", "--list", "marble")
+
+
+def test_inputs_of_a_clone_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    module = tmp_path / "driver/thud/base/files.py"
+    monkeypatch.setattr(files, "__file__", str(module))
+    with pytest.raises(thud.InputError, match="inputs"):
+        files.inputs_folder()
+    (tmp_path / "inputs").mkdir()
+    assert files.inputs_folder() == tmp_path / "inputs"
+    (tmp_path / "driver/thud/inputs").mkdir(parents=True)
+    assert files.inputs_folder() == tmp_path / "driver/thud/inputs"
