@@ -11,7 +11,8 @@ module thud_room
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, list_field, real_field
    use thud_plate, only: air_type, get_mode_density, get_plate_radiation, get_surface_mass, get_total_loss, plate_type
-   use thud_rating, only: fast_reverberation, find_rated_bands, get_a_weighted_level
+   use thud_rating, only: fast_reverberation, find_rated_bands, get_a_weighted_level, get_rounded, get_standardization, &
+      rating_names
    use thud_response_spread, only: get_band_variance, get_level_spread
    use thud_text, only: to_text
    use thud_transient_energy, only: get_fast_history, get_fast_maximum
@@ -19,7 +20,7 @@ module thud_room
    private
 
    public :: check_below, check_room, few_modes, get_completed_room, get_room_bands, get_room_fields, get_room_level
-   public :: room_level_type, room_type
+   public :: meets_requirement, room_level_type, room_type
 
    !> A room whose reverberation time contains all its losses, as measured ones do.
    character(len=*), parameter :: finished_room = 'finished'
@@ -73,6 +74,10 @@ module thud_room
       type(walls_type) :: walls
       !> Suspended ceiling.
       type(ceiling_type) :: ceiling
+      !> Maximum rating that is required, dB; 0: none.
+      real(wp) :: required = 0.0_wp
+      !> The rating that it refers to, one of `rating_names`.
+      character(len=name_length) :: required_rating = rating_names(1)
    end type room_type
 
    !> A prediction in one-third-octave bands.
@@ -97,8 +102,8 @@ module thud_room
       real(wp), allocatable :: level(:), time(:)
       !> Expected standard deviation of that level for one source and one microphone position, dB: [n_band].
       real(wp), allocatable :: spread(:)
-      !> A-weighted maximum level, dB (ISO 717-2 annex D).
-      real(wp) :: a_weighted = 0.0_wp
+      !> Ratings in the order of `rating_names`, not rounded, dB.
+      real(wp) :: rating(size(rating_names)) = 0.0_wp
       !> Octave bands, their levels and times, as above: [n_octave].
       type(band_type), allocatable :: octaves(:)
       real(wp), allocatable :: octave_level(:), octave_time(:)
@@ -120,7 +125,7 @@ contains
    function get_room_fields(room) result(fields)
       !> The room that the fields read and set.
       type(room_type), intent(in), target :: room
-      !> One field per component: [19].
+      !> One field per component: [21].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
@@ -138,7 +143,10 @@ contains
          //'without floor, walls and ceiling', [character(len=8) :: finished_room, 'bare']), &
          real_field('air_density', room%air%density, 'kg/m3', 'density of the air', '[0.5, 2]'), &
          real_field('sound_speed', room%air%sound_speed, 'm/s', 'speed of sound in the air', '[200, 500]'), &
-         get_wall_fields(room%walls), get_ceiling_fields(room%ceiling)]
+         get_wall_fields(room%walls), get_ceiling_fields(room%ceiling), &
+         real_field('required', room%required, 'dB', 'maximum rating that is required; 0: none', '[0, 200]'), &
+         choice_field('required_rating', room%required_rating, 'rating that required refers to: of octaves (KS F ' &
+         //'2863-2), thirds (ISO 717-2) or standardized thirds', rating_names)]
    end function get_room_fields
 
    !> Checks the number of reverberation times.
@@ -187,8 +195,8 @@ contains
       product = completed%length*completed%width*completed%height
       if (abs(product - completed%volume) > volume_tolerance*completed%volume) then
          error = input_error('&room: length, width and height, '//to_text(completed%length)//' x ' &
-            //to_text(completed%width)//' x '//to_text(completed%height)//' m (a length or width that is not stated is that ' &
-            //'of the floor), contradict the volume, '//to_text(completed%volume)//' m3; allowed: a volume of ' &
+            //to_text(completed%width)//' x '//to_text(completed%height)//' m (not stated: those of the floor), ' &
+            //'contradict the volume, '//to_text(completed%volume)//' m3; allowed: a volume of ' &
             //to_text(product)//' m3, or without volume or height')
       else if (completed%volume < min_volume) then
          error = input_error('&room: the volume is '//to_text(completed%volume)//' m3; allowed: at least ' &
@@ -256,10 +264,22 @@ contains
             decay_of_60_db/prediction%reverberation_time(i), width(i))])
       end do
       prediction%level = 10*log10(maximum/reference_pressure**2)
-      prediction%a_weighted = get_a_weighted_level(third_set, prediction%level)
       call add_octaves(energies, prediction)
+      prediction%rating = [get_a_weighted_level(octave_set, prediction%octave_level), &
+         get_a_weighted_level(third_set, prediction%level), get_a_weighted_level(third_set, prediction%level &
+         + get_standardization(prediction%reverberation_time, prediction%volume))]
       call add_history(energies, prediction)
    end subroutine get_room_level
+
+   !> Whether a prediction meets the requirement of its room: the rounded rating is at most the required one.
+   pure function meets_requirement(room, prediction) result(met)
+      !> A room with a requirement.
+      type(room_type), intent(in) :: room
+      type(room_level_type), intent(in) :: prediction
+      logical :: met
+
+      met = get_rounded(prediction%rating(findloc(rating_names == room%required_rating, .true., dim=1))) <= room%required
+   end function meets_requirement
 
    !> Levels of the octaves. The detector is linear in the energies, so an octave needs the sum of the energies of its
    !> one-third-octave bands; the maximum of the sum is at most the sum of the maxima.

@@ -78,6 +78,7 @@ FloatingFloorEdges = Literal["building", "laboratory", "absorption"]
 JoistFloorSourceOn = Literal["sheathing", "joist"]
 RoomReverberationOf = Literal["finished", "bare"]
 RoomWallJunction = Literal["cross", "t", "index"]
+RoomRequiredRating = Literal["octaves", "thirds", "standardized"]
 BandSet = Literal["octave", "third"]
 
 
@@ -313,6 +314,11 @@ class Room(Group):
         Depth of the air cavity above the ceiling, m; 0.01 <= ceiling_depth <= 2.
     ceiling_loss_factor : float
         Loss factor of the ceiling cavity; 0.001 <= ceiling_loss_factor <= 1.
+    required : float
+        Maximum rating that is required; 0: none, dB; 0 <= required <= 200.
+    required_rating : str
+        Rating that required refers to: of octaves (KS F 2863-2), thirds (ISO 717-2) or
+        standardized thi; "octaves", "thirds", "standardized".
     """
 
     length: float = 0.0
@@ -334,6 +340,8 @@ class Room(Group):
     ceiling_mass: float = 0.0
     ceiling_depth: float = 0.1
     ceiling_loss_factor: float = 0.3
+    required: float = 0.0
+    required_rating: RoomRequiredRating = "octaves"
 
 
 @dataclass(frozen=True, eq=False)
@@ -1027,6 +1035,13 @@ LIMITS: dict[LimitsSource, tuple[tuple[str, str, float, float], ...]] = {
 # Maximum A-weighted levels of the classes 1, 2, ... of KS F 2863-2, dB.
 CLASS_LIMITS = (37.0, 41.0, 45.0, 49.0)
 
+# Single-number ratings of a level in a room, with symbols, bands and standards.
+RATINGS: dict[RoomRequiredRating, str] = {
+    "octaves": "L_iA,Fmax of octaves (KS F 2863-2)",
+    "thirds": "L_iA,Fmax of one-third octaves (ISO 717-2)",
+    "standardized": "standardized L_iA,Fmax of one-third octaves (ISO 16283-2)",
+}
+
 # Every key, in the order of an input file.
 KEYS = (
     Key("", "case", "name", "text", "", "name of the case and of its output directory"),
@@ -1188,4 +1203,6 @@ KEYS = (
     Key("room", "room", "ceiling_mass", "real", "kg/m2", "mass per unit area of a suspended ceiling; 0: none", (), 0.0, 200.0),
     Key("room", "room", "ceiling_depth", "real", "m", "depth of the air cavity above the ceiling", (), 0.01, 2.0),
     Key("room", "room", "ceiling_loss_factor", "real", "", "loss factor of the ceiling cavity", (), 0.001, 1.0),
+    Key("room", "room", "required", "real", "dB", "maximum rating that is required; 0: none", (), 0.0, 200.0),
+    Key("room", "room", "required_rating", "choice", "", "rating that required refers to: of octaves (KS F 2863-2), thirds (ISO 717-2) or standardized thi", ('octaves', 'thirds', 'standardized')),
 )
