@@ -9,6 +9,7 @@ module thud_room
    use thud_field, only: field_type, list_type, name_length
    use thud_flanking, only: get_junction_rate, get_vibration_reduction, get_wall_fields, get_walls, walls_type
    use thud_kinds, only: wp
+   use thud_lapack, only: dgetf2, dgetrs
    use thud_new_field, only: choice_field, list_field, real_field
    use thud_plate, only: air_type, get_mode_density, get_plate_radiation, get_surface_mass, get_total_loss, plate_type
    use thud_rating, only: fast_reverberation, find_rated_bands, get_a_weighted_level, get_rounded, get_standardization, &
@@ -100,6 +101,9 @@ module thud_room
       real(wp), allocatable :: floor_modes(:), room_modes(:)
       !> Maximum Fast level in the room, dB re 20 uPa, and its time after the impact, s: [n_band].
       real(wp), allocatable :: level(:), time(:)
+      !> Fractions of the energy that enters the room, over all times: from the floor, directly or through a ceiling, and
+      !> from each flanking wall: [n_band, 1 + n_wall].
+      real(wp), allocatable :: path_share(:, :)
       !> Expected standard deviation of that level for one source and one microphone position, dB: [n_band].
       real(wp), allocatable :: spread(:)
       !> Ratings in the order of `rating_names`, not rounded, dB.
@@ -117,6 +121,8 @@ module thud_room
       real(wp), allocatable :: loss_matrix(:, :)
       !> Initial energies, J, and squared sound pressure per energy, Pa2/J: [n].
       real(wp), allocatable :: initial_energy(:), weight(:)
+      !> Rates at which energy flows from them into the room, 1/s; those of the floor, the walls and then others: [n].
+      real(wp), allocatable :: into_room(:)
    end type band_energies_type
 
 contains
@@ -253,11 +259,13 @@ contains
       prediction%floor_modes = get_mode_density(plate)*width
       prediction%room_modes = get_room_mode_density(room, bands%center)*width
       allocate (prediction%level(size(bands)), prediction%time(size(bands)), prediction%spread(size(bands)))
+      allocate (prediction%path_share(size(bands), 1 + room%walls%lengths%count))
       floor_decay = 2*pi*bands%center*prediction%loss_factor
       do i = 1, size(bands)
          energies(i) = get_band_energies(plate, room, prediction, i)
          call get_fast_maximum(energies(i)%loss_matrix, energies(i)%initial_energy, energies(i)%weight, maximum(i), &
             prediction%time(i))
+         prediction%path_share(i, :) = get_path_shares(energies(i), size(prediction%path_share, 2))
          prediction%spread(i) = get_level_spread([ &
             get_band_variance(2, get_mode_density(plate), floor_decay(i), width(i)), &
             get_band_variance(3, get_room_mode_density(room, bands(i)%center), &
@@ -387,9 +395,34 @@ contains
          allocate (energies%initial_energy(size(flow%internal_loss)), energies%weight(size(flow%internal_loss)), &
             source=0.0_wp)
          energies%initial_energy(1) = prediction%energy(band)
+         allocate (energies%into_room, source=flow%rate(at_room, :))
          energies%weight(at_room) = air%density*air%sound_speed**2/room%volume
       end associate
    end function get_band_energies
+
+   !> Fractions of the energy that enters the room by each path: [n_path].
+   !>
+   !> With dE/dt = -A E the integrals of the energies over time are A**-1 E(0).
+   pure function get_path_shares(energies, n_path) result(share)
+      type(band_energies_type), intent(in) :: energies
+      !> Number of paths: the floor and the walls. What else radiates, a ceiling's cavity, belongs to the floor.
+      integer, intent(in) :: n_path
+      real(wp) :: share(n_path)
+      real(wp) :: matrix(size(energies%initial_energy), size(energies%initial_energy))
+      real(wp) :: integral(size(energies%initial_energy), 1)
+      integer :: pivot(size(energies%initial_energy))
+      integer :: n, info
+
+      n = size(energies%initial_energy)
+      matrix = energies%loss_matrix
+      integral(:, 1) = energies%initial_energy
+      call dgetf2(n, n, matrix, n, pivot, info)
+      call dgetrs('N', n, 1, matrix, n, pivot, integral, n, info)
+      integral(:, 1) = energies%into_room*integral(:, 1)
+      share = integral(:n_path, 1)
+      share(1) = share(1) + sum(integral(n_path + 1:, 1))
+      share = share/sum(share)
+   end function get_path_shares
 
    !> Modes of a room per hertz, s.
    elemental function get_room_mode_density(room, frequency) result(density)

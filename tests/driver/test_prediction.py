@@ -550,3 +550,28 @@ def test_requirement_is_judged_by_the_rating_that_it_names(
         )
         page = thud.compare_floors({"floor": thud.predict_level(shell, floor, strict)})
         assert ("required, dB", f"{limit} ({name}): {word}") in page.rows()
+
+
+def test_paths_share_the_energy_that_enters_the_room(
+    shell: thud.Impact, run: Run, case_file: CaseFile
+) -> None:
+    floor = thud.Plate(thickness=0.2)
+    bare = thud.predict_level(shell, floor, thud.Room(volume=40.0))
+    assert bare.path_shares.tolist() == [[1.0]] * 12
+    room = thud.Room(volume=40.0, wall_lengths=(5, 4, 4))
+    found = thud.predict_level(shell, floor, room)
+    assert found.path_shares.shape == (12, 4)
+    assert found.path_shares.sum(axis=1) == pytest.approx(1.0)
+    # Equal walls have equal shares. Walls decay as slowly as the floor does: the level rises as
+    # much as the energy.
+    assert found.path_shares[:, 2] == pytest.approx(found.path_shares[:, 3])
+    rise = -10 * np.log10(found.path_shares[:, 0])
+    assert found.level - bare.level == pytest.approx(rise, abs=0.3)
+    assert (rise > 0.1).all()
+    text = ROOM_CASE.replace("volume = 40", "volume = 40\n wall_lengths = 5, 4, 4")
+    done = run(case_file(text), "-o", "out")
+    assert "Energy that enters the room through the floor:" in done.stdout
+    path = case_file(text).parent / "out" / "room_levels.csv"
+    table = np.genfromtxt(path, delimiter=",", names=True)
+    columns = [table[name] for name in ("direct_share", "wall_1_share", "wall_2_share")]
+    assert pytest.approx(found.path_shares[:, :3], abs=1e-9) == np.array(columns).T

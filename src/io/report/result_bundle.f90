@@ -117,6 +117,7 @@ contains
       call bundle%add_array('room_bands.level', n, room%level)
       call bundle%add_array('room_bands.time', n, room%time)
       call bundle%add_array('room_bands.spread', n, room%spread)
+      call bundle%add_array('room_paths.share', shape(room%path_share), room%path_share)
       n = size(room%octaves)
       call bundle%add_array('room_octaves.frequency', n, room%octaves%nominal)
       call bundle%add_array('room_octaves.level', n, room%octave_level)

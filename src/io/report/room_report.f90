@@ -32,14 +32,19 @@ contains
       type(room_level_type), intent(in) :: prediction
       !> The files: [size(room_file_names)].
       type(text_file_type), intent(out) :: files(:)
-      character(len=:), allocatable :: header
+      character(len=:), allocatable :: header, wall_titles
       integer :: i
 
       files%name = room_file_names
+      wall_titles = ''
+      do i = 1, size(prediction%path_share, 2) - 1
+         wall_titles = wall_titles//',wall_'//to_text(i)//'_share'
+      end do
       files(1)%content = get_table_csv('nominal_Hz,level_dB,time_of_maximum_s,spread_dB,energy_J,radiation_factor,' &
-         //'loss_factor,reverberation_time_s,floor_modes,room_modes', reshape([prediction%bands%nominal, prediction%level, &
-         prediction%time, prediction%spread, prediction%energy, prediction%radiation_factor, prediction%loss_factor, &
-         prediction%reverberation_time, prediction%floor_modes, prediction%room_modes], [size(prediction%level), 10]))
+         //'loss_factor,reverberation_time_s,floor_modes,room_modes,direct_share'//wall_titles, &
+         reshape([prediction%bands%nominal, prediction%level, prediction%time, prediction%spread, prediction%energy, &
+         prediction%radiation_factor, prediction%loss_factor, prediction%reverberation_time, prediction%floor_modes, &
+         prediction%room_modes, prediction%path_share], [size(prediction%level), 10 + size(prediction%path_share, 2)]))
       files(2)%content = get_table_csv('nominal_Hz,level_dB,time_of_maximum_s', reshape([prediction%octaves%nominal, &
          prediction%octave_level, prediction%octave_time], [size(prediction%octave_level), 3]))
       header = 'time_s'
@@ -107,6 +112,9 @@ contains
          if (rating_names(i) == 'octaves') text = text//', '//get_class_text(prediction%rating(i))
          text = text//newline
       end do
+      if (size(prediction%path_share, 2) > 1) text = text//'  Energy that enters the room through the floor: ' &
+         //fixed(100*minval(prediction%path_share(:, 1)), 0)//' to '//fixed(100*maxval(prediction%path_share(:, 1)), 0) &
+         //' %, from the walls the rest.'//newline
       associate (room => case%room)
          if (room%required > 0.0_wp) text = text//'  Required of '//trim(room%required_rating)//': at most ' &
             //to_text(room%required)//' dB: '//trim(merge('met    ', 'not met', meets_requirement(room, prediction))) &
