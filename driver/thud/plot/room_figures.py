@@ -91,11 +91,12 @@ def draw_prediction(prediction: RoomPrediction, measured: RoomLevels | None = No
             x[marks], prediction.level[marks], color=COLORS[0], marker="o", markersize=4,
             markerfacecolor=face, linestyle="none",
         )  # fmt: skip
-    label = f"in the room: L_iA,Fmax {prediction.rating.rounded} dB"
+    label = f"in the room: L_iA,Fmax {prediction.rating.rounded} dB (ISO 717-2)"
     below.plot([], [], color=COLORS[0], marker="o", markersize=4, label=label)
     below.plot(
         x, prediction.standardized, color=COLORS[1], marker="s", markersize=3, linewidth=1,
-        linestyle="--", label=f"standardized: {prediction.standardized_rating.rounded} dB",
+        linestyle="--",
+        label=f"standardized: {prediction.standardized_rating.rounded} dB (ISO 16283-2)",
     )  # fmt: skip
     if measured is not None:
         level = prediction.level + prediction.difference(measured)
