@@ -116,7 +116,7 @@ contains
 
       text = text//newline//'  ISO 717-2, of one-third octaves: L_iA,Fmax '//to_text(get_rounded(prediction%rated))//' dB (' &
          //fixed(prediction%interval(1), 0)//' to '//fixed(prediction%interval(2), 0)//'), statistical ' &
-         //fixed(prediction%a_weighted, 1)//' dB, modal ' &
+         //fixed(get_a_weighted_level(prediction%bands(1)%set, prediction%level), 1)//' dB, modal ' &
          //fixed(get_a_weighted_level(prediction%bands(1)%set, prediction%modal_level), 1)//' dB'//newline
       text = text//'  Contributions:'
       do i = 1, size(contribution_names)
