@@ -7,7 +7,7 @@ module thud_answer
    use thud_case_text, only: read_case
    use thud_error, only: error_type, input_error
    use thud_floor_answers, only: answer_floor_energy, answer_floor_impact, answer_floor_modes, answer_mobility, &
-      answer_mobility_fit, answer_modal_room, answer_point_velocity, answer_radiator, answer_room_level
+      answer_mobility_fit, answer_modal_room, answer_point_velocity, answer_radiation, answer_radiator, answer_room_level
    use thud_level_answers, only: answer_background, answer_levels, answer_low_pass, answer_peak_count, answer_rating, &
       answer_standardization
    use thud_request, only: request_type
@@ -68,6 +68,8 @@ contains
          call answer_modal_room(case, request, bundle, error)
       case ('floor_modes')
          call answer_floor_modes(case, request, bundle, error)
+      case ('radiation')
+         call answer_radiation(case, request, bundle, error)
       case ('radiator')
          call answer_radiator(case, request, bundle, error)
       case ('mobility_fit')

@@ -13,6 +13,7 @@ module thud_floor_answers
    use thud_kinds, only: wp
    use thud_measured_mobility_floor, only: measured_mobility_floor_type
    use thud_mobility_fit, only: fit_mobility
+   use thud_modal_radiation, only: get_modal_radiation, modal_radiation_type
    use thud_modal_room, only: box_type, get_crossover, get_modal_room, modal_room_type
    use thud_plate, only: get_critical_frequency, get_plate_radiation, get_surface_mass, get_total_loss, plate_type
    use thud_receiver, only: get_mobility, receiver_type
@@ -20,12 +21,12 @@ module thud_floor_answers
    use thud_result_bundle, only: add_history, add_room_level
    use thud_ritz_system, only: get_mode_values
    use thud_room, only: check_below, get_room_bands, room_level_type
-   use thud_room_prediction, only: get_box, get_positions, predict_room
+   use thud_room_prediction, only: get_area, get_box, get_positions, predict_room
    implicit none (type, external)
    private
 
    public :: answer_floor_energy, answer_floor_impact, answer_mobility, answer_mobility_fit, answer_point_velocity
-   public :: answer_floor_modes, answer_modal_room, answer_radiator, answer_room_level
+   public :: answer_floor_modes, answer_modal_room, answer_radiation, answer_radiator, answer_room_level
 
 contains
 
@@ -175,6 +176,38 @@ contains
       frequency = request%get_number('highest')
       if (.not. request%has('highest')) frequency = get_crossover(box)
    end function get_highest
+
+   !> Radiation of a case's floor into the room below in the rated one-third-octave bands, by its modes: averaged over the
+   !> floor, or over the strike points `x`, `y`, relative to its sides.
+   subroutine answer_radiation(case, request, bundle, error)
+      type(case_type), intent(in) :: case
+      type(request_type), intent(in) :: request
+      type(bundle_type), intent(inout) :: bundle
+      !> Set if the floor has no modes.
+      type(error_type), allocatable, intent(out) :: error
+      type(modal_radiation_type) :: radiation
+      type(floor_modes_type) :: modes
+      type(plate_type) :: plate
+      type(box_type) :: box
+
+      call get_case_box(case, box, plate, error)
+      if (allocated(error)) return
+      associate (floor => case%floors(get_floor_number(case))%model)
+         call floor%get_room_modes(floor%get_support(), plate, modes, error)
+      end associate
+      if (allocated(error)) return
+      associate (x => request%get_array('x'), y => request%get_array('y'), area => get_area(case%room, plate))
+         if (size(x) > 0) then
+            call get_modal_radiation(modes, plate, box%air, box%bands, area, radiation, &
+               reshape([x, y], [2, size(x)], order=[2, 1]))
+         else
+            call get_modal_radiation(modes, plate, box%air, box%bands, area, radiation)
+         end if
+      end associate
+      call bundle%add_array('frequency', shape(box%bands), box%bands%nominal)
+      call bundle%add_array('radiation_factor', shape(box%bands), radiation%radiation_factor)
+      call bundle%add_array('radiated', shape(box%bands), radiation%radiated)
+   end subroutine answer_radiation
 
    !> Natural frequencies, Hz, and loss factors of the modes of a case's floor up to `highest`, Hz, and the shapes of its
    !> radiating plate at the points `x`, `y`, m, 1/sqrt(kg).

@@ -19,7 +19,7 @@ module thud_room_prediction
    implicit none (type, external)
    private
 
-   public :: contribution_names, get_box, get_positions, predict_room
+   public :: contribution_names, get_area, get_box, get_positions, predict_room
 
    !> Contributions to the interval of a rating.
    character(len=*), parameter :: contribution_names(*) = [character(len=18) :: 'source', 'edges', 'reverberation_time', &

@@ -79,7 +79,7 @@ print(chosen := floors[1].name, thud.mobility(floors[2], [25.0]), moved.differen
 name: thud.FloorName = chosen
 floor, room = thud.Plate(thickness=0.2), thud.Room(volume=40.0)
 below: thud.RoomPrediction = thud.predict_level(flagship, floor, room)
-places: thud.ModalRoom = thud.modal_room(flagship, floor, room, balls=1, microphones=2)
+places: thud.ModalRoom = thud.modal_room(flagship, floor, room)
 tapping: thud.TappingLevel = thud.tapping_level(floor)
 library: thud.Constructions = thud.constructions("concrete 180")
 deck: thud.Construction = thud.construction(library.names[0])

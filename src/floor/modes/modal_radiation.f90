@@ -38,6 +38,8 @@ module thud_modal_radiation
       real(wp), allocatable :: radiation_factor(:)
       !> Power that the radiating plate dissipates per mean-square force, m/(N s): [n_band].
       real(wp), allocatable :: conductance(:)
+      !> Power that it radiates to one side per mean-square force, m/(N s): [n_band].
+      real(wp), allocatable :: radiated(:)
    end type modal_radiation_type
 
    !> Transforms of the modes at some wavenumbers.
@@ -54,7 +56,7 @@ contains
 
    !> Radiation of a floor in bands, averaged over strike points and over the frequencies of each band. A single plate
    !> without ribs has orthogonal modes: averaged over all strike points, their cross terms vanish.
-   subroutine get_modal_radiation(modes, plate, air, bands, area, radiation)
+   subroutine get_modal_radiation(modes, plate, air, bands, area, radiation, stated_strike)
       type(floor_modes_type), intent(in) :: modes
       !> The radiating plate, with its mass and total losses.
       type(plate_type), intent(in) :: plate
@@ -64,14 +66,21 @@ contains
       !> Ends of the part of the plate above the room along length and width, m: [4].
       real(wp), intent(in) :: area(4)
       type(modal_radiation_type), intent(out) :: radiation
+      !> Strike points, relative to length and width (default: a mean over the floor): [2, n].
+      real(wp), intent(in), optional :: stated_strike(:, :)
       real(wp), allocatable :: strike(:, :), all_drives(:, :), drive(:, :), square(:), omega(:), loss_factor(:)
       integer, allocatable :: kept(:)
       real(wp) :: power, velocity, total
       integer :: i, k
 
       allocate (radiation%radiation_factor(size(bands)), radiation%conductance(size(bands)))
-      if (.not. is_orthogonal(modes)) then
-         call get_strike_points(n_strike, strike)
+      allocate (radiation%radiated(size(bands)))
+      if (present(stated_strike) .or. .not. is_orthogonal(modes)) then
+         if (present(stated_strike)) then
+            strike = stated_strike
+         else
+            call get_strike_points(n_strike, strike)
+         end if
          call get_mode_values(modes%modes, 1, modes%stack%length*strike(1, :), modes%stack%width*strike(2, :), all_drives)
       end if
       do i = 1, size(bands)
@@ -87,6 +96,7 @@ contains
             call add_modes(modes, kept, omega, loss_factor, square, air, bands(i), area, power, velocity, total)
          end if
          radiation%radiation_factor(i) = power/velocity
+         radiation%radiated(i) = air%density*air%sound_speed*power/total
          radiation%conductance(i) = velocity/total*get_surface_mass(plate)*2*pi*bands(i)%center &
             *get_total_loss(plate, air, bands(i)%center)
       end do
@@ -131,11 +141,11 @@ contains
             ! Geometric steps, whose widths are proportional to the frequency.
             frequency = edge(1)*ratio**((l - 0.5_wp)/n)
             associate (w => 2*pi*frequency)
-               amplitude = spread(cmplx(0.0_wp, w, wp)/cmplx(omega**2 - w**2, w*omega*loss_factor, wp), 2, n_strike)*drive
+               amplitude = spread(cmplx(0.0_wp, w, wp)/cmplx(omega**2 - w**2, w*omega*loss_factor, wp), 2, size(drive, 2))*drive
             end associate
             power = power + frequency*get_power(transforms, amplitude)
             velocity = velocity + frequency*get_square_velocity(modes, kept, amplitude)
-            total = total + frequency*n_strike
+            total = total + frequency*size(drive, 2)
          end do
       end do
    end subroutine add_strikes

@@ -1,0 +1,258 @@
+"""Floors by modes against independent codes: finite elements, exact joists, radiators in space."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from baffled_plate import SupportedPlate, band_radiation_factor
+from joists import JoistFloor, get_conductance, get_frequencies, get_joists, get_octaves
+from joists import get_radiated_energy as get_exact_energy
+from mindlin_plate import ThickPlate, get_supported_frequencies
+from modal_room_reference import get_maximum_levels, get_plate_velocity, get_pressure
+from plate_elements import (
+    CLAMPED,
+    SUPPORTED,
+    Edge,
+    LineSpring,
+    Plate,
+    assemble,
+    get_grid,
+    get_modes,
+    get_point_mobility,
+)
+
+import thud
+from thud.base.bridge import ask
+from thud.case.case import case_text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+THIRDS = np.array([50, 63, 80, 100, 125, 160, 200, 250, 315, 400, 500, 630], float)
+# 160 mm of concrete.
+STIFFNESS = 2300 * 0.16 * (3500 * 0.16) ** 2 / 12
+CONCRETE = thud.Plate(thickness=0.16, loss_factor=0.03, edges="absorption")
+
+
+def frequencies_of(floor: object, highest: float) -> Array:
+    """Return natural frequencies of a floor by thud, Hz."""
+    case = thud.Case(floor=floor)  # type: ignore[arg-type]
+    return np.asarray(ask("floor_modes", case=case_text(case), highest=highest)["frequency"])
+
+
+def elements_of(edge: Edge, **parts: object) -> object:
+    """Return the concrete plate by elements of 0.25 m."""
+    plate = Plate(
+        STIFFNESS, 0.2 * STIFFNESS, STIFFNESS, 0.4 * STIFFNESS, 2300 * 0.16, (edge,) * 4, 0.03
+    )
+    return assemble(get_grid(5.0, 0.25), get_grid(4.0, 0.25), [plate], **parts)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("edge", "keys"),
+    [
+        (SUPPORTED, {}),
+        (CLAMPED, {"support": "clamped"}),
+        (
+            Edge(translation=3e8, rotation=2e7),
+            {"support": "elastic", "support_stiffness": (3e8,), "support_rotation": (2e7,)},
+        ),
+    ],
+)
+def test_edges_have_the_frequencies_of_finite_elements(
+    edge: Edge, keys: dict[str, object], oracle: Callable[..., None]
+) -> None:
+    expected = get_modes(elements_of(edge), 20)[0]  # type: ignore[arg-type]
+    found = frequencies_of(replace(CONCRETE, **keys), 1000.0)[:20]  # type: ignore[arg-type]
+    oracle(
+        f"20 natural frequencies, edges {keys.get('support', 'simple')}, by finite elements",
+        "independent code",
+        found / expected - 1,
+        2e-3,
+    )
+
+
+def test_joists_have_the_frequencies_of_an_exact_solution(oracle: Callable[..., None]) -> None:
+    """Discrete ribs with bending, shear and torsion on sheathing."""
+    expected = get_frequencies(JoistFloor(shear=True), 20)[0]
+    found = frequencies_of(thud.JoistFloor(), 200.0)[:20]
+    oracle(
+        "20 natural frequencies of a joist floor by an exact solution",
+        "independent code",
+        found / expected - 1,
+        1e-2,
+    )
+
+
+def joist_position(*, on_joist: bool) -> tuple[float, float]:
+    """Return the position of the source, m."""
+    joists = get_joists(JoistFloor())
+    y = joists[5] if on_joist else (joists[4] + joists[5]) / 2
+    return 1.7, float(y)
+
+
+@pytest.mark.parametrize("on_joist", [True, False])
+def test_joists_have_the_mobility_of_an_exact_solution(
+    on_joist: bool,  # noqa: FBT001 - a parameter of the test
+    oracle: Callable[..., None],
+) -> None:
+    point = joist_position(on_joist=on_joist)
+    expected = get_conductance(JoistFloor(shear=True), point)
+    floor = thud.JoistFloor(
+        source_on="position", source_x=point[0] / 4.0, source_y=point[1] / 5.0, loss_factor=0.05
+    )
+    edges = THIRDS[:, None] * 2 ** (np.array([-1.0, 1.0]) / 6)
+    found = [
+        thud.mobility(floor, np.linspace(low, high, 200)).real.mean() for low, high in edges
+    ]
+    oracle(
+        f"Re Y {'on a joist' if on_joist else 'between joists'} in thirds by an exact solution",
+        "independent code",
+        10 * np.log10(found / expected),
+        1.0,
+        "dB",
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("on_joist", [True, False])
+def test_joists_radiate_as_an_exact_solution(
+    on_joist: bool,  # noqa: FBT001 - a parameter of the test
+    oracle: Callable[..., None],
+) -> None:
+    point = joist_position(on_joist=on_joist)
+    expected = get_octaves(get_exact_energy(JoistFloor(shear=True), point)[0])
+    case = thud.Case(floor=thud.JoistFloor(), room=thud.Room(sound_speed=343.0))
+    answer = ask(
+        "radiation", case=case_text(case), x=np.array([point[0] / 4]), y=np.array([point[1] / 5])
+    )
+    # The exact solution has no losses by radiation, and those of thud are the same.
+    oracle(
+        f"energy radiated {'from a joist' if on_joist else 'between joists'}, octaves, exactly",
+        "independent code",
+        10 * np.log10(get_octaves(answer["radiated"]) / expected),
+        2.0,
+        "dB",
+    )
+
+
+def test_plate_radiates_as_elementary_radiators(oracle: Callable[..., None]) -> None:
+    plate = SupportedPlate(5.0, 4.0, 0.18, 2300.0, 3500.0, 0.03)
+    expected = band_radiation_factor(plate, THIRDS)
+    floor = thud.Plate(loss_factor=0.03, edges="absorption")
+    case = thud.Case(floor=floor, room=thud.Room(sound_speed=340.0))
+    found = ask("radiation", case=case_text(case))["radiation_factor"]
+    oracle(
+        "radiation factor of a concrete plate in thirds by elementary radiators",
+        "independent code",
+        10 * np.log10(found / expected),
+        0.5,
+        "dB",
+    )
+
+
+def test_laminate_has_the_frequencies_of_mindlin(oracle: Callable[..., None]) -> None:
+    """Layers by hand: moments of the moduli, and the shear of the energy of Q**2/G."""
+    floor = thud.LaminateFloor(added_mass=40.0)
+    z = np.linspace(-0.08, 0.08, 320_001)
+    center = (z[1:] + z[:-1]) / 2
+    step = z[1] - z[0]
+    along = ~((abs(center) > 0.02) & (abs(center) < 0.04))
+    bending, shear = [], []
+    for grain in (along, ~along):
+        modulus = np.where(grain, 1.1e10, 3.7e8)
+        shear_modulus = np.where(grain, 6.9e8, 5e7)
+        moment = np.cumsum(modulus * center) * step
+        bending.append((modulus * center**2).sum() * step)
+        shear.append(bending[-1] ** 2 / ((moment**2 / shear_modulus).sum() * step))
+    thick = ThickPlate(
+        length=5.0, width=4.0, d11=bending[0], d12=0.0, d22=bending[1],
+        d66=0.65 * 6.9e8 * 0.16**3 / 12, s1=shear[0], s2=shear[1],
+        mass=470 * 0.16 + 40, rotary_inertia=470 * 0.16**3 / 12,
+    )  # fmt: skip
+    m, n = (grid.ravel() for grid in np.meshgrid(np.arange(1, 12), np.arange(1, 12)))
+    expected = np.sort(get_supported_frequencies(thick, m, n)[:, 0])[:20]
+    found = frequencies_of(floor, 500.0)[:20]
+    oracle(
+        "20 natural frequencies of cross-laminated timber by Mindlin's theory",
+        "closed form",
+        found / expected - 1,
+        1e-4,
+    )
+
+
+def test_two_bays_have_the_mobility_of_finite_elements(oracle: Callable[..., None]) -> None:
+    line = LineSpring(along="y", at=2.0, translation=1e14)
+    system = elements_of(SUPPORTED, lines=[line])
+    frequency = np.array([30.0, 55.0, 90.0, 140.0])
+    expected = get_point_mobility(system, frequency, 0.9, 1.3, 0)  # type: ignore[arg-type]
+    floor = replace(CONCRETE, line_x=(2.0,), source_x=0.9 / 5, source_y=1.3 / 4)
+    found = thud.mobility(floor, frequency)
+    # Dashpots lose as much as complex stiffness at resonance only.
+    oracle(
+        "mobility of a slab of two bays by finite elements",
+        "independent code",
+        20 * np.log10(abs(found / np.ravel(expected))),
+        0.5,
+        "dB",
+    )
+
+
+def test_levels_in_the_room_are_those_of_an_integration_in_time(
+    oracle: Callable[..., None],
+) -> None:
+    """The room stepped in time, with other filters and another detector."""
+    impact = thud.solve(model="modal_ball")
+    floor = thud.Plate(length=4.5, width=3.7, thickness=0.16, edges="laboratory")
+    room = thud.Room(volume=40.0, reverberation_time=(0.4,))
+    ball, microphones = [1.1, 2.3], [[3.1, 0.9, 1.4], [1.0, 1.0, 1.2]]
+    found = thud.modal_room(impact, floor, room, balls=[ball], microphones=microphones)
+    rate = 4096.0
+    time = np.arange(int(1.5 * rate)) / rate
+    source = found.prediction.source
+    force = np.interp(time, source.time, source.force("floor"), right=0.0)
+    half_waves = np.array([(m, n) for m in range(1, 25) for n in range(1, 25)])
+    unit = 3500 * 0.16 * np.pi / (4 * np.sqrt(3))
+    natural = unit * ((half_waves / [4.5, 3.7]) ** 2).sum(axis=1)
+    half_waves, natural = half_waves[natural < 1000], natural[natural < 1000]
+    loss = 0.005 + 2300 * 0.16 / (485 * np.sqrt(natural))
+    drive = np.prod(np.sin(np.pi * half_waves * ball / [4.5, 3.7]), axis=1)
+    drive /= 2300 * 0.16 * 4.5 * 3.7 / 4
+    velocity = get_plate_velocity(force, rate, natural, loss, drive)
+    middles = [(np.arange(60) + 0.5) / 60 for _ in range(2)]
+    shapes = (
+        np.sin(np.pi * np.outer(half_waves[:, 0], middles[0]))[:, :, None]
+        * np.sin(np.pi * np.outer(half_waves[:, 1], middles[1]))[:, None, :]
+    )
+    pressure = get_pressure(
+        velocity, shapes, rate, found.size, microphones, 0.4, maximum=450.0,
+        air_density=1.2, sound_speed=343.0,
+    )  # fmt: skip
+    expected = get_maximum_levels(pressure, rate, found.frequency)
+    oracle(
+        "levels in a modal room by an integration in time",
+        "independent code",
+        found.level[0].T - expected,
+        0.3,
+        "dB",
+    )
+
+
+def test_energies_given_are_those_that_are_lost(oracle: Callable[..., None]) -> None:
+    impact = thud.solve()
+    for floor in (thud.Plate(support="clamped"), thud.JoistFloor(), thud.LaminateFloor()):
+        room = thud.modal_room(impact, floor, thud.Room())
+        for name, energy in (("floor", room.floor_energy), ("room", room.room_energy)):
+            oracle(
+                f"modal room below {type(floor).__name__}: energy into the {name} − lost",
+                "balance",
+                energy[:, 0] / energy[:, 1] - 1,
+                1e-9,
+            )
